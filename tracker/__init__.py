@@ -1,0 +1,1 @@
+"""Model-based tracking of people in calibrated multi-camera footage."""

@@ -1,0 +1,427 @@
+"""Articulated bodies: a tree of joints that carry parts, and the kinematics of a pose.
+
+A pose is a flat array of *values* (one per revolute axis or translation, four per ball joint: a unit quaternion
+w, x, y, z). Steps, Jacobians and limits live in the *degrees of freedom* (dofs), of which a ball joint has three:
+a rotation vector in the frame of its child part. Where a model has no ball joint, values and dofs coincide.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tracker import rigid
+from tracker.rigid import Array
+from tracker.shapes import TaperedSuperquadric
+
+IntArray = NDArray[np.int64]
+
+_TRANSLATE, _REVOLVE, _BALL = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One rotation of a revolute joint."""
+
+    name: str
+    """Name of the degree of freedom within its joint, e.g. `abduction`."""
+    direction: tuple[float, float, float]
+    """Unit axis in the joint's frame, after the rotations listed before it."""
+    limits: tuple[float, float]
+    """Lowest and highest angle, rad; infinite where the angle may wind."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What moves a part against its parent."""
+
+    name: str
+    parent: str
+    """Name of the parent part; empty for the root."""
+    child: str
+    """Name of the part that the joint moves; its frame sits at the joint."""
+    position: tuple[float, float, float]
+    """Where the joint sits in the parent's frame, as a fraction of body height."""
+    kind: Literal["revolute", "ball"]
+    axes: tuple[Axis, ...]
+    """Rotations in order for a revolute joint; none makes it rigid. Empty for a ball joint."""
+    free: bool = False
+    """Whether the joint also translates along world x, y, z before it rotates (the root)."""
+    cone: float = np.pi
+    """Ball joints: largest tilt of the child's z axis from the parent's, rad."""
+    twist: float = np.pi
+    """Ball joints: largest rotation about the child's z axis either way, rad."""
+
+    @property
+    def dof_names(self) -> tuple[str, ...]:
+        """Names of the joint's degrees of freedom, translations first."""
+        rotations = tuple(a.name for a in self.axes) if self.kind == "revolute" else ("rx", "ry", "rz")
+        return tuple(f"{self.name}.{n}" for n in (("x", "y", "z") if self.free else ()) + rotations)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A rigid piece of the body: a shape in the frame of a part, all lengths as fractions of body height."""
+
+    name: str
+    half_axes: tuple[float, float, float]
+    """Half-axes of the shape along its x, y, z, fraction of body height."""
+    exponents: tuple[float, float]
+    """e1, e2 of the tapered superquadric."""
+    taper: tuple[float, float]
+    """k_x, k_y of the tapered superquadric."""
+    center: tuple[float, float, float]
+    """Centre of the shape in the part's frame, fraction of body height."""
+    color: str
+    """Colour in which the part is drawn, `#rrggbb`."""
+
+
+@dataclass(frozen=True)
+class Landmark:
+    """A named point of the body that is not a joint of the tree (a wrist, an ankle, the head)."""
+
+    name: str
+    part: str
+    position: tuple[float, float, float]
+    """Position in the part's frame, fraction of body height."""
+
+
+@dataclass(frozen=True)
+class SearchGroup:
+    """A leaf of the decomposition of the pose space (GD96 Eq. 5-7)."""
+
+    name: str
+    dofs: tuple[str, ...]
+    """Names of the degrees of freedom searched together."""
+
+
+class Kinematics(NamedTuple):
+    """Where a pose puts everything."""
+
+    Ts_world_part: Array
+    """Part poses, (n_parts, 4, 4), metres."""
+    axes_world: Array
+    """Unit axis of each degree of freedom, (n_dofs, 3): of rotation, or of translation for the root's x, y, z."""
+    origins_world: Array
+    """A point on each rotation axis, (n_dofs, 3), metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyModel:
+    """An articulated body of fixed size. Joints come parent first; joint i moves part i."""
+
+    name: str
+    height_m: float
+    """Body height by which all fractions are scaled, metres."""
+    joints: tuple[Joint, ...]
+    parts: tuple[Part, ...]
+    """In the order of the joints that move them."""
+    landmarks: tuple[Landmark, ...]
+    search_groups: tuple[SearchGroup, ...]
+
+    def with_height(self, height_m: float) -> "BodyModel":
+        """Return the same proportions at another body height."""
+        return replace(self, height_m=height_m)
+
+    @cached_property
+    def part_index(self) -> Mapping[str, int]:
+        """Index of each part by name."""
+        return {p.name: i for i, p in enumerate(self.parts)}
+
+    @cached_property
+    def parents(self) -> tuple[int, ...]:
+        """Index of each part's parent, -1 for the root."""
+        return tuple(self.part_index[j.parent] if j.parent else -1 for j in self.joints)
+
+    @cached_property
+    def shapes(self) -> tuple[TaperedSuperquadric, ...]:
+        """Shape of each part at this body's size, metres."""
+        H = self.height_m
+        return tuple(
+            TaperedSuperquadric(
+                (p.half_axes[0] * H, p.half_axes[1] * H, p.half_axes[2] * H), p.exponents, p.taper
+            )
+            for p in self.parts
+        )
+
+    @cached_property
+    def centers_part(self) -> Array:
+        """Centre of each part's shape in the part's frame, (n_parts, 3), metres."""
+        return np.array([p.center for p in self.parts]) * self.height_m
+
+    @cached_property
+    def dof_names(self) -> tuple[str, ...]:
+        """Names of all degrees of freedom, e.g. `left_shoulder.abduction`."""
+        return tuple(n for j in self.joints for n in j.dof_names)
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of degrees of freedom."""
+        return len(self.dof_names)
+
+    @cached_property
+    def dof_is_length(self) -> NDArray[np.bool_]:
+        """Whether a degree of freedom is a length in metres (else an angle in radians), (n_dofs,)."""
+        kinds = [[True] * 3 * j.free + [False] * (len(j.dof_names) - 3 * j.free) for j in self.joints]
+        return np.array([k for joint in kinds for k in joint])
+
+    @cached_property
+    def dof_joint(self) -> IntArray:
+        """Index of the joint (and so of the part) that each degree of freedom belongs to, (n_dofs,)."""
+        return np.array([i for i, j in enumerate(self.joints) for _ in j.dof_names], dtype=np.int64)
+
+    @cached_property
+    def dof_value(self) -> IntArray:
+        """Index into the values of each degree of freedom, (n_dofs,); the quaternion's start for a ball joint."""
+        out, value = [], 0
+        for j in self.joints:
+            n = len(j.dof_names)
+            if j.kind == "ball":
+                out += [value + i for i in range(n - 3)] + [value + n - 3] * 3
+                value += n + 1
+            else:
+                out += [value + i for i in range(n)]
+                value += n
+        return np.array(out, dtype=np.int64)
+
+    @cached_property
+    def value_names(self) -> tuple[str, ...]:
+        """Names of the values; as the dofs, but `joint.qw`, `qx`, `qy`, `qz` for a ball joint."""
+        names: list[str] = []
+        for j in self.joints:
+            rest = list(j.dof_names)
+            if j.kind == "ball":
+                rest = rest[:-3] + [f"{j.name}.{q}" for q in ("qw", "qx", "qy", "qz")]
+            names += rest
+        return tuple(names)
+
+    @cached_property
+    def limits(self) -> Array:
+        """Lowest and highest value of each degree of freedom, (n_dofs, 2); infinite where there is none."""
+        rows = []
+        for j in self.joints:
+            rows += [(-np.inf, np.inf)] * (len(j.dof_names) - len(j.axes))
+            rows += [a.limits for a in j.axes]
+        return np.array(rows, dtype=np.float64).reshape(-1, 2)
+
+    @cached_property
+    def moves(self) -> NDArray[np.bool_]:
+        """Whether a degree of freedom moves a part, (n_dofs, n_parts)."""
+        ancestors = np.zeros((len(self.parts), len(self.parts)), dtype=bool)  # [joint, part]
+        for part, parent in enumerate(self.parents):
+            if parent >= 0:
+                ancestors[:, part] = ancestors[:, parent]
+            ancestors[part, part] = True
+        return ancestors[self.dof_joint]
+
+    @cached_property
+    def point_names(self) -> tuple[str, ...]:
+        """Names of the body's points: its joints, then its landmarks."""
+        return tuple(j.name for j in self.joints) + tuple(m.name for m in self.landmarks)
+
+    @cached_property
+    def point_parts(self) -> IntArray:
+        """Index of the part that carries each point, (n_points,)."""
+        landmarks = [self.part_index[m.part] for m in self.landmarks]
+        return np.array([*range(len(self.joints)), *landmarks], dtype=np.int64)
+
+    @cached_property
+    def points_part(self) -> Array:
+        """Each point in the frame of the part that carries it, (n_points, 3), metres."""
+        landmarks = [m.position for m in self.landmarks]
+        return np.array([(0.0, 0.0, 0.0)] * len(self.joints) + landmarks) * self.height_m
+
+    @cached_property
+    def _tree(self) -> tuple[IntArray, Array, IntArray, Array]:
+        """Arrays of the kernel: parents (P,), offsets (P, 3) m, ops (n, 2) of kind and joint, axes (n, 3)."""
+        parents = np.array(self.parents, dtype=np.int64)
+        offsets = np.array([j.position for j in self.joints]) * self.height_m
+        ops, axes = [], []
+        for i, j in enumerate(self.joints):
+            if j.free:
+                ops.append((_TRANSLATE, i))
+                axes.append((0.0, 0.0, 0.0))
+            if j.kind == "ball":
+                ops.append((_BALL, i))
+                axes.append((0.0, 0.0, 0.0))
+            for a in j.axes:
+                ops.append((_REVOLVE, i))
+                axes.append(a.direction)
+        return parents, offsets, np.array(ops, dtype=np.int64), np.array(axes, dtype=np.float64)
+
+    def neutral(self) -> Array:
+        """Values of the standing pose at the world's origin, arms hanging; angles are put within limits."""
+        values = np.zeros(len(self.value_names))
+        for i, name in enumerate(self.value_names):
+            if name.endswith(".qw"):
+                values[i] = 1.0
+        return self.clip(values)
+
+    def kinematics(self, values: Array) -> Kinematics:
+        """Place the parts for the values of a pose, (n_values,)."""
+        n_parts, n_dofs = len(self.parts), self.n_dofs
+        out = Kinematics(np.empty((n_parts, 4, 4)), np.empty((n_dofs, 3)), np.empty((n_dofs, 3)))
+        forward_kinematics(np.asarray(values, dtype=np.float64), *self._tree, *out)
+        return out
+
+    def points_world(self, values: Array) -> Array:
+        """Positions of the body's points (see `point_names`), (n_points, 3), metres."""
+        T = self.kinematics(values).Ts_world_part[self.point_parts]
+        return np.einsum("nij,nj->ni", T[:, :3, :3], self.points_part) + T[:, :3, 3]
+
+    def point_jacobian(self, kinematics: Kinematics, parts: IntArray, points_world: Array) -> Array:
+        """Derivative of points fixed to parts by the degrees of freedom.
+
+        A rotation by axis a through o moves x at `a x (x - o)`, a translation at `a` (the columns of the
+        geometric Jacobian; cf. KRH08 Eq. 24 with spatial twists).
+
+        Args:
+            kinematics: of the pose at which to differentiate.
+            parts: index of the part that carries each point, (N,).
+            points_world: the points, (N, 3), metres.
+
+        Returns:
+            (N, 3, n_dofs), metres per radian or per metre.
+        """
+        arms = points_world[:, None, :] - kinematics.origins_world  # (N, n_dofs, 3)
+        J = np.cross(kinematics.axes_world, arms)
+        J[:, self.dof_is_length] = kinematics.axes_world[self.dof_is_length]
+        J *= self.moves[:, parts].T[..., None]
+        return np.swapaxes(J, 1, 2)
+
+    def retract(self, values: Array, step: Array) -> Array:
+        """Move a pose by a step in its degrees of freedom, (n_dofs,); angles and lengths add, balls turn."""
+        out = np.array(values, dtype=np.float64)
+        first = 0
+        for j in self.joints:
+            n = len(j.dof_names)
+            at = self.dof_value[first : first + n]
+            n_plain = n - 3 if j.kind == "ball" else n
+            out[at[:n_plain]] += step[first : first + n_plain]
+            if j.kind == "ball":
+                q = slice(at[-1], at[-1] + 4)
+                turn = rigid.quaternion_exp(step[first + n_plain : first + n])
+                out[q] = rigid.quaternion_multiply(out[q], turn)
+            first += n
+        return out
+
+    def difference(self, values_to: Array, values_from: Array) -> Array:
+        """Step in the degrees of freedom, (n_dofs,), that `retract` needs from one pose to the other."""
+        step = (np.asarray(values_to) - values_from)[self.dof_value].astype(np.float64)
+        for i, j in enumerate(self.joints):
+            if j.kind == "ball":
+                dofs = np.flatnonzero(self.dof_joint == i)[-3:]
+                q = slice(self.dof_value[dofs[0]], self.dof_value[dofs[0]] + 4)
+                back = np.asarray(values_from)[q] * (1.0, -1.0, -1.0, -1.0)
+                step[dofs] = rigid.quaternion_log(rigid.quaternion_multiply(back, np.asarray(values_to)[q]))
+        return step
+
+    def clip(self, values: Array) -> Array:
+        """Put a pose within the joint limits: angles to their range, balls to their cone and twist."""
+        out = np.array(values, dtype=np.float64)
+        for i, j in enumerate(self.joints):
+            dofs = np.flatnonzero(self.dof_joint == i)
+            if j.kind == "ball":
+                at = self.dof_value[dofs[-1]]
+                out[at : at + 4] = _clip_ball(out[at : at + 4], j.cone, j.twist)
+            else:
+                at = self.dof_value[dofs]
+                out[at] = np.clip(out[at], self.limits[dofs, 0], self.limits[dofs, 1])
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A body model in a pose. Everything that synthesizes, hides or scores takes a list of these."""
+
+    model: BodyModel
+    values: Array
+    """Pose, (n_values,)."""
+
+
+def _clip_ball(wxyz: Array, cone: float, twist: float) -> Array:
+    """Split a rotation into swing times twist about z, bound both, and put them together again."""
+    q = wxyz / np.linalg.norm(wxyz)
+    norm = np.hypot(q[0], q[3])
+    turn = np.array([q[0], 0.0, 0.0, q[3]]) / norm if norm > 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
+    swing = rigid.quaternion_log(rigid.quaternion_multiply(q, turn * (1.0, -1.0, -1.0, -1.0)))
+    angle = np.linalg.norm(swing)
+    if angle > cone:
+        swing *= cone / angle
+    about_z = np.clip(rigid.quaternion_log(turn)[2], -twist, twist)
+    turn = rigid.quaternion_exp(np.array([0.0, 0.0, about_z]))
+    return rigid.quaternion_multiply(rigid.quaternion_exp(swing), turn)
+
+
+@njit(nogil=True, cache=True)
+def forward_kinematics(values, parents, offsets, ops, op_axes, Ts, axes, origins):  # type: ignore[no-untyped-def]
+    """Fill the arrays of a `Kinematics` from a pose and the arrays of `BodyModel._tree`."""
+    op, dof, value = 0, 0, 0
+    R, step, parent_R = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    n_ops = ops.shape[0]
+    for part in range(parents.shape[0]):
+        parent = parents[part]
+        for i in range(3):
+            for j in range(3):
+                parent_R[i, j] = Ts[parent, i, j] if parent >= 0 else (1.0 if i == j else 0.0)
+                R[i, j] = parent_R[i, j]
+        x, y, z = offsets[part, 0], offsets[part, 1], offsets[part, 2]
+        for i in range(3):
+            base = Ts[parent, i, 3] if parent >= 0 else 0.0
+            Ts[part, i, 3] = base + parent_R[i, 0] * x + parent_R[i, 1] * y + parent_R[i, 2] * z
+        first_dof = dof
+        while op < n_ops and ops[op, 1] == part:
+            kind = ops[op, 0]
+            if kind == 0:
+                for k in range(3):
+                    Ts[part, k, 3] += values[value + k]
+                    for i in range(3):
+                        axes[dof + k, i] = 1.0 if i == k else 0.0
+                dof += 3
+                value += 3
+            else:
+                if kind == 1:
+                    ax, ay, az = op_axes[op, 0], op_axes[op, 1], op_axes[op, 2]
+                    for i in range(3):
+                        axes[dof, i] = R[i, 0] * ax + R[i, 1] * ay + R[i, 2] * az
+                    half = 0.5 * values[value]
+                    s = np.sin(half)
+                    qw, qx, qy, qz = np.cos(half), s * ax, s * ay, s * az
+                    dof += 1
+                    value += 1
+                else:
+                    qw, qx, qy, qz = values[value], values[value + 1], values[value + 2], values[value + 3]
+                    norm = np.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
+                    qw, qx, qy, qz = qw / norm, qx / norm, qy / norm, qz / norm
+                    value += 4
+                step[0, 0] = 1 - 2 * (qy * qy + qz * qz)
+                step[0, 1] = 2 * (qx * qy - qw * qz)
+                step[0, 2] = 2 * (qx * qz + qw * qy)
+                step[1, 0] = 2 * (qx * qy + qw * qz)
+                step[1, 1] = 1 - 2 * (qx * qx + qz * qz)
+                step[1, 2] = 2 * (qy * qz - qw * qx)
+                step[2, 0] = 2 * (qx * qz - qw * qy)
+                step[2, 1] = 2 * (qy * qz + qw * qx)
+                step[2, 2] = 1 - 2 * (qx * qx + qy * qy)
+                for i in range(3):
+                    a, b, c = R[i, 0], R[i, 1], R[i, 2]
+                    for k in range(3):
+                        R[i, k] = a * step[0, k] + b * step[1, k] + c * step[2, k]
+                if kind == 2:  # the three dofs of a ball turn about the axes of its child
+                    for k in range(3):
+                        for i in range(3):
+                            axes[dof + k, i] = R[i, k]
+                    dof += 3
+            op += 1
+        for k in range(first_dof, dof):
+            for i in range(3):
+                origins[k, i] = Ts[part, i, 3]
+        for i in range(3):
+            for k in range(3):
+                Ts[part, i, k] = R[i, k]
+            Ts[part, 3, i] = 0.0
+        Ts[part, 3, 3] = 1.0

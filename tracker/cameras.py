@@ -1,0 +1,217 @@
+"""A calibrated camera with OpenCV's model of projection and lens distortion."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker import rigid
+from tracker.errors import CalibrationError
+from tracker.rigid import Array
+
+DISTORTION_COUNTS = (0, 4, 5, 8)
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """One calibrated camera.
+
+    Pixel centres lie at integers; axes are OpenCV's (x right, y down, z forward). *Original* pixels are those
+    of the footage as filmed; *undistorted* pixels are those of `pinhole`, the same camera without its lens
+    distortion, in which everything is drawn and matched.
+    """
+
+    name: str
+    """Name by which footage and people refer to the camera."""
+    size: tuple[int, int]
+    """Image width and height, px."""
+    K: Array
+    """Pinhole matrix, (3, 3), px."""
+    distortion: Array
+    """OpenCV coefficients k1, k2, p1, p2[, k3[, k4, k5, k6]]; (0,), (4,), (5,) or (8,)."""
+    T_world_camera: Array
+    """Pose, (4, 4), metres: maps camera coordinates to world coordinates."""
+
+    def __post_init__(self) -> None:
+        if self.distortion.shape not in [(n,) for n in DISTORTION_COUNTS]:
+            raise CalibrationError(
+                f"camera '{self.name}': expected 0, 4, 5 or 8 distortion coefficients, "
+                f"found {self.distortion.size}; correct 'distortions' in the calibration file"
+            )
+        assert self.K.shape == (3, 3)
+        assert self.T_world_camera.shape == (4, 4)
+
+    @property
+    def width(self) -> int:
+        """Image width, px."""
+        return self.size[0]
+
+    @property
+    def height(self) -> int:
+        """Image height, px."""
+        return self.size[1]
+
+    @cached_property
+    def T_camera_world(self) -> Array:
+        """Inverse pose, (4, 4): maps world coordinates to camera coordinates."""
+        return rigid.inverse(self.T_world_camera)
+
+    @property
+    def center_world(self) -> Array:
+        """Optical centre in the world, (3,), metres."""
+        return self.T_world_camera[:3, 3]
+
+    @property
+    def is_pinhole(self) -> bool:
+        """Whether there is no lens distortion, so that original and undistorted pixels are the same."""
+        return not np.any(self.distortion)
+
+    @cached_property
+    def pinhole(self) -> "Camera":
+        """The same camera without lens distortion: the camera of undistorted pixels."""
+        return self if self.is_pinhole else replace(self, distortion=np.zeros(0))
+
+    def scaled(self, scale: float) -> "Camera":
+        """Return the camera of the image resized by `scale`, pixel areas (not centres) kept aligned."""
+        K = self.K.copy()
+        K[:2] *= scale
+        # OpenCV's resize keeps pixel borders aligned: u' + 1/2 = s (u + 1/2), with centres at integers.
+        K[:2, 2] += (scale - 1.0) / 2.0
+        size = (round(self.width * scale), round(self.height * scale))
+        return replace(self, size=size, K=K)
+
+    def depths(self, points_world: Array) -> Array:
+        """Distances along the optical axis, `(..., 3)` to `(...)`, metres; positive in front of the camera."""
+        return rigid.apply(self.T_camera_world, points_world)[..., 2]
+
+    def project(self, points_world: Array) -> Array:
+        """Project world points `(..., 3)` to original pixels `(..., 2)`; NaN behind the camera."""
+        points_camera = rigid.apply(self.T_camera_world, np.asarray(points_world, dtype=np.float64))
+        z = points_camera[..., 2:]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            xy = np.where(z > 1e-9, points_camera[..., :2] / z, np.nan)
+        return self._normalized_to_px(xy)
+
+    def rays(self, points_px: Array) -> Array:
+        """Unit directions in the world, `(..., 3)`, of the lines of sight of original pixels `(..., 2)`.
+
+        The rays start at `center_world`.
+        """
+        xy = self._px_to_normalized(np.asarray(points_px, dtype=np.float64))
+        directions_camera = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
+        directions_camera /= np.linalg.norm(directions_camera, axis=-1, keepdims=True)
+        return directions_camera @ self.T_world_camera[:3, :3].T
+
+    def back_project(self, points_px: Array, depths_m: Array | float) -> Array:
+        """World points `(..., 3)` seen at original pixels `(..., 2)` at the given depths (see `depths`)."""
+        xy = self._px_to_normalized(np.asarray(points_px, dtype=np.float64))
+        z = np.broadcast_to(np.asarray(depths_m, dtype=np.float64), xy.shape[:-1])[..., None]
+        return rigid.apply(self.T_world_camera, np.concatenate([xy * z, z], axis=-1))
+
+    def undistort_points(self, points_px: Array) -> Array:
+        """Map original pixels `(..., 2)` to undistorted pixels."""
+        if self.is_pinhole:
+            return np.asarray(points_px, dtype=np.float64)
+        return self.pinhole._normalized_to_px(self._px_to_normalized(np.asarray(points_px, dtype=np.float64)))
+
+    def distort_points(self, points_px: Array) -> Array:
+        """Map undistorted pixels `(..., 2)` to original pixels."""
+        if self.is_pinhole:
+            return np.asarray(points_px, dtype=np.float64)
+        return self._normalized_to_px(self.pinhole._px_to_normalized(np.asarray(points_px, dtype=np.float64)))
+
+    def undistort_image(self, image: NDArray[np.uint8], nearest: bool = False) -> NDArray[np.uint8]:
+        """Resample an image as filmed, `(H, W[, C])`, to undistorted pixels of the same size.
+
+        Args:
+            image: the image; its size must be that of the camera.
+            nearest: take the nearest pixel instead of interpolating, as masks need.
+        """
+        assert image.shape[:2] == (self.height, self.width), (image.shape, self.size)
+        if self.is_pinhole:
+            return image
+        return cv2.remap(  # type: ignore[return-value]
+            image, *self._undistort_maps, cv2.INTER_NEAREST if nearest else cv2.INTER_LINEAR
+        )
+
+    @cached_property
+    def _undistort_maps(self) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
+        return cv2.initUndistortRectifyMap(  # type: ignore[return-value]
+            self.K, self.distortion, np.eye(3), self.K, self.size, cv2.CV_16SC2
+        )
+
+    def _normalized_to_px(self, xy: Array) -> Array:
+        x, y = xy[..., 0], xy[..., 1]
+        if not self.is_pinhole:
+            k1, k2, p1, p2, k3, k4, k5, k6 = np.pad(self.distortion, (0, 8 - self.distortion.size))
+            r2 = x * x + y * y
+            radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+            x, y = (
+                x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+                y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+            )
+        u = self.K[0, 0] * x + self.K[0, 1] * y + self.K[0, 2]
+        v = self.K[1, 1] * y + self.K[1, 2]
+        return np.stack([u, v], axis=-1)
+
+    def _px_to_normalized(self, points_px: Array) -> Array:
+        y = (points_px[..., 1] - self.K[1, 2]) / self.K[1, 1]
+        x = (points_px[..., 0] - self.K[0, 2] - self.K[0, 1] * y) / self.K[0, 0]
+        xy = np.stack([x, y], axis=-1)
+        if self.is_pinhole or xy.size == 0:
+            return xy
+        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
+        flat = points_px.reshape(-1, 1, 2)
+        out = cv2.undistortPointsIter(flat, self.K, self.distortion, np.eye(3), np.eye(3), criteria)
+        return np.asarray(out, dtype=np.float64).reshape(points_px.shape)
+
+
+def epipolar_segment(source: Camera, target: Camera, point_px: Array, near_m: float = 0.1) -> Array | None:
+    """Where the line of sight of a pixel of `source` appears in the image of `target`.
+
+    Args:
+        source: the camera in which the point was seen.
+        target: the camera in which to draw.
+        point_px: the point in undistorted pixels of `source`, (2,).
+        near_m: how far before the target camera the visible part of the line of sight begins.
+
+    Returns:
+        The end points of the visible segment in undistorted pixels of `target`, (2, 2), clipped to its image,
+        or None where the line of sight does not cross the image.
+    """
+    direction = target.T_camera_world[:3, :3] @ source.pinhole.rays(point_px)
+    origin = rigid.apply(target.T_camera_world, source.center_world)
+    # The part of the ray t >= 0 in front of the target: z(t) = o_z + t d_z >= near.
+    t_low, t_high = 0.0, np.inf
+    if abs(direction[2]) < 1e-12:
+        if origin[2] < near_m:
+            return None
+    else:
+        t_near = (near_m - origin[2]) / direction[2]
+        t_low, t_high = (max(0.0, t_near), t_high) if direction[2] > 0 else (t_low, t_near)
+    if t_high <= t_low:
+        return None
+    P = target.K @ np.stack([origin, direction], axis=1)  # (3, 2): homogeneous pixel as P @ (1, t)
+    ends = np.stack([P @ (1.0, t_low), P[:, 1] if np.isinf(t_high) else P @ (1.0, t_high)])
+    if abs(ends[1, 2]) < 1e-12:  # the ray runs parallel to the image: go far enough to leave it
+        ends[1] = P @ (1.0, t_low + 1e6)
+    return _clip_segment(ends[:, :2] / ends[:, 2:], target.size)
+
+
+def _clip_segment(segment_px: Array, size: tuple[int, int]) -> Array | None:
+    """Clip a segment (2, 2) to the image by Liang and Barsky's method."""
+    (start, end), t0, t1 = segment_px, 0.0, 1.0
+    delta = end - start
+    for axis in (0, 1):
+        for sign, bound in ((-1.0, 0.5), (1.0, size[axis] - 0.5)):
+            p, q = sign * delta[axis], bound - sign * start[axis]
+            if abs(p) < 1e-12:
+                if q < 0:
+                    return None
+            elif p < 0:
+                t0 = max(t0, q / p)
+            else:
+                t1 = min(t1, q / p)
+    return np.stack([start + t0 * delta, start + t1 * delta]) if t0 < t1 else None

@@ -1,0 +1,121 @@
+"""Rigid motions as plain arrays: rotations `(..., 3, 3)` and homogeneous transforms `(..., 4, 4)`.
+
+`T_a_b` maps coordinates of frame b to frame a, so `T_a_c = T_a_b @ T_b_c`.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def skew(v: Array) -> Array:
+    """Return the matrix `[v]x` with `[v]x @ u = v x u`; `(..., 3)` to `(..., 3, 3)`."""
+    v = np.asarray(v, dtype=np.float64)
+    out = np.zeros((*v.shape[:-1], 3, 3))
+    out[..., 0, 1], out[..., 0, 2] = -v[..., 2], v[..., 1]
+    out[..., 1, 0], out[..., 1, 2] = v[..., 2], -v[..., 0]
+    out[..., 2, 0], out[..., 2, 1] = -v[..., 1], v[..., 0]
+    return out
+
+
+def so3_exp(rotvec: Array) -> Array:
+    """Rotation matrix of a rotation vector in radians (Rodrigues' formula); `(..., 3)` to `(..., 3, 3)`."""
+    rotvec = np.asarray(rotvec, dtype=np.float64)
+    theta2 = np.sum(rotvec**2, axis=-1)[..., None, None]
+    theta = np.sqrt(theta2)
+    # Taylor series below 1e-4 rad, where sin(x)/x and (1-cos x)/x^2 lose digits.
+    small = theta < 1e-4
+    safe = np.where(small, 1.0, theta)
+    a = np.where(small, 1.0 - theta2 / 6.0, np.sin(safe) / safe)
+    b = np.where(small, 0.5 - theta2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
+    K = skew(rotvec)
+    return np.eye(3) + a * K + b * (K @ K)
+
+
+def so3_log(R: Array) -> Array:
+    """Rotation vector in radians, of length at most pi, of a rotation matrix; `(..., 3, 3)` to `(..., 3)`."""
+    return quaternion_log(quaternion_from_matrix(R))
+
+
+def quaternion_from_matrix(R: Array) -> Array:
+    """Unit quaternion (w, x, y, z) with w >= 0 of a rotation matrix; `(..., 3, 3)` to `(..., 4)`."""
+    R = np.asarray(R, dtype=np.float64)
+    m00, m11, m22 = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
+    # Shepperd: of the four equivalent forms take the one with the largest pivot.
+    pivots = np.stack(
+        [1 + m00 + m11 + m22, 1 + m00 - m11 - m22, 1 - m00 + m11 - m22, 1 - m00 - m11 + m22], axis=-1
+    )
+    x_w, y_w, z_w = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
+    xy, xz, yz = R[..., 0, 1] + R[..., 1, 0], R[..., 0, 2] + R[..., 2, 0], R[..., 1, 2] + R[..., 2, 1]
+    rows = np.stack(
+        [
+            np.stack([pivots[..., 0], x_w, y_w, z_w], axis=-1),
+            np.stack([x_w, pivots[..., 1], xy, xz], axis=-1),
+            np.stack([y_w, xy, pivots[..., 2], yz], axis=-1),
+            np.stack([z_w, xz, yz, pivots[..., 3]], axis=-1),
+        ],
+        axis=-2,
+    )
+    best = np.argmax(pivots, axis=-1)
+    q = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.where(q[..., :1] < 0, -q, q)
+
+
+def matrix_from_quaternion(wxyz: Array) -> Array:
+    """Rotation matrix of a quaternion (w, x, y, z), normalized first; `(..., 4)` to `(..., 3, 3)`."""
+    q = np.asarray(wxyz, dtype=np.float64)
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    w, V = q[..., 0][..., None, None], skew(q[..., 1:])
+    return np.eye(3) + 2.0 * w * V + 2.0 * (V @ V)
+
+
+def quaternion_log(wxyz: Array) -> Array:
+    """Rotation vector in radians of a unit quaternion (w, x, y, z); `(..., 4)` to `(..., 3)`."""
+    q = np.asarray(wxyz, dtype=np.float64)
+    q = np.where(q[..., :1] < 0, -q, q)
+    s = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(s, q[..., :1])
+    factor = np.where(s < 1e-8, 2.0, angle / np.where(s < 1e-8, 1.0, s))
+    return factor * q[..., 1:]
+
+
+def quaternion_exp(rotvec: Array) -> Array:
+    """Unit quaternion (w, x, y, z) of a rotation vector in radians; `(..., 3)` to `(..., 4)`."""
+    rotvec = np.asarray(rotvec, dtype=np.float64)
+    half = np.linalg.norm(rotvec, axis=-1, keepdims=True) / 2.0
+    return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * rotvec], axis=-1)
+
+
+def quaternion_multiply(a: Array, b: Array) -> Array:
+    """Product `a b` of quaternions (w, x, y, z): rotate by b, then by a; `(..., 4)`."""
+    a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    aw, av, bw, bv = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
+    w = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
+    return np.concatenate([w, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
+
+
+def transform(R: Array | None = None, t: Array | None = None) -> Array:
+    """Homogeneous transform from a rotation `(3, 3)` and a translation `(3,)`; identity where missing."""
+    T = np.eye(4)
+    if R is not None:
+        T[:3, :3] = R
+    if t is not None:
+        T[:3, 3] = t
+    return T
+
+
+def inverse(T: Array) -> Array:
+    """Inverse of rigid transforms `(..., 4, 4)`: `inverse(T_a_b)` is `T_b_a`."""
+    R_t = np.swapaxes(T[..., :3, :3], -1, -2)
+    out = np.zeros_like(T)
+    out[..., :3, :3] = R_t
+    out[..., :3, 3] = -(R_t @ T[..., :3, 3:])[..., 0]
+    out[..., 3, 3] = 1.0
+    return out
+
+
+def apply(T_a_b: Array, points_b: Array) -> Array:
+    """Map points `(..., 3)` from frame b to frame a by `(4, 4)`."""
+    return points_b @ T_a_b[:3, :3].T + T_a_b[:3, 3]
