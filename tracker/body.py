@@ -142,9 +142,7 @@ class BodyModel:
         """Shape of each part at this body's size, metres."""
         H = self.height_m
         return tuple(
-            TaperedSuperquadric(
-                (p.half_axes[0] * H, p.half_axes[1] * H, p.half_axes[2] * H), p.exponents, p.taper
-            )
+            TaperedSuperquadric((p.half_axes[0] * H, p.half_axes[1] * H, p.half_axes[2] * H), p.exponents, p.taper)
             for p in self.parts
         )
 

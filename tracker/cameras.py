@@ -164,7 +164,7 @@ class Camera:
             return xy
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
         flat = points_px.reshape(-1, 1, 2)
-        out = cv2.undistortPointsIter(flat, self.K, self.distortion, np.eye(3), np.eye(3), criteria)
+        out = cv2.undistortPoints(flat, self.K, self.distortion, criteria=criteria)
         return np.asarray(out, dtype=np.float64).reshape(points_px.shape)
 
 

@@ -45,9 +45,7 @@ class TaperedSuperquadric:
         co, so = _signed_power(np.cos(omega), e2), _signed_power(np.sin(omega), e2)
         z = se
         sx, sy = 1 + kx * z, 1 + ky * z
-        points = np.stack(
-            [a1 * sx * ce * co, a2 * sy * ce * so, np.broadcast_to(a3 * z, (ce * co).shape)], -1
-        )
+        points = np.stack([a1 * sx * ce * co, a2 * sy * ce * so, np.broadcast_to(a3 * z, (ce * co).shape)], -1)
         # Normal of the untapered solid, carried through the inverse transpose of the taper's Jacobian.
         nx = _signed_power(np.cos(eta), 2 - e1) * _signed_power(np.cos(omega), 2 - e2) / a1
         ny = _signed_power(np.cos(eta), 2 - e1) * _signed_power(np.sin(omega), 2 - e2) / a2

@@ -80,9 +80,7 @@ def parse_model(text: str, source: str, height_m: float | None = None) -> BodyMo
     children = [j.child for j in joints]
     if sorted(children) != sorted(parts) or len(set(children)) != len(children):
         odd = sorted(set(children) ^ set(parts)) or sorted({c for c in children if children.count(c) > 1})
-        raise ModelError(
-            f"body model {source}: expected exactly one joint for each part, but see: {', '.join(odd)}"
-        )
+        raise ModelError(f"body model {source}: expected exactly one joint for each part, but see: {', '.join(odd)}")
     for m in landmarks:
         if m.part not in parts:
             raise ModelError(f"body model {source}: landmark '{m.name}' is on a missing part '{m.part}'")
@@ -164,9 +162,7 @@ def _axis(data: Any, source: str, joint: str) -> Axis:
 def _joint(data: Any, source: str) -> Joint:
     name, kind = str(data["name"]), data.get("kind", "revolute")
     if kind not in ("revolute", "ball"):
-        raise ModelError(
-            f"body model {source}: joint '{name}' expected kind revolute or ball, found '{kind}'"
-        )
+        raise ModelError(f"body model {source}: joint '{name}' expected kind revolute or ball, found '{kind}'")
     return Joint(
         name,
         str(data.get("parent", "")),
@@ -185,11 +181,7 @@ def _part(data: Any, source: str) -> Part:
     half_axes = _numbers(data["half_axes"], 3, source, name)
     exponents = _numbers(data.get("exponents", (1, 1)), 2, source, name)
     taper = _numbers(data.get("taper", (0, 0)), 2, source, name)
-    if (
-        min(half_axes) <= 0
-        or not all(0.05 <= e <= 1 for e in exponents)
-        or not all(abs(k) < 0.9 for k in taper)
-    ):
+    if min(half_axes) <= 0 or not all(0.05 <= e <= 1 for e in exponents) or not all(abs(k) < 0.9 for k in taper):
         raise ModelError(
             f"body model {source}: part '{name}' expected half-axes above 0, exponents of 0.05 to 1 and tapers within "
             f"0.9, found {half_axes}, {exponents}, {taper}"
@@ -215,9 +207,7 @@ def _order(joints: tuple[Joint, ...], source: str) -> tuple[Joint, ...]:
         ready = next((j for j in waiting if not j.parent or j.parent in placed), None)
         if ready is None:
             names = ", ".join(j.name for j in waiting)
-            raise ModelError(
-                f"body model {source}: the joints {names} form a loop; each needs a way to the root"
-            )
+            raise ModelError(f"body model {source}: the joints {names} form a loop; each needs a way to the root")
         placed[ready.child] = ready
         waiting.remove(ready)
     if len(roots) != 1:
@@ -225,9 +215,7 @@ def _order(joints: tuple[Joint, ...], source: str) -> tuple[Joint, ...]:
     return tuple(placed.values())
 
 
-def _search_groups(
-    model: BodyModel, groups: list[tuple[str, list[str]]], source: str
-) -> tuple[SearchGroup, ...]:
+def _search_groups(model: BodyModel, groups: list[tuple[str, list[str]]], source: str) -> tuple[SearchGroup, ...]:
     """Expand `joint.*` patterns; without any group, one group holds everything."""
     if not groups:
         return (SearchGroup("whole body", model.dof_names),)
@@ -237,9 +225,7 @@ def _search_groups(
         for pattern in patterns:
             found = [d for d in model.dof_names if fnmatchcase(d, pattern)]
             if not found:
-                raise ModelError(
-                    f"body model {source}: search group '{name}' names an unknown dof '{pattern}'"
-                )
+                raise ModelError(f"body model {source}: search group '{name}' names an unknown dof '{pattern}'")
             dofs += found
         out.append(SearchGroup(name, tuple(dofs)))
     return tuple(out)
