@@ -356,7 +356,7 @@ def _clip_ball(wxyz: Array, cone: float, twist: float) -> Array:
 
 
 @njit(nogil=True, cache=True)
-def forward_kinematics(values, parents, offsets, ops, op_axes, Ts, axes, origins):  # type: ignore[no-untyped-def]
+def forward_kinematics(values, parents, offsets, ops, op_axes, Ts, axes, origins):  # type: ignore[no-untyped-def]  # noqa: C901
     """Fill the arrays of a `Kinematics` from a pose and the arrays of `BodyModel._tree`."""
     op, dof, value = 0, 0, 0
     R, step, parent_R = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
