@@ -1,0 +1,48 @@
+"""Text files written whole or not at all, and TOML files read with errors that name the line."""
+
+import os
+import secrets
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from tracker.errors import TrackerError
+
+
+def write_text_whole(path: Path, text: str) -> None:
+    """Write UTF-8 text to a temporary sibling, then rename it onto `path`: a crash leaves the old file or the new.
+
+    Raises:
+        OSError: the folder is missing or not writable, or the disk is full.
+    """
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        with temporary.open("x", encoding="utf-8", newline="") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def read_toml(path: Path, what: str, error_type: type[TrackerError]) -> dict[str, Any]:
+    """Parse a TOML file.
+
+    Args:
+        path: the file.
+        what: what the file is to the user, for messages: `calibration`.
+        error_type: kind of error to raise.
+
+    Raises:
+        TrackerError: of the given kind; the file is missing, unreadable, or not TOML (the message has the line).
+    """
+    try:
+        return tomllib.loads(path.read_text("utf-8"))
+    except FileNotFoundError as error:
+        raise error_type(f"{what} {path} not found; check the path") from error
+    except tomllib.TOMLDecodeError as error:
+        raise error_type(f"{what} {path} is not valid TOML: {error}; correct it") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise error_type(f"{what} {path} cannot be read as a UTF-8 text file: {error}") from error
