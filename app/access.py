@@ -1,0 +1,105 @@
+"""Who may talk to the page's server.
+
+A browser lets any page on the internet send requests to this machine, so that listening on loopback alone protects
+nothing. Every request must name the server by an expected name (against DNS rebinding) and, where the browser says from
+which origin it comes, from that same name and port. A server that listens beyond loopback wants a token as well.
+"""
+
+import hashlib
+import ipaddress
+import re
+import secrets
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+from tracker.errors import TrackerError
+
+_HOST = re.compile(r"(?P<name>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9_.-]+)(?::(?P<port>[0-9]{1,5}))?")
+_DEFAULT_PORTS = {"http": "80", "https": "443"}
+
+
+@dataclass(frozen=True)
+class Access:
+    """What a request must show to be answered."""
+
+    hosts: frozenset[str] = frozenset()
+    """Names, besides those of loopback, by which the server may be called; lower case, without port."""
+    token: str | None = None
+    """What the page's address and then its cookie must hold; None where nothing but loopback can connect."""
+
+    @property
+    def cookie(self) -> str:
+        """Name of the token's cookie: cookies ignore ports, and several programs may run on one machine."""
+        assert self.token is not None
+        return "quadrille_" + hashlib.sha256(self.token.encode()).hexdigest()[:12]
+
+    def refusal(self, host: str | None, origin: str | None, tokens: Iterable[str] = ()) -> str | None:
+        """Say why a request is refused, or return None where it may pass.
+
+        Args:
+            host: the Host header.
+            origin: the Origin header; browsers send it with every WebSocket and every request of a foreign page.
+            tokens: what the request holds in the way of tokens, by address or cookie.
+        """
+        called = _HOST.fullmatch(host or "")
+        if called is None or not (is_loopback(called["name"]) or called["name"].lower() in self.hosts):
+            return (
+                f"expected to be called by a name of this machine, found Host '{host or ''}'; "
+                "open the address printed at the start, or start again with --allow-host and this name"
+            )
+        if origin is not None and not _same(origin, called):
+            return f"expected a request of this page, found one of '{origin}'; open the page itself"
+        if self.token is not None and not any(secrets.compare_digest(self.token, t) for t in tokens):
+            return "expected this start's token, found none or another; open the address printed at the start"
+        return None
+
+
+def access_for(host: str, allow_hosts: Iterable[str] = ()) -> Access:
+    """Decide what requests must show when the server listens at `host`.
+
+    Raises:
+        TrackerError: where `host` is not loopback and nobody said by which names it may be called.
+    """
+    names = frozenset(name.strip().lower() for name in allow_hosts)
+    malformed = sorted(name for name in names if (match := _HOST.fullmatch(name)) is None or match["port"])
+    if malformed:
+        raise TrackerError(
+            f"expected --allow-host to be a host name without port, found '{malformed[0]}'; "
+            "give it like lab.example.org"
+        )
+    if is_loopback(host):
+        return Access(names)
+    if not names:
+        raise TrackerError(
+            f"listening on '{host}' needs the names by which browsers may call this machine, found none; "
+            "add --allow-host NAME, or use --host 127.0.0.1 and an SSH tunnel"
+        )
+    return Access(names, secrets.token_urlsafe(32))
+
+
+def is_loopback(name: str) -> bool:
+    """Whether a host name or address, without port, is this machine as it calls itself."""
+    if name.lower() == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(name.strip("[]")).is_loopback
+    except ValueError:
+        return False
+
+
+def _same(origin: str, called: re.Match[str]) -> bool:
+    """Whether an Origin is the page's own: the same name and port as in the Host header."""
+    try:
+        parts = urlsplit(origin)
+    except ValueError:
+        return False
+    found = _HOST.fullmatch(parts.netloc)
+    if found is None or parts.scheme not in _DEFAULT_PORTS:
+        return False
+    default = _DEFAULT_PORTS[parts.scheme]
+    return _address(found, default) == _address(called, default)
+
+
+def _address(host: Mapping[str, str] | re.Match[str], default_port: str) -> tuple[str, str]:
+    return host["name"].lower(), host["port"] or default_port

@@ -1,0 +1,191 @@
+"""The web server: the page, its pane socket, and viser behind `/viser/`.
+
+One port serves everything, so that one SSH tunnel is enough, and every request passes `access` before anything else
+sees it: viser itself has no such check and listens on loopback only.
+"""
+
+import asyncio
+import errno
+import logging
+import weakref
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Protocol
+
+import aiohttp
+import viser
+from aiohttp import web
+from aiohttp.typedefs import Handler, Middleware
+
+from app import viser_proxy
+from app.access import Access, is_loopback
+from tracker.errors import TrackerError
+
+_LOG = logging.getLogger(__name__)
+_SOCKETS: web.AppKey[weakref.WeakSet[web.WebSocketResponse]] = web.AppKey("sockets", weakref.WeakSet)
+_PAGE_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src {sources}; "
+    "frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+_MAX_MESSAGE_BYTES = 1 << 20  # what a page sends is a line or two of JSON
+_HEARTBEAT_S = 20.0
+_CLOSE_TIMEOUT_S = 1.0
+
+
+class PaneEndpoint(Protocol):
+    """What answers the pane socket (docs/protocol.md)."""
+
+    async def serve(self, socket: web.WebSocketResponse) -> None:
+        """Talk to one page until its socket closes."""
+
+
+def create_app(panes: PaneEndpoint, viser_port: int, access: Access, static: Path) -> web.Application:
+    """Build the web application.
+
+    Args:
+        panes: answers the pane sockets, one call for each page that connects.
+        viser_port: where viser listens on 127.0.0.1.
+        access: what every request must show.
+        static: the folder of the page (`static_folder`).
+    """
+    app = web.Application(middlewares=[_guard(access)])
+    app[_SOCKETS] = weakref.WeakSet()
+    proxy = viser_proxy.ViserProxy(viser_port)
+
+    async def page(request: web.Request) -> web.StreamResponse:
+        response = web.FileResponse(static / "index.html")
+        if access.token is not None and "token" in request.query:
+            # Set with the page itself: on a redirect a browser that came from a link would keep back a Strict cookie.
+            response.set_cookie(access.cookie, access.token, httponly=True, samesite="Strict", path="/")
+        return response
+
+    async def pane_socket(request: web.Request) -> web.StreamResponse:
+        # JPEG does not compress, and small vectors are not worth the delay.
+        socket = web.WebSocketResponse(
+            heartbeat=_HEARTBEAT_S, timeout=_CLOSE_TIMEOUT_S, compress=False, max_msg_size=_MAX_MESSAGE_BYTES
+        )
+        await socket.prepare(request)
+        request.app[_SOCKETS].add(socket)
+        try:
+            await panes.serve(socket)
+        except ConnectionError:
+            _LOG.debug("a page went away in the middle of a message")
+        except Exception:
+            _LOG.exception("a pane socket failed; the page connects again")
+            await socket.close(code=aiohttp.WSCloseCode.INTERNAL_ERROR)
+        return socket
+
+    app.router.add_get("/", page)
+    app.router.add_get("/ws", pane_socket)
+    app.router.add_static("/static", static)
+    app.router.add_get("/viser", proxy.handle)
+    app.router.add_get("/viser/{path:.*}", proxy.handle)
+    app.on_response_prepare.append(_add_headers)
+    app.on_shutdown.append(_close_sockets)
+
+    async def client(_: web.Application) -> AsyncIterator[None]:
+        async with proxy:
+            yield
+
+    app.cleanup_ctx.append(client)
+    return app
+
+
+async def serve_forever(
+    app: web.Application, access: Access, host: str, port: int, on_ready: Callable[[str], None]
+) -> None:
+    """Serve until the task is cancelled, then close all sockets and finish.
+
+    Args:
+        app: what `create_app` returned.
+        access: the same as given to `create_app`; its token goes into the address.
+        host: address to listen at.
+        port: port to listen at; 0 takes a free one.
+        on_ready: called once with the page's address as soon as it answers.
+
+    Raises:
+        TrackerError: where the port is taken or the address is not this machine's.
+    """
+    runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=2.0)
+    await runner.setup()
+    try:
+        try:
+            await web.TCPSite(runner, host, port).start()
+        except (OSError, OverflowError) as error:
+            raise TrackerError(_listen_message(host, port, error)) from error
+        on_ready(page_address(access, host, runner.addresses[0][1]))
+        await asyncio.Event().wait()
+    finally:
+        await runner.cleanup()
+
+
+def page_address(access: Access, host: str, port: int) -> str:
+    """Return the address under which a person opens the page, with the token where one is needed."""
+    name = host if is_loopback(host) or not access.hosts else min(access.hosts)
+    bracketed = f"[{name}]" if ":" in name and not name.startswith("[") else name
+    return f"http://{bracketed}:{port}/" + (f"?token={access.token}" if access.token else "")
+
+
+def static_folder() -> Path:
+    """Return the folder of the page: inside the installed package, or beside it in a checkout."""
+    here = Path(__file__).resolve().parent
+    for folder in (here / "static", here.parent / "static"):
+        if (folder / "index.html").is_file():
+            return folder
+    raise TrackerError(f"expected the page's files in '{here / 'static'}', found none; install quadrille again")
+
+
+def start_viser() -> viser.ViserServer:
+    """Start viser on a free port of loopback, without the button that would share it with the internet.
+
+    A later `configure_theme` has to say `show_share_button=False` again.
+    """
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    server.gui.configure_theme(show_share_button=False, show_logo=False)
+    return server
+
+
+def _guard(access: Access) -> Middleware:
+    @web.middleware
+    async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+        hosts = request.headers.getall("Host", [])
+        tokens = [] if access.token is None else [request.query.get("token"), request.cookies.get(access.cookie)]
+        why = access.refusal(
+            hosts[0] if len(hosts) == 1 else None,
+            request.headers.get("Origin"),
+            [token for token in tokens if token is not None],
+        )
+        if why is not None:
+            return web.Response(status=403, text=f"Quadrille refused this request: {why}.\n")
+        return await handler(request)
+
+    return guard
+
+
+async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:
+    host = request.headers.get("Host", "")
+    # 'self' covers WebSockets in some browsers only. The guard has seen the Host header by now: it is a plain name,
+    # or the answer is a refusal, which connects nowhere.
+    sources = f"'self' ws://{host} wss://{host}" if response.status != 403 else "'none'"
+    policy = viser_proxy.POLICY if viser_proxy.is_viser(request.path) else _PAGE_POLICY
+    response.headers["Content-Security-Policy"] = policy.format(sources=sources)
+    response.headers["X-Content-Type-Options"] = "nosniff"
+    response.headers["Referrer-Policy"] = "no-referrer"
+    response.headers["Cross-Origin-Resource-Policy"] = "same-origin"
+    # Modules may be kept but are asked for each time (304 where nothing changed): no page runs half of an old version.
+    response.headers["Cache-Control"] = "no-cache"
+
+
+async def _close_sockets(app: web.Application) -> None:
+    sockets = app[_SOCKETS]
+    ends = (s.close(code=aiohttp.WSCloseCode.GOING_AWAY, message=b"the program ends") for s in list(sockets))
+    await asyncio.gather(*ends, return_exceptions=True)
+
+
+def _listen_message(host: str, port: int, error: OSError | OverflowError) -> str:
+    number = getattr(error, "errno", None)
+    if number == errno.EADDRINUSE:
+        return f"expected port {port} of {host} to be free, found it in use; stop the other program or choose --port"
+    if number in (errno.EACCES, errno.EPERM):
+        return f"expected to be allowed to listen at port {port}, found it refused; choose a --port above 1023"
+    return f"cannot listen at {host}, port {port} ({error}); give an address of this machine as --host, a free --port"

@@ -1,0 +1,121 @@
+"""Hands requests under `/viser/` on to viser, which listens on loopback and checks nobody."""
+
+import asyncio
+from types import TracebackType
+from typing import Self
+from urllib.parse import unquote
+
+import aiohttp
+from aiohttp import web
+
+# viser's client is one page that unpacks itself: inline script and style, WebAssembly, workers from blobs.
+POLICY = (
+    "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:; "
+    "worker-src 'self' blob: data:; style-src 'self' 'unsafe-inline' blob: data:; img-src 'self' blob: data:; "
+    "font-src 'self' data:; connect-src {sources} blob: data:; frame-src 'self' blob: data:; object-src 'none'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+
+# What viser answers that means something to a browser; hop-by-hop headers must not be passed on.
+_PASSED_DOWN = ("Content-Type", "Content-Length", "Content-Encoding")
+_MAX_MESSAGE_BYTES = 256 << 20
+_HEARTBEAT_S = 20.0
+
+Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
+
+
+def is_viser(path: str) -> bool:
+    """Whether a request path belongs to viser."""
+    return path == "/viser" or path.startswith("/viser/")
+
+
+class ViserProxy:
+    """A reverse proxy to one viser server; an asynchronous context that owns its connections."""
+
+    def __init__(self, port: int) -> None:
+        self._origin = f"http://127.0.0.1:{port}"
+        self._session: aiohttp.ClientSession | None = None
+
+    async def __aenter__(self) -> Self:
+        # Bodies pass through as compressed as they come.
+        self._session = aiohttp.ClientSession(auto_decompress=False)
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        assert self._session is not None
+        await self._session.close()
+
+    async def handle(self, request: web.Request) -> web.StreamResponse:
+        """Answer one request under `/viser`, WebSocket or not."""
+        if ".." in unquote(unquote(request.raw_path.partition("?")[0])).replace("\\", "/").split("/"):
+            raise web.HTTPNotFound
+        try:
+            if request.headers.get("Upgrade", "").lower() == "websocket":
+                return await self._socket(request)
+            if request.path == "/viser":
+                raise web.HTTPFound("/viser/")  # relative addresses, and those in viser's page, need the slash
+            return await self._fetch(request)
+        except aiohttp.ClientError as error:
+            raise web.HTTPBadGateway(text="The 3-D view does not answer; start quadrille again.\n") from error
+
+    async def _fetch(self, request: web.Request) -> web.StreamResponse:
+        assert self._session is not None
+        path = request.raw_path.removeprefix("/viser")
+        headers = {"Accept-Encoding": request.headers.get("Accept-Encoding", "identity")}
+        async with self._session.get(self._origin + path, headers=headers, allow_redirects=False) as upstream:
+            passed = {name: upstream.headers[name] for name in _PASSED_DOWN if name in upstream.headers}
+            response = web.StreamResponse(status=upstream.status, headers=passed)
+            await response.prepare(request)
+            async for chunk in upstream.content.iter_chunked(1 << 16):
+                await response.write(chunk)
+            await response.write_eof()
+            return response
+
+    async def _socket(self, request: web.Request) -> web.StreamResponse:
+        assert self._session is not None
+        # viser tells its clients' versions by the subprotocol: ours is whichever viser chose.
+        offered = [p.strip() for p in request.headers.get("Sec-WebSocket-Protocol", "").split(",") if p.strip()]
+        async with self._session.ws_connect(
+            self._origin, protocols=offered, max_msg_size=_MAX_MESSAGE_BYTES, compress=0
+        ) as upstream:
+            chosen = [upstream.protocol] if upstream.protocol else []
+            downstream = web.WebSocketResponse(
+                protocols=chosen, heartbeat=_HEARTBEAT_S, max_msg_size=_MAX_MESSAGE_BYTES, compress=False
+            )
+            await downstream.prepare(request)
+            pumps = {
+                asyncio.ensure_future(_pump(upstream, downstream)),
+                asyncio.ensure_future(_pump(downstream, upstream)),
+            }
+            try:
+                await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                for pump in pumps:
+                    pump.cancel()
+                await asyncio.gather(*pumps, return_exceptions=True)
+            return downstream
+
+
+async def _pump(source: Socket, target: Socket) -> None:
+    """Pass messages on until the source closes, then close the target for the same reason.
+
+    Sending waits while the target's buffer is full, and so stops reading from the source.
+    """
+    while True:
+        message = await source.receive()
+        try:
+            if message.type is aiohttp.WSMsgType.BINARY:
+                await target.send_bytes(message.data)
+            elif message.type is aiohttp.WSMsgType.TEXT:
+                await target.send_str(message.data)
+            else:
+                code = source.close_code
+                # 1005 and 1006 say that no reason came over the wire, and may not be sent over it.
+                sendable = code is not None and (1000 <= code <= 1003 or 1007 <= code <= 1014 or code >= 3000)
+                reason = message.extra.encode() if isinstance(message.extra, str) else b""
+                await target.close(code=code if sendable and code else aiohttp.WSCloseCode.GOING_AWAY, message=reason)
+                return
+        except ConnectionError:
+            return

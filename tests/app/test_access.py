@@ -1,0 +1,82 @@
+import pytest
+
+from app.access import Access, access_for
+from tracker.errors import TrackerError
+
+LOCAL = Access()
+REMOTE = Access(frozenset({"lab.example.org"}), "secret")
+
+
+@pytest.mark.parametrize(
+    "host", ["localhost", "LOCALHOST:8080", "127.0.0.1:1", "127.9.9.9", "[::1]:8080", "localhost:65535"]
+)
+def test_loopback_names_pass_at_any_port(host):
+    assert LOCAL.refusal(host, None) is None
+
+
+@pytest.mark.parametrize(
+    "host", [None, "", "evil.example", "localhost.evil.example", "x@localhost", "localhost:80:80", "192.168.0.3", "::1"]
+)
+def test_other_hosts_are_refused(host):
+    assert "Host" in LOCAL.refusal(host, None)
+
+
+@pytest.mark.parametrize(
+    ("host", "origin"),
+    [
+        ("localhost:9000", "http://localhost:9000"),
+        ("localhost", "http://localhost:80"),
+        ("localhost:443", "https://localhost"),
+        ("[::1]:9", "http://[::1]:9"),
+    ],
+)
+def test_own_origin_passes(host, origin):
+    assert LOCAL.refusal(host, origin) is None
+
+
+@pytest.mark.parametrize(
+    "origin",
+    [
+        "null",
+        "http://evil.example",
+        "http://localhost:9001",
+        "http://127.0.0.1:9000",
+        "ftp://localhost:9000",
+        "http://[",
+    ],
+)
+def test_other_origins_are_refused(origin):
+    assert origin in LOCAL.refusal("localhost:9000", origin)
+
+
+def test_beyond_loopback_wants_name_and_token():
+    assert REMOTE.refusal("lab.example.org:8080", None, ["secret"]) is None
+    assert REMOTE.refusal("lab.example.org:8080", None, ["guess", "secret"]) is None
+    assert "token" in REMOTE.refusal("lab.example.org:8080", None, ["guess"])
+    assert "token" in REMOTE.refusal("localhost:8080", None)
+    assert "Host" in REMOTE.refusal("other.example.org:8080", None, ["secret"])
+
+
+def test_access_for_loopback_needs_no_token():
+    assert access_for("127.0.0.1").token is None
+    assert access_for("localhost", ["tunnel.example.org"]).hosts == {"tunnel.example.org"}
+
+
+def test_access_beyond_loopback_makes_a_token_at_each_start():
+    first, second = (access_for("0.0.0.0", ["Lab.Example.org"]) for _ in range(2))
+    assert first.hosts == {"lab.example.org"}
+    assert first.token
+    assert second.token
+    assert first.token != second.token
+    assert first.cookie != second.cookie
+
+
+def test_access_beyond_loopback_without_names_says_what_to_do():
+    with pytest.raises(TrackerError, match=r"0\.0\.0\.0.*--allow-host"):
+        access_for("0.0.0.0")
+
+
+@pytest.mark.parametrize("name", ["http://lab", "lab:8080", "a b"])
+def test_malformed_names_are_refused(name):
+    with pytest.raises(TrackerError, match="host name without port"):
+        access_for("0.0.0.0", [name])

@@ -1,0 +1,280 @@
+import asyncio
+import socket
+from contextlib import asynccontextmanager
+
+import aiohttp
+import pytest
+from aiohttp import web
+from yarl import URL
+
+from app import server
+from app.access import Access
+from tracker.errors import TrackerError
+
+NAMED = Access(frozenset({"lab.example.org"}), "secret")
+
+
+class EchoPanes:
+    """A pane endpoint that answers every message with itself."""
+
+    async def serve(self, socket):
+        async for message in socket:
+            if message.type is aiohttp.WSMsgType.TEXT:
+                await socket.send_str(message.data)
+
+
+class FakeViser:
+    """Stands for viser: remembers what it was asked, echoes, and closes when told to."""
+
+    def __init__(self):
+        self.requests = []
+        self.close_codes = []
+
+    async def handle(self, request):
+        self.requests.append(request)
+        if request.headers.get("Upgrade", "").lower() != "websocket":
+            return web.Response(body=b"viser " + request.raw_path.encode(), content_type="text/html")
+        sock = web.WebSocketResponse(protocols=["viser-v1.1.1"], max_msg_size=0)
+        await sock.prepare(request)
+        async for message in sock:
+            if message.data == "close":
+                await sock.close(code=4001, message=b"told to")
+            elif message.type is aiohttp.WSMsgType.TEXT:
+                await sock.send_str(message.data)
+            else:
+                await sock.send_bytes(message.data)
+        self.close_codes.append(sock.close_code)
+        return sock
+
+
+@asynccontextmanager
+async def listening(app):
+    runner = web.AppRunner(app, shutdown_timeout=1.0)
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", 0).start()
+    try:
+        yield runner.addresses[0][1]
+    finally:
+        await runner.cleanup()
+
+
+@pytest.fixture
+async def fake_viser():
+    fake = FakeViser()
+    app = web.Application()
+    app.router.add_get("/{path:.*}", fake.handle)
+    async with listening(app) as fake.port:
+        yield fake
+
+
+@pytest.fixture
+def access():
+    return Access()
+
+
+@pytest.fixture
+async def port(fake_viser, access):
+    app = server.create_app(EchoPanes(), fake_viser.port, access, server.static_folder())
+    async with listening(app) as port:
+        yield port
+
+
+@pytest.fixture
+async def client(port):
+    async with aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session:
+        yield session
+
+
+async def raw_get(port, target, host="localhost"):
+    """Send a request whose target no client library has tidied up; return status and the whole answer."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(f"GET {target} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode())
+    answer = await reader.read()
+    writer.close()
+    return int(answer.split()[1]), answer
+
+
+async def test_page_and_modules_are_served_with_their_headers(client):
+    async with client.get("/") as response:
+        assert response.status == 200
+        assert response.content_type == "text/html"
+        policy = response.headers["Content-Security-Policy"]
+        assert "frame-ancestors 'none'" in policy
+        assert "unsafe" not in policy
+        assert response.headers["X-Content-Type-Options"] == "nosniff"
+    async with client.get("/static/main.js") as response:
+        assert response.status == 200
+        assert "javascript" in response.content_type
+        assert response.headers["Cache-Control"] == "no-cache"
+        tag = response.headers["ETag"]
+    async with client.get("/static/main.js", headers={"If-None-Match": tag}) as response:
+        assert response.status == 304
+
+
+@pytest.mark.parametrize("path", ["/", "/static/main.js", "/ws", "/viser/", "/viser", "/nothing"])
+@pytest.mark.parametrize(
+    "headers",
+    [{"Host": "evil.example"}, {"Origin": "http://evil.example"}, {"Origin": "null"}, {"Origin": "http://localhost:1"}],
+)
+async def test_foreign_requests_get_403(client, fake_viser, path, headers):
+    async with client.get(path, headers=headers) as response:
+        assert response.status == 403
+        assert "refused" in await response.text()
+    assert not fake_viser.requests
+
+
+@pytest.mark.parametrize("path", ["/ws", "/viser", "/viser/"])
+async def test_foreign_sockets_get_403(client, path):
+    with pytest.raises(aiohttp.WSServerHandshakeError) as caught:
+        await client.ws_connect(path, origin="http://evil.example")
+    assert caught.value.status == 403
+
+
+async def test_a_request_through_a_port_forward_passes_by_its_own_name_only(port):
+    async with aiohttp.ClientSession() as session:
+        url = f"http://127.0.0.1:{port}/ws"
+        tunnel = {"Host": "localhost:9999"}
+        async with session.ws_connect(url, headers=tunnel, origin="http://localhost:9999") as sock:
+            await sock.send_str("hello")
+            assert await sock.receive_str() == "hello"
+        for path in ("", "ws", "viser/"):
+            headers = tunnel | {"Origin": "http://evil.example"}
+            async with session.get(f"http://127.0.0.1:{port}/{path}", headers=headers) as response:
+                assert response.status == 403
+
+
+@pytest.mark.parametrize("prefix", ["/static/", "/viser/", "/"])
+@pytest.mark.parametrize(
+    "climb", ["../pyproject.toml", "%2e%2e/pyproject.toml", "..%2fpyproject.toml", "%2e%2e%5cpyproject.toml"]
+)
+async def test_dots_reach_no_file(port, fake_viser, prefix, climb):
+    status, answer = await raw_get(port, prefix + climb)
+    assert status in (403, 404)
+    assert b"hatchling" not in answer
+    assert not fake_viser.requests
+
+
+async def test_doubly_encoded_dots_reach_no_file(port, fake_viser):
+    assert (await raw_get(port, "/viser/%252e%252e/secret"))[0] == 404
+    assert not fake_viser.requests
+
+
+async def test_viser_is_fetched_below_its_own_root(client, fake_viser):
+    async with client.get(URL("/viser/a%20b?darkMode=", encoded=True)) as response:
+        assert response.status == 200
+        assert await response.text() == "viser /a%20b?darkMode="
+        assert "frame-ancestors 'self'" in response.headers["Content-Security-Policy"]
+    assert "Origin" not in fake_viser.requests[0].headers
+    async with client.get("/viser", allow_redirects=False) as response:
+        assert response.status == 302
+        assert response.headers["Location"] == "/viser/"
+
+
+@pytest.mark.parametrize("path", ["/viser", "/viser/"])
+async def test_viser_socket_keeps_protocol_kinds_and_large_messages(client, path):
+    async with client.ws_connect(path, protocols=["viser-v1.1.1"], max_msg_size=0) as sock:
+        assert sock.protocol == "viser-v1.1.1"
+        await sock.send_str("text")
+        assert await sock.receive_str() == "text"
+        large = bytes(9 << 20)
+        await sock.send_bytes(large)
+        assert await sock.receive_bytes() == large
+
+
+async def test_viser_socket_closes_with_visers_reason(client):
+    async with client.ws_connect("/viser", protocols=["viser-v1.1.1"]) as sock:
+        await sock.send_str("close")
+        message = await sock.receive()
+        assert (message.type, message.data, message.extra) == (aiohttp.WSMsgType.CLOSE, 4001, "told to")
+
+
+async def test_a_page_that_leaves_closes_its_viser_socket(client, fake_viser):
+    sock = await client.ws_connect("/viser", protocols=["viser-v1.1.1"])
+    await sock.close(code=1000)
+    async with asyncio.timeout(2.0):
+        while not fake_viser.close_codes:
+            await asyncio.sleep(0.01)
+    assert fake_viser.close_codes == [1000]
+
+
+async def test_without_viser_the_proxy_says_so():
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        unused = free.getsockname()[1]
+    app = server.create_app(EchoPanes(), unused, Access(), server.static_folder())
+    async with listening(app) as port, aiohttp.ClientSession() as session:
+        async with session.get(f"http://127.0.0.1:{port}/viser/") as response:
+            assert response.status == 502
+
+
+class TestToken:
+    @pytest.fixture
+    def access(self):
+        return NAMED
+
+    async def test_address_gives_a_cookie_and_the_cookie_opens_everything(self, client):
+        host = {"Host": "lab.example.org:8080"}
+        for path in ("/", "/?token=guess", "/static/main.js", "/ws", "/viser/"):
+            async with client.get(path, headers=host) as response:
+                assert response.status == 403
+        async with client.get("/?token=secret", headers=host) as response:
+            assert response.status == 200
+            cookie = response.cookies[NAMED.cookie]
+            assert cookie["httponly"]
+            assert cookie["samesite"] == "Strict"
+        holder = host | {"Cookie": f"{NAMED.cookie}={cookie.value}"}
+        for path in ("/", "/static/main.js", "/viser/"):
+            async with client.get(path, headers=holder) as response:
+                assert response.status == 200
+        async with client.ws_connect("/ws", headers=holder) as sock:
+            await sock.send_str("hello")
+            assert await sock.receive_str() == "hello"
+
+
+async def test_serving_a_busy_port_names_it_and_the_remedy():
+    with socket.socket() as busy:
+        busy.bind(("127.0.0.1", 0))
+        busy.listen()
+        port = busy.getsockname()[1]
+        app = server.create_app(EchoPanes(), 1, Access(), server.static_folder())
+        with pytest.raises(TrackerError, match=rf"port {port} .* in use; .*--port"):
+            await server.serve_forever(app, Access(), "127.0.0.1", port, lambda _: None)
+
+
+async def test_serving_tells_the_address_and_closes_its_sockets_at_the_end():
+    ready = asyncio.get_running_loop().create_future()
+    app = server.create_app(EchoPanes(), 1, Access(), server.static_folder())
+    task = asyncio.create_task(server.serve_forever(app, Access(), "127.0.0.1", 0, ready.set_result))
+    address = await asyncio.wait_for(ready, 5.0)
+    async with aiohttp.ClientSession() as session, session.ws_connect(address + "ws") as sock:
+        task.cancel()
+        message = await sock.receive(timeout=5.0)
+        assert (message.type, message.data) == (aiohttp.WSMsgType.CLOSE, aiohttp.WSCloseCode.GOING_AWAY)
+        with pytest.raises(asyncio.CancelledError):
+            await task
+
+
+def test_page_address_carries_name_and_token():
+    assert server.page_address(Access(), "127.0.0.1", 8080) == "http://127.0.0.1:8080/"
+    assert server.page_address(Access(), "::1", 8080) == "http://[::1]:8080/"
+    assert server.page_address(NAMED, "0.0.0.0", 8080) == "http://lab.example.org:8080/?token=secret"
+
+
+def test_viser_listens_on_loopback_only():
+    started = server.start_viser()
+    try:
+        assert started.get_host() == "127.0.0.1"
+        with pytest.raises(OSError), socket.create_connection((_own_address(), started.get_port()), timeout=0.5):
+            pass
+    finally:
+        started.stop()
+
+
+def _own_address():
+    """Address of this machine that is not loopback; where it has none, one that answers nobody."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))  # sends nothing: asks which of our addresses would be used
+            return probe.getsockname()[0]
+        except OSError:
+            return "192.0.2.1"
