@@ -99,6 +99,19 @@ class SearchGroup:
     """Names of the degrees of freedom searched together."""
 
 
+class Tree(NamedTuple):
+    """A joint tree as arrays."""
+
+    parents: IntArray
+    """Index of each part's parent, -1 for the root, (n_parts,)."""
+    offsets: Array
+    """Where each part's joint sits in its parent's frame, (n_parts, 3), metres."""
+    ops: IntArray
+    """What the joints do, in order: kind (translate, revolve, ball) and index of the joint, (n_ops, 2)."""
+    axes: Array
+    """Unit axis of each operation that revolves, (n_ops, 3)."""
+
+
 class Kinematics(NamedTuple):
     """Where a pose puts everything."""
 
@@ -234,10 +247,8 @@ class BodyModel:
         return np.array([(0.0, 0.0, 0.0)] * len(self.joints) + landmarks) * self.height_m
 
     @cached_property
-    def _tree(self) -> tuple[IntArray, Array, IntArray, Array]:
-        """Arrays of the kernel: parents (P,), offsets (P, 3) m, ops (n, 2) of kind and joint, axes (n, 3)."""
-        parents = np.array(self.parents, dtype=np.int64)
-        offsets = np.array([j.position for j in self.joints]) * self.height_m
+    def tree(self) -> "Tree":
+        """The joint tree as arrays, for `forward_kinematics`."""
         ops, axes = [], []
         for i, j in enumerate(self.joints):
             if j.free:
@@ -249,7 +260,12 @@ class BodyModel:
             for a in j.axes:
                 ops.append((_REVOLVE, i))
                 axes.append(a.direction)
-        return parents, offsets, np.array(ops, dtype=np.int64), np.array(axes, dtype=np.float64)
+        return Tree(
+            np.array(self.parents, dtype=np.int64),
+            np.array([j.position for j in self.joints]) * self.height_m,
+            np.array(ops, dtype=np.int64),
+            np.array(axes, dtype=np.float64),
+        )
 
     def neutral(self) -> Array:
         """Values of the standing pose at the world's origin, arms hanging; angles are put within limits."""
@@ -263,7 +279,7 @@ class BodyModel:
         """Place the parts for the values of a pose, (n_values,)."""
         n_parts, n_dofs = len(self.parts), self.n_dofs
         out = Kinematics(np.empty((n_parts, 4, 4)), np.empty((n_dofs, 3)), np.empty((n_dofs, 3)))
-        forward_kinematics(np.asarray(values, dtype=np.float64), *self._tree, *out)
+        forward_kinematics(np.asarray(values, dtype=np.float64), self.tree, *out)
         return out
 
     def points_world(self, values: Array) -> Array:
@@ -356,8 +372,9 @@ def _clip_ball(wxyz: Array, cone: float, twist: float) -> Array:
 
 
 @njit(nogil=True, cache=True)
-def forward_kinematics(values, parents, offsets, ops, op_axes, Ts, axes, origins):  # type: ignore[no-untyped-def]  # noqa: C901
-    """Fill the arrays of a `Kinematics` from a pose and the arrays of `BodyModel._tree`."""
+def forward_kinematics(values: Array, tree: Tree, Ts: Array, axes: Array, origins: Array) -> None:  # noqa: C901
+    """Fill the arrays of a `Kinematics` from the values of a pose, (n_values,)."""
+    parents, offsets, ops = tree.parents, tree.offsets, tree.ops
     op, dof, value = 0, 0, 0
     R, step, parent_R = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     n_ops = ops.shape[0]
@@ -383,7 +400,7 @@ def forward_kinematics(values, parents, offsets, ops, op_axes, Ts, axes, origins
                 value += 3
             else:
                 if kind == 1:
-                    ax, ay, az = op_axes[op, 0], op_axes[op, 1], op_axes[op, 2]
+                    ax, ay, az = tree.axes[op, 0], tree.axes[op, 1], tree.axes[op, 2]
                     for i in range(3):
                         axes[dof, i] = R[i, 0] * ax + R[i, 1] * ay + R[i, 2] * az
                     half = 0.5 * values[value]

@@ -75,11 +75,13 @@ class Camera:
 
     def scaled(self, scale: float) -> "Camera":
         """Return the camera of the image resized by `scale`, pixel areas (not centres) kept aligned."""
-        K = self.K.copy()
-        K[:2] *= scale
-        # OpenCV's resize keeps pixel borders aligned: u' + 1/2 = s (u + 1/2), with centres at integers.
-        K[:2, 2] += (scale - 1.0) / 2.0
         size = (round(self.width * scale), round(self.height * scale))
+        # OpenCV's resize keeps pixel borders aligned: u' + 1/2 = s (u + 1/2), with centres at integers, and s is
+        # the ratio of the whole sizes.
+        s = np.array([size[0] / self.width, size[1] / self.height])
+        K = self.K.copy()
+        K[:2] *= s[:, None]
+        K[:2, 2] += (s - 1.0) / 2.0
         return replace(self, size=size, K=K)
 
     def depths(self, points_world: Array) -> Array:

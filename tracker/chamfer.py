@@ -1,0 +1,283 @@
+"""How well posed bodies explain the edges of all views: the robust chamfer distance of GD96 Sect. 4.1.
+
+The directed distance of the model's visible contour to the image's edges is read from a distance image; that of
+the image's edges to the model's contour is measured point by piece. Both are normalized, averaged (Eq. 1-3), and
+averaged over the views. Costs are in undistorted pixels of the footage; images may be matched at a smaller scale.
+"""
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tracker import contours
+from tracker.body import Body, BodyModel, Tree, forward_kinematics
+from tracker.contours import FloatArray
+from tracker.evidence import ViewEvidence, default_theta_px
+from tracker.rigid import Array
+
+Outliers = Literal["truncated", "paper"]
+
+
+class Cost(NamedTuple):
+    """Undirected normalized chamfer distance (GD96 Eq. 3)."""
+
+    total_px: float
+    """Mean over the views that have any edges, px of the footage."""
+    views_px: Array
+    """Cost of each view, (V,), px of the footage; NaN for a view without edges."""
+    forward_px: Array
+    """Model to image, (V,), px of the footage."""
+    backward_px: Array
+    """Image to model, (V,), px of the footage."""
+
+
+class _Scene(NamedTuple):
+    """The evidence of all views as arrays, for the kernels; lengths in matched px."""
+
+    P: Array
+    """Projection matrices, (V, 3, 4)."""
+    eyes: Array
+    """Camera centres in the world, (V, 3), metres."""
+    sizes: NDArray[np.int64]
+    """Image widths and heights, (V, 2)."""
+    distances: FloatArray
+    """The distance images, one after the other, row by row."""
+    points: FloatArray
+    """Edge points near the prediction, one view after the other, (N, 2)."""
+    firsts: NDArray[np.int64]
+    """Index of the first edge point of each view, and the number of all, (V + 1,)."""
+    thetas: Array
+    """Outlier distances, (V,)."""
+
+
+class _Scratch(NamedTuple):
+    """Room that the kernels work in."""
+
+    contour: contours.Contour
+    starts: FloatArray
+    """x and y of the start of each visible piece, (2, room)."""
+    steps: FloatArray
+    """x and y from its start to its end, (2, room)."""
+    inverse: FloatArray
+    """Its inverse squared length, (room,)."""
+    lengths: FloatArray
+    """Its length, (room,)."""
+    distances: FloatArray
+    """Distances, of pieces or of edge points, (room,)."""
+    ones: FloatArray
+    """Weights of edge points, (room,)."""
+
+
+class ChamferCost:
+    """The cost of poses against fixed evidence; what a search minimizes.
+
+    The image-to-model direction sees only the edge points within theta of the predicted contours: edges elsewhere
+    belong to other things. The selection is made once, so that the cost compares like with like during a search.
+    """
+
+    def __init__(
+        self,
+        views: Sequence[ViewEvidence],
+        predicted: Sequence[Body],
+        theta_px: float | None = None,
+        outliers: Outliers = "truncated",
+    ) -> None:
+        """Prepare the evidence for the kernels.
+
+        Args:
+            views: the evidence of each view.
+            predicted: everybody in the scene, as predicted.
+            theta_px: outlier distance, px of the footage; by default `default_theta_px` of each view.
+            outliers: "truncated" takes min(d, theta) over all points; "paper" rejects points beyond theta and then
+                beyond mean + 2 standard deviations (GD96 Sect. 4.1), and a direction of which fewer than half is
+                kept costs theta.
+        """
+        self.models: tuple[BodyModel, ...] = tuple(b.model for b in predicted)
+        self.outliers = outliers
+        self._surfaces = contours.surfaces_of(self.models)
+        self._scales = np.array([v.scale for v in views])
+        thetas = [default_theta_px(v.camera) if theta_px is None else theta_px * v.scale for v in views]
+        points = [_near(v, contours.trace(predicted, v.camera), theta) for v, theta in zip(views, thetas, strict=True)]
+        self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
+        self._scene = _Scene(
+            np.stack([contours.projection(v.camera) for v in views]),
+            np.stack([v.camera.center_world for v in views]),
+            np.array([v.camera.size for v in views], dtype=np.int64),
+            np.concatenate([v.distance.ravel() for v in views]),
+            np.concatenate(points).astype(np.float32).reshape(-1, 2),
+            np.concatenate([[0], np.cumsum([len(p) for p in points])]).astype(np.int64),
+            np.array(thetas),
+        )
+        self._widest = max((v.camera for v in views), key=lambda camera: camera.width)
+
+    def __call__(self, poses: Sequence[Array]) -> Cost:
+        """Cost of one pose of everybody; `poses` holds the values of each body."""
+        directed = np.empty((len(self._seen), 2))
+        _score(
+            self._part_poses(poses), self._surfaces, self._scene, self.outliers == "paper", self._scratch(), directed
+        )
+        directed_px = directed / self._scales[:, None]
+        views_px = self._blank_unseen(directed_px.mean(axis=-1))
+        return Cost(float(self._mean(views_px)), views_px, directed_px[:, 0], directed_px[:, 1])
+
+    def of_person(self, person: int, candidates: Array, poses: Sequence[Array]) -> tuple[Array, Array]:
+        """Costs of many candidate poses of one person, the others held at `poses`.
+
+        Args:
+            person: index of the body that varies.
+            candidates: its poses, (C, n_values).
+            poses: the values of each body; that of `person` is not used.
+
+        Returns:
+            The total costs, (C,), and those of each view, (C, V), px of the footage; NaN for views without edges.
+        """
+        model = self.models[person]
+        first = sum(len(m.parts) for m in self.models[:person])
+        directed = np.empty((len(candidates), len(self._seen), 2))
+        _score_candidates(
+            np.ascontiguousarray(candidates, dtype=np.float64), first, model.n_dofs, model.tree,
+            self._part_poses(poses), self._surfaces, self._scene, self.outliers == "paper", self._scratch(), directed,
+        )  # fmt: skip
+        views_px = self._blank_unseen(directed.mean(axis=-1) / self._scales)
+        return self._mean(views_px), views_px
+
+    def _part_poses(self, poses: Sequence[Array]) -> Array:
+        return contours.part_poses([Body(m, p) for m, p in zip(self.models, poses, strict=True)])
+
+    def _scratch(self) -> _Scratch:
+        """Fresh for each call: several threads may score at a time."""
+        contour = contours.contour_buffer(self._widest, len(self.models))
+        room = len(contour.parts)
+        longest = max(room, len(self._scene.points))
+        return _Scratch(
+            contour, np.empty((2, room), np.float32), np.empty((2, room), np.float32), np.empty(room, np.float32),
+            np.empty(room, np.float32), np.empty(longest, np.float32), np.ones(longest, np.float32),
+        )  # fmt: skip
+
+    def _blank_unseen(self, views_px: Array) -> Array:
+        views_px[..., ~self._seen] = np.nan
+        return views_px
+
+    def _mean(self, views_px: Array) -> Array:
+        """Mean over the views with edges, (..., V) to (...); where there is none, that of the outlier distances."""
+        if not self._seen.any():
+            return np.full(views_px.shape[:-1], np.mean(self._scene.thetas / self._scales))
+        return views_px[..., self._seen].mean(axis=-1)
+
+
+def _near(view: ViewEvidence, contour: contours.Contour, theta: float) -> FloatArray:
+    """Edge points within theta of the visible model contour, (N, 2)."""
+    pieces = contour.pieces_px[~contour.hidden]
+    if not len(pieces) or not len(view.points_px):
+        return np.empty((0, 2), np.float32)
+    starts = np.ascontiguousarray(pieces[:, :2].T)
+    steps = np.ascontiguousarray((pieces[:, 2:] - pieces[:, :2]).T)
+    inverse = (1 / np.maximum(np.sum(steps**2, axis=0), 1e-12)).astype(np.float32)
+    distances = np.empty(len(view.points_px), np.float32)
+    nearest_piece(view.points_px, starts, steps, inverse, len(pieces), distances)
+    return view.points_px[distances <= theta]
+
+
+@njit(nogil=True, cache=True, fastmath=True)
+def nearest_piece(
+    points: FloatArray, starts: FloatArray, steps: FloatArray, inverse: FloatArray, n: int, distances: FloatArray
+) -> None:
+    """Distance of each point (N, 2) to the nearest of n straight pieces; brute force, because it vectorizes."""
+    x, y, dx, dy = starts[0], starts[1], steps[0], steps[1]
+    for i in range(points.shape[0]):
+        px, py = points[i, 0], points[i, 1]
+        best = np.float32(1e12)
+        for k in range(n):
+            ux, uy = px - x[k], py - y[k]
+            t = min(np.float32(1.0), max(np.float32(0.0), (ux * dx[k] + uy * dy[k]) * inverse[k]))
+            ex, ey = ux - t * dx[k], uy - t * dy[k]
+            best = min(best, ex * ex + ey * ey)
+        distances[i] = np.sqrt(best)
+
+
+@njit(nogil=True, cache=True)
+def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool) -> float:
+    """Mean of n distances with weights w, outliers treated as `ChamferCost` says; theta where there are none."""
+    total, weight = 0.0, 0.0
+    if not paper:
+        for i in range(n):
+            total += w[i] * min(d[i], theta)
+            weight += w[i]
+        return total / weight if weight > 0 else theta
+    everything, squares = 0.0, 0.0
+    for i in range(n):
+        everything += w[i]
+        if d[i] <= theta:
+            total += w[i] * d[i]
+            squares += w[i] * d[i] * d[i]
+            weight += w[i]
+    if weight <= 0.0:
+        return theta
+    mean = total / weight
+    bound = min(theta, mean + 2.0 * np.sqrt(max(0.0, squares / weight - mean * mean)))
+    total, weight = 0.0, 0.0
+    for i in range(n):
+        if d[i] <= bound:
+            total += w[i] * d[i]
+            weight += w[i]
+    return total / weight if weight >= 0.5 * everything else theta
+
+
+@njit(nogil=True, cache=True)
+def sample_distance(distances: FloatArray, first: int, width: int, height: int, u: float, v: float) -> float:
+    """Bilinear distance at a pixel; outside the image, that of the nearest border pixel and the way to it."""
+    cu = min(max(u, 0.0), width - 1.0)
+    cv = min(max(v, 0.0), height - 1.0)
+    outside = np.sqrt((u - cu) ** 2 + (v - cv) ** 2)
+    c, r = min(int(cu), width - 2), min(int(cv), height - 2)
+    a, b = cu - c, cv - r
+    i = first + r * width + c
+    top = distances[i] * (1 - a) + distances[i + 1] * a
+    bottom = distances[i + width] * (1 - a) + distances[i + width + 1] * a
+    return top * (1 - b) + bottom * b + outside
+
+
+@njit(nogil=True, cache=True)
+def _score(
+    Ts: Array, surfaces: contours.Surfaces, scene: _Scene, paper: bool, scratch: _Scratch, directed: Array
+) -> None:
+    """Fill the directed costs of one pose, (V, 2): model to image and image to model, matched px."""
+    pieces, hidden = scratch.contour.pieces_px, scratch.contour.hidden
+    starts, steps, d = scratch.starts, scratch.steps, scratch.distances
+    pixel = 0
+    for view in range(scene.P.shape[0]):
+        width, height, theta = scene.sizes[view, 0], scene.sizes[view, 1], scene.thetas[view]
+        n = contours.trace_view(scene.P[view], scene.eyes[view], Ts, surfaces, contours.PIECE_PX, scratch.contour)
+        kept = 0
+        for i in range(n):
+            if not hidden[i]:
+                x, y = pieces[i, 0], pieces[i, 1]
+                dx, dy = pieces[i, 2] - x, pieces[i, 3] - y
+                length2 = max(dx * dx + dy * dy, np.float32(1e-12))
+                starts[0, kept], starts[1, kept], steps[0, kept], steps[1, kept] = x, y, dx, dy
+                scratch.inverse[kept] = 1 / length2
+                scratch.lengths[kept] = np.sqrt(length2)
+                d[kept] = sample_distance(scene.distances, pixel, width, height, x + 0.5 * dx, y + 0.5 * dy)
+                kept += 1
+        directed[view, 0] = _robust_mean(d, scratch.lengths, kept, theta, paper)
+        points = scene.points[scene.firsts[view] : scene.firsts[view + 1]]
+        nearest_piece(points, starts, steps, scratch.inverse, kept, d)
+        directed[view, 1] = _robust_mean(d, scratch.ones, points.shape[0], theta, paper)
+        pixel += width * height
+
+
+@njit(nogil=True, cache=True)
+def _score_candidates(
+    candidates: Array, first: int, n_dofs: int, tree: Tree, Ts: Array, surfaces: contours.Surfaces, scene: _Scene,
+    paper: bool, scratch: _Scratch, directed: Array,
+) -> None:  # fmt: skip
+    """`_score` for many poses of the person whose parts begin at `first`; directed is (C, V, 2)."""
+    last = first + tree.parents.shape[0]
+    own = Ts.copy()
+    axes, origins = np.empty((n_dofs, 3)), np.empty((n_dofs, 3))
+    for c in range(candidates.shape[0]):
+        forward_kinematics(candidates[c], tree, own[first:last], axes, origins)
+        _score(own, surfaces, scene, paper, scratch, directed[c])

@@ -1,0 +1,172 @@
+"""The one Gauss-Newton of the project: poses from residual blocks.
+
+A block turns a pose into weighted residuals and their Jacobian. Whatever speaks for a pose is one: joints known in
+space, a prior. The solver is damped (Levenberg-Marquardt) and holds the joint limits.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.body import BodyModel, IntArray, Kinematics
+from tracker.errors import TrackerError
+from tracker.rigid import Array
+
+
+class Block(Protocol):
+    """One kind of evidence for the pose of one person."""
+
+    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> tuple[Array, Array]:
+        """Weighted residuals (N,) at a pose and their derivative by the degrees of freedom, (N, n_dofs)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class PointTargets:
+    """Points of the body drawn to known places in the world."""
+
+    points: IntArray
+    """Indices into `BodyModel.point_names`, (N,)."""
+    targets_world: Array
+    """Where they should be, (N, 3), metres."""
+    weights: Array
+    """Weight of each point's distance, (N,), per metre."""
+
+    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> tuple[Array, Array]:
+        """See `Block`."""
+        parts = model.point_parts[self.points]
+        T = kinematics.Ts_world_part[parts]
+        points_world = np.einsum("nij,nj->ni", T[:, :3, :3], model.points_part[self.points]) + T[:, :3, 3]
+        J = model.point_jacobian(kinematics, parts, points_world) * self.weights[:, None, None]
+        r = (points_world - self.targets_world) * self.weights[:, None]
+        return r.ravel(), J.reshape(-1, model.n_dofs)
+
+
+@dataclass(frozen=True, eq=False)
+class StayNear:
+    """A prior that keeps a pose near another one; what the evidence leaves open stays as it was."""
+
+    values: Array
+    """The pose to stay near, (n_values,)."""
+    weights: Array
+    """Weight of each degree of freedom, (n_dofs,), per radian or metre."""
+
+    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> tuple[Array, Array]:
+        """See `Block`."""
+        # d(difference)/d(step) is the identity to first order, for balls up to the curvature of the rotation.
+        return model.difference(values, self.values) * self.weights, np.diag(self.weights)
+
+
+class Fit(NamedTuple):
+    """What the solver found."""
+
+    values: Array
+    """Pose, (n_values,), within the joint limits."""
+    cost: float
+    """Half the sum of squared residuals."""
+    iterations: int
+
+
+def solve(
+    model: BodyModel,
+    values: Array,
+    blocks: Sequence[Block],
+    free: NDArray[np.bool_] | None = None,
+    max_iterations: int = 50,
+    tolerance: float = 1e-6,
+) -> Fit:
+    """Minimize the sum of squared residuals of all blocks within the joint limits.
+
+    Args:
+        model: the body.
+        values: where to start, (n_values,).
+        blocks: the evidence.
+        free: which degrees of freedom may move, (n_dofs,); all by default.
+        max_iterations: how often to linearize at most.
+        tolerance: smallest step that is worth another iteration, rad or metres.
+    """
+    may_move = np.ones(model.n_dofs, dtype=bool) if free is None else free
+    values = model.clip(values)
+    r, J = _stack(model, values, blocks)
+    cost, damping = 0.5 * float(r @ r), 1e-3
+    for iteration in range(1, max_iterations + 1):
+        gradient, hessian = J.T @ r, J.T @ J
+        moving = may_move & ~_pressed_against_limit(model, values, gradient)
+        if not moving.any():
+            return Fit(values, cost, iteration)
+        g, H = gradient[moving], hessian[np.ix_(moving, moving)]
+        # Damping by the diagonal leaves metres and radians to themselves; the floor serves dofs nothing speaks of.
+        scale = np.diag(H) + 1e-6 * max(1e-12, float(np.trace(H)) / len(H))
+        while True:
+            step = np.zeros(model.n_dofs)
+            step[moving] = -np.linalg.solve(H + damping * np.diag(scale), g)
+            trial = model.clip(model.retract(values, step))
+            trial_r, trial_J = _stack(model, trial, blocks)
+            trial_cost = 0.5 * float(trial_r @ trial_r)
+            if trial_cost < cost or damping > 1e8:
+                break
+            damping *= 10
+        moved = float(np.abs(model.difference(trial, values)).max())
+        if trial_cost >= cost:
+            return Fit(values, cost, iteration)
+        values, r, J, cost = trial, trial_r, trial_J, trial_cost
+        damping = max(1e-9, damping / 10)
+        if moved < tolerance:
+            break
+    return Fit(values, cost, iteration)
+
+
+def fit_to_points(model: BodyModel, targets_world: dict[str, Array], near: Array | None = None) -> Fit:
+    """Pose a body so that its points come close to known places (triangulated or measured joints).
+
+    Without a pose to start from, the body is put upright at the targets' mean, facing each of eight ways; the best
+    of the fits counts.
+
+    Args:
+        model: the body; its sizes stay.
+        targets_world: place of each known point by name, (3,), metres; NaN is passed over.
+        near: pose to start from, (n_values,).
+
+    Raises:
+        TrackerError: fewer than four of the body's points are known.
+    """
+    known = {n: t for n, t in targets_world.items() if n in model.point_names and np.all(np.isfinite(t))}
+    if len(known) < 4:
+        raise TrackerError(
+            f"expected the places of at least 4 of the body's points, found {len(known)} "
+            f"({', '.join(sorted(known)) or 'none'}); known names are {', '.join(model.point_names)}"
+        )
+    indices = np.array([model.point_names.index(n) for n in known])
+    targets = np.stack(list(known.values()))
+    block = PointTargets(indices, targets, np.ones(len(indices)))
+    if near is not None:
+        starts = [near]
+    else:
+        base = model.neutral()
+        step = np.zeros(model.n_dofs)
+        step[:3] = targets.mean(axis=0) - model.points_world(base)[indices].mean(axis=0)
+        root_turn = np.flatnonzero(model.dof_joint == 0)[-1]  # about the body's long axis, in every preset
+        starts = []
+        for turn in np.arange(8) * np.pi / 4:
+            step[root_turn] = turn
+            starts.append(model.retract(base, step))
+    # A weak pull to the start decides what the points leave open, such as the twist of a straight arm.
+    rest = np.full(model.n_dofs, 1e-3)
+    fits = [solve(model, start, [block, StayNear(start, rest)], max_iterations=100) for start in starts]
+    return min(fits, key=lambda f: f.cost)
+
+
+def _stack(model: BodyModel, values: Array, blocks: Sequence[Block]) -> tuple[Array, Array]:
+    kinematics = model.kinematics(values)
+    parts = [b.linearize(model, values, kinematics) for b in blocks]
+    return np.concatenate([r for r, _ in parts]), np.concatenate([J for _, J in parts])
+
+
+def _pressed_against_limit(model: BodyModel, values: Array, gradient: Array) -> NDArray[np.bool_]:
+    """Degrees of freedom that stand at a limit which descent would cross."""
+    at = values[model.dof_value]
+    low, high = model.limits[:, 0], model.limits[:, 1]
+    return ((at <= low + 1e-9) & (gradient > 0)) | ((at >= high - 1e-9) & (gradient < 0))

@@ -1,0 +1,182 @@
+"""Best-first search over a decomposed pose space (GD96 Sect. 4.1, Eq. 4-7 and Fig. 2).
+
+The space of a stage is a lattice around the prediction in a few degrees of freedom, the others held. The cheapest
+node not yet expanded is expanded: its neighbours along each axis are scored. The search is a generator of steps, one
+per expansion, so that a person can watch it and a program can drain it; whoever stops it keeps the best pose so far.
+"""
+
+import heapq
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tracker.body import BodyModel, SearchGroup
+from tracker.chamfer import ChamferCost
+from tracker.rigid import Array
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """Bounds and steps of the lattice; the defaults are those of GD96 Sect. 5, but for the finer passes."""
+
+    bound_rad: float = float(np.radians(15))
+    """Largest change of an angle from the prediction, rad."""
+    bound_m: float = 0.10
+    """Largest change of a position from the prediction, metres."""
+    step_rad: float = float(np.radians(5))
+    """Spacing of the lattice along an angle, rad."""
+    step_m: float = 0.05
+    """Spacing of the lattice along a position, metres."""
+    bounds: dict[str, float] = field(default_factory=dict)
+    """Bounds of single degrees of freedom by name, rad or metres, where they differ."""
+    steps: dict[str, float] = field(default_factory=dict)
+    """Steps of single degrees of freedom by name, rad or metres, where they differ."""
+    passes: tuple[float, ...] = (1.0, 0.5, 0.25)
+    """Factors on the steps: all stages are searched once per factor, each time around the best pose so far.
+    The paper's single pass is `(1.0,)`."""
+    patience: int = 3
+    """A stage ends after this many expansions in a row that found nothing better (the paper gives no rule)."""
+    max_expansions: int = 60
+    """A stage ends after this many expansions in any case."""
+
+    def lattice(self, model: BodyModel, dofs: Sequence[int]) -> tuple[Array, Array]:
+        """Bounds and steps of some degrees of freedom, each (len(dofs),), rad or metres."""
+        names = [model.dof_names[d] for d in dofs]
+        lengths = model.dof_is_length[list(dofs)]
+        bounds = [
+            self.bounds.get(n, self.bound_m if is_m else self.bound_rad) for n, is_m in zip(names, lengths, strict=True)
+        ]
+        steps = [
+            self.steps.get(n, self.step_m if is_m else self.step_rad) for n, is_m in zip(names, lengths, strict=True)
+        ]
+        return np.array(bounds), np.array(steps)
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One leaf of the decomposition tree at one spacing."""
+
+    person: int
+    """Index of the person whose pose is searched."""
+    group: SearchGroup
+    """The degrees of freedom searched together."""
+    factor: float
+    """Factor on the steps of the lattice."""
+
+
+@dataclass(frozen=True, eq=False)
+class SearchStep:
+    """What one expansion did."""
+
+    stage: Stage
+    candidate: tuple[Array, ...]
+    """Pose of each person with the cheapest of the nodes just scored, (n_values,) each."""
+    candidate_px: float
+    """Its cost, px."""
+    best: tuple[Array, ...]
+    """Cheapest poses so far, (n_values,) each."""
+    best_px: float
+    """Their cost, px."""
+    best_views_px: Array
+    """Their cost in each view, (V,), px; NaN for views without edges."""
+    evaluations: int
+    """Poses scored since the search began."""
+    stage_done: bool
+    """Whether this was the last step of its stage."""
+
+
+def stages(models: Sequence[BodyModel], settings: SearchSettings, people: Sequence[int] | None = None) -> list[Stage]:
+    """List the leaves of the decomposition in the order of search: pass by pass, person by person (GD96 Fig. 2)."""
+    chosen = range(len(models)) if people is None else people
+    return [Stage(i, g, f) for f in settings.passes for i in chosen for g in models[i].search_groups]
+
+
+def search(
+    cost: ChamferCost,
+    poses: Sequence[Array],
+    settings: SearchSettings | None = None,
+    people: Sequence[int] | None = None,
+) -> Iterator[SearchStep]:
+    """Search the poses of all people one stage after the other.
+
+    While person i is searched, people before it stand at their found poses and those after at their predicted ones.
+
+    Args:
+        cost: what to minimize.
+        poses: the predicted pose of each person, (n_values,) each.
+        settings: bounds, steps and stopping rule.
+        people: whom to search; everybody by default. The others are held, and still hide and explain.
+
+    Yields:
+        One step per expansion; at least one per stage.
+    """
+    settings = settings or SearchSettings()
+    predicted = [np.array(p, dtype=np.float64) for p in poses]
+    best = list(predicted)
+    first = cost(best)
+    best_px, views_px, evaluations = first.total_px, first.views_px, 1
+    for stage in stages(cost.models, settings, people):
+        for step in _search_stage(cost, stage, settings, predicted[stage.person], best, best_px, views_px, evaluations):
+            yield step
+            best, best_px, views_px = list(step.best), step.best_px, step.best_views_px
+            evaluations = step.evaluations
+
+
+def _search_stage(
+    cost: ChamferCost,
+    stage: Stage,
+    settings: SearchSettings,
+    predicted: Array,
+    best: Sequence[Array],
+    best_px: float,
+    views_px: Array,
+    evaluations: int,
+) -> Iterator[SearchStep]:
+    """Best-first search of one stage around the best pose so far, within the bounds around the prediction."""
+    model, person = cost.models[stage.person], stage.person
+    dofs = [model.dof_names.index(d) for d in stage.group.dofs]
+    bounds, steps = settings.lattice(model, dofs)
+    steps = steps * stage.factor
+    center = best[person]
+    offset = model.difference(center, predicted)[dofs]
+    # Lattice coordinates that stay within the bounds around the prediction; the centre itself is always allowed.
+    low = np.minimum(0, np.ceil((-bounds - offset) / steps - 1e-9)).astype(int)
+    high = np.maximum(0, np.floor((bounds - offset) / steps + 1e-9)).astype(int)
+
+    def pose(node: tuple[int, ...]) -> Array:
+        change = np.zeros(model.n_dofs)
+        change[dofs] = np.array(node) * steps
+        return model.clip(model.retract(center, change))
+
+    origin = (0,) * len(dofs)
+    queue: list[tuple[float, tuple[int, ...]]] = [(best_px, origin)]
+    visited = {origin}
+    idle = expansions = 0
+    while True:
+        _, node = heapq.heappop(queue)
+        neighbours = []
+        for axis in range(len(dofs)):
+            for direction in (-1, 1):
+                moved = (*node[:axis], node[axis] + direction, *node[axis + 1 :])
+                if moved not in visited and low[axis] <= moved[axis] <= high[axis]:
+                    visited.add(moved)
+                    neighbours.append(moved)
+        expansions, idle = expansions + 1, idle + 1
+        candidate, candidate_px = best[person], best_px
+        if neighbours:
+            candidates = np.stack([pose(n) for n in neighbours])
+            totals, views = cost.of_person(person, candidates, best)
+            evaluations += len(neighbours)
+            for total, neighbour in zip(totals, neighbours, strict=True):
+                heapq.heappush(queue, (float(total), neighbour))
+            cheapest = int(np.argmin(totals))
+            candidate, candidate_px = candidates[cheapest], float(totals[cheapest])
+            if candidate_px < best_px:
+                best = [*best[:person], candidate, *best[person + 1 :]]
+                best_px, views_px, idle = candidate_px, views[cheapest], 0
+        done = not queue or idle >= settings.patience or expansions >= settings.max_expansions
+        shown = tuple(candidate if i == person else p for i, p in enumerate(best))
+        yield SearchStep(stage, shown, candidate_px, tuple(best), best_px, views_px, evaluations, done)
+        if done:
+            return
