@@ -1,0 +1,264 @@
+import random
+import struct
+import threading
+
+import av
+import cv2
+import numpy as np
+import pytest
+from clips import SIZE, N, encode, number, write_images
+
+from tracker.errors import RecordingError
+from tracker.footage import ImageFolder, VideoFile, open_footage
+
+
+def decode_all(path):
+    """What a decoder shows from start to end: the truth for every other order of access."""
+    with av.open(str(path)) as container:
+        return [f.to_ndarray(format="rgb24") for f in container.decode(video=0)]
+
+
+def assert_same_in_any_order(path, frames):
+    video = VideoFile(path, "cam")
+    assert video.n_frames == len(frames)
+    rng = random.Random(1)
+    forward = list(range(len(frames)))
+    for order in (forward, forward[::-1], rng.sample(forward, len(frames)), [0, 0, 5, 5, 3, len(frames) - 1, 1]):
+        for k in order:
+            np.testing.assert_array_equal(video.read(k), frames[k], err_msg=f"frame {k}")
+    video.close()
+
+
+OPEN_GOP = {"x264-params": "open-gop=1:keyint=10:min-keyint=10:bframes=3:b-adapt=0:scenecut=0"}
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("short.mp4", {}),
+        ("long.mp4", {"gop": 250}),
+        ("pyramid.mp4", {"options": {"x264-params": "bframes=5:b-adapt=0:b-pyramid=normal:scenecut=0"}}),
+        ("open.mp4", {"options": OPEN_GOP}),
+        ("open.mkv", {"options": OPEN_GOP}),
+        ("open.ts", {"options": OPEN_GOP}),
+        ("intra.mp4", {"gop": 1, "bframes": 0}),
+        ("a.mkv", {}),
+        ("a.avi", {"codec": "mpeg4", "bframes": 0}),
+        ("m.avi", {"codec": "mjpeg", "bframes": 0, "pix_fmt": "yuvj420p"}),
+        ("a.mpg", {"codec": "mpeg2video", "bframes": 2}),
+        ("a.webm", {"codec": "libvpx-vp9", "options": {"auto-alt-ref": "1", "lag-in-frames": "16"}}),
+        ("h265.mp4", {"codec": "libx265", "options": {"x265-params": "keyint=15:bframes=4:open-gop=1:log-level=none"}}),
+    ],
+)
+def test_every_order_of_access_is_bit_identical(tmp_path, name, settings):
+    path = encode(tmp_path / name, **settings)
+    frames = decode_all(path)
+    assert len(frames) == N
+    assert all(abs(number(f) - i) <= 1 for i, f in enumerate(frames))  # old codecs lose more than a gray level
+    assert_same_in_any_order(path, frames)
+
+
+def with_edit(path, skip, ticks_per_frame=512, duration_ms=None):
+    """Let the edit list of an MP4 begin `skip` frames later, in the middle of a group of pictures."""
+    data = bytearray(path.read_bytes())
+    at = data.find(b"elst") + 12
+    duration, media_time = struct.unpack(">Ii", data[at : at + 8])
+    data[at : at + 8] = struct.pack(">Ii", duration_ms or duration, media_time + skip * ticks_per_frame)
+    path.write_bytes(data)
+    return path
+
+
+@pytest.mark.parametrize("skip", [1, 7, 12, 17])
+def test_edit_lists(tmp_path, skip):
+    path = with_edit(encode(tmp_path / "a.mp4"), skip)
+    frames = decode_all(path)
+    assert [number(f) for f in frames] == list(range(skip, N))
+    assert_same_in_any_order(path, frames)
+
+
+def test_edit_list_that_cuts_the_end(tmp_path):
+    path = with_edit(encode(tmp_path / "a.mp4"), 5, duration_ms=1000)
+    frames = decode_all(path)
+    assert [number(f) for f in frames] == list(range(5, 35))
+    assert_same_in_any_order(path, frames)
+
+
+def test_video_that_starts_before_zero(tmp_path):
+    path = encode(tmp_path / "a.mp4", start=-5)
+    frames = decode_all(path)
+    assert [number(f) for f in frames] == list(range(5, N))
+    assert_same_in_any_order(path, frames)
+
+
+@pytest.mark.parametrize("rotation", [0, 90, 180, -90])
+def test_display_rotation_turns_as_opencv_does(tmp_path, rotation):
+    path = encode(tmp_path / "a.mp4", rotation=rotation)
+    video = VideoFile(path, "cam")
+    assert video.size == (SIZE if rotation % 180 == 0 else SIZE[::-1])
+    image = video.read(9)
+    assert image.shape[1::-1] == video.size
+    reader = cv2.VideoCapture(str(path))
+    for _ in range(10):
+        _, bgr = reader.read()
+    # The converters round differently: up to a few levels, where a wrong turn would differ by a hundred.
+    assert np.abs(bgr[..., ::-1].astype(int) - image).mean() < 3
+
+
+def test_facts_of_a_video(tmp_path):
+    video = VideoFile(encode(tmp_path / "a.mp4", rate=50), "cam")
+    assert (video.size, video.n_frames, video.fps, video.has_constant_rate) == (SIZE, N, 50.0, True)
+
+
+@pytest.mark.parametrize("rate", [30, 60, 240])
+def test_coarse_ticks_are_still_a_constant_rate(tmp_path, rate):
+    video = VideoFile(encode(tmp_path / "a.mkv", rate=rate), "cam")
+    assert video.has_constant_rate
+    assert video.fps == pytest.approx(rate, rel=1e-6)
+
+
+def test_variable_rate_is_noticed(tmp_path):
+    times = [i + (i > 20) for i in range(N)]  # one dropped frame
+    assert not VideoFile(encode(tmp_path / "a.mp4", times=times), "cam").has_constant_rate
+
+
+def test_many_threads_get_the_right_frames(tmp_path):
+    video = VideoFile(encode(tmp_path / "a.mp4"), "cam")
+    wrong = []
+
+    def work(seed):
+        for k in random.Random(seed).choices(range(N), k=40):
+            if number(video.read(k)) != k:
+                wrong.append(k)
+
+    threads = [threading.Thread(target=work, args=(s,)) for s in range(4)]
+    for t in threads:
+        t.start()
+    for t in threads:
+        t.join()
+    assert wrong == []
+
+
+@pytest.mark.parametrize("k", [-1, N])
+def test_out_of_range_names_the_range(tmp_path, k):
+    with pytest.raises(RecordingError, match=rf"from 0 to {N - 1}, found {k}"):
+        VideoFile(encode(tmp_path / "a.mp4"), "cam").read(k)
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("a.mp4", {}),
+        ("fast.mp4", {"container_options": {"movflags": "faststart"}}),
+        ("a.mkv", {}),
+        ("a.avi", {"codec": "mpeg4", "bframes": 0}),
+    ],
+)
+def test_truncated_video(tmp_path, name, settings):
+    path = encode(tmp_path / name, **settings)
+    path.write_bytes(path.read_bytes()[: int(path.stat().st_size * 0.6)])
+    with pytest.raises(RecordingError, match=r"camera 'cam'.*truncated"):
+        VideoFile(path, "cam")
+
+
+def test_damaged_frame_does_not_take_the_others_with_it(tmp_path):
+    path = encode(tmp_path / "a.mp4", gop=1, bframes=0)
+    frames = decode_all(path)
+    with av.open(str(path)) as container:
+        packet = next(p for i, p in enumerate(container.demux(video=0)) if i == 30)
+        position, size = packet.pos, packet.size
+    data = bytearray(path.read_bytes())
+    data[position : position + size] = bytes(size)
+    path.write_bytes(data)
+    video = VideoFile(path, "cam")
+    assert video.n_frames == N
+    for k in (30, 29, 30, 31, 59):
+        if k == 30:
+            assert video.read(k) is None
+        else:
+            np.testing.assert_array_equal(video.read(k), frames[k])
+
+
+def test_not_a_video(tmp_path):
+    (tmp_path / "a.mp4").write_text("hello")
+    with pytest.raises(RecordingError, match=r"camera 'cam'.*cannot be read"):
+        VideoFile(tmp_path / "a.mp4", "cam")
+
+
+def test_missing_video(tmp_path):
+    with pytest.raises(RecordingError, match=r"camera 'cam'.*not found"):
+        open_footage(tmp_path / "a.mp4", "cam")
+
+
+def test_sound_alone(tmp_path):
+    with av.open(str(tmp_path / "a.mp4"), "w") as container:
+        stream = container.add_stream("aac", rate=8000)
+        frame = av.AudioFrame.from_ndarray(np.zeros((1, 1024), np.float32), format="fltp", layout="mono")
+        frame.sample_rate = 8000
+        container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    with pytest.raises(RecordingError, match="without a video stream"):
+        VideoFile(tmp_path / "a.mp4", "cam")
+
+
+def test_no_time_stamps(tmp_path):
+    path = encode(tmp_path / "a.h264", n=1)
+    with pytest.raises(RecordingError, match="time stamps"):
+        VideoFile(path, "cam")
+
+
+def test_time_stamps_out_of_order(tmp_path):
+    # H.264 with B-frames, whose order AVI cannot keep.
+    path = encode(tmp_path / "a.avi", gop=250, options={"x264-params": "bframes=3:b-adapt=2:b-pyramid=none"})
+    with pytest.raises(RecordingError, match="AVI files with B-frames"):
+        VideoFile(path, "cam")
+
+
+@pytest.mark.parametrize("name", ["cam01", "cam02", "cam03", "cam04"])
+def test_real_footage(data_folder, name):
+    video = VideoFile(data_folder("balance_real") / f"{name}.mp4", name)
+    assert (video.n_frames, video.fps, video.has_constant_rate) == (100, 60.0, True)
+    first = {k: video.read(k) for k in (99, 40, 41, 3)}
+    for k in (3, 40, 99):
+        np.testing.assert_array_equal(video.read(k), first[k])
+
+
+@pytest.mark.parametrize("suffix", ["png", "bmp", "tif"])
+def test_images_in_natural_order(tmp_path, suffix):
+    folder = write_images(tmp_path / "f", [f"f{i}.{suffix}" for i in range(12)])
+    (folder / "notes.txt").write_text("not a frame")
+    images = open_footage(folder, "cam")
+    assert isinstance(images, ImageFolder)
+    assert (images.n_frames, images.size, images.fps) == (12, SIZE, None)
+    assert [number(images.read(k)) for k in (11, 0, 2, 10)] == [11, 0, 2, 10]
+    assert images.read(5)[0, 0].tolist() == [20, 20, 5]  # RGB
+
+
+def test_image_folder_out_of_range(tmp_path):
+    with pytest.raises(RecordingError, match="from 0 to 1, found 2"):
+        ImageFolder(write_images(tmp_path / "f", ["1.png", "2.png"]), "cam").read(2)
+
+
+def test_empty_image_folder(tmp_path):
+    with pytest.raises(RecordingError, match=r"camera 'cam'.*found none"):
+        ImageFolder(write_images(tmp_path / "f", []), "cam")
+
+
+def test_images_of_two_kinds(tmp_path):
+    with pytest.raises(RecordingError, match=r"found \.jpg and \.png"):
+        ImageFolder(write_images(tmp_path / "f", ["1.png", "2.jpg"]), "cam")
+
+
+def test_images_of_two_sizes(tmp_path):
+    folder = write_images(tmp_path / "f", ["1.png"])
+    cv2.imwrite(str(folder / "2.png"), np.zeros((10, 10, 3), np.uint8))
+    with pytest.raises(RecordingError, match=r"64x48.*10x10 in 2\.png"):
+        ImageFolder(folder, "cam").read(1)
+
+
+def test_damaged_image(tmp_path):
+    folder = write_images(tmp_path / "f", ["1.png"])
+    (folder / "2.png").write_bytes(b"")
+    assert ImageFolder(folder, "cam").read(1) is None
+    (folder / "1.png").write_bytes(b"not an image")
+    with pytest.raises(RecordingError, match=r"1\.png is damaged"):
+        ImageFolder(folder, "cam")

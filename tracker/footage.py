@@ -1,0 +1,356 @@
+"""The footage of one camera: a video file or a folder of images, with random access to frame k.
+
+Frame k is the k-th frame that decoding from the start would show. All video is decoded here and nowhere else: two
+decoders disagree on rotation, colour and frame numbers. Videos are turned as their display rotation says, and images as
+their EXIF orientation says, which is how OpenCV reads them and so how calibration tools see them.
+"""
+
+import re
+import threading
+from collections.abc import Generator, Iterable
+from itertools import chain
+from pathlib import Path
+from typing import NamedTuple
+
+import av
+import cv2
+import numpy as np
+from av.packet import Packet
+from av.video.frame import VideoFrame
+from numpy.typing import NDArray
+
+from tracker.errors import RecordingError
+
+Image = NDArray[np.uint8]
+
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+
+# Time stamps are compared with the decoder's over this many frames, enough for any order of B-frames to show.
+_CHECKED_FRAMES = 16
+# Intervals between frames that differ by more than this part of the usual one make the rate variable.
+_RATE_JITTER = 0.2
+
+
+class _Key(NamedTuple):
+    """A frame from which decoding can start."""
+
+    position: int
+    """Index of its packet in the file."""
+    pts: int
+    """Its presentation time stamp."""
+
+
+class _Index(NamedTuple):
+    """What the packets of a video say, without decoding them."""
+
+    pts: NDArray[np.int64]
+    """Presentation time stamps of the frames that are shown, ascending, (n_frames,)."""
+    position: dict[int, int]
+    """Index in the file of the packet with each presentation time stamp."""
+    keys: tuple[_Key, ...]
+    """In the order of the file."""
+
+
+class VideoFile:
+    """A video file, indexed when it is opened. Safe to use from several threads."""
+
+    path: Path
+    size: tuple[int, int]
+    """Width and height as displayed, px."""
+    n_frames: int
+    fps: float
+    """Mean frame rate, 1/s."""
+    has_constant_rate: bool
+    """Whether all frames follow each other at the same interval."""
+
+    def __init__(self, path: Path, camera: str) -> None:
+        """Open and index a video.
+
+        Args:
+            path: the file.
+            camera: name of its camera, for messages.
+
+        Raises:
+            RecordingError: the file is missing, unreadable, truncated, or has no usable time stamps.
+        """
+        self.path = path
+        self._where = f"camera '{camera}': video {path}"
+        self._lock = threading.Lock()
+        if not path.is_file():
+            raise RecordingError(f"{self._where} not found; check the path")
+        try:
+            self._open()
+            self._index = self._read_index()
+            self._open()
+            first = self._check_order()
+        except av.FFmpegError as error:
+            raise RecordingError(
+                f"{self._where} cannot be read: {error.strerror}; it may be truncated, or not a video"
+            ) from error
+        self.size = (first.width, first.height) if first.rotation % 180 == 0 else (first.height, first.width)
+        self.n_frames = len(self._index.pts)
+        self.fps, self.has_constant_rate = self._rate()
+
+    def read(self, k: int) -> Image | None:
+        """Decode frame k, (H, W, 3) RGB; None where the frame is damaged.
+
+        Raises:
+            RecordingError: k is out of range, or the file cannot be read any more.
+        """
+        if not 0 <= k < self.n_frames:
+            raise RecordingError(f"{self._where}: expected a frame from 0 to {self.n_frames - 1}, found {k}")
+        with self._lock:
+            try:
+                frame = self._decode_frame(k)
+            except av.FFmpegError as error:
+                raise RecordingError(
+                    f"{self._where} cannot be read any more: {error.strerror}; check the disk"
+                ) from error
+            return None if frame is None else _to_rgb(frame)
+
+    def close(self) -> None:
+        """Release the file; reading is over."""
+        with self._lock:
+            self._frames.close()
+            self._container.close()
+
+    def _open(self) -> None:
+        """Stand before the first frame."""
+        self._container = av.open(str(self.path))
+        if not self._container.streams.video:
+            raise RecordingError(f"{self._where}: expected a video, found a file without a video stream")
+        self._stream = self._container.streams.video[0]
+        self._stream.thread_type = "AUTO"
+        self._tick_s = float(self._stream.time_base or 0)
+        self._frames = self._decode(self._container.demux(self._stream))
+        self._next = 0
+
+    def _decode_frame(self, k: int) -> VideoFrame | None:
+        """Frame k, or None where it is damaged."""
+        if not self._reaches_soon(k):
+            self._seek(self._best_key(k))
+            frame = self._decode_until(k)
+            if frame is not None:
+                return frame
+            # Some containers (MPEG program streams) lose the first time stamps after a seek: take a longer run.
+            self._seek(max(0, self._best_key(k) - 2))
+        return self._decode_until(k)
+
+    def _decode_until(self, k: int) -> VideoFrame | None:
+        target = int(self._index.pts[k])
+        for frame in self._frames:
+            assert frame.pts is not None  # the index knows no frame without
+            self._next = int(np.searchsorted(self._index.pts, frame.pts, side="right"))
+            if frame.pts >= target:
+                return frame if frame.pts == target and not frame.is_corrupt else None
+        return None
+
+    def _decode(self, packets: Iterable[Packet]) -> Generator[VideoFrame, None, None]:
+        """Decode packets to frames in the order of display; damaged packets yield nothing."""
+        for packet in packets:
+            try:
+                yield from packet.decode()
+            except av.InvalidDataError:
+                continue
+
+    def _read_index(self) -> _Index:
+        """List the frames from the packets alone, which takes a hundredth of the time of decoding."""
+        every: list[int] = []
+        shown: list[int] = []
+        keys: list[_Key] = []
+        end, damaged = 0, False
+        for packet in self._container.demux(self._stream):
+            if not packet.size:
+                continue
+            if packet.pts is None:
+                raise RecordingError(
+                    f"{self._where} has frames without time stamps, so they cannot be found; convert it to MP4"
+                )
+            if packet.is_keyframe:
+                keys.append(_Key(len(every), packet.pts))
+            every.append(packet.pts)
+            # Frames cut off by an edit list are needed to decode others, but never shown.
+            if keys and not packet.is_discard and packet.pts >= keys[0].pts:
+                shown.append(packet.pts)
+            end = max(end, packet.pts + (packet.duration or 0))
+            damaged = damaged or packet.is_corrupt
+        pts = np.array(sorted(shown), dtype=np.int64)
+        if not len(pts):
+            raise RecordingError(f"{self._where} has no frames; record or convert it again")
+        if len(np.unique(pts)) != len(pts):
+            raise RecordingError(f"{self._where} has frames with the same time stamp; convert it to MP4")
+        if damaged or self._promises_more(end):
+            raise RecordingError(
+                f"{self._where} is truncated: its header promises more than the {len(pts)} frames that it holds; "
+                "copy or convert it again"
+            )
+        return _Index(pts, {p: i for i, p in enumerate(every)}, tuple(keys))
+
+    def _promises_more(self, end: int) -> bool:
+        """Whether the header speaks of frames that the file does not hold; `end` is where the last one ends, ticks."""
+        if "mp4" in self._container.format.name:
+            # The durations here are of no use, because an edit list may rightly skip frames.
+            entries = self._stream.index_entries
+            return any(e.pos + e.size > self._container.size for e in entries)
+        if self._container.duration is None or len(self._container.streams) > 1:
+            return False  # the file's duration may be that of its sound
+        missing_s = self._container.duration / av.time_base - end * self._tick_s
+        return missing_s > 1.5 / float(self._stream.average_rate or 1)
+
+    def _check_order(self) -> VideoFrame:
+        """Check that the decoder shows frames in the order of their time stamps; return the first."""
+        first = None
+        for expected in self._index.pts[:_CHECKED_FRAMES]:
+            frame = next(self._frames, None)
+            if frame is None or frame.pts != expected:
+                raise RecordingError(
+                    f"{self._where} has time stamps that do not follow the order of its frames, as AVI files with "
+                    "B-frames have; convert it to MP4"
+                )
+            first = first or frame
+            self._next += 1
+        assert first is not None
+        return first
+
+    def _rate(self) -> tuple[float, bool]:
+        intervals = np.diff(self._index.pts)
+        declared = float(self._stream.average_rate or 0)
+        if not len(intervals):
+            return declared or 1.0, True
+        mean = float(1 / (intervals.mean() * self._tick_s))
+        usual = np.median(intervals)
+        # Coarse ticks (a millisecond in Matroska) move single frames by up to one of them.
+        constant = bool(np.all(np.abs(intervals - usual) <= max(_RATE_JITTER * usual, 1)))
+        # The header's rate is exact where the mean over a short clip is rounded to ticks.
+        return (declared if constant and abs(declared / mean - 1) < 0.005 else mean), constant
+
+    def _best_key(self, k: int) -> int:
+        """Index of the last key frame from which frame k decodes whole.
+
+        A frame shown before a key frame but stored after it may need what came before the key frame.
+        """
+        pts, position = int(self._index.pts[k]), self._index.position[int(self._index.pts[k])]
+        fitting = [i for i, key in enumerate(self._index.keys) if key.position <= position and key.pts <= pts]
+        return fitting[-1]
+
+    def _reaches_soon(self, k: int) -> bool:
+        """Whether decoding on from here is the shortest way to frame k."""
+        if k < self._next:
+            return False
+        return self._next == k or self._index.keys[self._best_key(k)].pts <= self._index.pts[self._next]
+
+    def _seek(self, best: int) -> None:
+        """Stand at a key frame, given by its index, or before it."""
+        # Some containers land after the time asked for; then ask for an earlier key frame.
+        for key in reversed(self._index.keys[max(0, best - 2) : best + 1]):
+            try:
+                self._container.seek(key.pts, stream=self._stream)
+                packets = self._container.demux(self._stream)
+                first = next(packets)
+            except (av.FFmpegError, StopIteration):
+                continue
+            if first.pts is not None and self._index.position[first.pts] <= self._index.keys[best].position:
+                self._frames = self._decode(chain([first], packets))
+                return
+        self._container.close()
+        self._open()
+
+
+class ImageFolder:
+    """A folder of images of one kind, in the natural order of their names (2 before 10)."""
+
+    path: Path
+    size: tuple[int, int]
+    """Width and height, px."""
+    n_frames: int
+    fps: None = None
+    """Images do not say when they were taken."""
+    has_constant_rate: bool = True
+
+    def __init__(self, path: Path, camera: str) -> None:
+        """List the images and read the first.
+
+        Args:
+            path: the folder.
+            camera: name of its camera, for messages.
+
+        Raises:
+            RecordingError: no images, images of several kinds, or the first is unreadable.
+        """
+        self.path = path
+        self._where = f"camera '{camera}': image folder {path}"
+        images = [f for f in path.iterdir() if f.suffix.lower() in IMAGE_SUFFIXES and not f.name.startswith(".")]
+        kinds = sorted({f.suffix.lower() for f in images})
+        if len(kinds) != 1:
+            raise RecordingError(
+                f"{self._where}: expected images of one kind ({', '.join(IMAGE_SUFFIXES)}), "
+                f"found {' and '.join(kinds) or 'none'}; leave only the frames of this camera in it"
+            )
+        self._files = sorted(images, key=_natural)
+        self.n_frames = len(self._files)
+        height, width = read_image(self._files[0], self._where).shape[:2]
+        self.size = (width, height)
+
+    def read(self, k: int) -> Image | None:
+        """Decode frame k, (H, W, 3) RGB; None where the image is damaged.
+
+        Raises:
+            RecordingError: k is out of range, or the image is missing or of another size.
+        """
+        if not 0 <= k < self.n_frames:
+            raise RecordingError(f"{self._where}: expected a frame from 0 to {self.n_frames - 1}, found {k}")
+        image = _read_image_or_none(self._files[k], self._where)
+        if image is not None and image.shape[1::-1] != self.size:
+            raise RecordingError(
+                f"{self._where}: expected {self.size[0]}x{self.size[1]} pixels as in the first image, found "
+                f"{image.shape[1]}x{image.shape[0]} in {self._files[k].name}; give all images one size"
+            )
+        return image
+
+    def close(self) -> None:
+        """Do nothing: no file stays open."""
+
+
+Footage = VideoFile | ImageFolder
+
+
+def open_footage(path: Path, camera: str) -> Footage:
+    """Open a video file or a folder of images.
+
+    Raises:
+        RecordingError: it is missing, unreadable, truncated or empty.
+    """
+    return ImageFolder(path, camera) if path.is_dir() else VideoFile(path, camera)
+
+
+def read_image(path: Path, where: str) -> Image:
+    """Read an image as 8-bit RGB, (H, W, 3); `where` begins the message.
+
+    Raises:
+        RecordingError: the file is missing or not an image.
+    """
+    image = _read_image_or_none(path, where)
+    if image is None:
+        raise RecordingError(f"{where}: {path} is damaged or not an image; export it again")
+    return image
+
+
+def _read_image_or_none(path: Path, where: str) -> Image | None:
+    try:
+        # Not cv2.imread: it cannot open every path on every system, and prints.
+        data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
+    except OSError as error:
+        raise RecordingError(f"{where}: cannot read {path}: {error.strerror}; check the path") from error
+    image = cv2.imdecode(data, cv2.IMREAD_COLOR_RGB) if data.size else None
+    return None if image is None else np.asarray(image, dtype=np.uint8)
+
+
+def _natural(path: Path) -> list[tuple[int, int | str]]:
+    """Sorting key that takes runs of digits as numbers."""
+    return [(0, int(t)) if t.isdigit() else (1, t) for t in re.split(r"(\d+)", path.name) if t]
+
+
+def _to_rgb(frame: VideoFrame) -> Image:
+    image = frame.to_ndarray(format="rgb24")
+    # The display rotation is counter-clockwise, as rot90 turns.
+    return np.ascontiguousarray(np.rot90(image, frame.rotation // 90))

@@ -1,0 +1,165 @@
+"""Frame k of every camera of a session, by random access, and the side files of its cameras."""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from types import TracebackType
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.errors import RecordingError
+from tracker.footage import IMAGE_SUFFIXES, Image, open_footage, read_image
+from tracker.session import CameraSource
+
+DEFAULT_CACHE_BYTES = 256 * 2**20
+
+
+class Recording:
+    """The footage of all cameras, with a cache of frames bounded in bytes. Safe to use from several threads."""
+
+    n_frames: int
+    """Number of frames that all cameras have."""
+    fps: float | None
+    """Frame rate of the videos, 1/s; None where all cameras are folders of images."""
+
+    def __init__(self, cameras: Sequence[CameraSource], cache_bytes: int = DEFAULT_CACHE_BYTES) -> None:
+        """Open the footage of all cameras, which lists the frames of every video.
+
+        Args:
+            cameras: where each camera's footage lies, and what its offset is.
+            cache_bytes: how much memory decoded frames may keep; the frames in use come on top.
+
+        Raises:
+            RecordingError: footage is missing, unreadable, truncated or empty, or its size is not the camera's.
+        """
+        self._cameras = tuple(cameras)
+        self._pool = ThreadPoolExecutor(max(1, len(self._cameras)), thread_name_prefix="decode")
+        self._footage = list(self._pool.map(lambda c: open_footage(c.footage, c.camera.name), self._cameras))
+        for source, footage in zip(self._cameras, self._footage, strict=True):
+            check_size(source.camera.name, footage.path, footage.size, source.camera.size)
+        self.n_frames = min(f.n_frames - c.offset for c, f in zip(self._cameras, self._footage, strict=True))
+        self.fps = next((f.fps for f in self._footage if f.fps is not None), None)
+        self._cache: OrderedDict[tuple[int, int], Image] = OrderedDict()
+        self._cache_bytes, self._cached_bytes = cache_bytes, 0
+        self._cache_lock = threading.Lock()
+
+    def read(self, k: int) -> tuple[Image | None, ...]:
+        """Frame k of each camera as filmed, (H, W, 3) RGB, not writable; None where it is damaged.
+
+        Raises:
+            RecordingError: k is out of range, or a file cannot be read any more.
+        """
+        if not 0 <= k < self.n_frames:
+            raise RecordingError(f"expected a frame from 0 to {self.n_frames - 1}, found {k}")
+        return tuple(self._pool.map(lambda i: self._read_one(i, k), range(len(self._cameras))))
+
+    def cached(self, k: int) -> bool:
+        """Whether frame k of every camera is at hand without decoding."""
+        with self._cache_lock:
+            return all((i, k) in self._cache for i in range(len(self._cameras)))
+
+    def close(self) -> None:
+        """Release all files; reading is over."""
+        self._pool.shutdown()
+        for footage in self._footage:
+            footage.close()
+
+    def __enter__(self) -> "Recording":
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        self.close()
+
+    def _read_one(self, camera: int, k: int) -> Image | None:
+        with self._cache_lock:
+            image = self._cache.get((camera, k))
+            if image is not None:
+                self._cache.move_to_end((camera, k))
+                return image
+        image = self._footage[camera].read(k + self._cameras[camera].offset)
+        if image is not None:
+            image.setflags(write=False)  # all readers share it
+            self._keep((camera, k), image)
+        return image
+
+    def _keep(self, key: tuple[int, int], image: Image) -> None:
+        with self._cache_lock:
+            if key in self._cache:  # another thread was faster
+                return
+            self._cache[key] = image
+            self._cached_bytes += image.nbytes
+            while self._cached_bytes > self._cache_bytes:
+                _, oldest = self._cache.popitem(last=False)
+                self._cached_bytes -= oldest.nbytes
+
+
+def check_size(camera: str, path: Path, found: tuple[int, int], calibrated: tuple[int, int]) -> None:
+    """Check that a picture has the size that its camera was calibrated for; sizes are width, height, px.
+
+    Raises:
+        RecordingError: it has not.
+    """
+    if found != calibrated:
+        turned = "; the picture may be rotated" if found == calibrated[::-1] else ""
+        raise RecordingError(
+            f"camera '{camera}': expected {calibrated[0]}x{calibrated[1]} pixels as in the calibration, found "
+            f"{found[0]}x{found[1]} in {path}{turned}; calibrate at the size of the footage or convert the footage"
+        )
+
+
+def read_background(source: CameraSource) -> Image | None:
+    """The empty scene as filmed, (H, W, 3) RGB: an image, or the mean of a video; None where there is none.
+
+    Raises:
+        RecordingError: the file is missing, unreadable or of another size than the camera.
+    """
+    if source.background is None:
+        return None
+    name, path = source.camera.name, source.background
+    if path.suffix.lower() in IMAGE_SUFFIXES:
+        image = read_image(path, f"camera '{name}': background")
+    else:
+        image = _mean_frame(path, name)
+    check_size(name, path, image.shape[1::-1], source.camera.size)
+    return image
+
+
+def _mean_frame(path: Path, camera: str) -> Image:
+    footage = open_footage(path, camera)
+    total, count = np.zeros((footage.size[1], footage.size[0], 3)), 0
+    for k in range(footage.n_frames):
+        image = footage.read(k)
+        if image is not None:
+            total += image
+            count += 1
+    footage.close()
+    if not count:
+        raise RecordingError(f"camera '{camera}': no frame of the background {path} can be decoded; record it again")
+    return np.round(total / count).astype(np.uint8)
+
+
+def read_mask(source: CameraSource, k: int) -> NDArray[np.uint8] | None:
+    """The mask of frame k as filmed, (H, W): 0 background, 255 anyone, 1..K person K; None where there is none.
+
+    Raises:
+        RecordingError: the file is not a gray 8-bit image, or of another size than the camera.
+    """
+    if source.masks is None:
+        return None
+    path = source.masks / f"{k + source.offset:06d}.png"
+    if not path.is_file():
+        return None
+    data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
+    mask = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    if mask is None or mask.ndim != 2 or mask.dtype != np.uint8:
+        found = "no image" if mask is None else f"{mask.dtype} with {mask.shape[2] if mask.ndim > 2 else 1} channels"
+        raise RecordingError(
+            f"camera '{source.camera.name}': expected a gray 8-bit image as mask, found {found} in {path}; "
+            "export masks as single-channel PNG"
+        )
+    check_size(source.camera.name, path, mask.shape[1::-1], source.camera.size)
+    return np.asarray(mask, dtype=np.uint8)

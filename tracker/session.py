@@ -1,0 +1,316 @@
+"""What a session is: calibrated cameras with their footage, people with their body models, in one folder.
+
+    my_session/
+      session.toml         version, name, fps, n_frames, up, per camera its footage, the people
+      calibration.toml     anipose / Pose2Sim layout, metres
+      models/NAME.toml     a person's body model
+      annotations.sqlite   poses (see `tracker.annotations`)
+
+Footage may stay where it is. Paths in session.toml are relative to the session folder for what lies in it or
+beside it, so that the two can move together, and absolute for the rest.
+"""
+
+import os
+import re
+import secrets
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from tracker.body import BodyModel
+from tracker.cameras import Camera
+from tracker.errors import SessionError
+from tracker.files import read_toml, write_text_whole
+from tracker.footage import open_footage
+from tracker.formats.anipose import read_calibration, write_calibration
+from tracker.formats.model_toml import format_model, load_model
+
+VERSION = 1
+SESSION_FILE = "session.toml"
+CALIBRATION_FILE = "calibration.toml"
+ANNOTATIONS_FILE = "annotations.sqlite"
+UPS = ("x", "-x", "y", "-y", "z", "-z")
+PALETTE = ("#f2a33a", "#4cc3d9", "#c678dd", "#98c379", "#e06c75", "#61afef", "#d19a66", "#56b6c2")
+
+_NAME = re.compile(r"\w[\w .-]*")
+_KEYS = {"version", "name", "fps", "n_frames", "up", "calibration", "cameras", "people"}
+_CAMERA_KEYS = {"name", "footage", "background", "masks", "offset"}
+_PERSON_KEYS = {"name", "model", "color"}
+
+
+@dataclass(frozen=True, eq=False)
+class CameraSource:
+    """A camera and what it saw."""
+
+    camera: Camera
+    footage: Path
+    """Video file, or folder of images; absolute."""
+    background: Path | None = None
+    """Image, video, or folder of images of the empty scene in original pixels; absolute."""
+    masks: Path | None = None
+    """Folder of %06d.png by video frame: 0 background, 255 anyone, 1..K person K; original pixels; absolute."""
+    offset: int = 0
+    """Frame k of the session is frame k + offset of the footage; not negative."""
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """A person to be tracked."""
+
+    name: str
+    model: BodyModel
+    color: str
+    """Colour in which the person is drawn, `#rrggbb`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """A recording, its cameras and its people."""
+
+    folder: Path
+    """The session's folder; absolute."""
+    name: str
+    """Title for people to read."""
+    fps: float
+    """Frame rate of all cameras, 1/s."""
+    n_frames: int
+    """Number of frames that all cameras have."""
+    cameras: tuple[CameraSource, ...]
+    people: tuple[Person, ...]
+    up: str = "z"
+    """World axis that points up: x, y or z, with a minus sign where it points down."""
+
+    @property
+    def annotations_path(self) -> Path:
+        """Where the session's poses are stored."""
+        return self.folder / ANNOTATIONS_FILE
+
+
+def create_session(
+    folder: str | Path,
+    *,
+    cameras: Sequence[CameraSource],
+    people: Sequence[Person],
+    fps: float,
+    n_frames: int | None = None,
+    name: str | None = None,
+    up: str = "z",
+) -> Session:
+    """Write a new session folder; it appears complete or not at all.
+
+    Args:
+        folder: where; must not exist, or be empty.
+        cameras: at least one.
+        people: at least one.
+        fps: frame rate of all cameras, 1/s.
+        n_frames: number of frames; by default as many as all cameras have.
+        name: title; by default the folder's name.
+        up: world axis that points up.
+
+    Raises:
+        SessionError: the folder is in use or cannot be written, or a name or axis is not allowed.
+        RecordingError: footage is missing or unreadable (only where `n_frames` is left out).
+    """
+    folder = _tidy(Path(folder))
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise SessionError(f"{folder} exists already and is not an empty folder; choose another name or remove it")
+    sources = tuple(_absolute(c) for c in cameras)
+    if n_frames is None:
+        n_frames = min((open_footage(c.footage, c.camera.name).n_frames - c.offset for c in sources), default=0)
+    session = Session(folder, name or folder.name, float(fps), n_frames, sources, tuple(people), up)
+    _check(session)
+    temporary = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        temporary.mkdir(parents=True)
+        _write(session, temporary)
+        if folder.exists():
+            folder.rmdir()
+        temporary.rename(folder)
+    except OSError as error:
+        raise SessionError(f"cannot write the session {folder}: {error}; choose a folder you may write to") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return session
+
+
+def save_session(session: Session) -> None:
+    """Write a session's files into its folder, which is made if need be; session.toml comes last.
+
+    Raises:
+        SessionError: a name or axis is not allowed, or the folder cannot be written.
+    """
+    _check(session)
+    try:
+        session.folder.mkdir(parents=True, exist_ok=True)
+        _write(replace(session, cameras=tuple(_absolute(c) for c in session.cameras)), session.folder)
+    except OSError as error:
+        raise SessionError(
+            f"cannot write the session {session.folder}: {error}; choose a folder you may write to"
+        ) from error
+
+
+def load_session(folder: str | Path) -> Session:
+    """Read a session folder. Footage is not looked at: `Recording` does that.
+
+    Raises:
+        SessionError: no session there, newer than this program, or malformed.
+        CalibrationError: the calibration is missing or malformed.
+        ModelError: a body model is missing or malformed.
+    """
+    folder = _tidy(Path(folder))
+    path = folder / SESSION_FILE
+    if not path.is_file():
+        raise SessionError(f"{folder} is not a session: expected {SESSION_FILE} in it; make one with 'quadrille new'")
+    data = read_toml(path, "session", SessionError)
+    if not isinstance(data.get("version"), int):
+        raise SessionError(f"session {path}: expected a whole number as 'version', found {data.get('version')!r}")
+    if data["version"] > VERSION:
+        raise SessionError(
+            f"session {path} has version {data['version']}, this program reads up to {VERSION}; upgrade quadrille"
+        )
+    _check_keys(data, _KEYS, str(path))
+    try:
+        session = Session(
+            folder,
+            str(data["name"]),
+            float(data["fps"]),
+            int(data["n_frames"]),
+            _load_cameras(data, folder),
+            tuple(_load_person(p, folder) for p in data["people"]),
+            str(data["up"]),
+        )
+    except KeyError as error:
+        raise SessionError(f"session {path}: the key {error} is missing; add it or make the session anew") from error
+    except (TypeError, ValueError, AttributeError) as error:
+        raise SessionError(f"session {path} is malformed: {error}; correct it or make the session anew") from error
+    _check(session)
+    return session
+
+
+def _load_cameras(data: dict[str, Any], folder: Path) -> tuple[CameraSource, ...]:
+    """Join the calibration and the footage of each camera, in the order of session.toml."""
+    where = str(folder / SESSION_FILE)
+    calibrated = {c.name: c for c in read_calibration(folder / data["calibration"])}
+    for row in data["cameras"]:
+        _check_keys(row, _CAMERA_KEYS, where)
+    names = [row["name"] for row in data["cameras"]]
+    if sorted(names) != sorted(calibrated):
+        odd = sorted(set(names) ^ set(calibrated)) or names
+        raise SessionError(
+            f"session {where}: expected each calibrated camera once under [[cameras]], but see: {', '.join(odd)}"
+        )
+    return tuple(
+        CameraSource(
+            calibrated[row["name"]],
+            _resolve(row["footage"], folder),
+            _resolve(row["background"], folder) if "background" in row else None,
+            _resolve(row["masks"], folder) if "masks" in row else None,
+            int(row.get("offset", 0)),
+        )
+        for row in data["cameras"]
+    )
+
+
+def _load_person(row: dict[str, Any], folder: Path) -> Person:
+    _check_keys(row, _PERSON_KEYS, str(folder / SESSION_FILE))
+    return Person(str(row["name"]), load_model(_resolve(row["model"], folder)), str(row["color"]))
+
+
+def _write(session: Session, into: Path) -> None:
+    """Write the files of a session into a folder that will be, or is, `session.folder`."""
+    (into / "models").mkdir(exist_ok=True)
+    write_calibration(into / CALIBRATION_FILE, [c.camera for c in session.cameras])
+    for person in session.people:
+        write_text_whole(into / "models" / f"{person.name}.toml", format_model(person.model))
+    cameras = []
+    for c in session.cameras:
+        row: dict[str, Any] = {"name": c.camera.name, "footage": _relative(c.footage, session.folder)}
+        if c.background is not None:
+            row["background"] = _relative(c.background, session.folder)
+        if c.masks is not None:
+            row["masks"] = _relative(c.masks, session.folder)
+        cameras.append(row | {"offset": c.offset})
+    data = {
+        "version": VERSION,
+        "name": session.name,
+        "fps": session.fps,
+        "n_frames": session.n_frames,
+        "up": session.up,
+        "calibration": CALIBRATION_FILE,
+        "cameras": cameras,
+        "people": [{"name": p.name, "model": f"models/{p.name}.toml", "color": p.color} for p in session.people],
+    }
+    write_text_whole(into / SESSION_FILE, tomli_w.dumps(data))
+
+
+def _check(session: Session) -> None:
+    where = f"session {session.folder}"
+    cameras, people = [c.camera.name for c in session.cameras], [p.name for p in session.people]
+    for what, names in (("camera", cameras), ("person", people)):
+        if not names:
+            raise SessionError(f"{where}: expected at least one {what}, found none")
+        twice = sorted({n for n in names if names.count(n) > 1})
+        if twice:
+            raise SessionError(f"{where}: more than one {what} is named '{twice[0]}'; give each its own name")
+    for name in people:
+        # The name becomes a file's name, so it must not lead out of the folder.
+        if not _NAME.fullmatch(name):
+            raise SessionError(
+                f"{where}: a person cannot be named '{name}'; use letters, digits, spaces, dots, '-' and '_'"
+            )
+    if session.up not in UPS:
+        raise SessionError(
+            f"{where}: expected one of {', '.join(UPS)} as the axis that points up, found '{session.up}'"
+        )
+    if not (session.fps > 0 and session.n_frames > 0):
+        raise SessionError(
+            f"{where}: expected a frame rate and a number of frames above 0, "
+            f"found {session.fps:g} and {session.n_frames}; check the footage and the offsets"
+        )
+    for c in session.cameras:
+        if c.offset < 0:
+            raise SessionError(
+                f"{where}: camera '{c.camera.name}' has the offset {c.offset}, expected 0 or more; "
+                f"give each of the others an offset of {-c.offset} instead"
+            )
+
+
+def _check_keys(data: dict[str, Any], known: set[str], where: str) -> None:
+    unknown = sorted(set(data) - known)
+    if unknown:
+        raise SessionError(
+            f"session {where}: unknown key '{unknown[0]}'; version {VERSION} knows {', '.join(sorted(known))}"
+        )
+
+
+def _absolute(source: CameraSource) -> CameraSource:
+    """Pin relative paths to the working folder of now: the session outlives it."""
+    return replace(
+        source,
+        footage=_tidy(source.footage),
+        background=_tidy(source.background) if source.background is not None else None,
+        masks=_tidy(source.masks) if source.masks is not None else None,
+    )
+
+
+def _tidy(path: Path) -> Path:
+    """Make a path absolute and free of `..`, but keep links: a link to footage elsewhere must stay one."""
+    return Path(os.path.abspath(path))
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """Write a path relative to the session folder where it lies in it or in its parent, else absolute."""
+    if path.is_relative_to(folder):
+        return path.relative_to(folder).as_posix()
+    # The file system's top holds everything: what lies only there does not move with the session.
+    if folder.parent != Path(folder.anchor) and path.is_relative_to(folder.parent):
+        return (Path("..") / path.relative_to(folder.parent)).as_posix()
+    return path.as_posix()
+
+
+def _resolve(text: str, folder: Path) -> Path:
+    return _tidy(folder / text)
