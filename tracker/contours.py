@@ -109,7 +109,7 @@ def trace(bodies: Sequence[Body], camera: Camera, piece_px: float = PIECE_PX) ->
     surfaces = surfaces_of(tuple(b.model for b in bodies))
     out = contour_buffer(camera, len(bodies), piece_px)
     n = trace_view(projection(camera), camera.center_world, part_poses(bodies), surfaces, piece_px, out)
-    return Contour(*(a[:n] for a in out))
+    return Contour(out.pieces_px[:n], out.parts[:n], out.hidden[:n], out.points_world[:n])
 
 
 def contour_buffer(camera: Camera, n_bodies: int, piece_px: float = PIECE_PX) -> Contour:
@@ -126,82 +126,10 @@ def projection(camera: Camera) -> Array:
     return camera.K @ camera.T_camera_world[:3]
 
 
-def part_edges(bodies: Sequence[Body], camera: Camera) -> FloatArray:
-    """Where surfaces of parts intersect: drawn for the eye, never matched (GD96 Sect. 5).
-
-    The surface of each part is cut by the implicit function of every other part near it; pieces that some part
-    hides are left out.
-
-    Returns:
-        End points x0, y0, x1, y1 in undistorted px, (N, 4).
-    """
-    surfaces = surfaces_of(tuple(b.model for b in bodies))
-    Ts = part_poses(bodies)
-    shapes = [s for b in bodies for s in b.model.shapes]
-    P = projection(camera)
-    out = []
-    for a in range(len(shapes)):
-        grid = surfaces.points[a].astype(np.float64) @ Ts[a, :3, :3].T + Ts[a, :3, 3]
-        facing = np.sum((surfaces.normals[a] @ Ts[a, :3, :3].T) * (grid - camera.center_world), axis=-1) < 0
-        for b in range(a):  # each pair once: the curve lies on both surfaces
-            reach = surfaces.shapes[a, 7] + surfaces.shapes[b, 7]
-            apart = Ts[a, :3] @ (*surfaces.centers[a], 1.0) - Ts[b, :3] @ (*surfaces.centers[b], 1.0)
-            if np.linalg.norm(apart) > reach:
-                continue
-            local = (grid - Ts[b, :3, 3]) @ Ts[b, :3, :3] - surfaces.centers[b]
-            depth = shapes[b].inside_outside(local) ** (shapes[b].exponents[0] / 2) - 1.0
-            curve = _zero_segments(depth, grid, facing)
-            if len(curve):
-                out.append(curve)
-    if not out:
-        return np.empty((0, 4), np.float32)
-    curves = np.concatenate(out)  # (n, 2, 3)
-    homogeneous = np.concatenate([curves, np.ones((*curves.shape[:2], 1))], axis=-1) @ P.T
-    ahead = np.all(homogeneous[..., 2] > 0.05, axis=1)
-    seen = ahead & ~_hidden_points(curves.mean(axis=1), camera.center_world, Ts, shapes, surfaces)
-    px = homogeneous[seen, :, :2] / homogeneous[seen, :, 2:]
-    return px.reshape(-1, 4).astype(np.float32)
-
-
-def _zero_segments(values: Array, points: Array, keep: NDArray[np.bool_]) -> Array:
-    """Zero line of a function on a grid of closed rings as segments (n, 2, 3), on cells with a kept corner."""
-    segments = []
-    n_rings, n_sectors = values.shape
-    for r in range(n_rings - 1):
-        for s in range(n_sectors):
-            corners = [(r, s), (r, (s + 1) % n_sectors), (r + 1, (s + 1) % n_sectors), (r + 1, s)]
-            v = [values[c] for c in corners]
-            if min(v) > 0 or max(v) <= 0 or not any(keep[c] for c in corners):
-                continue
-            ends = []
-            for i in range(4):
-                v0, v1 = v[i], v[(i + 1) % 4]
-                if (v0 > 0) != (v1 > 0):
-                    t = v0 / (v0 - v1)
-                    ends.append((1 - t) * points[corners[i]] + t * points[corners[(i + 1) % 4]])
-            if len(ends) == 2:
-                segments.append(ends)
-    return np.array(segments).reshape(-1, 2, 3)
-
-
-def _hidden_points(points: Array, center: Array, Ts: Array, shapes: Sequence, surfaces: Surfaces) -> NDArray[np.bool_]:
-    """Whether more than 1 cm of some part lies before each point as seen from the camera, (n,)."""
-    hidden = np.zeros(len(points), dtype=bool)
-    directions = points - center
-    lengths = np.linalg.norm(directions, axis=-1, keepdims=True)
-    steps = np.linspace(0.0, 0.6, 40)[1:]  # a body part is thinner than 60 cm along most lines of sight
-    for b, shape in enumerate(shapes):
-        for back in steps:
-            p = points - directions / lengths * (0.01 + back)
-            local = (p - Ts[b, :3, 3]) @ Ts[b, :3, :3] - surfaces.centers[b]
-            hidden |= shape.inside_outside(local) < 1.0
-    return hidden
-
-
-class _Blockers(NamedTuple):
+class Blockers(NamedTuple):
     """The parts that may hide one part in one view; room for all."""
 
-    index: NDArray[np.int64]
+    parts: NDArray[np.int64]
     """Index of each blocking part, (P,)."""
     transform: Array
     """From the hidden part's frame to the frame of the blocker's shape, (P, 3, 4), metres."""
@@ -225,8 +153,8 @@ def _inside_outside(x: float, y: float, z: float, shape: Array) -> float:
 
 
 @njit(nogil=True, cache=True)
-def _hide(
-    first: int, last: int, blockers: _Blockers, k: int, shapes: Array, points: FloatArray, hidden: NDArray[np.bool_]
+def hide(
+    first: int, last: int, blockers: Blockers, k: int, shapes: Array, points: FloatArray, hidden: NDArray[np.bool_]
 ) -> None:
     """Mark the pieces that the k-th blocker hides; their middles are in the frame of the part they belong to.
 
@@ -234,7 +162,7 @@ def _hide(
     cut with the enclosing elliptic cylinder, in closed form, then the implicit function is evaluated at four points
     of what they share: exact but for lines that graze the surface.
     """
-    shape, Q = shapes[blockers.index[k]], blockers.transform[k]
+    shape, Q = shapes[blockers.parts[k]], blockers.transform[k]
     q00, q01, q02, q03 = Q[0, 0], Q[0, 1], Q[0, 2], Q[0, 3]
     q10, q11, q12, q13 = Q[1, 0], Q[1, 1], Q[1, 2], Q[1, 3]
     q20, q21, q22, q23 = Q[2, 0], Q[2, 1], Q[2, 2], Q[2, 3]
@@ -274,7 +202,7 @@ def _hide(
 
 
 @njit(nogil=True, cache=True)
-def _find_blockers(a: int, eye: Array, Ts: Array, surfaces: Surfaces, out: _Blockers) -> int:
+def _find_blockers(a: int, eye: Array, Ts: Array, surfaces: Surfaces, out: Blockers) -> int:
     """List the parts whose cone of sight meets that of part a and that are not all behind it; their count."""
     centers, shapes = surfaces.centers, surfaces.shapes
     ca, cb = np.empty(3), np.empty(3)
@@ -306,7 +234,7 @@ def _find_blockers(a: int, eye: Array, Ts: Array, surfaces: Surfaces, out: _Bloc
                 transform[i, 3] += Ts[b, k, i] * (Ts[a, k, 3] - Ts[b, k, 3])
                 eye_b[i] += Ts[b, k, i] * (eye[k] - Ts[b, k, 3])
         out.reach[count] = 1.0 + JOINT_MARGIN_M / da if surfaces.adjoining[a, b] else 1.0
-        out.index[count] = b
+        out.parts[count] = b
         count += 1
     return count
 
@@ -327,7 +255,7 @@ def _cap_line(f: FloatArray, g: FloatArray, segment: FloatArray) -> bool:
 
 
 @njit(nogil=True, cache=True)
-def _zero_line(f: FloatArray, g: FloatArray, segments: FloatArray) -> int:
+def zero_line(f: FloatArray, g: FloatArray, segments: FloatArray) -> int:
     """Zero line of f over the surface grid g as segments (n, 2, 3), by marching squares; their number."""
     n_rings, n_sectors = f.shape
     n = 0
@@ -361,7 +289,7 @@ def _zero_line(f: FloatArray, g: FloatArray, segments: FloatArray) -> int:
 
 
 @njit(nogil=True, cache=True)
-def _cut(segments: FloatArray, n_segments: int, M: Array, piece_px: float, n: int, out: Contour) -> int:
+def cut(segments: FloatArray, n_segments: int, M: Array, piece_px: float, n: int, out: Contour) -> int:
     """Project segments (n, 2, 3) by M, cut them into pieces and append those; returns the new count of pieces.
 
     The middles of the pieces are left in the frame of the segments.
@@ -405,7 +333,7 @@ def trace_view(P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: fl
     shapes, points = surfaces.shapes, out.points_world
     f = np.empty((n_rings, n_sectors), np.float32)
     segments = np.empty((6 * (n_rings + n_sectors), 2, 3), np.float32)
-    blockers = _Blockers(
+    blockers = Blockers(
         np.empty(n_parts, np.int64), np.empty((n_parts, 3, 4)), np.empty((n_parts, 3)), np.empty(n_parts)
     )
     M, e = np.empty((3, 4)), np.empty(3, np.float32)
@@ -425,11 +353,11 @@ def trace_view(P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: fl
             for s in range(n_sectors):
                 f[r, s] = offsets[r, s] - (normals[r, s, 0] * e[0] + normals[r, s, 1] * e[1] + normals[r, s, 2] * e[2])
         first = n
-        n = _cut(segments, _zero_line(f, surfaces.points[part], segments), M, piece_px, n, out)
+        n = cut(segments, zero_line(f, surfaces.points[part], segments), M, piece_px, n, out)
         out.parts[first:n] = part
         out.hidden[first:n] = False
         for k in range(_find_blockers(part, eye, Ts, surfaces, blockers)):
-            _hide(first, n, blockers, k, shapes, points, out.hidden)
+            hide(first, n, blockers, k, shapes, points, out.hidden)
         for i in range(first, n):
             x, y, z = points[i, 0], points[i, 1], points[i, 2]
             for row in range(3):

@@ -1,0 +1,100 @@
+"""What the screen shows, as one frozen value. Only the controller makes a new one; the views read it."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from tracker.rigid import Array
+from tracker.search import SearchSettings
+
+Base = Literal["image", "edges", "distance"]
+BASES: tuple[Base, ...] = ("image", "edges", "distance")
+OVERLAYS = ("contours", "joints", "part_edges", "skeleton")
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """One person on the frame that is shown."""
+
+    values: Array
+    """Pose, (n_values,)."""
+    source: str | None
+    """Who set it; None for a draft that is not stored: the pose of the nearest frame that has one."""
+
+
+@dataclass(frozen=True)
+class JobState:
+    """The search that runs or stands on the shown frame."""
+
+    running: bool = False
+    kind: str | None = None
+    """`search`, or None where none stands."""
+    stage: str | None = None
+    """Name of the stage at work."""
+    stages: tuple[str, ...] = ()
+    """Names of all stages, in order."""
+    evaluations: int = 0
+    """Poses scored since the search began."""
+    per_second: float = 0.0
+    """Poses scored per second of work."""
+    best_px: float | None = None
+    """Cost of the best pose so far, px."""
+    candidate: tuple[Array, ...] | None = field(default=None, compare=False)
+    """Pose of each person under test."""
+    message: str = ""
+    """How the last one ended."""
+
+
+@dataclass(frozen=True)
+class DragState:
+    """A hand on a point."""
+
+    camera: int
+    person: int
+    point: str
+    pointer_px: tuple[float, float]
+    """Undistorted px."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Everything the views need, and nothing they could derive."""
+
+    frame: int
+    people: tuple[Shown, ...]
+    person: int = 0
+    """Index of the person worked on."""
+    point: str | None = None
+    """The point last touched."""
+    base: Base = "image"
+    overlays: frozenset[str] = frozenset(("contours", "joints"))
+    cost_px: float | None = None
+    """Mean over the views, px; None while the frame's evidence is not there yet."""
+    view_costs_px: tuple[float | None, ...] = ()
+    """Cost of each view, px; None for a view without edges."""
+    job: JobState = JobState()
+    drag: DragState | None = None
+    drag_seqs: tuple[tuple[int, int], ...] = ()
+    """For each page that drags: its number, and the last of its drag messages that this state takes in."""
+    settings: SearchSettings = SearchSettings()
+    theta_px: float | None = None
+    """Outlier distance, px; None for the default."""
+    outliers: Literal["truncated", "paper"] = "truncated"
+    undo: str | None = None
+    """What undo would take back."""
+    redo: str | None = None
+    save_error: str | None = None
+    """Why the last edit is not on disk; None where all is saved."""
+    timeline_version: int = 0
+    """Rises whenever the stored poses change."""
+
+    @property
+    def poses(self) -> tuple[Array, ...]:
+        """Pose of each person, (n_values,) each."""
+        return tuple(p.values for p in self.people)
+
+
+def finite_or_none(value: float) -> float | None:
+    """None where a number is NaN or infinite, as JSON wants it."""
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,123 @@
+"""Posing a body by hand: a point of it follows a place in an image, the rest of the chain gives way."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.body import BodyModel
+from tracker.cameras import Camera
+from tracker.fit import PointTargets, StayNear, fit_to_points, solve
+from tracker.rigid import Array
+
+_REST_WEIGHT = 0.01
+"""Pull of the rest of the chain to its pose at the grab, per rad, against 1 per metre for the dragged point: it
+decides what the pointer leaves open and holds the point back by some 0.1 mm."""
+
+UP_ROTATIONS = {
+    "z": np.eye(3),
+    "-z": np.diag([1.0, -1.0, -1.0]),
+    "y": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
+    "-y": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+    "x": np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]]),
+    "-x": np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]]),
+}
+"""Rotations that turn the body's z axis to the world axis that points up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grab:
+    """A hand on a point of a body in one view, from press to release."""
+
+    model: BodyModel
+    camera: Camera
+    """The view in which it is dragged; positions are in its undistorted pixels."""
+    point: int
+    """Index of the point into `BodyModel.point_names`."""
+    values: Array
+    """Pose when it was grabbed, (n_values,)."""
+    depth_m: float
+    """Distance of the point along the optical axis, kept during the drag, metres."""
+    offset_px: Array
+    """From the pointer to the point when it was grabbed, (2,), px; kept, so that nothing jumps."""
+    free: NDArray[np.bool_]
+    """Degrees of freedom that give way, (n_dofs,)."""
+
+    @property
+    def moves_body(self) -> bool:
+        """Whether the whole body moves parallel to the image."""
+        return self.point == 0
+
+
+def grab(model: BodyModel, values: Array, camera: Camera, point: str, pointer_px: Array) -> Grab:
+    """Take hold of a point of a body.
+
+    The root point moves the whole body. A point of a limb moves its chain up to the trunk; a point of the trunk
+    turns the body about its root.
+
+    Args:
+        model: the body.
+        values: its pose, (n_values,).
+        camera: the view.
+        point: name of the point.
+        pointer_px: where the pointer is, undistorted px, (2,).
+    """
+    index = model.point_names.index(point)
+    place = model.points_world(values)[index]
+    moving = model.moves[:, model.point_parts[index]]
+    of_root = model.dof_joint == 0
+    if index == 0:
+        free = of_root & model.dof_is_length
+    elif np.any(moving & ~of_root):
+        free = moving & ~of_root
+    else:
+        free = of_root & ~model.dof_is_length
+    offset = camera.pinhole.project(place) - pointer_px
+    return Grab(model, camera.pinhole, index, np.array(values), float(camera.depths(place)), offset, free)
+
+
+def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
+    """Let the grabbed point follow the pointer, at the depth it had, within the joint limits.
+
+    Args:
+        hand: from `grab`.
+        pointer_px: where the pointer is now, undistorted px, (2,).
+        values: the pose of the last call, from which to go on, (n_values,).
+
+    Returns:
+        The new pose, (n_values,); the nearest that limits and lengths allow.
+    """
+    model = hand.model
+    target = hand.camera.back_project(np.asarray(pointer_px) + hand.offset_px, hand.depth_m)
+    if hand.moves_body:
+        step = np.zeros(model.n_dofs)
+        step[hand.free] = target - model.points_world(hand.values)[0]
+        return model.retract(hand.values, step)
+    blocks = [
+        PointTargets(np.array([hand.point]), target[None], np.ones(1)),
+        StayNear(hand.values, np.full(model.n_dofs, _REST_WEIGHT)),
+    ]
+    return solve(model, values, blocks, free=hand.free, max_iterations=30).values
+
+
+def standing_pose(model: BodyModel, cameras: list[Camera], up: str = "z") -> Array:
+    """Upright pose where the cameras look: where a model stands before anybody has placed it.
+
+    The body's root is put at the point nearest to all optical axes, in the least squares sense.
+
+    Args:
+        model: the body.
+        cameras: the views.
+        up: world axis that points up.
+    """
+    A, b = np.zeros((3, 3)), np.zeros(3)
+    for camera in cameras:
+        axis = camera.T_world_camera[:3, 2]
+        across = np.eye(3) - np.outer(axis, axis)
+        A += across
+        b += across @ camera.center_world
+    # One camera, or parallel ones, leave the depth open: then 4 m in front of the first is as good as any.
+    front = cameras[0].center_world + 4.0 * cameras[0].T_world_camera[:3, 2]
+    center = np.linalg.solve(A + 1e-3 * np.eye(3), b + 1e-3 * front)
+    points = model.points_world(model.neutral()) @ UP_ROTATIONS[up].T + center
+    return fit_to_points(model, dict(zip(model.point_names, points, strict=True))).values
