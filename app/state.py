@@ -73,11 +73,11 @@ class State:
     """Mean over the views, px; None while the frame's evidence is not there yet."""
     view_costs_px: tuple[float | None, ...] = ()
     """Cost of each view, px; None for a view without edges."""
-    job: JobState = JobState()
+    job: JobState = field(default_factory=JobState)
     drag: DragState | None = None
     drag_seqs: tuple[tuple[int, int], ...] = ()
     """For each page that drags: its number, and the last of its drag messages that this state takes in."""
-    settings: SearchSettings = SearchSettings()
+    settings: SearchSettings = field(default_factory=SearchSettings)
     theta_px: float | None = None
     """Outlier distance, px; None for the default."""
     outliers: Literal["truncated", "paper"] = "truncated"

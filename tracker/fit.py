@@ -4,6 +4,7 @@ A block turns a pose into weighted residuals and their Jacobian. Whatever speaks
 space, a prior. The solver is damped (Levenberg-Marquardt) and holds the joint limits.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
@@ -122,8 +123,8 @@ def solve(
 def fit_to_points(model: BodyModel, targets_world: dict[str, Array], near: Array | None = None) -> Fit:
     """Pose a body so that its points come close to known places (triangulated or measured joints).
 
-    Without a pose to start from, the body is put upright at the targets' mean, facing each of eight ways; the best
-    of the fits counts.
+    Without a pose to start from, the body is put at the targets' mean, upright, lying and upside down, facing each
+    of eight ways; the best of the fits counts.
 
     Args:
         model: the body; its sizes stay.
@@ -148,10 +149,10 @@ def fit_to_points(model: BodyModel, targets_world: dict[str, Array], near: Array
         base = model.neutral()
         step = np.zeros(model.n_dofs)
         step[:3] = targets.mean(axis=0) - model.points_world(base)[indices].mean(axis=0)
-        root_turn = np.flatnonzero(model.dof_joint == 0)[-1]  # about the body's long axis, in every preset
+        turns = np.flatnonzero((model.dof_joint == 0) & ~model.dof_is_length)
         starts = []
-        for turn in np.arange(8) * np.pi / 4:
-            step[root_turn] = turn
+        for tilt, turn in itertools.product(range(4), range(8)):
+            step[turns[0]], step[turns[-1]] = tilt * np.pi / 2, turn * np.pi / 4
             starts.append(model.retract(base, step))
     # A weak pull to the start decides what the points leave open, such as the twist of a straight arm.
     rest = np.full(model.n_dofs, 1e-3)

@@ -11,6 +11,9 @@ from tracker.cameras import Camera
 from tracker.contours import FloatArray
 from tracker.rigid import Array
 
+_LIFT_M = 0.012
+"""How far a curve is lifted off the surfaces to see whether they hide it, metres."""
+
 
 def points_hidden(bodies: Sequence[Body], camera: Camera, points_world: Array) -> NDArray[np.bool_]:
     """Whether a part hides each point, (n,); parts that hold the point itself, as around a joint, do not count.
@@ -48,7 +51,6 @@ def part_edges(bodies: Sequence[Body], camera: Camera) -> FloatArray:
     shown = [np.empty((0, 4), np.float32)]
     for a in range(len(shapes)):
         grid = surfaces.points[a] @ Ts[a, :3, :3].T + Ts[a, :3, 3]
-        away = np.sum((surfaces.normals[a] @ Ts[a, :3, :3].T) * (grid - camera.center_world), axis=-1) > 0
         for b in range(a):  # each pair once: the curve lies on both surfaces
             apart = Ts[a, :3] @ (*surfaces.centers[a], 1.0) - Ts[b, :3] @ (*surfaces.centers[b], 1.0)
             if np.linalg.norm(apart) > surfaces.shapes[a, 7] + surfaces.shapes[b, 7]:
@@ -56,13 +58,15 @@ def part_edges(bodies: Sequence[Body], camera: Camera) -> FloatArray:
             local = (grid - Ts[b, :3, 3]) @ Ts[b, :3, :3] - surfaces.centers[b]
             # The root makes the implicit function nearly linear across the surface, as interpolation wants it.
             depth = shapes[b].inside_outside(local) ** (shapes[b].exponents[0] / 2) - 1.0
-            depth[away] = np.abs(depth[away]) + 1e-3  # the far side of the part shows no curve
             n = contours.zero_line(depth.astype(np.float32), grid.astype(np.float32), segments)
             out = contours.contour_buffer(camera, 1)
             n = contours.cut(segments, n, P, contours.PIECE_PX, 0, out)
-            holds = np.zeros((len(shapes), n), dtype=bool)
-            holds[[a, b]] = True
-            shown.append(out.pieces_px[:n][~_blocked(camera, Ts, surfaces, out.points_world[:n], holds)])
+            points = out.points_world[:n]
+            # Where both surfaces face the camera, a small way towards it leads out of both parts.
+            towards = camera.center_world - points
+            lifted = points + _LIFT_M * towards / np.linalg.norm(towards, axis=-1, keepdims=True)
+            nothing = np.zeros((len(shapes), n), dtype=bool)
+            shown.append(out.pieces_px[:n][~_blocked(camera, Ts, surfaces, lifted.astype(np.float32), nothing)])
     return np.concatenate(shown)
 
 

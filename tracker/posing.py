@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tracker.body import BodyModel
 from tracker.cameras import Camera
-from tracker.fit import PointTargets, StayNear, fit_to_points, solve
+from tracker.fit import Block, PointTargets, StayNear, fit_to_points, solve
 from tracker.rigid import Array
 
 _REST_WEIGHT = 0.01
@@ -93,7 +93,7 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
         step = np.zeros(model.n_dofs)
         step[hand.free] = target - model.points_world(hand.values)[0]
         return model.retract(hand.values, step)
-    blocks = [
+    blocks: list[Block] = [
         PointTargets(np.array([hand.point]), target[None], np.ones(1)),
         StayNear(hand.values, np.full(model.n_dofs, _REST_WEIGHT)),
     ]
