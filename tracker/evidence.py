@@ -1,5 +1,6 @@
 """What a frame shows: per view the edges that poses are scored against, and their distance image."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -9,6 +10,8 @@ from numpy.typing import NDArray
 from tracker import silhouettes
 from tracker.cameras import Camera
 from tracker.edges import detect_edges
+from tracker.recording import Recording, read_background, read_mask
+from tracker.session import CameraSource
 from tracker.silhouettes import Image
 
 FloatArray = NDArray[np.float32]
@@ -71,32 +74,61 @@ def match_scale(camera: Camera) -> float:
     return min(1.0, float(np.sqrt(MATCH_AREA_PX / (camera.width * camera.height))))
 
 
-def observe(
-    camera: Camera, image: Image, background: Image | None = None, mask: NDArray[np.uint8] | None = None
-) -> ViewEvidence:
-    """Turn one frame of one view into the evidence that poses are scored against.
+class Observer:
+    """Turns the frames of a recording into evidence. Safe to use from several threads."""
 
-    Args:
-        camera: the view as calibrated.
-        image: frame as filmed, (H, W, 3) RGB.
-        background: the empty scene as filmed, (H, W, 3) RGB.
-        mask: which pixels show anybody (non-zero), as filmed, (H, W); goes before the background.
-    """
-    scale = match_scale(camera)
-    matched = camera.pinhole.scaled(scale)
-    frame = _matched(camera, matched, image)
-    foreground = None
-    if mask is not None:
-        undistorted = camera.undistort_image(mask, nearest=True)
-        foreground = cv2.resize(undistorted, matched.size, interpolation=cv2.INTER_NEAREST) > 0
-    elif background is not None:
-        foreground = silhouettes.subtract_background(frame, _matched(camera, matched, background))
-    if foreground is not None:
-        foreground = silhouettes.grow(foreground, FOREGROUND_MARGIN * max(matched.size))
-    return view_evidence(matched, scale, detect_edges(frame, foreground))
+    def __init__(self, cameras: Sequence[CameraSource], recording: Recording) -> None:
+        """Read the backgrounds.
+
+        Args:
+            cameras: the views, with their side files.
+            recording: their footage.
+
+        Raises:
+            RecordingError: a background is missing, unreadable or of the wrong size.
+        """
+        self.cameras = tuple(cameras)
+        self._recording = recording
+        self._scales = [match_scale(c.camera) for c in cameras]
+        self._matched = [c.camera.pinhole.scaled(s) for c, s in zip(cameras, self._scales, strict=True)]
+        self._backgrounds = [
+            None if image is None else _matched(source.camera, matched, image)
+            for source, matched, image in zip(cameras, self._matched, map(read_background, self.cameras), strict=True)
+        ]
+
+    def images(self, k: int) -> tuple[Image | None, ...]:
+        """Frame k of each camera in undistorted pixels, (H, W, 3) RGB; None where it is damaged."""
+        return tuple(
+            None if image is None else source.camera.undistort_image(image)
+            for source, image in zip(self.cameras, self._recording.read(k), strict=True)
+        )
+
+    def evidence(self, k: int) -> tuple[ViewEvidence, ...]:
+        """The edges of frame k in each view, kept to the foreground where masks or a background tell it.
+
+        A damaged frame has no edges: the view has no say in the cost.
+        """
+        frames = self._recording.read(k)
+        return tuple(self._observe(i, image, k) for i, image in enumerate(frames))
+
+    def _observe(self, i: int, image: Image | None, k: int) -> ViewEvidence:
+        source, matched = self.cameras[i], self._matched[i]
+        if image is None:
+            return view_evidence(matched, self._scales[i], np.zeros((matched.height, matched.width), dtype=bool))
+        frame = _matched(source.camera, matched, image)
+        mask, background, foreground = read_mask(source, k), self._backgrounds[i], None
+        if mask is not None:
+            undistorted = source.camera.undistort_image(mask, nearest=True)
+            foreground = cv2.resize(undistorted, matched.size, interpolation=cv2.INTER_NEAREST) > 0
+        elif background is not None:
+            foreground = silhouettes.subtract_background(frame, background)
+        if foreground is not None:
+            foreground = silhouettes.grow(foreground, FOREGROUND_MARGIN * max(matched.size))
+        return view_evidence(matched, self._scales[i], detect_edges(frame, foreground))
 
 
 def _matched(camera: Camera, matched: Camera, image: Image) -> Image:
+    """Undistort an image as filmed and bring it to the scale of matching."""
     undistorted = camera.undistort_image(image)
     if matched.size == camera.size:
         return undistorted
