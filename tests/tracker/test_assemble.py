@@ -1,0 +1,205 @@
+from fractions import Fraction
+
+import cv2
+import numpy as np
+import pytest
+from clips import SIZE, encode, write_images
+
+from tracker import rigid
+from tracker.assemble import assemble
+from tracker.cameras import Camera
+from tracker.errors import CalibrationError, ModelError, RecordingError, SessionError
+from tracker.formats.anipose import write_calibration
+from tracker.recording import Recording
+from tracker.session import load_session
+
+K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])
+
+
+@pytest.fixture
+def room(tmp_path):
+    """A calibration of two cameras and their videos of 9 frames."""
+    write_calibration(
+        tmp_path / "Calib.toml",
+        [
+            Camera(name, SIZE, K, np.zeros(0), rigid.transform(t=np.array([0.0, i, 1.0])))
+            for i, name in enumerate(("front", "left"))
+        ],
+    )
+    for name in ("front", "left"):
+        encode(tmp_path / f"{name}.mp4", n=9)
+    return tmp_path
+
+
+def new(room, **changes):
+    settings = {"calibration": room / "Calib.toml", "videos": [room / "left.mp4", room / "front.mp4"]}
+    return assemble(room / "s", **(settings | changes))
+
+
+def assert_refused(room, kind, expected, **changes):
+    before = sorted(room.iterdir())
+    with pytest.raises(kind, match=expected):
+        new(room, **changes)
+    assert sorted(room.iterdir()) == before  # nothing half-written
+
+
+def test_videos_go_to_the_cameras_of_their_name(room):
+    session = new(room)
+    assert [(c.camera.name, c.footage.name) for c in session.cameras] == [("front", "front.mp4"), ("left", "left.mp4")]
+    assert (session.fps, session.n_frames, session.up) == (30.0, 9, "z")
+    assert [(p.name, p.model.name, p.model.height_m) for p in session.people] == [("person", "gavrila22", 1.75)]
+    with Recording(load_session(room / "s").cameras) as recording:
+        assert len(recording.read(8)) == 2
+
+
+def test_camera_option_goes_before_the_name(room):
+    encode(room / "other.mp4", n=9)
+    session = new(room, camera_paths={"left": room / "other.mp4"})
+    assert [c.footage.name for c in session.cameras] == ["front.mp4", "other.mp4"]
+
+
+def test_folder_of_images_beside_a_video(room):
+    (room / "left.mp4").unlink()
+    folder = write_images(room / "left", [f"{i}.png" for i in range(9)])
+    session = new(room, videos=[room / "front.mp4", folder])
+    assert [c.footage.name for c in session.cameras] == ["front.mp4", "left"]
+    assert session.fps == 30.0
+
+
+def test_images_alone_need_a_rate(room):
+    folders = [write_images(room / name, [f"{i}.png" for i in range(9)]) for name in ("front", "left")]
+    assert_refused(room, RecordingError, "--fps", videos=folders)
+    assert new(room, videos=folders, fps=25.0).fps == 25.0
+
+
+def test_people_models_and_heights(room):
+    session = new(room, people=["ann", "bob"], models={"bob": "gavrila22"}, heights={"ann": 1.6})
+    assert [(p.name, p.model.height_m) for p in session.people] == [("ann", 1.6), ("bob", 1.75)]
+    assert session.people[0].color != session.people[1].color
+
+
+def test_offsets_shorten_the_session(room):
+    session = new(room, offsets={"left": 2})
+    assert session.n_frames == 7
+    assert [c.offset for c in session.cameras] == [0, 2]
+
+
+def test_offset_explains_a_longer_video(room):
+    encode(room / "left.mp4", n=12)
+    assert new(room, offsets={"left": 3}).n_frames == 9
+
+
+def test_side_files(room):
+    for name in ("front", "left"):
+        (room / "masks" / name).mkdir(parents=True)
+        cv2.imwrite(str(room / "masks" / name / "000002.png"), np.zeros(SIZE[::-1], np.uint8))
+    (room / "bg").mkdir()
+    cv2.imwrite(str(room / "bg" / "front.png"), np.zeros((*SIZE[::-1], 3), np.uint8))
+    encode(room / "bg" / "left.mp4", n=3)
+    session = new(room, background=room / "bg", masks=room / "masks")
+    assert [c.background.name for c in session.cameras] == ["front.png", "left.mp4"]
+    assert [c.masks.name for c in session.cameras] == ["front", "left"]
+    cv2.imwrite(str(room / "bg" / "front.png"), np.zeros((5, 5, 3), np.uint8))
+    with pytest.raises(RecordingError, match=r"camera 'front'.*5x5"):
+        assemble(room / "t", calibration=room / "Calib.toml", videos=room.glob("*.mp4"), background=room / "bg")
+
+
+def test_missing_side_files(room):
+    (room / "bg").mkdir()
+    assert_refused(room, RecordingError, r"camera 'front': no background.*front\.png", background=room / "bg")
+    assert_refused(room, RecordingError, r"camera 'front': no masks", masks=room / "bg")
+
+
+def test_video_without_camera(room):
+    encode(room / "top.mp4", n=9)
+    videos = [room / f"{n}.mp4" for n in ("front", "left", "top")]
+    assert_refused(
+        room, SessionError, r"top\.mp4 belongs to no calibrated camera.*front, left.*--camera", videos=videos
+    )
+
+
+def test_camera_without_video(room):
+    assert_refused(room, SessionError, r"no video for camera left.*--camera left=PATH", videos=[room / "front.mp4"])
+
+
+def test_two_videos_for_a_camera(room):
+    write_images(room / "left", ["1.png"])
+    videos = [room / "front.mp4", room / "left.mp4", room / "left"]
+    assert_refused(room, SessionError, "'left' has two videos", videos=videos)
+
+
+def test_missing_video(room):
+    (room / "left.mp4").unlink()
+    assert_refused(room, RecordingError, r"camera 'left'.*not found")
+
+
+def test_truncated_video(room):
+    data = (room / "left.mp4").read_bytes()
+    (room / "left.mp4").write_bytes(data[: len(data) // 2])
+    assert_refused(room, RecordingError, "camera 'left'.*truncated")
+
+
+def test_different_lengths(room):
+    encode(room / "left.mp4", n=12)
+    assert_refused(room, RecordingError, r"'front' 9, 'left' 12; .*--offset")
+    assert_refused(room, RecordingError, "'front' 9, 'left' 12", offsets={"left": 1})
+
+
+def test_different_rates(room):
+    encode(room / "left.mp4", n=9, rate=25)
+    assert_refused(room, RecordingError, "'front' 30, 'left' 25")
+
+
+def test_television_rate_is_not_thirty(room):
+    encode(room / "left.mp4", n=9, rate=Fraction(30000, 1001))
+    assert_refused(room, RecordingError, r"'front' 30, 'left' 29\.97")
+
+
+def test_rate_that_the_videos_do_not_have(room):
+    assert_refused(room, RecordingError, r"expected 60 frames per second, found 'front' 30", fps=60.0)
+
+
+def test_variable_rate(room):
+    encode(room / "left.mp4", n=9, times=[0, 1, 2, 5, 6, 7, 8, 9, 10])
+    assert_refused(room, RecordingError, "camera 'left'.*variable frame rate")
+
+
+def test_size_unlike_the_calibration(room):
+    (room / "left.mp4").unlink()
+    folder = write_images(room / "left", [f"{i}.png" for i in range(9)], size=(32, 24))
+    assert_refused(
+        room, RecordingError, "camera 'left': expected 64x48.*found 32x24", videos=[room / "front.mp4", folder]
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind", "expected"),
+    [
+        ({"camera_paths": {"lft": "x.mp4"}}, SessionError, "--camera names an unknown camera 'lft'.*front, left"),
+        ({"offsets": {"lft": 1}}, SessionError, "--offset names an unknown camera 'lft'"),
+        ({"offsets": {"left": -2}}, SessionError, "others an offset of 2"),
+        ({"offsets": {"left": 9}}, SessionError, "check the footage and the offsets"),
+        ({"models": {"bob": "gavrila22"}}, SessionError, "--model names an unknown person 'bob'"),
+        ({"heights": {"bob": 1.7}}, SessionError, "--height names an unknown person 'bob'"),
+        ({"heights": 17.5}, ModelError, "0.3 to 3 metres"),
+        ({"models": "gavrila23"}, ModelError, "gavrila22"),
+        ({"units": "mm"}, CalibrationError, "look like metres"),
+        ({"up": "q"}, SessionError, "axis that points up"),
+    ],
+)
+def test_wrong_options(room, changes, kind, expected):
+    assert_refused(room, kind, expected, **changes)
+
+
+@pytest.mark.parametrize("name", ["balance_real", "walk", "two_people", "fast_arms"])
+def test_footage_at_hand(data_folder, tmp_path, name):
+    folder = data_folder(name)
+    session = assemble(
+        tmp_path / "s",
+        calibration=folder / "Calib.toml",
+        videos=sorted(folder.glob("*.mp4")),
+        background=folder / "background",
+        masks=folder / "masks" if (folder / "masks").exists() else None,
+    )
+    assert len(session.cameras) == 4
+    assert session.fps in (30.0, 60.0)

@@ -1,0 +1,189 @@
+import shutil
+
+import numpy as np
+import pytest
+from clips import SIZE, encode
+
+from tracker import rigid
+from tracker.cameras import Camera
+from tracker.errors import CalibrationError, ModelError, SessionError
+from tracker.formats.model_toml import load_model
+from tracker.session import CameraSource, Person, create_session, load_session, save_session
+
+K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])
+
+
+def camera(name, x=0.0):
+    return Camera(name, SIZE, K, np.full(5, 0.01), rigid.transform(t=np.array([x, 0.0, 1.0])))
+
+
+def people(*names):
+    return [Person(n, load_model("gavrila22", 1.62), "#112233") for n in names]
+
+
+@pytest.fixture
+def cameras(tmp_path):
+    """One camera's footage in the session, one's beside it."""
+    return [
+        CameraSource(camera("front"), tmp_path / "s" / "front.mp4", tmp_path / "bg" / "front.png"),
+        CameraSource(camera("left", 2.0), tmp_path / "videos" / "left", masks=tmp_path / "masks", offset=3),
+    ]
+
+
+def make(tmp_path, sources, **changes):
+    return create_session(
+        tmp_path / "s", **({"cameras": sources, "people": people("ann"), "fps": 50.0, "n_frames": 9} | changes)
+    )
+
+
+def assert_same(a, b):
+    assert (a.folder, a.name, a.fps, a.n_frames, a.up) == (b.folder, b.name, b.fps, b.n_frames, b.up)
+    for x, y in zip(a.cameras, b.cameras, strict=True):
+        assert (x.footage, x.background, x.masks, x.offset) == (y.footage, y.background, y.masks, y.offset)
+        assert (x.camera.name, x.camera.size) == (y.camera.name, y.camera.size)
+        np.testing.assert_allclose(x.camera.T_world_camera, y.camera.T_world_camera, atol=1e-12)
+    for p, q in zip(a.people, b.people, strict=True):
+        assert (p.name, p.color, p.model.height_m) == (q.name, q.color, q.model.height_m)
+        assert p.model.value_names == q.model.value_names
+
+
+def test_round_trip(tmp_path, cameras):
+    session = make(tmp_path, cameras, people=people("ann", "bob"), name="A title", up="-y")
+    assert_same(load_session(tmp_path / "s"), session)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["s"]
+
+
+def test_defaults(tmp_path, cameras):
+    session = make(tmp_path, cameras)
+    assert (session.name, session.up) == ("s", "z")
+
+
+def test_saved_again(tmp_path, cameras):
+    session = make(tmp_path, cameras)
+    save_session(session)
+    assert_same(load_session(tmp_path / "s"), session)
+
+
+def test_session_moves_with_what_lies_beside_it(tmp_path, cameras):
+    make(tmp_path, cameras)
+    (tmp_path / "elsewhere").mkdir()
+    shutil.move(tmp_path / "s", tmp_path / "elsewhere" / "s")
+    front, left = load_session(tmp_path / "elsewhere" / "s").cameras
+    assert front.footage == tmp_path / "elsewhere" / "s" / "front.mp4"
+    assert left.footage == tmp_path / "elsewhere" / "videos" / "left"
+
+
+def test_footage_far_away_keeps_its_path(tmp_path, cameras):
+    create_session(tmp_path / "deep" / "s", cameras=cameras, people=people("ann"), fps=30, n_frames=3)
+    shutil.move(tmp_path / "deep" / "s", tmp_path / "s")
+    assert load_session(tmp_path / "s").cameras[1].footage == tmp_path / "videos" / "left"
+
+
+def test_relative_paths_are_those_of_now(tmp_path, cameras, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    source = CameraSource(camera("front"), tmp_path.relative_to(tmp_path) / "videos" / ".." / "front.mp4")
+    create_session("s", cameras=[source], people=people("ann"), fps=30, n_frames=3)
+    monkeypatch.chdir("/")
+    assert load_session(tmp_path / "s").cameras[0].footage == tmp_path / "front.mp4"
+
+
+def test_length_is_counted_where_it_is_not_given(tmp_path):
+    sources = [
+        CameraSource(camera("a"), encode(tmp_path / "a.mp4", n=8)),
+        CameraSource(camera("b"), encode(tmp_path / "b.mp4", n=9), offset=2),
+    ]
+    assert make(tmp_path, sources, n_frames=None).n_frames == 7
+
+
+def test_empty_folder_is_filled(tmp_path, cameras):
+    (tmp_path / "s").mkdir()
+    make(tmp_path, cameras)
+    load_session(tmp_path / "s")
+
+
+def test_folder_in_use_is_left_alone(tmp_path, cameras):
+    (tmp_path / "s").mkdir()
+    (tmp_path / "s" / "thesis.txt").write_text("precious")
+    with pytest.raises(SessionError, match="exists already"):
+        make(tmp_path, cameras)
+    assert [p.name for p in (tmp_path / "s").iterdir()] == ["thesis.txt"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"people": []}, "at least one person"),
+        ({"cameras": []}, "at least one camera"),
+        ({"people": people("ann", "ann")}, "more than one person is named 'ann'"),
+        ({"people": people("../ann")}, "cannot be named"),
+        ({"people": people("")}, "cannot be named"),
+        ({"up": "w"}, "x, -x, y, -y, z, -z"),
+        ({"fps": 0.0}, "above 0"),
+        ({"fps": float("nan")}, "above 0"),
+        ({"n_frames": -3}, "check the footage and the offsets"),
+    ],
+)
+def test_refused_before_anything_is_written(tmp_path, cameras, changes, expected):
+    with pytest.raises(SessionError, match=expected):
+        make(tmp_path, cameras, **changes)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_negative_offset_says_what_to_do(tmp_path, cameras):
+    early = CameraSource(camera("right"), tmp_path / "r.mp4", offset=-4)
+    with pytest.raises(SessionError, match="others an offset of 4"):
+        make(tmp_path, [*cameras, early])
+
+
+def test_nothing_half_written_when_writing_fails(tmp_path, cameras, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("tracker.session.format_model", full)
+    with pytest.raises(SessionError, match="No space left"):
+        make(tmp_path, cameras)
+    assert list(tmp_path.iterdir()) == []
+
+
+def edit(folder, old, new):
+    path = folder / "session.toml"
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("version = 1", "version = 2", "version 2, this program reads up to 1; upgrade"),
+        ("version = 1", "version = 'x'", "whole number as 'version'"),
+        ("fps = 50.0", "", "'fps' is missing"),
+        ("fps = 50.0", "fps = 'fast'", "malformed"),
+        ("fps = 50.0", "fps = 50.0\nshutter = 3", "unknown key 'shutter'"),
+        ("offset = 3", "offset = 3, shutter = 3", "unknown key 'shutter'"),
+        ("color =", "colour =", "unknown key 'colour'"),
+        ('name = "left"', 'name = "right"', "left, right"),
+        ("fps = 50.0", "fps = = 50.0", "line 3"),
+        ("n_frames = 9", "n_frames = 0", "above 0"),
+    ],
+)
+def test_malformed_session_file(tmp_path, cameras, old, new, expected):
+    make(tmp_path, cameras)
+    edit(tmp_path / "s", old, new)
+    with pytest.raises(SessionError, match=expected):
+        load_session(tmp_path / "s")
+
+
+def test_missing_parts(tmp_path, cameras):
+    make(tmp_path, cameras)
+    (tmp_path / "s" / "models" / "ann.toml").unlink()
+    with pytest.raises(ModelError, match="not found"):
+        load_session(tmp_path / "s")
+    (tmp_path / "s" / "calibration.toml").unlink()
+    with pytest.raises(CalibrationError, match="not found"):
+        load_session(tmp_path / "s")
+
+
+def test_no_session(tmp_path):
+    with pytest.raises(SessionError, match="quadrille new"):
+        load_session(tmp_path)

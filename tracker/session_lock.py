@@ -1,0 +1,157 @@
+"""One writer for each session: a lock file that says who, where and since when.
+
+A file, because sessions lie on network drives, where the system's own locks cannot be relied on. What a program that
+died leaves behind is recognised on the machine it ran on; of another machine nothing can be known.
+"""
+
+import json
+import os
+import secrets
+import socket
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple
+
+from tracker.errors import SessionError
+
+LOCK_FILE = "lock.json"
+
+_WRITING_S = 0.2  # a lock file that cannot be read may be one that is being written
+
+
+class Holder(NamedTuple):
+    """Who holds a lock."""
+
+    host: str
+    process: int
+    started: str
+    """When the process began, as the system tells it; empty where it does not. Process numbers are used again."""
+    since: str
+    """When the lock was taken, ISO 8601."""
+    token: str
+    """Tells this lock from all others."""
+
+
+class SessionLock:
+    """The right to write a session; a context manager.
+
+    Raises:
+        SessionError: on entering, where another program holds the session or the folder cannot be written.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self._path = Path(folder) / LOCK_FILE
+        self._held: Holder | None = None
+
+    def __enter__(self) -> "SessionLock":
+        self.acquire()
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        self.release()
+
+    def acquire(self) -> None:
+        """Take the lock; one that a dead program of this machine left is taken over.
+
+        Raises:
+            SessionError: another program holds it, or the folder cannot be written.
+        """
+        me = Holder(
+            socket.gethostname(),
+            os.getpid(),
+            _start_of(os.getpid()),
+            datetime.now(UTC).isoformat(timespec="seconds"),
+            secrets.token_hex(8),
+        )
+        try:
+            while not self._create(me):
+                self._clear_stale()
+        except OSError as error:
+            raise SessionError(
+                f"cannot write {self._path}: {error.strerror}; open the session where you may write"
+            ) from error
+        self._held = me
+
+    def release(self) -> None:
+        """Give the lock back; nothing happens where it is not held."""
+        if self._held is not None and _read(self._path) == self._held:
+            self._path.unlink(missing_ok=True)
+        self._held = None
+
+    def _create(self, me: Holder) -> bool:
+        """Make the lock file; False where there is one already."""
+        try:
+            # Exclusive creation: of two programs that try at once, one fails. Hard links would also make the file
+            # whole at once, but not every network drive has them.
+            with self._path.open("x", encoding="utf-8") as file:
+                json.dump(me._asdict(), file)
+        except FileExistsError:
+            return False
+        return True
+
+    def _clear_stale(self) -> None:
+        """Remove the lock file if its program is dead, else raise."""
+        holder = _read(self._path)
+        if holder is None:
+            time.sleep(_WRITING_S)
+            holder = _read(self._path)
+        if holder is None and not self._path.exists():
+            return  # released in the meantime
+        if holder is None or _is_alive(holder):
+            raise SessionError(f"session {self._path.parent} is open already {_describe(holder, self._path)}")
+        # Another program may be taking it over at the same time: whoever moves the file away looks at what it moved.
+        aside = self._path.with_name(f".{LOCK_FILE}.stale.{secrets.token_hex(8)}")
+        try:
+            self._path.rename(aside)
+        except FileNotFoundError:
+            return
+        if _read(aside) == holder:
+            aside.unlink()
+        else:
+            aside.rename(self._path)
+
+
+def _read(path: Path) -> Holder | None:
+    try:
+        return Holder(**json.loads(path.read_text("utf-8")))
+    except (OSError, ValueError, TypeError):
+        return None
+
+
+def _describe(holder: Holder | None, path: Path) -> str:
+    if holder is None:
+        return f"and its lock {path} cannot be read; close the other program, or delete that file if there is none"
+    if holder.host == socket.gethostname() and holder.process == os.getpid():
+        return f"in this program since {holder.since}; go on there"
+    return (
+        f"in process {holder.process} on {holder.host} since {holder.since}; close it there, "
+        f"or delete {path} if that program no longer runs"
+    )
+
+
+def _is_alive(holder: Holder) -> bool:
+    """Whether the holder may still run; only what is surely dead counts as dead."""
+    if holder.host != socket.gethostname():
+        return True
+    if os.name == "nt":  # signal 0 would end the process there
+        return True
+    try:
+        os.kill(holder.process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        pass
+    started = _start_of(holder.process)
+    return not holder.started or not started or holder.started == started
+
+
+def _start_of(process: int) -> str:
+    """Start of a process, in ticks since the machine started; empty where the system does not say."""
+    try:
+        stat = Path(f"/proc/{process}/stat").read_text("utf-8")
+    except OSError:
+        return ""
+    # The program's name, in parentheses, may hold spaces; the start is the 22nd field, the 20th after the name.
+    return stat.rpartition(")")[2].split()[19]
