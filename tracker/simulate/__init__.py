@@ -1,0 +1,6 @@
+"""Recordings with known truth: smooth-skinned people filmed in a furnished room.
+
+`scenes` moves skeletons (`skeleton`); `skin` (from `anatomy` and `surface_nets`, dressed by `outfit`) or `parts` gives
+them a surface; `room` and `furniture` stand around them; `rig` mounts the cameras; `render` and `film` make images;
+`encode` and `record` write them into a session folder.
+"""

@@ -1,0 +1,75 @@
+"""What a simulated person wears: colours as a function of the place on the body."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.rigid import Array
+from tracker.simulate.textures import value_noise
+
+Color = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Outfit:
+    """Colours of clothes, skin and hair, red, green, blue from 0 to 1."""
+
+    shirt: Color = (0.17, 0.20, 0.27)
+    left_sleeve: Color = (0.87, 0.80, 0.60)
+    right_sleeve: Color = (0.80, 0.33, 0.22)
+    trousers: Color = (0.40, 0.37, 0.33)
+    """Close to the floor and the racks, as real clothes are: subtraction finds no clean silhouette."""
+    shoes: Color = (0.16, 0.13, 0.12)
+    skin: Color = (0.80, 0.60, 0.48)
+    hair: Color = (0.20, 0.13, 0.08)
+
+    def colors(self, bones: NDArray[np.str_], points_bone: Array, points_torso: Array) -> Array:
+        """Colour the skin.
+
+        Args:
+            bones: name of the bone that each point follows, (n,).
+            points_bone: points of the rest pose in the frames of their bones, (n, 3), fraction of body height.
+            points_torso: the same points in the torso's frame, (n, 3), fraction of body height.
+
+        Returns:
+            Colours, (n, 3), from 0 to 1.
+        """
+        out = np.empty((len(bones), 3))
+        out[:] = self.shirt
+        x, y, z = points_bone.T
+        in_torso = bones == "torso"
+        head, foot = bones == "head", np.char.endswith(bones, "_foot")
+        leg = np.char.endswith(bones, "_thigh") | np.char.endswith(bones, "_calf")
+        arm = np.char.endswith(bones, "_arm") | np.char.endswith(bones, "_forearm")
+        hand = np.char.endswith(bones, "_forearm") & (z < -0.138)
+        # The seam of a raglan sleeve runs from the collar to the armpit.
+        sleeve = (arm & ~hand) | (in_torso & (np.abs(points_torso[:, 1]) > 0.092) & (points_torso[:, 2] > 0.06))
+        collar = in_torso & (z > 0.160) & (np.hypot(x + 0.004, y) < 0.040)
+        waist = in_torso & (z < -0.118)
+        out[sleeve & (points_torso[:, 1] > 0)] = self.left_sleeve
+        out[sleeve & (points_torso[:, 1] < 0)] = self.right_sleeve
+        out[leg | waist] = self.trousers
+        out[waist & (z > -0.129)] = np.array(self.shoes) * 0.8  # belt
+        out[foot] = self.shoes
+        out[foot & (z < -0.034)] = (0.55, 0.53, 0.50)  # sole
+        out[hand | head | collar] = self.skin
+        self._paint_face(out, head, points_bone)
+        folds = np.where(leg | arm | in_torso, 0.10, 0.03)
+        shade = (
+            1.0
+            + folds * value_noise(points_bone, np.array([0.03, 0.03, 0.05]))
+            + 0.03 * value_noise(points_bone, 0.006)
+        )
+        return np.clip(out * shade[:, None], 0.0, 1.0)
+
+    def _paint_face(self, out: Array, head: NDArray[np.bool_], points: Array) -> None:
+        """Paint hair, eyes, brows and mouth into `out`."""
+        x, y, z = points.T
+        hairline = np.where(x > 0.0, 0.108 + 0.45 * np.maximum(x - 0.03, 0.0), 0.108 + 1.5 * x)
+        out[head & (z > np.maximum(hairline, 0.035))] = self.hair
+        front = head & (x > 0.035)
+        side = np.abs(np.abs(y) - 0.017)
+        out[front & (np.hypot(side, z - 0.088) < 0.0055)] = (0.13, 0.10, 0.09)
+        out[front & (side < 0.010) & (np.abs(z - 0.099) < 0.0025)] = self.hair
+        out[front & (np.abs(y) < 0.013) & (np.abs(z - 0.053) < 0.0028)] = (0.58, 0.30, 0.27)

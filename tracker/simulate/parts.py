@@ -1,0 +1,44 @@
+"""The fitted body itself as something to film: its part shapes, for recordings without shape mismatch."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tracker import rigid
+from tracker.body import BodyModel, IntArray
+from tracker.rigid import Array
+
+
+@dataclass(frozen=True, eq=False)
+class PartsFigure:
+    """A body model drawn with the shapes and colours of its own parts."""
+
+    model: BodyModel
+
+    @cached_property
+    def _meshes(self) -> tuple[list[Array], IntArray]:
+        """Vertices of each part in its frame, and the triangles over all of them."""
+        vertices, faces, first = [], [], 0
+        for shape, center in zip(self.model.shapes, self.model.centers_part, strict=True):
+            mesh = shape.mesh()
+            vertices.append(np.asarray(mesh.vertices) + center)
+            faces.append(np.asarray(mesh.faces) + first)
+            first += len(mesh.vertices)
+        return vertices, np.concatenate(faces)
+
+    @property
+    def faces(self) -> IntArray:
+        """Triangles, counter-clockwise seen from outside, (M, 3)."""
+        return self._meshes[1]
+
+    def posed(self, values: Array) -> Array:
+        """Vertices in a pose, (N, 3), metres, world."""
+        Ts = self.model.kinematics(values).Ts_world_part
+        return np.concatenate([rigid.apply(T, v) for T, v in zip(Ts, self._meshes[0], strict=True)])
+
+    def colors(self, faces: IntArray, corner_weights: Array) -> Array:
+        """Colours of the parts, (n, 3), 0 to 1, of points on triangles `(n,)`."""
+        part_colors = [[int(p.color[i : i + 2], 16) / 255 for i in (1, 3, 5)] for p in self.model.parts]
+        part_of_vertex = np.repeat(np.arange(len(self._meshes[0])), [len(v) for v in self._meshes[0]])
+        return np.array(part_colors)[part_of_vertex[self.faces[faces, 0]]]
