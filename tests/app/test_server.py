@@ -202,9 +202,12 @@ async def test_without_viser_the_proxy_says_so():
         free.bind(("127.0.0.1", 0))
         unused = free.getsockname()[1]
     app = server.create_app(EchoPanes(), unused, Access(), server.static_folder())
-    async with listening(app) as port, aiohttp.ClientSession() as session:
-        async with session.get(f"http://127.0.0.1:{port}/viser/") as response:
-            assert response.status == 502
+    async with (
+        listening(app) as port,
+        aiohttp.ClientSession() as session,
+        session.get(f"http://127.0.0.1:{port}/viser/") as response,
+    ):
+        assert response.status == 502
 
 
 class TestToken:

@@ -1,0 +1,66 @@
+/** The pane socket: keeps itself open, and hands messages on. */
+
+import { decodeBinary } from "./protocol.js";
+
+const FIRST_DELAY_MS = 250;
+const LONGEST_DELAY_MS = 5000;
+
+/**
+ * @typedef {object} Listener
+ * @property {(open: boolean) => void} onOpen called when the connection opens and when it is lost
+ * @property {(message: import("./protocol.js").TextMessage) => void} onText
+ * @property {(header: import("./protocol.js").ImageHeader | import("./protocol.js").OverlayHeader,
+ *   payload: ArrayBuffer) => void} onBinary
+ */
+
+export class Connection {
+  /** @type {WebSocket | null} */
+  #socket = null;
+  #delayMs = FIRST_DELAY_MS;
+  /** @type {Listener} */
+  #listener;
+
+  /** @param {Listener} listener */
+  constructor(listener) {
+    this.#listener = listener;
+    this.#connect();
+    // A laptop that wakes up or finds its network again need not wait for the next attempt.
+    addEventListener("online", () => this.#connect());
+  }
+
+  /**
+   * Send a message, or drop it where there is no connection: the program sends its state anew on the next one.
+   *
+   * @param {import("./protocol.js").ClientMessage} message
+   */
+  send(message) {
+    if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify(message));
+  }
+
+  #connect() {
+    if (this.#socket && this.#socket.readyState !== WebSocket.CLOSED) return;
+    const url = new URL("ws", document.baseURI);
+    url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+    url.search = "";
+    const socket = new WebSocket(url);
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => {
+      this.#delayMs = FIRST_DELAY_MS;
+      this.#listener.onOpen(true);
+    };
+    socket.onmessage = ({ data }) => {
+      if (typeof data === "string") {
+        this.#listener.onText(JSON.parse(data));
+      } else {
+        const { header, payload } = decodeBinary(data);
+        this.#listener.onBinary(header, payload);
+      }
+    };
+    socket.onclose = () => {
+      this.#listener.onOpen(false);
+      setTimeout(() => this.#connect(), this.#delayMs * (0.75 + 0.5 * Math.random()));
+      this.#delayMs = Math.min(2 * this.#delayMs, LONGEST_DELAY_MS);
+    };
+    this.#socket = socket;
+  }
+}

@@ -1,0 +1,183 @@
+/** Draws one pane: the image layer, and the vectors over it. All sizes on the screen are CSS pixels. */
+
+/**
+ * @typedef {import("./protocol.js").Overlay} Overlay
+ * @typedef {import("./protocol.js").Handle} Handle
+ * @typedef {import("./pane_view.js").PaneView} PaneView
+ * @typedef {{handle: Handle, x: number, y: number}} PlacedHandle
+ */
+
+const HALO = "rgba(0, 0, 0, 0.45)";
+const PIXELS_VISIBLE_FROM = 4;
+const JOINT_RADIUS = 4.5;
+const TORSO_HALF_SIDE = 6.5;
+export const TORSO = "torso";
+
+/** @type {Record<import("./protocol.js").Path["kind"], {width: number, alpha: number, dash: number[]}>} */
+const LINE_STYLES = {
+  model: { width: 1.75, alpha: 1, dash: [] },
+  candidate: { width: 1.25, alpha: 0.8, dash: [] },
+  part_edge: { width: 1, alpha: 0.75, dash: [] },
+  epipolar: { width: 1.25, alpha: 0.9, dash: [6, 4] },
+};
+
+/**
+ * Give a canvas the size of its pane in device pixels, and return its context scaled to CSS pixels and cleared.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param {number} width
+ * @param {number} height
+ */
+export function prepare(canvas, width, height) {
+  const ratio = devicePixelRatio;
+  const [deviceWidth, deviceHeight] = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (canvas.width !== deviceWidth || canvas.height !== deviceHeight) {
+    canvas.width = deviceWidth;
+    canvas.height = deviceHeight;
+  }
+  const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, width, height);
+  return context;
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {PaneView} view
+ * @param {ImageBitmap} bitmap
+ */
+export function drawImage(context, view, bitmap) {
+  // Far in, pixels are what one wants to see.
+  context.imageSmoothingEnabled = view.scale < PIXELS_VISIBLE_FROM;
+  context.imageSmoothingQuality = "medium";
+  const { x, y } = view.toScreen(-0.5, -0.5);
+  context.drawImage(bitmap, x, y, bitmap.width * view.scale, bitmap.height * view.scale);
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {PaneView} view
+ * @param {Overlay} overlay
+ * @param {number} camera
+ * @param {import("./protocol.js").Overlays} layers
+ */
+export function drawPaths(context, view, overlay, camera, layers) {
+  for (const path of overlay.paths) {
+    if (path.camera !== camera || path.count === 0) continue;
+    if (path.kind === "part_edge" ? !layers.part_edges : path.kind !== "epipolar" && !layers.contours) continue;
+    const style = LINE_STYLES[path.kind];
+    const line = tracePath(view, overlay.segments, path.first, path.count);
+    context.globalAlpha = style.alpha;
+    context.setLineDash(style.dash);
+    stroke(context, line, path.color, style.width);
+  }
+  context.setLineDash([]);
+  context.globalAlpha = 1;
+}
+
+/**
+ * @param {PaneView} view
+ * @param {Float32Array} segments
+ * @param {number} first
+ * @param {number} count
+ */
+function tracePath(view, segments, first, count) {
+  const { x, y } = view.origin;
+  const scale = view.scale;
+  const line = new Path2D();
+  for (let i = 4 * first, end = 4 * (first + count); i < end; i += 4) {
+    // Segments that go on where the last one ended are one line: its corners join, and it is drawn in half the time.
+    const goesOn = i > 4 * first && segments[i] === segments[i - 2] && segments[i + 1] === segments[i - 1];
+    if (!goesOn) line.moveTo(x + scale * segments[i], y + scale * segments[i + 1]);
+    line.lineTo(x + scale * segments[i + 2], y + scale * segments[i + 3]);
+  }
+  return line;
+}
+
+/**
+ * Stroke with a dark halo, so that any colour shows on any image.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {Path2D} line
+ * @param {string} color
+ * @param {number} width
+ */
+function stroke(context, line, color, width) {
+  context.lineJoin = context.lineCap = "round";
+  context.strokeStyle = HALO;
+  context.lineWidth = width + 2;
+  context.stroke(line);
+  context.strokeStyle = color;
+  context.lineWidth = width;
+  context.stroke(line);
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {PlacedHandle[]} placed
+ * @param {import("./protocol.js").PersonInfo[]} people
+ */
+export function drawSkeleton(context, placed, people) {
+  people.forEach((person, index) => {
+    const joints = new Map(placed.filter((p) => p.handle.person === index).map((p) => [p.handle.point, p]));
+    const line = new Path2D();
+    for (const [from, to] of person.bones) {
+      const [a, b] = [joints.get(from), joints.get(to)];
+      if (!a || !b) continue;
+      line.moveTo(a.x, a.y);
+      line.lineTo(b.x, b.y);
+    }
+    context.globalAlpha = 0.85;
+    stroke(context, line, person.color, 2);
+    context.globalAlpha = 1;
+  });
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {PlacedHandle} placed
+ * @param {string} color
+ * @param {"plain" | "selected" | "hovered"} emphasis
+ */
+export function drawHandle(context, { handle, x, y }, color, emphasis) {
+  const grown = emphasis === "hovered" ? 1.5 : 0;
+  const outline = new Path2D();
+  if (handle.point === TORSO) {
+    const half = TORSO_HALF_SIDE + grown;
+    outline.roundRect(x - half, y - half, 2 * half, 2 * half, 2);
+  } else {
+    outline.arc(x, y, JOINT_RADIUS + grown, 0, 2 * Math.PI);
+  }
+  // Hidden joints are hollow: a ring of the colour. Visible ones are discs with a white ring.
+  context.strokeStyle = HALO;
+  context.lineWidth = 4;
+  context.stroke(outline);
+  if (handle.visible) {
+    context.fillStyle = color;
+    context.fill(outline);
+  }
+  context.strokeStyle = handle.visible || emphasis !== "plain" ? "#fff" : color;
+  context.lineWidth = emphasis === "plain" ? 1.5 : 2.25;
+  context.stroke(outline);
+}
+
+/**
+ * Write a joint's name beside it, on the side where the pane has room.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {PlacedHandle} placed
+ * @param {number} paneWidth
+ */
+export function drawName(context, { handle, x, y }, paneWidth) {
+  const text = handle.point.replaceAll("_", " ") + (handle.visible ? "" : " (hidden)");
+  context.font = "500 12px system-ui, sans-serif";
+  context.textBaseline = "middle";
+  const width = context.measureText(text).width + 12;
+  const left = x + 12 + width < paneWidth ? x + 12 : x - 12 - width;
+  context.fillStyle = "rgba(12, 13, 15, 0.85)";
+  context.beginPath();
+  context.roundRect(left, y - 10, width, 20, 4);
+  context.fill();
+  context.fillStyle = "#fff";
+  context.fillText(text, left + 6, y + 0.5);
+}

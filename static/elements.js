@@ -1,0 +1,28 @@
+/** Elements of the page that must be there. */
+
+/**
+ * @template {HTMLElement} T
+ * @param {string} id
+ * @param {{new (): T}} kind
+ * @returns {T}
+ */
+export function byId(id, kind) {
+  const element = document.getElementById(id);
+  if (!(element instanceof kind)) throw new Error(`index.html has no ${kind.name} with id '${id}'`);
+  return element;
+}
+
+/**
+ * A button that does what it says and gives the focus back after a click by pointer, so that Space goes on to mean "play".
+ *
+ * @param {string} id
+ * @param {() => void} run
+ */
+export function button(id, run) {
+  const element = byId(id, HTMLButtonElement);
+  element.addEventListener("click", (event) => {
+    if (event.detail > 0) element.blur();
+    run();
+  });
+  return element;
+}

@@ -1,0 +1,205 @@
+/**
+ * The pointer in a pane. On a joint it drags the joint, anywhere else (or with the middle button) it moves the view.
+ *
+ * A drag keeps the distance between pointer and joint, begins after a few pixels (a click only selects), and sends at most
+ * one message per animation frame.
+ */
+
+const GRAB_RADIUS = 12;
+const DRAG_THRESHOLD = 3;
+
+/**
+ * @typedef {import("./drawing.js").PlacedHandle} PlacedHandle
+ * @typedef {{pane: import("./pane.js").Pane, camera: number, pointer: number, person: number, point: string,
+ *   start: {x: number, y: number}, grabbed: {u: number, v: number}, at: {u: number, v: number},
+ *   offset: {u: number, v: number}, begun: boolean}} Drag
+ */
+
+export class Gestures {
+  #store;
+  #send;
+  #latency;
+  /** @type {Drag | null} */
+  #drag = null;
+  /** @type {{pane: import("./pane.js").Pane, pointer: number, x: number, y: number} | null} */
+  #pan = null;
+  #seq = 0;
+  #moveScheduled = false;
+
+  /**
+   * @param {import("./store.js").Store} store
+   * @param {(message: import("./protocol.js").ClientMessage) => void} send
+   * @param {import("./latency.js").Latency} latency
+   */
+  constructor(store, send, latency) {
+    this.#store = store;
+    this.#send = send;
+    this.#latency = latency;
+    store.subscribe((changed) => {
+      if (!changed.has("connected")) return;
+      this.#release();
+      this.#latency.forget();
+    });
+  }
+
+  /**
+   * Watch the pointer in a pane.
+   *
+   * @param {import("./pane.js").Pane} pane
+   * @param {number} camera
+   */
+  watch(pane, camera) {
+    const surface = pane.surface;
+    surface.addEventListener("pointerdown", (event) => this.#down(event, pane, camera));
+    surface.addEventListener("pointermove", (event) => this.#move(event, pane, camera));
+    surface.addEventListener("pointerup", (event) => this.#up(event));
+    surface.addEventListener("pointercancel", () => this.cancel());
+    surface.addEventListener("pointerleave", () => {
+      if (!this.#drag && this.#store.facts.hover) this.#store.set({ hover: null });
+    });
+    // The middle button would scroll, and paste on some systems.
+    surface.addEventListener("mousedown", (event) => event.button === 1 && event.preventDefault());
+  }
+
+  /** Let go of whatever is held and take a begun drag back; says whether there was anything. */
+  cancel() {
+    const held = this.#drag !== null || this.#pan !== null;
+    if (this.#drag?.begun) this.#message("cancel", this.#drag.grabbed);
+    this.#release();
+    return held;
+  }
+
+  /**
+   * The joint nearest to a pointer, within reach.
+   *
+   * @param {import("./pane.js").Pane} pane
+   * @param {{x: number, y: number}} at
+   * @returns {PlacedHandle | null}
+   */
+  #hit(pane, at) {
+    if (!this.#store.isSettled || !this.#store.facts.state?.overlays.joints) return null;
+    let nearest = null;
+    let reach = GRAB_RADIUS;
+    for (const placed of pane.placedHandles()) {
+      const distance = Math.hypot(placed.x - at.x, placed.y - at.y);
+      if (distance <= reach) [nearest, reach] = [placed, distance];
+    }
+    return nearest;
+  }
+
+  /**
+   * @param {PointerEvent} event
+   * @param {import("./pane.js").Pane} pane
+   * @param {number} camera
+   */
+  #down(event, pane, camera) {
+    if (this.#drag || this.#pan || event.button > 1) return;
+    const at = pane.locate(event);
+    const hit = event.button === 0 ? this.#hit(pane, at) : null;
+    pane.surface.setPointerCapture(event.pointerId);
+    if (!hit) {
+      this.#pan = { pane, pointer: event.pointerId, x: event.clientX, y: event.clientY };
+      pane.surface.classList.add("is-panning");
+      return;
+    }
+    const { person, point, u, v } = hit.handle;
+    const pointer = pane.view.toImage(at.x, at.y);
+    this.#drag = {
+      pane,
+      camera,
+      pointer: event.pointerId,
+      person,
+      point,
+      start: at,
+      grabbed: { u, v },
+      at: { u, v },
+      offset: { u: u - pointer.u, v: v - pointer.v },
+      begun: false,
+    };
+    pane.surface.classList.add("is-dragging");
+    this.#store.set({ dragging: true, hover: { camera, person, point } });
+    this.#send({ type: "select", person, point });
+  }
+
+  /**
+   * @param {PointerEvent} event
+   * @param {import("./pane.js").Pane} pane
+   * @param {number} camera
+   */
+  #move(event, pane, camera) {
+    if (this.#pan?.pointer === event.pointerId) {
+      this.#pan.pane.panBy(event.clientX - this.#pan.x, event.clientY - this.#pan.y);
+      [this.#pan.x, this.#pan.y] = [event.clientX, event.clientY];
+    } else if (this.#drag?.pointer === event.pointerId) {
+      this.#dragTo(this.#drag, pane.locate(event));
+    } else if (!this.#drag && !this.#pan) {
+      this.#hoverAt(pane, camera, pane.locate(event));
+    }
+  }
+
+  /**
+   * @param {Drag} drag
+   * @param {{x: number, y: number}} at
+   */
+  #dragTo(drag, at) {
+    if (!drag.begun) {
+      if (Math.hypot(at.x - drag.start.x, at.y - drag.start.y) < DRAG_THRESHOLD) return;
+      drag.begun = true;
+      this.#message("start", drag.grabbed);
+    }
+    const { u, v } = drag.pane.view.toImage(at.x, at.y);
+    drag.at = { u: u + drag.offset.u, v: v + drag.offset.v };
+    if (this.#moveScheduled) return;
+    this.#moveScheduled = true;
+    const moved = performance.now();
+    requestAnimationFrame(() => {
+      this.#moveScheduled = false;
+      if (this.#drag !== drag) return;
+      this.#latency.sent(this.#message("move", drag.at), moved);
+    });
+  }
+
+  /** @param {PointerEvent} event */
+  #up(event) {
+    const pointer = this.#drag?.pointer ?? this.#pan?.pointer;
+    if (event.pointerId !== pointer) return;
+    if (this.#drag?.begun) this.#message("end", this.#drag.at);
+    this.#release();
+  }
+
+  /**
+   * @param {import("./pane.js").Pane} pane
+   * @param {number} camera
+   * @param {{x: number, y: number}} at
+   */
+  #hoverAt(pane, camera, at) {
+    const hit = this.#hit(pane, at);
+    const { hover } = this.#store.facts;
+    pane.surface.classList.toggle("is-over-joint", hit !== null);
+    if (!hit) {
+      if (hover) this.#store.set({ hover: null });
+    } else if (hover?.camera !== camera || hover.person !== hit.handle.person || hover.point !== hit.handle.point) {
+      this.#store.set({ hover: { camera, person: hit.handle.person, point: hit.handle.point } });
+    }
+  }
+
+  /**
+   * @param {"start" | "move" | "end" | "cancel"} phase
+   * @param {{u: number, v: number}} at
+   * @returns the message's number
+   */
+  #message(phase, { u, v }) {
+    const { camera, person, point } = /** @type {Drag} */ (this.#drag);
+    this.#seq += 1;
+    this.#send({ type: "drag", phase, camera, person, point, u, v, seq: this.#seq });
+    return this.#seq;
+  }
+
+  #release() {
+    const surface = (this.#drag ?? this.#pan)?.pane.surface;
+    surface?.classList.remove("is-dragging", "is-panning");
+    this.#drag = null;
+    this.#pan = null;
+    if (this.#store.facts.dragging) this.#store.set({ dragging: false });
+  }
+}

@@ -1,0 +1,152 @@
+/** The keys: one table that is both obeyed and shown to whoever asks with `?`. */
+
+import { hasSearch } from "./actions.js";
+
+/**
+ * @typedef {object} Binding
+ * @property {string[]} keys how the keys are written for people
+ * @property {string} label
+ * @property {(event: KeyboardEvent) => boolean} matches
+ * @property {(event: KeyboardEvent) => void} run
+ */
+
+/** Keys that belong to viser's camera while the 3-D view has the focus. */
+const VISER_KEYS = new Set(["s", "w", "a", "d", "q", "e"]);
+
+/**
+ * Match a plain key by its character or, since Shift changes that by keyboard layout, by its place.
+ *
+ * @param {string} key
+ * @param {string} [code]
+ * @param {boolean} [shift]
+ * @returns {(event: KeyboardEvent) => boolean}
+ */
+function plain(key, code, shift = false) {
+  return (event) =>
+    !event.ctrlKey &&
+    !event.metaKey &&
+    !event.altKey &&
+    event.shiftKey === shift &&
+    (event.key.toLowerCase() === key || (code !== undefined && event.code === code));
+}
+
+/**
+ * @param {string} key
+ * @param {boolean} shift
+ * @returns {(event: KeyboardEvent) => boolean}
+ */
+function control(key, shift) {
+  return (event) =>
+    (event.ctrlKey || event.metaKey) && !event.altKey && event.shiftKey === shift && event.key.toLowerCase() === key;
+}
+
+/**
+ * @typedef {object} Parts
+ * @property {import("./store.js").Store} store
+ * @property {import("./actions.js").Actions} actions
+ * @property {import("./navigation.js").Navigation} navigation
+ * @property {import("./pane_grid.js").PaneGrid} grid
+ * @property {import("./gestures.js").Gestures} gestures
+ * @property {() => void} showHelp
+ */
+
+/**
+ * @param {Parts} parts
+ * @returns {Binding[]}
+ */
+export function bindings({ store, actions, navigation, grid, gestures, showHelp }) {
+  const escape = () => {
+    if (gestures.cancel()) return;
+    if (hasSearch(store.facts.state)) actions.search("stop");
+    else if (store.facts.filled !== null) grid.toggleFill(store.facts.filled);
+  };
+  const search = (/** @type {"step" | "frame"} */ action) => () => {
+    if (store.facts.connected && !store.facts.state?.job.running) actions.search(action);
+  };
+  return [
+    { keys: [","], label: "Previous frame", matches: plain(",", "Comma"), run: () => navigation.step(-1) },
+    { keys: ["."], label: "Next frame", matches: plain(".", "Period"), run: () => navigation.step(1) },
+    { keys: ["Shift ,"], label: "Ten frames back", matches: plain("<", "Comma", true), run: () => navigation.step(-10) },
+    { keys: ["Shift ."], label: "Ten frames on", matches: plain(">", "Period", true), run: () => navigation.step(10) },
+    { keys: ["Home"], label: "First frame", matches: plain("home"), run: () => navigation.first() },
+    { keys: ["End"], label: "Last frame", matches: plain("end"), run: () => navigation.last() },
+    { keys: ["Space"], label: "Play or pause", matches: plain(" "), run: () => navigation.togglePlay() },
+    { keys: ["Ctrl Z"], label: "Undo", matches: control("z", false), run: () => actions.undo() },
+    {
+      keys: ["Ctrl Shift Z", "Ctrl Y"],
+      label: "Redo",
+      matches: (event) => control("z", true)(event) || control("y", false)(event),
+      run: () => actions.redo(),
+    },
+    { keys: ["S"], label: "Search: one step", matches: plain("s"), run: search("step") },
+    { keys: ["F"], label: "Search: this frame", matches: plain("f"), run: search("frame") },
+    { keys: ["Esc"], label: "Cancel the drag, else stop the search", matches: plain("escape"), run: escape },
+    {
+      keys: ["1 – 9"],
+      label: "Fill the grid with a camera, and back",
+      matches: (event) => plain(event.key.toLowerCase())(event) && /^[1-9]$/.test(event.key),
+      run: (event) => grid.toggleFill(Number(event.key) - 1),
+    },
+    { keys: ["0"], label: "Show the whole image", matches: plain("0"), run: () => grid.resetViews() },
+    { keys: ["?"], label: "This list", matches: (event) => event.key === "?", run: showHelp },
+  ];
+}
+
+/**
+ * Obey the keys pressed in a document.
+ *
+ * @param {Document} target the page's, or that of the 3-D view
+ * @param {Binding[]} table
+ * @param {{viser: boolean, isDragging: () => boolean}} options
+ */
+export function listen(target, table, { viser, isDragging }) {
+  target.addEventListener("keydown", (event) => {
+    const from = /** @type {HTMLElement | null} */ (event.target);
+    const isEscape = event.key === "Escape";
+    if (event.defaultPrevented || target.querySelector("dialog[open]")) return;
+    if (!isEscape && (isDragging() || writes(from) || operates(from, event))) return;
+    if (viser && !event.ctrlKey && VISER_KEYS.has(event.key.toLowerCase())) return;
+    const binding = table.find(({ matches }) => matches(event));
+    if (!binding) return;
+    event.preventDefault();
+    binding.run(event);
+  });
+}
+
+/** @param {HTMLElement | null} element */
+function writes(element) {
+  return !!element?.matches?.("input:not([type=radio], [type=checkbox]), textarea, select, [contenteditable=true]");
+}
+
+/**
+ * Whether the key means something to the control that has the focus.
+ *
+ * @param {HTMLElement | null} element
+ * @param {KeyboardEvent} event
+ */
+function operates(element, event) {
+  return event.key === " " && !!element?.matches?.("button, input, a, summary, [role=button]");
+}
+
+/**
+ * Fill the dialog that lists the keys.
+ *
+ * @param {HTMLElement} list
+ * @param {Binding[]} table
+ */
+export function describe(list, table) {
+  for (const { keys, label } of table) {
+    const term = document.createElement("dt");
+    keys.forEach((key, index) => {
+      if (index > 0) term.append(" or ");
+      for (const part of key.split(" ")) {
+        const cap = document.createElement(part === "–" ? "span" : "kbd");
+        cap.textContent = part;
+        term.append(cap, " ");
+      }
+    });
+    const description = document.createElement("dd");
+    description.textContent = label;
+    list.append(term, description);
+  }
+}

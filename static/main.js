@@ -1,0 +1,66 @@
+/** Puts the page together: messages go into the store, the views read it, gestures and keys send. */
+
+import { Actions } from "./actions.js";
+import { Connection } from "./connection.js";
+import { button, byId } from "./elements.js";
+import { Gestures } from "./gestures.js";
+import * as keys from "./keys.js";
+import { Latency } from "./latency.js";
+import { Navigation } from "./navigation.js";
+import { showNotice, watchConnection } from "./notices.js";
+import { PaneGrid } from "./pane_grid.js";
+import { Receiver } from "./receiver.js";
+import { makeSplitter } from "./splitter.js";
+import { Store } from "./store.js";
+import { Timeline } from "./timeline.js";
+import { TopBar } from "./top_bar.js";
+import { Transport } from "./transport.js";
+
+// A token has become a cookie by now, and does not belong into the history or a screenshot.
+if (location.search) history.replaceState(null, "", location.pathname);
+
+const store = new Store();
+const latency = new Latency();
+const notices = byId("notices", HTMLElement);
+const receiver = new Receiver(store, (notice) => showNotice(notices, notice));
+/** @type {(message: import("./protocol.js").ClientMessage) => void} */
+const send = (message) => connection.send(message);
+
+const actions = new Actions(store, send);
+const gestures = new Gestures(store, send, latency);
+const navigation = new Navigation(store, send);
+const grid = new PaneGrid(byId("panes", HTMLElement), store, gestures, latency);
+new TopBar(store, actions);
+new Transport(store, navigation);
+new Timeline(byId("timeline", HTMLElement), store, navigation);
+watchConnection(byId("banner", HTMLElement), store);
+makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement));
+
+const help = byId("help", HTMLDialogElement);
+const table = keys.bindings({ store, actions, navigation, grid, gestures, showHelp: () => help.showModal() });
+keys.describe(byId("help-keys", HTMLElement), table);
+button("show-help", () => help.showModal());
+help.addEventListener("click", (event) => event.target === help && help.close());
+
+const isDragging = () => store.facts.dragging;
+keys.listen(document, table, { viser: false, isDragging });
+const scene = byId("scene", HTMLIFrameElement);
+scene.addEventListener("load", () => {
+  if (scene.contentDocument) keys.listen(scene.contentDocument, table, { viser: true, isDragging });
+});
+// viser is dark only where its address says so.
+scene.src = matchMedia("(prefers-color-scheme: dark)").matches ? "viser/?darkMode" : "viser/";
+
+const connection = new Connection(receiver);
+
+Object.assign(window, {
+  quadrille: {
+    latencies: latency.latencies,
+    toClient: grid.toClient.bind(grid),
+    get state() {
+      const { bitmaps: _, ...shown } = store.facts.shown ?? { bitmaps: [] };
+      const views = grid.panes.map(({ view }) => ({ zoom: view.zoom, scale: view.scale, origin: view.origin }));
+      return { ...store.facts, timeline: Object.fromEntries(store.facts.timeline), shown, views };
+    },
+  },
+});

@@ -1,0 +1,116 @@
+/**
+ * Where an image lies in its pane: zoom and centre, kept in image terms so that resizing the pane shows the same spot.
+ *
+ * Image positions are undistorted pixels with pixel centres at integers, so that the image spans -0.5 to width - 0.5;
+ * screen positions are CSS pixels from the pane's upper left corner.
+ */
+
+const LEAST_ZOOM = 0.25;
+const MOST_ZOOM = 40;
+
+export class PaneView {
+  /** 1 shows the whole image as large as the pane allows. */
+  zoom = 1;
+  #image;
+  #pane = { width: 1, height: 1 };
+  #center;
+
+  /**
+   * @param {number} width of the image, px
+   * @param {number} height of the image, px
+   */
+  constructor(width, height) {
+    this.#image = { width, height };
+    this.#center = this.#middle();
+  }
+
+  #middle() {
+    return { u: (this.#image.width - 1) / 2, v: (this.#image.height - 1) / 2 };
+  }
+
+  /** CSS pixels per image pixel. */
+  get scale() {
+    const { width, height } = this.#image;
+    return this.zoom * Math.min(this.#pane.width / width, this.#pane.height / height);
+  }
+
+  /** Screen position of image position (0, 0). */
+  get origin() {
+    return {
+      x: this.#pane.width / 2 - this.#center.u * this.scale,
+      y: this.#pane.height / 2 - this.#center.v * this.scale,
+    };
+  }
+
+  get isReset() {
+    const { u, v } = this.#middle();
+    return this.zoom === 1 && this.#center.u === u && this.#center.v === v;
+  }
+
+  /**
+   * @param {number} width
+   * @param {number} height
+   */
+  resize(width, height) {
+    this.#pane = { width: Math.max(1, width), height: Math.max(1, height) };
+  }
+
+  /**
+   * @param {number} u
+   * @param {number} v
+   */
+  toScreen(u, v) {
+    const { x, y } = this.origin;
+    return { x: x + u * this.scale, y: y + v * this.scale };
+  }
+
+  /**
+   * @param {number} x
+   * @param {number} y
+   */
+  toImage(x, y) {
+    const origin = this.origin;
+    return { u: (x - origin.x) / this.scale, v: (y - origin.y) / this.scale };
+  }
+
+  /**
+   * Zoom so that what lies under a screen position stays there.
+   *
+   * @param {number} x
+   * @param {number} y
+   * @param {number} factor
+   */
+  zoomAt(x, y, factor) {
+    const fixed = this.toImage(x, y);
+    this.zoom = Math.max(LEAST_ZOOM, Math.min(MOST_ZOOM, this.zoom * factor));
+    const moved = this.toImage(x, y);
+    this.#moveCenter(fixed.u - moved.u, fixed.v - moved.v);
+  }
+
+  /**
+   * @param {number} dx
+   * @param {number} dy
+   */
+  panBy(dx, dy) {
+    this.#moveCenter(-dx / this.scale, -dy / this.scale);
+  }
+
+  reset() {
+    this.zoom = 1;
+    this.#center = this.#middle();
+  }
+
+  /**
+   * The pane's middle stays on the image, so that an image is never lost from sight.
+   *
+   * @param {number} du
+   * @param {number} dv
+   */
+  #moveCenter(du, dv) {
+    const { width, height } = this.#image;
+    this.#center = {
+      u: Math.max(0, Math.min(width - 1, this.#center.u + du)),
+      v: Math.max(0, Math.min(height - 1, this.#center.v + dv)),
+    };
+  }
+}

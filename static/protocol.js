@@ -1,0 +1,48 @@
+/**
+ * The messages of the pane socket (docs/protocol.md). Positions are undistorted pixels, pixel centres at integers.
+ *
+ * @typedef {"image" | "edges" | "distance"} Base
+ * @typedef {{contours: boolean, joints: boolean, part_edges: boolean, skeleton: boolean}} Overlays
+ * @typedef {{name: string, width: number, height: number}} CameraInfo
+ * @typedef {{name: string, color: string, points: string[], bones: [string, string][]}} PersonInfo
+ * @typedef {{type: "session", name: string, fps: number, n_frames: number, cameras: CameraInfo[],
+ *   people: PersonInfo[]}} SessionMessage
+ * @typedef {{running: boolean, kind: string | null, stage: string | null, stages: string[], evaluations: number,
+ *   per_second: number, best_px: number | null, message: string}} Job
+ * @typedef {{type: "state", frame: number, person: number, point: string | null, base: Base, overlays: Overlays,
+ *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, job: Job, undo: string | null,
+ *   redo: string | null, saved: boolean, save_error: string | null}} StateMessage
+ * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
+ * @typedef {{source: string, cost_px: number | null, keyframe: boolean}} Cell
+ * @typedef {{type: "timeline", cells: Record<string, Cell | null>, replace: boolean}} TimelineMessage
+ * @typedef {SessionMessage | StateMessage | NoticeMessage | TimelineMessage} TextMessage
+ *
+ * @typedef {{type: "image", camera: number, frame: number, base: Base}} ImageHeader
+ * @typedef {{camera: number, person: number, kind: "model" | "candidate" | "part_edge" | "epipolar", color: string,
+ *   first: number, count: number}} Path
+ * @typedef {{camera: number, person: number, point: string, u: number, v: number, visible: boolean}} Handle
+ * @typedef {{type: "overlay", frame: number, seq: number, job: boolean, paths: Path[], handles: Handle[]}} OverlayHeader
+ * @typedef {OverlayHeader & {segments: Float32Array}} Overlay
+ *
+ * @typedef {{type: "seek", frame: number} |
+ *   {type: "select", person: number, point: string | null} |
+ *   {type: "drag", phase: "start" | "move" | "end" | "cancel", camera: number, person: number, point: string,
+ *     u: number, v: number, seq: number} |
+ *   {type: "view", base: Base, overlays: Overlays} |
+ *   {type: "search", action: "step" | "frame" | "stop"} |
+ *   {type: "undo"} | {type: "redo"}} ClientMessage
+ */
+
+const decoder = new TextDecoder();
+
+/**
+ * Take a binary message apart: `[uint32 LE header length][header JSON][payload]`.
+ *
+ * @param {ArrayBuffer} buffer
+ * @returns {{header: ImageHeader | OverlayHeader, payload: ArrayBuffer}}
+ */
+export function decodeBinary(buffer) {
+  const headerLength = new DataView(buffer).getUint32(0, true);
+  const header = JSON.parse(decoder.decode(new Uint8Array(buffer, 4, headerLength)));
+  return { header, payload: buffer.slice(4 + headerLength) };
+}

@@ -1,0 +1,47 @@
+/** The bar between panes and 3-D view: dragged, moved by arrow keys, put back by a double click; remembered. */
+
+const STORED = "quadrille.panes-fraction";
+const USUAL = 0.65;
+const LEAST_PANES_PX = 480;
+const LEAST_SCENE_PX = 300;
+const KEY_STEP_PX = 24;
+
+/**
+ * @param {HTMLElement} workspace
+ * @param {HTMLElement} bar
+ */
+export function makeSplitter(workspace, bar) {
+  let fraction = Number(localStorage.getItem(STORED)) || USUAL;
+
+  const show = () => {
+    const width = workspace.clientWidth;
+    const most = width - LEAST_SCENE_PX;
+    const panes = Math.round(Math.max(Math.min(LEAST_PANES_PX, most), Math.min(most, fraction * width)));
+    workspace.style.setProperty("--panes-width", `${panes}px`);
+    bar.setAttribute("aria-valuenow", String(Math.round((100 * panes) / Math.max(1, width))));
+    return panes;
+  };
+  const moveTo = (/** @type {number} */ x) => {
+    fraction = x / workspace.clientWidth;
+    fraction = show() / workspace.clientWidth;
+    localStorage.setItem(STORED, String(fraction));
+  };
+
+  bar.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0) return;
+    bar.setPointerCapture(event.pointerId);
+    workspace.classList.add("is-splitting");
+  });
+  bar.addEventListener("pointermove", (event) => {
+    if (bar.hasPointerCapture(event.pointerId)) moveTo(event.clientX - workspace.getBoundingClientRect().left);
+  });
+  bar.addEventListener("lostpointercapture", () => workspace.classList.remove("is-splitting"));
+  bar.addEventListener("dblclick", () => moveTo(USUAL * workspace.clientWidth));
+  bar.addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: -KEY_STEP_PX, ArrowRight: KEY_STEP_PX }[event.key];
+    if (step === undefined) return;
+    event.preventDefault();
+    moveTo(show() + step);
+  });
+  new ResizeObserver(show).observe(workspace);
+}

@@ -1,0 +1,74 @@
+/**
+ * What the page knows, in one place. Views read it; they are told once per animation frame what changed, however many
+ * messages came in between.
+ */
+
+/**
+ * @typedef {{camera: number, person: number, point: string}} Joint
+ * @typedef {{frame: number, base: import("./protocol.js").Base, bitmaps: ImageBitmap[]}} Shown
+ *
+ * @typedef {object} Facts
+ * @property {boolean} connected
+ * @property {import("./protocol.js").SessionMessage | null} session
+ * @property {import("./protocol.js").StateMessage | null} state
+ * @property {Map<number, import("./protocol.js").Cell>} timeline the known cells by frame
+ * @property {Shown | null} shown the images on the screen
+ * @property {import("./protocol.js").Overlay | null} overlay the vectors on the screen
+ * @property {Joint | null} hover the joint under the pointer
+ * @property {boolean} dragging whether a hand holds a joint
+ * @property {number} target the frame the user asked for last
+ * @property {boolean} playing
+ * @property {number | null} filled the camera whose pane fills the grid
+ */
+
+export class Store {
+  /** @type {Facts} */
+  facts = {
+    connected: false,
+    session: null,
+    state: null,
+    timeline: new Map(),
+    shown: null,
+    overlay: null,
+    hover: null,
+    dragging: false,
+    target: 0,
+    playing: false,
+    filled: null,
+  };
+  /** @type {((changed: Set<keyof Facts>) => void)[]} */
+  #views = [];
+  /** @type {Set<keyof Facts>} */
+  #changed = new Set();
+
+  /**
+   * Change facts; views hear of it on the next animation frame.
+   *
+   * @param {Partial<Facts>} facts
+   */
+  set(facts) {
+    if (this.#changed.size === 0) requestAnimationFrame(() => this.#flush());
+    Object.assign(this.facts, facts);
+    for (const key of Object.keys(facts)) this.#changed.add(/** @type {keyof Facts} */ (key));
+  }
+
+  /** @param {(changed: Set<keyof Facts>) => void} view */
+  subscribe(view) {
+    this.#views.push(view);
+  }
+
+  #flush() {
+    const changed = this.#changed;
+    this.#changed = new Set();
+    for (const view of this.#views) view(changed);
+  }
+
+  /**
+   * Whether the vectors on the screen belong to the images under them and to the program's frame: only then does a hand
+   * that grabs a joint mean what it sees.
+   */
+  get isSettled() {
+    const { state, shown, overlay, connected } = this.facts;
+    return connected && !!state && shown?.frame === state.frame && overlay?.frame === state.frame;
+  }
+}

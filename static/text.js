@@ -1,0 +1,19 @@
+/** How figures are written. */
+
+const COUNT = new Intl.NumberFormat("en", { maximumFractionDigits: 0 });
+
+/** @param {number | null} value a cost in pixels */
+export function px(value) {
+  return value === null ? "–" : `${value.toFixed(2)} px`;
+}
+
+/** @param {number} value */
+export function count(value) {
+  return COUNT.format(value);
+}
+
+/** @param {number} seconds */
+export function clock(seconds) {
+  const minutes = Math.floor(seconds / 60);
+  return `${String(minutes).padStart(2, "0")}:${(seconds - 60 * minutes).toFixed(2).padStart(5, "0")}`;
+}

@@ -1,0 +1,109 @@
+/** The bar at the top: layers, search, cost, history. */
+
+import { hasSearch } from "./actions.js";
+import { button, byId } from "./elements.js";
+import { count, px } from "./text.js";
+
+export class TopBar {
+  #store;
+  #session = byId("session-name", HTMLElement);
+  #person = byId("person", HTMLSelectElement);
+  #cost = byId("cost", HTMLElement);
+  #stage = byId("search-stage", HTMLElement);
+  #stages = byId("search-stages", HTMLElement);
+  #figures = byId("search-figures", HTMLElement);
+  #saved = byId("saved", HTMLElement);
+  #bases = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll("input[name=base]")]);
+  #overlays = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll("#overlays input")]);
+  #step;
+  #frame;
+  #stop;
+  #undo;
+  #redo;
+
+  /**
+   * @param {import("./store.js").Store} store
+   * @param {import("./actions.js").Actions} actions
+   */
+  constructor(store, actions) {
+    this.#store = store;
+    this.#step = button("search-step", () => actions.search("step"));
+    this.#frame = button("search-frame", () => actions.search("frame"));
+    this.#stop = button("search-stop", () => actions.search("stop"));
+    this.#undo = button("undo", () => actions.undo());
+    this.#redo = button("redo", () => actions.redo());
+    for (const input of this.#bases) {
+      input.addEventListener("change", () => actions.showBase(/** @type {import("./protocol.js").Base} */ (input.value)));
+    }
+    for (const input of this.#overlays) {
+      const layer = /** @type {keyof import("./protocol.js").Overlays} */ (input.value);
+      input.addEventListener("change", () => actions.showOverlay(layer, input.checked));
+    }
+    this.#person.addEventListener("change", () => {
+      actions.selectPerson(Number(this.#person.value));
+      this.#person.blur();
+    });
+    store.subscribe((changed) => {
+      if (changed.has("session")) this.#showSession();
+      if (changed.has("state") || changed.has("connected") || changed.has("session")) this.#showState();
+    });
+  }
+
+  #showSession() {
+    const { session } = this.#store.facts;
+    if (!session) return;
+    this.#session.textContent = session.name;
+    this.#session.title = session.name;
+    document.title = `${session.name} – Quadrille`;
+    this.#person.replaceChildren(...session.people.map(({ name }, index) => new Option(name, String(index))));
+    this.#person.hidden = session.people.length < 2;
+  }
+
+  #showState() {
+    const { state, connected } = this.#store.facts;
+    const isReady = connected && !!state;
+    const isRunning = !!state?.job.running;
+    this.#step.disabled = this.#frame.disabled = !isReady || isRunning;
+    this.#stop.disabled = !isReady || !hasSearch(state);
+    this.#undo.disabled = !isReady || state.undo === null;
+    this.#redo.disabled = !isReady || state.redo === null;
+    for (const input of [...this.#bases, ...this.#overlays]) input.disabled = !isReady;
+    this.#person.disabled = !isReady;
+    if (!state) return;
+    this.#undo.title = state.undo === null ? "Nothing to undo" : `Undo ${state.undo} (Ctrl+Z)`;
+    this.#redo.title = state.redo === null ? "Nothing to redo" : `Redo ${state.redo} (Ctrl+Shift+Z)`;
+    for (const input of this.#bases) input.checked = input.value === state.base;
+    for (const input of this.#overlays) {
+      input.checked = state.overlays[/** @type {keyof import("./protocol.js").Overlays} */ (input.value)];
+    }
+    this.#person.value = String(state.person);
+    this.#cost.textContent = state.cost_px === null ? "–" : state.cost_px.toFixed(2);
+    this.#showJob(state.job);
+    this.#showSaved(state);
+  }
+
+  /** @param {import("./protocol.js").Job} job */
+  #showJob(job) {
+    const stands = job.running || job.kind !== null;
+    const at = stands && job.stage !== null ? job.stages.indexOf(job.stage) : -1;
+    this.#stage.textContent = stands ? (job.stage ?? "starting").replaceAll("_", " ") : job.message;
+    this.#stage.title = this.#stage.textContent;
+    this.#figures.textContent = stands
+      ? `${count(job.evaluations)} poses · ${count(job.per_second)}/s · best ${px(job.best_px)}`
+      : "";
+    this.#stages.replaceChildren(
+      ...(stands ? job.stages : []).map((_, index) => {
+        const mark = document.createElement("i");
+        mark.className = index < at ? "is-done" : index === at ? "is-current" : "";
+        return mark;
+      }),
+    );
+  }
+
+  /** @param {import("./protocol.js").StateMessage} state */
+  #showSaved({ saved, save_error }) {
+    this.#saved.className = save_error !== null ? "is-failed" : saved ? "is-saved" : "is-saving";
+    this.#saved.textContent = save_error !== null ? "Not saved" : saved ? "Saved" : "Saving";
+    this.#saved.title = save_error !== null ? `Not saved: ${save_error}` : saved ? "All edits are on disk" : "Saving";
+  }
+}
