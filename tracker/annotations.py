@@ -1,0 +1,391 @@
+"""The store of poses: who or what set them, when, why; pins, body models, and undo that survives a restart.
+
+An SQLite file. Edits form a tree: each stands on the one before it, `head` is the one that the current poses show.
+Undo moves head to the parent, redo to the youngest child. A commit after an undo grows a new branch; the old one
+stays in the log but cannot be reached any more. Nothing but the current state and head is ever changed in place.
+"""
+
+import json
+import sqlite3
+import threading
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tracker.errors import SessionError
+from tracker.records import (
+    SOURCES,
+    Change,
+    Committed,
+    FrameRow,
+    HistoryEntry,
+    ModelRevision,
+    Pin,
+    PinChange,
+    PoseChange,
+    PoseRecord,
+)
+
+VERSION = 1
+
+_SCHEMA = """
+CREATE TABLE edits (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    parent INTEGER REFERENCES edits,          -- NULL for the first
+    label TEXT NOT NULL, author TEXT NOT NULL, time TEXT NOT NULL, program TEXT NOT NULL
+);
+CREATE INDEX edits_parent ON edits (parent);
+-- One row; NULL: nothing is done.
+CREATE TABLE head (edit INTEGER REFERENCES edits);
+INSERT INTO head VALUES (NULL);
+CREATE TABLE moves (                                             -- undo and redo, as they happened
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    kind TEXT NOT NULL, edit INTEGER NOT NULL REFERENCES edits, time TEXT NOT NULL
+);
+CREATE TABLE model_revisions (
+    id INTEGER PRIMARY KEY AUTOINCREMENT, person TEXT NOT NULL, toml TEXT NOT NULL, time TEXT NOT NULL
+);
+CREATE TABLE pose_changes (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    edit INTEGER NOT NULL REFERENCES edits,
+    previous INTEGER REFERENCES pose_changes,                    -- what the frame showed before; NULL: nothing
+    person TEXT NOT NULL, frame INTEGER NOT NULL,
+    numbers BLOB,                                                -- little-endian float64; NULL: cleared
+    sources BLOB, keyframe INTEGER, status TEXT, cost_px REAL,
+    model_revision INTEGER REFERENCES model_revisions, settings TEXT
+);
+CREATE INDEX pose_changes_edit ON pose_changes (edit);
+CREATE TABLE poses (
+    person TEXT, frame INTEGER, change INTEGER NOT NULL REFERENCES pose_changes, PRIMARY KEY (person, frame)
+) WITHOUT ROWID;
+CREATE TABLE pin_changes (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    edit INTEGER NOT NULL REFERENCES edits,
+    previous INTEGER REFERENCES pin_changes,
+    person TEXT NOT NULL, frame INTEGER NOT NULL, point TEXT NOT NULL, camera TEXT NOT NULL,
+    u REAL, v REAL                                               -- original pixels; NULL: cleared
+);
+CREATE INDEX pin_changes_edit ON pin_changes (edit);
+CREATE TABLE pins (
+    person TEXT, frame INTEGER, point TEXT, camera TEXT, change INTEGER NOT NULL REFERENCES pin_changes,
+    PRIMARY KEY (person, frame, point, camera)
+) WITHOUT ROWID;
+CREATE TABLE settings (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+"""
+
+# What each kind of current state is found by, and the column that is NULL where a change clears.
+_KEYS = {"pose": ("person, frame", "numbers"), "pin": ("person, frame, point, camera", "u")}
+
+
+class AnnotationStore:
+    """The annotations of a session. Safe to use from several threads; one program may write at a time.
+
+    Whatever a method has written is on the disk when it returns.
+    """
+
+    def __init__(self, path: str | Path, read_only: bool = False) -> None:
+        """Open a store; a missing one is made, unless it is only to be read.
+
+        Raises:
+            SessionError: the file is missing, not a store, or newer than this program.
+        """
+        self._path = Path(path)
+        self._lock = threading.RLock()
+        if read_only and not self._path.is_file():
+            raise SessionError(f"annotations {path} not found; check the session folder")
+        mode = "ro" if read_only else "rwc"
+        with self._errors():
+            self._db = sqlite3.connect(
+                f"{self._path.absolute().as_uri()}?mode={mode}",
+                uri=True,
+                isolation_level=None,  # transactions are said, not guessed
+                check_same_thread=False,
+                timeout=10.0,
+            )
+            # No write-ahead log: it needs shared memory, which network drives lack. EXTRA is FULL plus the folder's
+            # entry, without which a power cut could bring the journal back and take the last commit away.
+            self._db.execute("PRAGMA journal_mode = DELETE")
+            self._db.execute("PRAGMA synchronous = EXTRA")
+            self._db.execute("PRAGMA foreign_keys = ON")
+            version = self._db.execute("PRAGMA user_version").fetchone()[0]
+            if version == 0 and not read_only:
+                with self._transaction():
+                    for statement in _SCHEMA.split(";\n"):
+                        self._db.execute(statement)
+                    self._db.execute(f"PRAGMA user_version = {VERSION}")
+                version = VERSION
+        if version != VERSION:
+            self._db.close()
+            what = "is not a store of annotations" if version == 0 else f"has version {version}"
+            raise SessionError(f"annotations {path} {what}, this program reads version {VERSION}; upgrade quadrille")
+
+    def close(self) -> None:
+        """Release the file."""
+        with self._lock:
+            self._db.close()
+
+    def pose(self, person: str, frame: int) -> PoseRecord | None:
+        """The pose of a person in a frame, or None."""
+        row = self._one(
+            "SELECT c.numbers, c.sources, c.model_revision, c.keyframe, c.status, c.cost_px, c.settings, e.author, "
+            "e.time, e.program FROM poses p JOIN pose_changes c ON c.id = p.change JOIN edits e ON e.id = c.edit "
+            "WHERE p.person = ? AND p.frame = ?",
+            (person, frame),
+        )
+        if row is None:
+            return None
+        numbers, sources, revision, keyframe, status, cost, settings, *made = row
+        values = np.frombuffer(numbers, dtype="<f8").astype(np.float64)
+        values.setflags(write=False)
+        labels = tuple(SOURCES[i] for i in sources)
+        return PoseRecord(values, labels, revision, bool(keyframe), status, cost, json.loads(settings), *made)
+
+    def frames(self, person: str) -> list[FrameRow]:
+        """All frames in which the person has a pose, ascending, in short."""
+        rows = self._all(
+            "SELECT c.frame, c.sources, c.status, c.cost_px, c.keyframe FROM poses p "
+            "JOIN pose_changes c ON c.id = p.change WHERE p.person = ? ORDER BY p.frame",
+            (person,),
+        )
+        return [FrameRow(f, SOURCES[min(s)], status, cost, bool(key)) for f, s, status, cost, key in rows]
+
+    def pins(self, person: str, frame: int) -> list[Pin]:
+        """The pins of a person in a frame, by point and camera."""
+        rows = self._all(
+            "SELECT c.point, c.camera, c.u, c.v FROM pins p JOIN pin_changes c ON c.id = p.change "
+            "WHERE p.person = ? AND p.frame = ? ORDER BY p.point, p.camera",
+            (person, frame),
+        )
+        return [Pin(point, camera, (u, v)) for point, camera, u, v in rows]
+
+    def commit(self, label: str, changes: Sequence[Change], author: str = "", by_program: bool = False) -> Committed:
+        """Make changes as one edit, which one undo takes back.
+
+        Args:
+            label: what the edit is to its user: `Drag left wrist`.
+            changes: poses and pins to set or clear.
+            author: who makes it.
+            by_program: leave keyframes as they are.
+        """
+        with self._lock, self._errors(), self._transaction():
+            (head,) = self._db.execute("SELECT edit FROM head").fetchone()
+            edit = self._db.execute(
+                "INSERT INTO edits (parent, label, author, time, program) VALUES (?, ?, ?, ?, ?)",
+                (head, label, author, _now(), _program_version()),
+            ).lastrowid
+            assert edit is not None
+            self._db.execute("UPDATE head SET edit = ?", (edit,))
+            return Committed(edit, self._apply(edit, changes, by_program))
+
+    def amend(self, edit: int, changes: Sequence[Change], by_program: bool = False) -> tuple[tuple[str, int], ...]:
+        """Add changes to the edit made last, as the same gesture goes on.
+
+        Returns:
+            Person and frame of the keyframes that a program was kept from changing.
+
+        Raises:
+            SessionError: another edit, or an undo, has come in between.
+        """
+        with self._lock, self._errors(), self._transaction():
+            (head,) = self._db.execute("SELECT edit FROM head").fetchone()
+            if head != edit:
+                raise SessionError(f"edit {edit} cannot go on: the history stands at {head}; begin a new edit")
+            return self._apply(edit, changes, by_program)
+
+    def undo(self) -> str | None:
+        """Take the last edit back; returns its label, or None where there is none."""
+        with self._lock, self._errors(), self._transaction():
+            row = self._db.execute(
+                "SELECT e.id, e.parent, e.label FROM head h JOIN edits e ON e.id = h.edit"
+            ).fetchone()
+            if row is None:
+                return None
+            edit, parent, label = row
+            self._move("undo", edit, parent)
+            for table in ("pose", "pin"):
+                for change, previous in self._changes(table, edit)[::-1]:
+                    self._show(table, change, previous)
+            return str(label)
+
+    def redo(self) -> str | None:
+        """Do again what the last undo took back; returns its label, or None where there is none."""
+        with self._lock, self._errors(), self._transaction():
+            row = self._db.execute(
+                "SELECT id, label FROM edits WHERE parent IS (SELECT edit FROM head) ORDER BY id DESC LIMIT 1"
+            ).fetchone()
+            if row is None:
+                return None
+            edit, label = row
+            self._move("redo", edit, edit)
+            for table in ("pose", "pin"):
+                for change, _ in self._changes(table, edit):
+                    self._show(table, change, change)
+            return str(label)
+
+    def history(self, limit: int = 100) -> list[HistoryEntry]:
+        """Edits that redo and undo can reach, latest first; at most `limit` of each."""
+        youngest = "(SELECT max(id) FROM edits WHERE parent IS {})"
+        undone = self._line(youngest.format("(SELECT edit FROM head)"), youngest.format("line.id"), limit)
+        done = self._line("(SELECT edit FROM head)", "line.parent", limit)
+        return [HistoryEntry(e, label, author, time, True) for e, label, author, time in reversed(undone)] + [
+            HistoryEntry(e, label, author, time, False) for e, label, author, time in done
+        ]
+
+    def add_model_revision(self, person: str, toml: str) -> int:
+        """Keep a body model for good; returns its id, that of the person's latest where nothing has changed."""
+        with self._lock, self._errors(), self._transaction():
+            latest = self.model_revisions(person)[-1:]
+            if latest and latest[0].toml == toml:
+                return latest[0].id
+            row = self._db.execute(
+                "INSERT INTO model_revisions (person, toml, time) VALUES (?, ?, ?)", (person, toml, _now())
+            ).lastrowid
+            assert row is not None
+            return row
+
+    def model_revisions(self, person: str) -> list[ModelRevision]:
+        """All body models that a person has had, oldest first."""
+        sql = "SELECT id, person, toml, time FROM model_revisions WHERE person = ? ORDER BY id"
+        return [ModelRevision(*r) for r in self._all(sql, (person,))]
+
+    def model_revision(self, revision: int) -> ModelRevision:
+        """The body model of an id that a pose names."""
+        row = self._one("SELECT id, person, toml, time FROM model_revisions WHERE id = ?", (revision,))
+        assert row is not None, f"no model revision {revision}"
+        return ModelRevision(*row)
+
+    def setting(self, key: str, default: Any = None) -> Any:
+        """A setting of the session: anything that JSON holds."""
+        row = self._one("SELECT value FROM settings WHERE key = ?", (key,))
+        return default if row is None else json.loads(row[0])
+
+    def set_setting(self, key: str, value: Any) -> None:
+        """Keep a setting of the session; not part of the history."""
+        with self._lock, self._errors(), self._transaction():
+            self._db.execute("INSERT OR REPLACE INTO settings VALUES (?, ?)", (key, json.dumps(value)))
+
+    def _apply(self, edit: int, changes: Sequence[Change], by_program: bool) -> tuple[tuple[str, int], ...]:
+        skipped = []
+        for change in changes:
+            if isinstance(change, PinChange):
+                self._set_pin(edit, change)
+            elif by_program and self._is_keyframe(change.person, change.frame):
+                skipped.append((change.person, change.frame))
+            else:
+                self._set_pose(edit, change)
+        return tuple(skipped)
+
+    def _is_keyframe(self, person: str, frame: int) -> bool:
+        sql = "SELECT c.keyframe FROM poses p JOIN pose_changes c ON c.id = p.change WHERE (p.person, p.frame) = (?, ?)"
+        row = self._db.execute(sql, (person, frame)).fetchone()
+        return row is not None and bool(row[0])
+
+    def _set_pose(self, edit: int, change: PoseChange) -> None:
+        pose = change.pose
+        if pose is None:
+            content: tuple[Any, ...] = (None,) * 7
+        else:
+            assert len(pose.sources) == len(pose.values)
+            assert np.all(np.isfinite(pose.values))
+            content = (
+                np.asarray(pose.values, dtype="<f8").tobytes(),
+                bytes(SOURCES.index(s) for s in pose.sources),
+                pose.keyframe,
+                pose.status,
+                pose.cost_px,
+                pose.model_revision,
+                json.dumps(dict(pose.settings)),
+            )
+        row = self._db.execute(
+            "INSERT INTO pose_changes (edit, previous, person, frame, numbers, sources, keyframe, status, cost_px, "
+            "model_revision, settings) VALUES (?1, (SELECT change FROM poses WHERE (person, frame) = (?2, ?3)), "
+            "?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
+            (edit, change.person, change.frame, *content),
+        ).lastrowid
+        self._show("pose", row, row)
+
+    def _set_pin(self, edit: int, change: PinChange) -> None:
+        u, v = change.position_px or (None, None)
+        row = self._db.execute(
+            "INSERT INTO pin_changes (edit, previous, person, frame, point, camera, u, v) VALUES (?1, (SELECT change "
+            "FROM pins WHERE (person, frame, point, camera) = (?2, ?3, ?4, ?5)), ?2, ?3, ?4, ?5, ?6, ?7)",
+            (edit, *change[:4], u, v),
+        ).lastrowid
+        self._show("pin", row, row)
+
+    def _line(self, start: str, onward: str, limit: int) -> list[Any]:
+        """Edits from one to the next in the tree; `start` and `onward` are SQL for their ids."""
+        columns = "edits.id, edits.parent, edits.label, edits.author, edits.time"
+        return self._all(
+            f"WITH RECURSIVE line (id, parent, label, author, time, n) AS (SELECT {columns}, 1 FROM edits "
+            f"WHERE id = {start} UNION ALL SELECT {columns}, n + 1 FROM line JOIN edits ON edits.id = {onward} "
+            "WHERE n < ?) SELECT id, label, author, time FROM line",
+            (limit,),
+        )
+
+    def _changes(self, kind: str, edit: int) -> list[tuple[int, int | None]]:
+        """Ids of an edit's changes, and of what was there before each, in order."""
+        return self._db.execute(
+            f"SELECT id, previous FROM {kind}_changes WHERE edit = ? ORDER BY id", (edit,)
+        ).fetchall()
+
+    def _show(self, kind: str, change: int | None, shown: int | None) -> None:
+        """Let the frame (or pin) that a change is about show another of its changes, or nothing."""
+        key, content = _KEYS[kind]
+        self._db.execute(
+            f"DELETE FROM {kind}s WHERE ({key}) = (SELECT {key} FROM {kind}_changes WHERE id = ?)", (change,)
+        )
+        self._db.execute(
+            f"INSERT INTO {kind}s ({key}, change) SELECT {key}, id FROM {kind}_changes "
+            f"WHERE id = ? AND {content} IS NOT NULL",
+            (shown,),
+        )
+
+    def _move(self, kind: str, edit: int, head: int | None) -> None:
+        self._db.execute("INSERT INTO moves (kind, edit, time) VALUES (?, ?, ?)", (kind, edit, _now()))
+        self._db.execute("UPDATE head SET edit = ?", (head,))
+
+    def _one(self, sql: str, parameters: tuple[Any, ...]) -> Any:
+        with self._lock, self._errors():
+            return self._db.execute(sql, parameters).fetchone()
+
+    def _all(self, sql: str, parameters: tuple[Any, ...]) -> list[Any]:
+        with self._lock, self._errors():
+            return self._db.execute(sql, parameters).fetchall()
+
+    @contextmanager
+    def _transaction(self) -> Generator[None, None, None]:
+        self._db.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        except BaseException:
+            self._db.execute("ROLLBACK")
+            raise
+        self._db.execute("COMMIT")
+
+    @contextmanager
+    def _errors(self) -> Generator[None, None, None]:
+        try:
+            yield
+        except sqlite3.Error as error:
+            raise SessionError(
+                f"annotations {self._path} cannot be read or written: {error}; check the disk and who has the file open"
+            ) from error
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+@cache
+def _program_version() -> str:
+    try:
+        return metadata.version("quadrille")
+    except metadata.PackageNotFoundError:  # run from the source tree without an installation
+        return "unknown"

@@ -1,0 +1,111 @@
+"""What the store of annotations takes and gives: poses with their provenance, pins, edits."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from tracker.rigid import Array
+
+# From a person's hand to a foreign file. Stored by index: add at the end, never reorder.
+SOURCES = ("manual", "pinned", "searched", "fitted", "tracked", "interpolated", "smoothed", "imported")
+
+
+@dataclass(frozen=True, eq=False)
+class PoseRecord:
+    """The pose of a person in a frame, and where it came from."""
+
+    values: Array
+    """Pose, (n_values,), in the order of the body model's `value_names`."""
+    sources: tuple[str, ...]
+    """Where each value came from, one of `SOURCES`, (n_values,)."""
+    model_revision: int
+    """The body model that the values belong to."""
+    keyframe: bool = False
+    """Whether a person set or verified the frame, so that no program may change it."""
+    status: str = ""
+    """How the tracker or a reviewer judges it, e.g. `ok`, `lost`."""
+    cost_px: float | None = None
+    """Mean cost over the views, px; None where nobody has computed it."""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """What the program that made it was told; anything that JSON holds."""
+    author: str = ""
+    """Who made the edit; filled in by the store, like the next two."""
+    time: str = ""
+    """When the edit was made, ISO 8601, UTC."""
+    program: str = ""
+    """Version of the program that made the edit."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseChange:
+    """Set the pose of a person in a frame, or clear it."""
+
+    person: str
+    frame: int
+    pose: PoseRecord | None
+    """The new pose; None clears."""
+
+
+class PinChange(NamedTuple):
+    """Set a pin, or clear it."""
+
+    person: str
+    frame: int
+    point: str
+    """One of the body model's `point_names`."""
+    camera: str
+    position_px: tuple[float, float] | None
+    """Where the point is seen, original pixels; None clears."""
+
+
+class Pin(NamedTuple):
+    """Where a person says that a point of the body is seen."""
+
+    point: str
+    camera: str
+    position_px: tuple[float, float]
+    """Original pixels."""
+
+
+Change = PoseChange | PinChange
+
+
+class Committed(NamedTuple):
+    """What became of a commit."""
+
+    edit: int
+    """Id of the edit, for `amend`."""
+    skipped: tuple[tuple[str, int], ...]
+    """Person and frame of the keyframes that a program was kept from changing."""
+
+
+class FrameRow(NamedTuple):
+    """A frame that has a pose, in short."""
+
+    frame: int
+    source: str
+    """The source of any of its values that is nearest to a person's hand (the first in `SOURCES`)."""
+    status: str
+    cost_px: float | None
+    keyframe: bool
+
+
+class HistoryEntry(NamedTuple):
+    """An edit that can be undone or redone."""
+
+    edit: int
+    label: str
+    author: str
+    time: str
+    undone: bool
+    """Whether redo would do it again."""
+
+
+class ModelRevision(NamedTuple):
+    """A body model as it was when poses were made with it; never changed."""
+
+    id: int
+    person: str
+    toml: str
+    """Text of the model file, with its sizes."""
+    time: str
