@@ -43,14 +43,15 @@ class Outfit:
         leg = np.char.endswith(bones, "_thigh") | np.char.endswith(bones, "_calf")
         arm = np.char.endswith(bones, "_arm") | np.char.endswith(bones, "_forearm")
         hand = np.char.endswith(bones, "_forearm") & (z < -0.138)
-        # The seam of a raglan sleeve runs from the collar to the armpit.
-        sleeve = (arm & ~hand) | (in_torso & (np.abs(points_torso[:, 1]) > 0.092) & (points_torso[:, 2] > 0.06))
-        collar = in_torso & (z > 0.160) & (np.hypot(x + 0.004, y) < 0.040)
-        waist = in_torso & (z < -0.118)
+        # The seam runs in a plane from the shoulder to the armpit, whichever bone the cloth follows there.
+        beyond_seam = (np.abs(points_torso[:, 1]) > 0.095) & (points_torso[:, 2] > 0.075)
+        sleeve = (arm & ~hand & (np.abs(points_torso[:, 1]) > 0.095)) | (in_torso & beyond_seam)
+        collar = in_torso & (z > 0.176) & (np.hypot(x + 0.004, y) < 0.040)
+        waist = in_torso & (z < -0.102)
         out[sleeve & (points_torso[:, 1] > 0)] = self.left_sleeve
         out[sleeve & (points_torso[:, 1] < 0)] = self.right_sleeve
         out[leg | waist] = self.trousers
-        out[waist & (z > -0.129)] = np.array(self.shoes) * 0.8  # belt
+        out[waist & (z > -0.113)] = np.array(self.shoes) * 0.8  # belt
         out[foot] = self.shoes
         out[foot & (z < -0.034)] = (0.55, 0.53, 0.50)  # sole
         out[hand | head | collar] = self.skin

@@ -7,11 +7,11 @@ from tracker.body import BodyModel, Joint, Landmark, Part
 # Every bone is 5% or more off the preset's, some longer and some shorter, in such a way that the body keeps its
 # height: a tracker that assumes the preset is wrong in the way it would be wrong about a real person.
 BONE_FACTORS = {
-    "neck": (1.0, 1.0, 0.945),
-    "shoulder": (1.0, 1.08, 0.945),
+    "neck": (1.0, 1.0, 1.055),
+    "shoulder": (1.0, 1.08, 1.055),
     "elbow": (1.0, 1.0, 1.07),
     "wrist": (1.0, 1.0, 0.94),
-    "hip": (1.0, 1.08, 1.058),
+    "hip": (1.0, 0.945, 0.94),
     "knee": (1.0, 1.0, 0.945),
     "ankle": (1.0, 1.0, 1.055),
     "head": (1.0, 1.0, 1.08),

@@ -1,0 +1,16 @@
+import pytest
+
+from tracker.formats.model_toml import load_model
+from tracker.simulate.outfit import Outfit
+from tracker.simulate.skeleton import altered_model
+from tracker.simulate.skin import make_skin
+
+
+@pytest.fixture(scope="session")
+def true_model():
+    return altered_model(load_model("gavrila22", 1.78))
+
+
+@pytest.fixture(scope="session")
+def skin(true_model):
+    return make_skin(true_model, Outfit())
