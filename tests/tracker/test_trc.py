@@ -1,0 +1,119 @@
+import numpy as np
+import pytest
+
+from tracker.errors import FormatError
+from tracker.formats.trc import read_trc, write_trc
+
+HEADER = (
+    "PathFileType\t4\t(X/Y/Z)\tx.trc\n"
+    "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n"
+    "50\t50\t2\t2\t{units}\t50\t1\t2\n"
+    "Frame#\tTime\tKnee\t\t\tHeel\t\t\n"
+    "\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n"
+)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def _write(rows, units="m", header=HEADER):
+        path = tmp_path / "x.trc"
+        path.write_text(header.format(units=units) + rows)
+        return path
+
+    return _write
+
+
+def test_rows_frames_and_blanks(write):
+    table = read_trc(write("\n7\t0.12\t1\t2\t3\t4\t5\t6\n9\t0.16\t1.5\t\t3\t\t\t\n"))
+    assert table.names == ("Knee", "Heel")
+    assert table.frames.tolist() == [0, 2]  # Frame# minus the first Frame#
+    assert table.times.tolist() == [0.12, 0.16]
+    assert table.rate == 50
+    np.testing.assert_array_equal(table.points[0], [[1, 2, 3], [4, 5, 6]])
+    assert np.isnan(table.points[1]).all()  # a point with one coordinate missing is missing
+
+
+@pytest.mark.parametrize(
+    "row", ["1\t0\t1\t2\t3", "1\t0\t1\t2\t3\t\t\t\t\t", "1\t0\t1\t2\t3\tNaN\tnan\t ", "1\t0\t1\t2\t3\t\t\t\n\n"]
+)
+def test_ways_to_leave_a_point_out(write, row):
+    points = read_trc(write(row + "\n")).points
+    assert points[0, 0].tolist() == [1, 2, 3]
+    assert np.isnan(points[0, 1]).all()
+
+
+@pytest.mark.parametrize(("units", "metres"), [("m", 1.0), ("mm", 0.001), ("cm", 0.01), ("meters", 1.0), ("MM", 0.001)])
+def test_units(write, units, metres):
+    assert read_trc(write("1\t0\t1\t2\t3\t4\t5\t6\n", units)).points[0, 1] == pytest.approx(
+        np.array([4, 5, 6]) * metres
+    )
+
+
+@pytest.mark.parametrize("units", ["m", "mm"])
+def test_round_trip(tmp_path, units):
+    rng = np.random.default_rng(2)
+    points = rng.normal(0, 2, (6, 3, 3))
+    points[2, 1] = np.nan
+    frames = [0, 1, 2, 5, 6, 9]
+    write_trc(tmp_path / "a.trc", ["a b", "c", "d"], points, 59.94, frames=frames, units=units)
+    back = read_trc(tmp_path / "a.trc")
+    assert back.names == ("a b", "c", "d")
+    assert back.frames.tolist() == frames
+    assert back.rate == 59.94
+    np.testing.assert_allclose(back.points, points, atol=1e-7)
+    np.testing.assert_allclose(back.times, np.array(frames) / 59.94, atol=1e-6)
+
+
+def test_first_frame_is_kept_by_a_blank_row(tmp_path):
+    write_trc(tmp_path / "a.trc", ["a"], np.ones((2, 1, 3)), 30, frames=[40, 41])
+    back = read_trc(tmp_path / "a.trc")
+    assert back.frames.tolist() == [0, 40, 41]
+    assert np.isnan(back.points[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("rows", "units", "expected"),
+    [
+        ("1\t0\t1\t2\t3\t4\t5\t6\t7\n", "m", "line 6: expected 8 columns for 2 points, found 9"),
+        ("1\t0\t1\t2\t3\t4\t5\t6\n2\t0.1\tx\n", "m", "line 7: expected numbers.*'x'"),
+        ("\t0\t1\t2\t3\t4\t5\t6\n", "m", "line 6"),
+        ("1.5\t0\t1\t2\t3\t4\t5\t6\n", "m", "line 6"),
+        ("2\t0\t1\n1\t0\t1\n", "m", "expected Frame# to rise"),
+        ("", "m", "no rows"),
+        ("1\t0\t1\t2\t3\t4\t5\t6\n", "feet", "line 3: expected Units.*'feet'"),
+    ],
+)
+def test_malformed(write, rows, units, expected):
+    with pytest.raises(FormatError, match=expected):
+        read_trc(write(rows, units))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("Heel", "Knee", "line 4: expected point names, each once"),
+        ("50\t50\t2", "fast\t50\t2", "line 3: expected a DataRate above 0, found 'fast'"),
+        ("PathFileType", "Path", "not a TRC file"),
+    ],
+)
+def test_malformed_header(write, old, new, expected):
+    with pytest.raises(FormatError, match=expected):
+        read_trc(write("1\t0\t1\t2\t3\t4\t5\t6\n", header=HEADER.replace(old, new, 1)))
+
+
+def test_missing(tmp_path):
+    with pytest.raises(FormatError, match="not found"):
+        read_trc(tmp_path / "none.trc")
+
+
+@pytest.mark.parametrize(
+    ("name", "n_frames", "n_points"),
+    [("walk/ground_truth.trc", 60, 32), ("balance_real/reference_joints.trc", 100, 25)],
+)
+def test_footage_at_hand(data_folder, name, n_frames, n_points):
+    folder, file = name.split("/")
+    table = read_trc(data_folder(folder) / file)
+    assert table.frames.tolist() == list(range(n_frames))
+    assert len(table.names) == n_points
+    heights = table.points[..., 2]
+    assert -0.1 < np.nanmin(heights) < np.nanmax(heights) < 2.0
