@@ -64,6 +64,11 @@ class Stage:
     factor: float
     """Factor on the steps of the lattice."""
 
+    @property
+    def name(self) -> str:
+        """Name for people to read."""
+        return self.group.name if self.factor == 1 else f"{self.group.name}, steps x {self.factor:g}"
+
 
 @dataclass(frozen=True, eq=False)
 class SearchStep:

@@ -1,0 +1,274 @@
+"""The command line: `quadrille COMMAND ...`; without a command, the page on the bundled sample."""
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from rich.console import Console
+
+from app import commands
+from app.commands import Reporter
+from tracker.errors import TrackerError
+from tracker.rigid import Array
+from tracker.session import Person
+
+SessionArg = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION", help="session folder")]
+_app = tyro.extras.SubcommandApp()
+
+
+@_app.command(name="open")
+def open_(
+    session: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION")] = None,
+    /,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    allow_host: tuple[str, ...] = (),
+    browser: bool = True,
+    start_again: bool = False,
+) -> None:
+    """Open a session in the page; without SESSION, a working copy of the bundled sample.
+
+    Args:
+        session: session folder.
+        host: address to listen at; anything but loopback needs --allow-host.
+        port: port to listen at; 0 takes a free one.
+        allow_host: names by which browsers may call this machine.
+        browser: open the page in the default browser.
+        start_again: throw away the working copy of the sample and make a new one.
+    """
+    from app.workbench import Serving, open_session, sample_copy  # the other commands do without a web server
+
+    folder = sample_copy(afresh=start_again) if session is None else session
+    open_session(folder, Serving(host, port, allow_host, browser), lambda line: print(line, flush=True))
+
+
+@_app.command
+def new(
+    session: SessionArg,
+    /,
+    calibration: Path,
+    videos: tuple[Path, ...] = (),
+    camera: tuple[str, ...] = (),
+    background: Path | None = None,
+    masks: Path | None = None,
+    offset: tuple[str, ...] = (),
+    people: tuple[str, ...] = ("person",),
+    model: tuple[str, ...] = (),
+    height: tuple[str, ...] = (),
+    fps: float | None = None,
+    up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z",
+    units: Literal["m", "mm"] = "m",
+) -> None:
+    """Make a session from videos and a calibration.
+
+    Args:
+        session: folder to make.
+        calibration: TOML file in the anipose / Pose2Sim layout.
+        videos: video files or image folders, each named after its camera.
+        camera: NAME=PATH: footage of a camera, whatever the file is called.
+        background: folder of CAM.png or CAM.mp4 of the empty scene.
+        masks: folder of CAM/%06d.png by video frame; 0 is background.
+        offset: CAM=N: frame k of the session is frame k + N of this camera.
+        people: names of the people.
+        model: body model of everybody, or NAME=MODEL.
+        height: body height in metres of everybody, or NAME=METRES.
+        fps: frame rate, where all footage is folders of images.
+        up: world axis that points up.
+        units: unit of the calibration's translations.
+    """
+    from tracker.assemble import DEFAULT_MODEL, assemble
+
+    made = assemble(
+        session,
+        calibration=calibration,
+        videos=videos,
+        camera_paths=_pairs(camera, "--camera", str),
+        background=background,
+        masks=masks,
+        offsets=_pairs(offset, "--offset", int),
+        people=people,
+        models=_common_or_pairs(model, "--model", str) or DEFAULT_MODEL,
+        heights=_common_or_pairs(height, "--height", float),
+        fps=fps,
+        up=up,
+        units=units,
+    )
+    print(f"made {made.folder}: {len(made.cameras)} cameras, {made.n_frames} frames at {made.fps:g} per second")
+
+
+@_app.command
+def info(session: SessionArg, /, json: bool = False) -> None:
+    """Say what a session holds.
+
+    Args:
+        session: session folder.
+        json: print one JSON object.
+    """
+    from tracker.session import load_session
+
+    found = commands.info(load_session(session))
+    if json:
+        print(commands.as_json(found))
+        return
+    print(f"{found['name']}: {found['frames']} frames at {found['fps']:g} per second, up is {found['up']}")
+    for c in found["cameras"]:
+        extras = "".join(f", {name}" for name in ("background", "masks") if c[name])
+        shift = f", offset {c['offset']}" if c["offset"] else ""
+        print(f"  camera {c['name']}: {c['size'][0]}x{c['size'][1]}, {c['footage']}{extras}{shift}")
+    for p in found["people"]:
+        body = f"{p['model']} of {p['height_m']:.2f} m, {p['dofs']} degrees of freedom"
+        print(f"  person {p['name']}: {body}, {p['poses']} poses, {p['keyframes']} keyframes")
+
+
+@_app.command
+def init(
+    session: SessionArg,
+    /,
+    joints: Path,
+    method: Literal["joints"] = "joints",
+    frame: int = 0,
+    person: str | None = None,
+    joint_map: Path | None = None,
+    axes: str = "x,y,z",
+    json: bool = False,
+) -> None:
+    """Set a first pose.
+
+    Args:
+        session: session folder.
+        joints: TRC file of 3-D joints.
+        method: joints fits the pose to known joints; the body's sizes stay.
+        frame: frame to set.
+        person: name; needed where there are several.
+        joint_map: TOML file that maps the file's joint names to the body's.
+        axes: the file's axes in the session's order, such as x,-z,y.
+        json: print one JSON object.
+    """
+    from tracker.evaluate import joints_of_frame
+
+    at = commands.target(session, person, several=False)
+    commands.frame_range(f"{frame}:{frame + 1}", at.session)
+
+    def of_person(_: Person) -> dict[str, Array]:
+        return joints_of_frame(joints, frame, at.session.fps, joint_map, axes)
+
+    found = commands.init_from_joints(at, frame, of_person)
+    residual = f"{found['mean_mm']:.1f} mm from {len(found['residual_mm'])} joints on average"
+    print(commands.as_json(found) if json else f"{found['person']}, frame {frame}: {residual}")
+
+
+@_app.command
+def track(
+    session: SessionArg,
+    /,
+    method: Literal["chamfer"] = "chamfer",
+    frames: str | None = None,
+    person: str | None = None,
+    backward: bool = False,
+    theta: float | None = None,
+    paper: bool = False,
+    json: bool = False,
+) -> None:
+    """Track people through a range of frames and store the poses.
+
+    Args:
+        session: session folder.
+        method: chamfer: best-first search on edges, frame by frame from the previous pose.
+        frames: A:B, half open; all by default.
+        person: whom; everybody by default.
+        backward: from the last frame of the range to the first.
+        theta: outlier distance in pixels; 3% of the longer side of the image by default.
+        paper: search as Gavrila and Davis 1996 do: one pass, outliers rejected.
+        json: print one JSON object.
+    """
+    from tracker.search import SearchSettings
+    from tracker.track import TrackSettings
+
+    at = commands.target(session, person, several=True)
+    wanted: Sequence[int] = commands.frame_range(frames, at.session)
+    passes = (1.0,) if paper else SearchSettings().passes
+    settings = TrackSettings(SearchSettings(passes=passes), theta, "paper" if paper else "truncated")
+    found = commands.track(at, wanted[::-1] if backward else wanted, settings, Reporter(silent=json))
+    summary = f"tracked {', '.join(found['people'])} over {found['frames']} frames"
+    print(commands.as_json(found) if json else f"{summary}, mean cost {found['mean_cost_px']:.2f} px")
+
+
+@_app.command
+def simulate(
+    out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUT")],
+    /,
+    scene: str = "elbow_rotation",
+    cameras: int = 4,
+    frames: int = 50,
+    seed: int = 0,
+    masks: bool = False,
+    body: Literal["skinned", "model"] = "skinned",
+) -> None:
+    """Make a session of a simulated recording with known truth.
+
+    Args:
+        out: folder to make.
+        scene: what the person does.
+        cameras: number of cameras.
+        frames: number of frames.
+        seed: of all that is random.
+        masks: write true masks too.
+        body: skinned, a smooth body unlike the model; model, the very shapes that are fitted.
+    """
+    from tracker.simulate import simulate as run
+
+    reporter = Reporter()
+    with reporter.over(frames, "rendering") as tick:
+        run(
+            out, scene=scene, n_cameras=cameras, n_frames=frames, seed=seed, body=body, masks=masks,
+            progress=lambda *_: tick(),
+        )  # fmt: skip
+    print(f"made {out}")
+
+
+def _pairs(words: Sequence[str], option: str, kind: Callable[[str], object]) -> dict[str, object]:
+    """Parse NAME=VALUE words."""
+    out: dict[str, object] = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        try:
+            if not equals or not name:
+                raise ValueError
+            out[name] = kind(value)
+        except ValueError:
+            raise TrackerError(f"expected {option} as NAME=VALUE, found '{word}'") from None
+    return out
+
+
+def _common_or_pairs(
+    words: Sequence[str], option: str, kind: Callable[[str], object]
+) -> Mapping[str, object] | object | None:
+    """Parse one value for everybody, or NAME=VALUE words; None where there are none."""
+    if len(words) == 1 and "=" not in words[0]:
+        try:
+            return kind(words[0])
+        except ValueError:
+            raise TrackerError(f"expected {option} as a value or NAME=VALUE, found '{words[0]}'") from None
+    return _pairs(words, option, kind) or None
+
+
+def main() -> None:
+    """Run the command line; what users and files get wrong is one sentence on standard error and status 1."""
+    words = sys.argv[1:]
+    if not words or (words[0] not in _app._subcommands and words[0] not in ("-h", "--help")):
+        words = ["open", *words]
+    try:
+        _app.cli(prog="quadrille", args=words)
+    except TrackerError as error:
+        Console(stderr=True).print(
+            f"quadrille: {error}", style="bold red", markup=False, highlight=False, soft_wrap=True
+        )
+        sys.exit(1)
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,288 @@
+"""What each command of the command line does; `__main__` reads the words and calls these."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from tracker.annotations import AnnotationStore, PoseChange, PoseRecord
+from tracker.errors import SessionError, TrackerError
+from tracker.evidence import Observer
+from tracker.fit import fit_to_points
+from tracker.formats.model_toml import format_model
+from tracker.recording import Recording
+from tracker.rigid import Array
+from tracker.session import Person, Session, load_session
+from tracker.session_lock import SessionLock
+from tracker.track import PoseEstimate, TrackSettings, track_chamfer
+
+_SAVE_FRAMES = 10
+"""A tracking run is on disk at least every so many frames."""
+
+
+class Target(NamedTuple):
+    """Whom a command is about."""
+
+    session: Session
+    people: tuple[int, ...]
+    """Indices into the session's people."""
+
+
+def target(folder: Path, person: str | None, several: bool) -> Target:
+    """Load a session and find the person a command names.
+
+    Args:
+        folder: the session folder.
+        person: name; may be left out where there is one person, or where several are meant.
+        several: whether no name means everybody.
+
+    Raises:
+        SessionError: there is no such person, or a name is needed.
+    """
+    session = load_session(folder)
+    names = [p.name for p in session.people]
+    if person is None:
+        if several or len(names) == 1:
+            return Target(session, tuple(range(len(names))))
+        raise SessionError(f"the session has several people: say --person, one of {', '.join(names)}")
+    if person not in names:
+        raise SessionError(f"expected --person to be one of {', '.join(names)}, found '{person}'")
+    return Target(session, (names.index(person),))
+
+
+def frame_range(text: str | None, session: Session) -> range:
+    """Parse `A:B`, half open, either end left out; the whole session for None.
+
+    Raises:
+        TrackerError: it is not a range within the session.
+    """
+    if text is None:
+        return range(session.n_frames)
+    first, colon, last = text.partition(":")
+    try:
+        found = range(int(first or 0), int(last or session.n_frames))
+    except ValueError:
+        found = range(0)
+    if not colon or not found or found.start < 0 or found.stop > session.n_frames:
+        raise TrackerError(f"expected --frames as A:B within 0:{session.n_frames} (A included, B not), found '{text}'")
+    return found
+
+
+def info(session: Session) -> dict[str, Any]:
+    """What a session holds, for people and programs."""
+    with (
+        AnnotationStore(session.annotations_path, read_only=True)
+        if session.annotations_path.exists()
+        else _empty() as (store)
+    ):
+        poses = {p.name: store.frames(p.name) if store is not None else [] for p in session.people}
+    return {
+        "name": session.name,
+        "folder": str(session.folder),
+        "frames": session.n_frames,
+        "fps": session.fps,
+        "up": session.up,
+        "cameras": [
+            {
+                "name": c.camera.name,
+                "size": list(c.camera.size),
+                "footage": str(c.footage),
+                "background": c.background is not None,
+                "masks": c.masks is not None,
+                "offset": c.offset,
+            }
+            for c in session.cameras
+        ],
+        "people": [
+            {
+                "name": p.name,
+                "model": p.model.name,
+                "height_m": p.model.height_m,
+                "dofs": p.model.n_dofs,
+                "poses": len(poses[p.name]),
+                "keyframes": sum(row.keyframe for row in poses[p.name]),
+            }
+            for p in session.people
+        ],
+    }
+
+
+def init_from_joints(at: Target, frame: int, joints: Callable[[Person], dict[str, Array]]) -> dict[str, Any]:
+    """Fit the pose of one person to known joints and store it as a keyframe.
+
+    Args:
+        at: the session and the person.
+        frame: where.
+        joints: places of the person's points in that frame by name, (3,), metres.
+
+    Returns:
+        The residual of each joint, mm, and their mean.
+    """
+    session, (index,) = at
+    person = session.people[index]
+    known = joints(person)
+    fit = fit_to_points(person.model, known)
+    with SessionLock(session.folder), AnnotationStore(session.annotations_path) as store:
+        revision = store.add_model_revision(person.name, format_model(person.model))
+        sources = ("imported",) * len(fit.values)
+        record = PoseRecord(fit.values, sources, revision, keyframe=True, settings={"method": "joints"})
+        store.commit(f"init from joints, frame {frame}", [PoseChange(person.name, frame, record)])
+    points = dict(zip(person.model.point_names, person.model.points_world(fit.values), strict=True))
+    residuals = {
+        name: float(1000 * np.linalg.norm(points[name] - place))
+        for name, place in known.items()
+        if name in points and np.all(np.isfinite(place))
+    }
+    return {"person": person.name, "frame": frame, "residual_mm": residuals, "mean_mm": _mean(residuals)}
+
+
+def track(at: Target, frames: Sequence[int], settings: TrackSettings, progress: "Reporter") -> dict[str, Any]:
+    """Track people with the chamfer tracker, frame by frame from the previous pose, and store what is found.
+
+    Keyframes stay as they are and tracking goes on from them. Interrupted, it keeps what is done.
+
+    Raises:
+        SessionError: nobody has placed a person at or before the first frame.
+    """
+    session = at.session
+    with (
+        SessionLock(session.folder),
+        AnnotationStore(session.annotations_path) as store,
+        Recording(session.cameras) as recording,
+    ):
+        models = [p.model for p in session.people]
+        revisions = [store.add_model_revision(p.name, format_model(p.model)) for p in session.people]
+        start = [_start(store, p, frames[0], i in at.people) for i, p in enumerate(session.people)]
+        fixed = _keyframes(store, session.people, frames)
+        observer = Observer(session.cameras, recording)
+        waiting: list[PoseChange] = []
+        edit: int | None = None
+        costs: dict[int, float] = {}
+
+        def save() -> None:
+            nonlocal edit
+            if waiting and edit is None:
+                edit = store.commit(f"track frames {frames[0]}:{frames[-1] + 1}", waiting, by_program=True).edit
+            elif waiting and edit is not None:
+                store.amend(edit, waiting, by_program=True)
+            waiting.clear()
+
+        try:
+            with progress.over(len(frames), "tracking") as tick:
+                for found in track_chamfer(observer, models, start, frames, settings, fixed, at.people):
+                    costs[found.frame] = found.cost_px
+                    waiting += _changes(found, at, revisions, settings)
+                    if len(waiting) >= _SAVE_FRAMES:
+                        save()
+                    tick()
+        finally:
+            save()
+    return {
+        "frames": len(costs),
+        "people": [session.people[i].name for i in at.people],
+        "mean_cost_px": float(np.mean(list(costs.values()))),
+    }
+
+
+class Reporter:
+    """Progress on a terminal as a bar, elsewhere as plain lines; nothing with `--json`."""
+
+    def __init__(self, silent: bool = False) -> None:
+        """Report on standard error unless silent."""
+        self._console, self._silent = Console(stderr=True), silent
+
+    @contextmanager
+    def over(self, total: int, what: str) -> Iterator[Callable[[], None]]:
+        """Give a function to call after each of `total` pieces of work."""
+        if self._silent:
+            yield lambda: None
+        elif self._console.is_terminal:
+            columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+            with Progress(*columns, console=self._console) as bar:
+                task = bar.add_task(what, total=total)
+                yield lambda: bar.advance(task)
+        else:
+            done = 0
+
+            def tick() -> None:
+                nonlocal done
+                done += 1
+                if done % max(1, total // 10) == 0 or done == total:
+                    self._console.print(f"{what}: {done} of {total}", highlight=False)
+
+            yield tick
+
+
+def as_json(result: Any) -> str:
+    """One JSON object; numbers that JSON cannot hold become null."""
+    return json.dumps(_plain(result), indent=2, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    if hasattr(value, "_asdict"):
+        value = value._asdict()
+    elif hasattr(value, "__dataclass_fields__"):
+        value = asdict(value)
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value
+
+
+@contextmanager
+def _empty() -> Iterator[None]:
+    yield None
+
+
+def _mean(values: dict[str, float]) -> float:
+    return float(np.mean(list(values.values())))
+
+
+def _start(store: AnnotationStore, person: Person, frame: int, needed: bool) -> Array:
+    """Pose to begin from: that of the frame itself, else of the last frame before it."""
+    rows = [row.frame for row in store.frames(person.name) if row.frame <= frame]
+    record = store.pose(person.name, rows[-1]) if rows else None
+    if record is not None:
+        return record.values
+    if not needed:
+        return person.model.neutral()
+    raise SessionError(
+        f"expected a pose of '{person.name}' at frame {frame} or before, found none; place the body in the page, or use "
+        "quadrille init"
+    )
+
+
+def _keyframes(store: AnnotationStore, people: Sequence[Person], frames: Sequence[int]) -> dict[int, dict[int, Array]]:
+    fixed: dict[int, dict[int, Array]] = {}
+    wanted = set(frames)
+    for index, person in enumerate(people):
+        for row in store.frames(person.name):
+            record = store.pose(person.name, row.frame) if row.keyframe and row.frame in wanted else None
+            if record is not None:
+                fixed.setdefault(row.frame, {})[index] = record.values
+    return fixed
+
+
+def _changes(found: PoseEstimate, at: Target, revisions: Sequence[int], settings: TrackSettings) -> list[PoseChange]:
+    told = {"method": "chamfer", **asdict(settings)}
+    return [
+        PoseChange(
+            at.session.people[i].name,
+            found.frame,
+            PoseRecord(
+                found.poses[i], ("tracked",) * len(found.poses[i]), revisions[i], cost_px=found.cost_px, settings=told
+            ),
+        )
+        for i in at.people
+    ]

@@ -1,0 +1,129 @@
+"""Long work in a worker thread: one step at a time or to the end, stopped at any step."""
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Generic, TypeVar
+
+_LOG = logging.getLogger(__name__)
+_POOL = ThreadPoolExecutor(2, thread_name_prefix="job")
+
+T = TypeVar("T")
+
+
+class Job(Generic[T]):
+    """Drains a generator of steps in the background.
+
+    `on_step(step, seconds)` is called in the worker with each step and the time worked so far, `on_end(error)` once
+    when the generator is exhausted or has raised. A stopped job stands: it can be stepped or run on.
+    """
+
+    def __init__(
+        self,
+        start: Callable[[], Iterator[T]],
+        on_step: Callable[[T, float], None],
+        on_end: Callable[[Exception | None], None],
+        on_pause: Callable[[], None],
+    ) -> None:
+        """Take the work; nothing is done yet.
+
+        Args:
+            start: makes the generator, in the worker.
+            on_step: see above.
+            on_end: see above.
+            on_pause: called in the worker when the job stands still before its end.
+        """
+        self._start, self._on_step, self._on_end, self._on_pause = start, on_step, on_end, on_pause
+        self._steps: Iterator[T] | None = None
+        self._stop = threading.Event()
+        self._future: Future[None] | None = None
+        self._seconds = 0.0
+        self.running = False
+        """Whether the worker is at it; already false when `on_pause` and `on_end` are called."""
+        self.ended = False
+        """Whether there are no more steps."""
+
+    def step(self) -> None:
+        """Do one step in the background; nothing if the job runs already."""
+        self._launch(1)
+
+    def run(self) -> None:
+        """Go on to the end in the background; nothing if the job runs already."""
+        self._launch(None)
+
+    def stop(self, timeout: float = 30.0) -> None:
+        """Stop after the step at hand, and wait for that. Never call it holding a lock that `on_step` takes."""
+        self._stop.set()
+        if self._future is not None:
+            self._future.exception(timeout)
+
+    def _launch(self, limit: int | None) -> None:
+        if not self.running and not self.ended:
+            self._stop.clear()
+            self.running = True
+            self._future = _POOL.submit(self._work, limit)
+
+    def _work(self, limit: int | None) -> None:
+        done = 0
+        try:
+            while not self._stop.is_set() and (limit is None or done < limit):
+                began = time.perf_counter()
+                if self._steps is None:
+                    self._steps = self._start()
+                step = next(self._steps, None)
+                self._seconds += time.perf_counter() - began
+                if step is None:
+                    self.ended, self.running = True, False
+                    self._on_end(None)
+                    return
+                self._on_step(step, self._seconds)
+                done += 1
+            self.running = False
+            self._on_pause()
+        except Exception as error:
+            self.ended, self.running = True, False
+            _LOG.exception("a job failed")
+            self._on_end(error)
+
+
+class Latest(Generic[T]):
+    """Hands values to a slow consumer in a thread of its own: per key only the newest that waits, in order of offer."""
+
+    def __init__(self, consume: Callable[[T], None], name: str) -> None:
+        """Start the thread.
+
+        Args:
+            consume: called with one value at a time.
+            name: of the thread.
+        """
+        self._consume = consume
+        self._waiting: dict[object, T] = {}
+        self._condition = threading.Condition()
+        self._closed = False
+        threading.Thread(target=self._work, name=name, daemon=True).start()
+
+    def offer(self, value: T, key: object = None) -> None:
+        """Let a value wait for its turn, in place of one of the same key that waits."""
+        with self._condition:
+            self._waiting[key] = value
+            self._condition.notify()
+
+    def close(self) -> None:
+        """End the thread; what waits is dropped."""
+        with self._condition:
+            self._closed = True
+            self._condition.notify()
+
+    def _work(self) -> None:
+        while True:
+            with self._condition:
+                self._condition.wait_for(lambda: self._waiting or self._closed)
+                if self._closed:
+                    return
+                value = self._waiting.pop(next(iter(self._waiting)))
+            try:
+                self._consume(value)
+            except Exception:
+                _LOG.exception("a view failed")

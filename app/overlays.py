@@ -1,0 +1,121 @@
+"""What is drawn over the views: contours, candidates, part edges, joints, epipolar lines."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from app.state import State
+from tracker import contours, occlusion
+from tracker.body import Body, BodyModel
+from tracker.cameras import Camera, epipolar_segment
+from tracker.contours import FloatArray
+from tracker.rigid import Array
+from tracker.session import Session
+
+CANDIDATE_COLOR = "#ffffff"
+PART_EDGE_COLOR = "#9aa3ad"
+EPIPOLAR_COLOR = "#ffd54a"
+
+
+class Path(NamedTuple):
+    """Line segments of one kind in one view."""
+
+    camera: int
+    person: int
+    kind: str
+    """`model`, `candidate`, `part_edge` or `epipolar`."""
+    color: str
+    segments_px: FloatArray
+    """x0, y0, x1, y1, (N, 4), undistorted px."""
+
+
+class Handle(NamedTuple):
+    """A joint in one view."""
+
+    camera: int
+    person: int
+    point: str
+    u: float
+    v: float
+    visible: bool
+    """Whether nothing hides it."""
+
+
+def bones(model: BodyModel) -> list[tuple[str, str]]:
+    """Pairs of points that a stick figure joins: each point and the joint of the part that carries it."""
+    pairs = []
+    for i, name in enumerate(model.point_names):
+        part = int(model.point_parts[i])
+        joint = model.joints[part]
+        if i != part:
+            pairs.append((joint.name, name))  # a landmark hangs on its part's joint
+        elif joint.parent:
+            pairs.append((model.joints[model.part_index[joint.parent]].name, name))
+    return pairs
+
+
+def paths(session: Session, state: State) -> list[Path]:
+    """Everything that the state's overlays call for, in all views."""
+    bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
+    out = []
+    for index, source in enumerate(session.cameras):
+        camera = source.camera.pinhole
+        if "contours" in state.overlays:
+            out += _contours(session, bodies, camera, index, "model", [p.color for p in session.people])
+            if state.job.candidate is not None and state.job.running:
+                tested = [Body(b.model, v) for b, v in zip(bodies, state.job.candidate, strict=True)]
+                out += _contours(session, tested, camera, index, "candidate", [CANDIDATE_COLOR] * len(tested))
+        if "part_edges" in state.overlays:
+            out.append(Path(index, 0, "part_edge", PART_EDGE_COLOR, occlusion.part_edges(bodies, camera)))
+    if state.drag is not None:
+        out += _epipolar_lines(session, state)
+    return out
+
+
+def handles(session: Session, state: State) -> list[Handle]:
+    """The joints of everybody in all views; those behind a camera are left out."""
+    bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
+    points = [b.model.points_world(b.values) for b in bodies]
+    out = []
+    for index, source in enumerate(session.cameras):
+        camera = source.camera.pinhole
+        hidden = occlusion.points_hidden(bodies, camera, np.concatenate(points))
+        first = 0
+        for person, body in enumerate(bodies):
+            px = camera.project(points[person])
+            for i, name in enumerate(body.model.point_names):
+                if np.all(np.isfinite(px[i])):
+                    u, v = float(px[i, 0]), float(px[i, 1])
+                    out.append(Handle(index, person, name, u, v, not hidden[first + i]))
+            first += len(px)
+    return out
+
+
+def _contours(
+    session: Session, bodies: Sequence[Body], camera: Camera, index: int, kind: str, colors: Sequence[str]
+) -> list[Path]:
+    piece_px = contours.PIECE_PX * max(1.0, max(camera.size) / 640)
+    contour = contours.trace(bodies, camera, piece_px)
+    people = contours.surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
+    return [
+        Path(index, person, kind, colors[person], contour.pieces_px[~contour.hidden & (people == person)])
+        for person in range(len(bodies))
+    ]
+
+
+def _epipolar_lines(session: Session, state: State) -> list[Path]:
+    """The line of sight of the dragged point, as the other views see it."""
+    drag = state.drag
+    assert drag is not None
+    model = session.people[drag.person].model
+    source = session.cameras[drag.camera].camera.pinhole
+    place: Array = model.points_world(state.poses[drag.person])[model.point_names.index(drag.point)]
+    out = []
+    for index, target in enumerate(session.cameras):
+        if index != drag.camera:
+            segment = epipolar_segment(source, target.camera.pinhole, source.project(place))
+            if segment is not None:
+                row = segment.reshape(1, 4).astype(np.float32)
+                out.append(Path(index, drag.person, "epipolar", EPIPOLAR_COLOR, row))
+    return out

@@ -1,0 +1,174 @@
+"""State to viser's panels and back: pose sliders and the settings of the search."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import viser
+
+from app.controller import Controller
+from app.jobs import Latest
+from app.state import State
+from tracker.body import BodyModel
+from tracker.errors import TrackerError
+
+_REACH_M = 6.0
+"""How far from the scene's middle the position sliders go, metres."""
+
+
+@dataclass(frozen=True)
+class _Change:
+    """A slider that somebody moved."""
+
+    person: int
+    dof: int
+    value: float
+    """rad or metres."""
+
+
+class Panels:
+    """The panels beside the 3-D view. They keep no facts: what they show is the state, what is done goes there."""
+
+    def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
+        """Build the panels and follow the controller's state."""
+        self._server, self._controller = server, controller
+        self._edits = Latest(self._apply, "sliders")
+        self._sliders: list[list[viser.GuiSliderHandle[float]]] = []
+        self._folders: list[viser.GuiFolderHandle] = []
+        middle = controller.state.people[0].values[:3]
+        for index, person in enumerate(controller.session.people):
+            folder = server.gui.add_folder(f"Pose of {person.name}")
+            with folder:
+                self._sliders.append(self._add_sliders(index, person.model, middle))
+            self._folders.append(folder)
+        self._search = self._add_search_settings()
+        latest = Latest(self._show, "panels")
+        controller.subscribe(latest.offer)
+        latest.offer(controller.state)
+
+    def _add_sliders(self, person: int, model: BodyModel, middle: np.ndarray) -> list[viser.GuiSliderHandle[float]]:
+        sliders = []
+        for joint_index, joint in enumerate(model.joints):
+            dofs = np.flatnonzero(model.dof_joint == joint_index)
+            if not len(dofs) or joint.kind == "ball":
+                continue
+            with self._server.gui.add_folder(joint.name.replace("_", " "), expand_by_default=joint_index == 0):
+                for dof in dofs:
+                    sliders.append(self._add_slider(person, model, int(dof), middle))
+        return sliders
+
+    def _add_slider(self, person: int, model: BodyModel, dof: int, middle: np.ndarray) -> viser.GuiSliderHandle[float]:
+        name = model.dof_names[dof].partition(".")[2]
+        if model.dof_is_length[dof]:
+            low, high, unit, step = 100 * (middle[dof] - _REACH_M), 100 * (middle[dof] + _REACH_M), "cm", 0.5
+        else:
+            low, high = np.degrees(np.clip(model.limits[dof], -np.pi, np.pi))
+            unit, step = "deg", 0.5
+        low, high = float(np.floor(low)), float(np.ceil(high))
+        value = _in_slider(model, dof, self._controller.state.poses[person])
+        slider = self._server.gui.add_slider(f"{name}, {unit}", low, high, step, min(max(value, low), high))
+
+        @slider.on_update
+        async def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:  # else the state set it
+                target = event.target.value / 100 if model.dof_is_length[dof] else float(np.radians(event.target.value))
+                self._edits.offer(_Change(person, dof, target), (person, dof))
+
+        return slider
+
+    def _apply(self, change: _Change) -> None:
+        self._controller.set_dof(change.person, change.dof, change.value)
+
+    def _add_search_settings(self) -> dict[str, Any]:
+        gui, state = self._server.gui, self._controller.state
+        s = state.settings
+        with gui.add_folder("Search", expand_by_default=False):
+            controls: dict[str, Any] = {
+                "bound_deg": gui.add_number(
+                    "bound, deg", float(np.degrees(s.bound_rad)), min=0.5, max=90.0, step=0.5,
+                    hint="Largest change of an angle from where the search begins",
+                ),
+                "bound_cm": gui.add_number(
+                    "bound, cm", 100 * s.bound_m, min=0.5, max=100.0, step=0.5,
+                    hint="Largest change of the position from where the search begins",
+                ),
+                "step_deg": gui.add_number(
+                    "step, deg", float(np.degrees(s.step_rad)), min=0.5, max=30.0, step=0.5,
+                    hint="Spacing of the poses tried, along an angle",
+                ),
+                "step_cm": gui.add_number(
+                    "step, cm", 100 * s.step_m, min=0.5, max=30.0, step=0.5,
+                    hint="Spacing of the poses tried, along the position",
+                ),
+                "passes": gui.add_text(
+                    "passes", ", ".join(f"{p:g}" for p in s.passes),
+                    hint="Factors on the steps: all stages are searched once per factor. The paper's mode is 1",
+                ),
+                "patience": gui.add_number(
+                    "patience", s.patience, min=1, max=100, step=1,
+                    hint="A stage ends after so many expansions that found nothing better",
+                ),
+                "theta_px": gui.add_number(
+                    "theta, px", 0.0, min=0.0, max=500.0, step=1.0,
+                    hint="Edges farther away than this say nothing; 0 takes 3% of the longer side of the image",
+                ),
+                "outliers": gui.add_dropdown(
+                    "outliers", ("truncated", "paper"), initial_value=state.outliers,
+                    hint="truncated: min(d, theta) over all points; paper: points beyond theta are left out",
+                ),
+            }  # fmt: skip
+
+        async def changed(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                try:
+                    self._read_search_settings()
+                except TrackerError as error:
+                    event.client.add_notification("Search", str(error), color="red", auto_close_seconds=8.0)
+
+        for control in controls.values():
+            control.on_update(changed)
+        self._search = controls
+        return controls
+
+    def _read_search_settings(self) -> None:
+        value = {name: control.value for name, control in self._search.items()}
+        try:
+            passes = tuple(float(p) for p in str(value["passes"]).split(",") if p.strip())
+        except ValueError:
+            passes = ()
+        if not passes or not all(0 < p <= 1 for p in passes):
+            raise TrackerError(
+                f"expected passes as factors above 0 and up to 1, such as '1, 0.5, 0.25', found '{value['passes']}'"
+            )
+        settings = replace(
+            self._controller.state.settings,
+            bound_rad=float(np.radians(value["bound_deg"])),
+            bound_m=value["bound_cm"] / 100,
+            step_rad=float(np.radians(value["step_deg"])),
+            step_m=value["step_cm"] / 100,
+            passes=passes,
+            patience=int(value["patience"]),
+        )
+        self._controller.set_search(settings, value["theta_px"] or None, value["outliers"])
+
+    def _show(self, state: State) -> None:
+        with self._server.atomic():
+            for index, (sliders, folder) in enumerate(zip(self._sliders, self._folders, strict=True)):
+                folder.visible = index == state.person
+                model = self._controller.models[index]
+                plain = [d for d in range(model.n_dofs) if model.joints[model.dof_joint[d]].kind != "ball"]
+                for slider, dof in zip(sliders, plain, strict=True):
+                    value = _in_slider(model, dof, state.poses[index])
+                    shown = min(max(value, slider.min), slider.max)
+                    if abs(slider.value - shown) > 1e-6:
+                        slider.value = shown  # type: ignore[misc]
+
+
+def _in_slider(model: BodyModel, dof: int, values: np.ndarray) -> float:
+    """Value of a degree of freedom in degrees or centimetres; angles without limits wrapped to half a turn."""
+    value = float(values[model.dof_value[dof]])
+    if model.dof_is_length[dof]:
+        return round(100 * value, 2)
+    if not np.all(np.isfinite(model.limits[dof])):
+        value = float((value + np.pi) % (2 * np.pi) - np.pi)
+    return round(float(np.degrees(value)), 2)

@@ -1,0 +1,254 @@
+"""The pane socket: state to messages, events of the panes to the controller (docs/protocol.md)."""
+
+import asyncio
+import itertools
+import json
+import struct
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import aiohttp
+import numpy as np
+from aiohttp import web
+
+from app import overlays
+from app.controller import Controller
+from app.state import OVERLAYS, State
+from tracker.errors import TrackerError
+
+_COALESCED = ("seek", "view")
+"""Of these only the newest that waits is carried out."""
+
+
+class Panes:
+    """Serves the panes of every page that is open on the session."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Serve this controller's session."""
+        self._controller = controller
+        self._pages = itertools.count(1)
+
+    async def serve(self, socket: web.WebSocketResponse) -> None:
+        """Talk to one page until its socket closes."""
+        page = _Page(next(self._pages), self._controller, socket)
+        await page.serve()
+
+
+class _Page:
+    """One page that is connected."""
+
+    def __init__(self, number: int, controller: Controller, socket: web.WebSocketResponse) -> None:
+        self._number, self._controller, self._socket = number, controller, socket
+        self._changed = asyncio.Event()
+        self._arrived = asyncio.Event()
+        self._waiting: deque[dict[str, Any]] = deque()
+        self._sent: State | None = None
+        self._sent_images: tuple[int, str] | None = None
+
+    async def serve(self) -> None:
+        loop = asyncio.get_running_loop()
+
+        def wake(_: State) -> None:
+            loop.call_soon_threadsafe(self._changed.set)
+
+        unsubscribe = self._controller.subscribe(wake)
+        self._changed.set()
+        tasks = [asyncio.create_task(t) for t in (self._send_all(), self._act())]
+        try:
+            async for message in self._socket:
+                if message.type == aiohttp.WSMsgType.TEXT:
+                    self._receive(json.loads(message.data))
+        finally:
+            unsubscribe()
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            await asyncio.to_thread(self._controller.end_drag, self._number)
+
+    # --- page to controller ------------------------------------------------------------------------------------
+
+    def _receive(self, message: dict[str, Any]) -> None:
+        """Queue a message; a newer seek, or a newer move of the same drag, takes the place of one that waits."""
+        last = self._waiting[-1] if self._waiting else None
+        if last is not None and last["type"] == message.get("type"):
+            moves = message["type"] == "drag" and last.get("phase") == message.get("phase") == "move"
+            if moves or message["type"] in _COALESCED:
+                self._waiting.pop()
+        self._waiting.append(message)
+        self._arrived.set()
+
+    async def _act(self) -> None:
+        while True:
+            await self._arrived.wait()
+            self._arrived.clear()
+            while self._waiting:
+                message = self._waiting.popleft()
+                try:
+                    await asyncio.to_thread(self._carry_out, message)
+                except TrackerError as error:
+                    await self._notice(str(error))
+                except (KeyError, TypeError, ValueError) as error:
+                    await self._notice(f"the page sent a message that is not understood ({error}); reload it")
+
+    def _carry_out(self, message: dict[str, Any]) -> None:
+        controller = self._controller
+        actions: dict[str, Callable[[], None]] = {
+            "seek": lambda: controller.seek(int(message["frame"])),
+            "select": lambda: controller.select(int(message["person"]), message.get("point")),
+            "drag": lambda: self._drag(message),
+            "view": lambda: controller.set_view(str(message["base"]), dict(message["overlays"])),
+            "search": lambda: self._search(str(message["action"])),
+            "undo": controller.undo,
+            "redo": controller.redo,
+        }
+        actions[message["type"]]()
+
+    def _drag(self, message: dict[str, Any]) -> None:
+        controller, page = self._controller, self._number
+        phase, pointer_px = message["phase"], (float(message["u"]), float(message["v"]))
+        if not np.all(np.isfinite(pointer_px)):
+            raise ValueError("a position that is not a number")
+        if phase == "start":
+            controller.begin_drag(page, int(message["camera"]), int(message["person"]), message["point"], pointer_px)
+        if phase == "cancel":
+            controller.cancel_drag(page)
+        else:
+            controller.move_drag(page, pointer_px, int(message["seq"]))
+        if phase == "end":
+            controller.end_drag(page)
+
+    def _search(self, action: str) -> None:
+        controller = self._controller
+        {"step": controller.search_step, "frame": controller.search_frame, "stop": controller.stop}[action]()
+
+    # --- controller to page ------------------------------------------------------------------------------------
+
+    async def _send_all(self) -> None:
+        await self._send(_session_message(self._controller))
+        while True:
+            await self._changed.wait()
+            self._changed.clear()
+            state, sent = self._controller.state, self._sent
+            self._sent = state
+            try:
+                if sent is None or _json_state(state) != _json_state(sent):
+                    await self._send(_json_state(state))
+                await self._send_overlay(state, sent)
+                await self._send_images(state)
+                if sent is None or sent.timeline_version != state.timeline_version:
+                    await self._send_timeline(0 if sent is None else sent.timeline_version)
+            except TrackerError as error:
+                await self._notice(str(error))
+
+    async def _send_images(self, state: State) -> None:
+        if self._sent_images == (state.frame, state.base):
+            return
+        self._sent_images = (state.frame, state.base)
+        jpeg, cameras = self._controller.frames.jpeg, range(len(self._controller.session.cameras))
+        pictures = await asyncio.gather(*(asyncio.to_thread(jpeg, state.frame, c, state.base) for c in cameras))
+        if self._controller.state.frame != state.frame:
+            self._sent_images = None
+            return  # the page is elsewhere by now
+        for camera, data in zip(cameras, pictures, strict=True):
+            header = {"type": "image", "camera": camera, "frame": state.frame, "base": state.base}
+            await self._socket.send_bytes(_binary(header, data))
+
+    async def _send_overlay(self, state: State, sent: State | None) -> None:
+        if sent is not None and _drawn(state) == _drawn(sent):
+            return
+        await self._socket.send_bytes(await asyncio.to_thread(self._overlay, state))
+
+    def _overlay(self, state: State) -> bytes:
+        session, segments, rows, first = self._controller.session, [], [], 0
+        for path in overlays.paths(session, state):
+            count = len(path.segments_px)
+            rows.append({**path._asdict(), "first": first, "count": count})
+            del rows[-1]["segments_px"]
+            segments.append(path.segments_px)
+            first += count
+        joints = not state.overlays.isdisjoint(("joints", "skeleton"))
+        header = {
+            "type": "overlay",
+            "frame": state.frame,
+            "seq": dict(state.drag_seqs).get(self._number, 0),
+            "job": state.job.running,
+            "paths": rows,
+            "handles": [h._asdict() for h in overlays.handles(session, state)] if joints else [],
+        }
+        data = np.concatenate(segments).astype("<f4").tobytes() if segments else b""
+        return _binary(header, data)
+
+    async def _send_timeline(self, since: int) -> None:
+        cells = {str(k): cell for k, cell in self._controller.timeline(since).items()}
+        await self._send({"type": "timeline", "cells": cells, "replace": since == 0})
+
+    async def _notice(self, text: str) -> None:
+        await self._send({"type": "notice", "level": "error", "text": text})
+
+    async def _send(self, message: dict[str, Any]) -> None:
+        await self._socket.send_str(json.dumps(message))
+
+
+def _drawn(state: State) -> tuple[object, ...]:
+    """What an overlay depends on, to be compared."""
+    poses = tuple(id(p.values) for p in state.people)
+    candidate = None if state.job.candidate is None else tuple(id(c) for c in state.job.candidate)
+    return state.frame, poses, candidate, state.job.running, state.overlays, state.drag, state.drag_seqs
+
+
+def _session_message(controller: Controller) -> dict[str, Any]:
+    session = controller.session
+    return {
+        "type": "session",
+        "name": session.name,
+        "fps": session.fps,
+        "n_frames": session.n_frames,
+        "cameras": [
+            {"name": c.camera.name, "width": c.camera.width, "height": c.camera.height} for c in session.cameras
+        ],
+        "people": [
+            {
+                "name": p.name,
+                "color": p.color,
+                "points": list(p.model.point_names),
+                "bones": [list(b) for b in overlays.bones(p.model)],
+            }
+            for p in session.people
+        ],
+    }
+
+
+def _json_state(state: State) -> dict[str, Any]:
+    job = state.job
+    sources = [p.source for p in state.people]
+    return {
+        "type": "state",
+        "frame": state.frame,
+        "person": state.person,
+        "point": state.point,
+        "base": state.base,
+        "overlays": {name: name in state.overlays for name in OVERLAYS},
+        "cost_px": state.cost_px,
+        "view_costs_px": list(state.view_costs_px),
+        "source": sources[state.person],
+        "job": {
+            "running": job.running,
+            "kind": job.kind,
+            "stage": job.stage,
+            "stages": list(job.stages),
+            "evaluations": job.evaluations,
+            "per_second": job.per_second,
+            "best_px": job.best_px,
+            "message": job.message,
+        },
+        "undo": state.undo,
+        "redo": state.redo,
+        "saved": state.save_error is None,
+        "save_error": state.save_error,
+    }
+
+
+def _binary(header: dict[str, Any], payload: bytes) -> bytes:
+    head = json.dumps(header).encode()
+    return struct.pack("<I", len(head)) + head + payload

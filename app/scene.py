@@ -1,0 +1,97 @@
+"""State to viser's 3-D scene: bodies, cameras, floor."""
+
+import numpy as np
+import viser
+
+from app.controller import Controller
+from app.jobs import Latest
+from app.state import State
+from tracker import rigid
+from tracker.body import Body
+from tracker.cameras import Camera
+from tracker.contours import part_poses
+from tracker.posing import UP_ROTATIONS
+from tracker.session import Session
+
+_FRUSTUM_M = 0.25
+
+
+class Scene:
+    """The 3-D view of a session."""
+
+    def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
+        """Build the scene and follow the controller's state."""
+        self._server, self._session = server, controller.session
+        self._shown: tuple[object, ...] = ()
+        _add_surroundings(server, self._session)
+        self._parts = [
+            server.scene.add_mesh_simple(
+                f"/people/{person.name}/{part.name}",
+                np.asarray(shape.mesh().vertices) + center,
+                np.asarray(shape.mesh().faces),
+                color=_rgb(part.color),
+            )
+            for person in self._session.people
+            for part, shape, center in zip(
+                person.model.parts, person.model.shapes, person.model.centers_part, strict=True
+            )
+        ]
+        latest = Latest(self._show, "scene")
+        controller.subscribe(latest.offer)
+        latest.offer(controller.state)
+
+    def _show(self, state: State) -> None:
+        poses = tuple(id(p) for p in state.poses)
+        if poses == self._shown:
+            return
+        self._shown = poses
+        bodies = [Body(p.model, v) for p, v in zip(self._session.people, state.poses, strict=True)]
+        Ts = part_poses(bodies)
+        turns = rigid.quaternion_from_matrix(Ts[:, :3, :3])
+        with self._server.atomic():
+            for handle, T, wxyz in zip(self._parts, Ts, turns, strict=True):
+                handle.position, handle.wxyz = T[:3, 3], wxyz
+
+
+def _add_surroundings(server: viser.ViserServer, session: Session) -> None:
+    cameras = [c.camera for c in session.cameras]
+    sign = "" if session.up.startswith("-") else "+"
+    server.scene.set_up_direction(f"{sign}{session.up}")  # type: ignore[arg-type]
+    server.scene.add_grid(
+        "/floor",
+        width=8.0,
+        height=8.0,
+        cell_size=0.5,
+        section_size=1.0,
+        wxyz=rigid.quaternion_from_matrix(UP_ROTATIONS[session.up]),
+        shadow_opacity=0.25,
+    )
+    for camera in cameras:
+        T = camera.T_world_camera
+        server.scene.add_camera_frustum(
+            f"/cameras/{camera.name}",
+            fov=2 * float(np.arctan2(camera.height / 2, camera.K[1, 1])),
+            aspect=camera.width / camera.height,
+            scale=_FRUSTUM_M,
+            color=(120, 130, 140),
+            wxyz=rigid.quaternion_from_matrix(T[:3, :3]),
+            position=T[:3, 3],
+        )
+        server.scene.add_label(f"/cameras/{camera.name}/name", camera.name)
+    _place_eye(server, cameras, session.up)
+
+
+def _place_eye(server: viser.ViserServer, cameras: list[Camera], up: str) -> None:
+    """Look at the middle of what the cameras see, from beside and above the first."""
+    axes = np.stack([c.T_world_camera[:3, 2] for c in cameras])
+    centers = np.stack([c.center_world for c in cameras])
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    middle = np.linalg.lstsq(across.sum(axis=0), (across @ centers[..., None]).sum(axis=0)[:, 0], rcond=None)[0]
+    to_first = rigid.so3_exp(UP_ROTATIONS[up][:, 2] * np.radians(25)) @ (centers[0] - middle)
+    server.initial_camera.look_at = tuple(middle)
+    server.initial_camera.position = tuple(middle + 0.9 * to_first)
+    server.initial_camera.up = tuple(UP_ROTATIONS[up][:, 2])
+
+
+def _rgb(color: str) -> tuple[int, int, int]:
+    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)

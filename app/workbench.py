@@ -1,0 +1,127 @@
+"""Opens a session in the page: everything from the lock to the web server, wired together."""
+
+import asyncio
+import shutil
+import signal
+import threading
+import webbrowser
+from collections.abc import Callable, Coroutine, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from platformdirs import user_data_path
+
+from app.access import access_for
+from app.controller import Controller
+from app.frames import Frames
+from app.panels import Panels
+from app.panes import Panes
+from app.saving import Saver
+from app.scene import Scene
+from app.server import create_app, serve_forever, start_viser, static_folder
+from tracker.annotations import AnnotationStore
+from tracker.errors import SessionError
+from tracker.evidence import Observer
+from tracker.recording import Recording
+from tracker.session import SESSION_FILE, load_session
+from tracker.session_lock import SessionLock
+
+DEFAULT_SAMPLE = "elbow_rotation"
+
+
+@dataclass(frozen=True)
+class Serving:
+    """How the page is served."""
+
+    host: str = "127.0.0.1"
+    port: int = 8080
+    allow_hosts: tuple[str, ...] = ()
+    browser: bool = True
+    """Whether to open the page in the default browser."""
+
+
+def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> None:
+    """Serve the page of a session until the program is interrupted.
+
+    Args:
+        folder: the session folder.
+        serving: address and access.
+        say: shows a line to the user.
+
+    Raises:
+        TrackerError: the session cannot be opened, is open elsewhere, or the port is taken.
+    """
+    session = load_session(folder)
+    access = access_for(serving.host, serving.allow_hosts)
+    static = static_folder()
+    with SessionLock(session.folder), Recording([c for c in session.cameras]) as recording:
+        store = AnnotationStore(session.annotations_path)
+        controller = Controller(session, Saver(session, store), Frames(Observer(session.cameras, recording)))
+        viser_server = start_viser()
+        try:
+            Scene(viser_server, controller)
+            Panels(viser_server, controller)
+            app = create_app(Panes(controller), viser_server.get_port(), access, static)
+
+            def ready(address: str) -> None:
+                say(f"{session.name}: {address}")
+                if serving.browser:
+                    threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+
+            asyncio.run(_until_interrupted(serve_forever(app, access, serving.host, serving.port, ready)))
+        finally:
+            controller.close()
+            viser_server.stop()
+            store.close()
+
+
+async def _until_interrupted(serving: Coroutine[Any, Any, None]) -> None:
+    """Run until SIGINT or SIGTERM, then let the server finish."""
+    task = asyncio.ensure_future(serving)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, task.cancel)
+    try:
+        await task
+    except asyncio.CancelledError:
+        if not task.cancelled():
+            raise
+
+
+def sample_copy(name: str = DEFAULT_SAMPLE, afresh: bool = False) -> Path:
+    """Working copy of a bundled sample in the user's data folder, made where it is missing.
+
+    Args:
+        name: of the sample.
+        afresh: throw the working copy away and start again.
+
+    Raises:
+        SessionError: the sample is unknown, or the copy is open in another program.
+    """
+    source = _samples_folder() / name
+    if not (source / SESSION_FILE).is_file():
+        raise SessionError(f"expected one of the samples {', '.join(samples())}, found '{name}'")
+    copy = user_data_path("quadrille", appauthor=False) / "samples" / name
+    if afresh and copy.exists():
+        with SessionLock(copy):
+            pass  # nobody works on it
+        shutil.rmtree(copy)
+    if not copy.exists():
+        unfinished = copy.with_name(f".{name}.unfinished")
+        shutil.rmtree(unfinished, ignore_errors=True)
+        shutil.copytree(source, unfinished)
+        for path in (unfinished, *unfinished.rglob("*")):  # a read-only install gives read-only copies
+            path.chmod(path.stat().st_mode | 0o200)
+        unfinished.rename(copy)
+    return copy
+
+
+def samples() -> Iterable[str]:
+    """Names of the bundled samples."""
+    return sorted(p.parent.name for p in _samples_folder().glob(f"*/{SESSION_FILE}"))
+
+
+def _samples_folder() -> Path:
+    here = Path(__file__).resolve().parent
+    bundled = here / "sample_sessions"
+    return bundled if bundled.is_dir() else here.parent / "sample_sessions"
