@@ -38,11 +38,15 @@ def read_toml(path: Path, what: str, error_type: type[TrackerError]) -> dict[str
     Raises:
         TrackerError: of the given kind; the file is missing, unreadable, or not TOML (the message has the line).
     """
+    text = ""
     try:
-        return tomllib.loads(path.read_text("utf-8"))
+        text = path.read_text("utf-8")
+        return tomllib.loads(text)
     except FileNotFoundError as error:
         raise error_type(f"{what} {path} not found; check the path") from error
     except tomllib.TOMLDecodeError as error:
-        raise error_type(f"{what} {path} is not valid TOML: {error}; correct it") from error
+        # What is open at the end is reported without a line: give the last.
+        place = str(error).replace("at end of document", f"at line {max(1, len(text.splitlines()))}, the last")
+        raise error_type(f"{what} {path} is not valid TOML: {place}; correct it") from error
     except (OSError, UnicodeDecodeError) as error:
         raise error_type(f"{what} {path} cannot be read as a UTF-8 text file: {error}") from error

@@ -167,9 +167,10 @@ def test_metres_read_as_millimetres(write):
         read_calibration(write({"cam01": section()}), units="mm")
 
 
-def test_syntax_error_names_the_line(write):
+@pytest.mark.parametrize("text", ["[cam01]\nname = \nsize = [640, 480]\n", "[cam01]\nname = "])
+def test_syntax_error_names_the_line(write, text):
     with pytest.raises(CalibrationError, match="line 2"):
-        read_calibration(write("[cam01]\nname = \nsize = [640, 480]\n"))
+        read_calibration(write(text))
 
 
 @pytest.mark.parametrize(

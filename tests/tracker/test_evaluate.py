@@ -1,0 +1,210 @@
+import numpy as np
+import pytest
+
+from tracker import rigid
+from tracker.errors import FormatError
+from tracker.evaluate import at_rate, best_rigid, evaluate_joints, evaluate_poses, joints_of_poses, remap_axes
+from tracker.formats.model_toml import load_model
+from tracker.formats.trc import MarkerTable
+from tracker.joint_maps import JOINTS, LIMB_JOINTS
+
+
+def table(points, frames=None, names=JOINTS, rate=30.0):
+    points = np.asarray(points, dtype=np.float64)
+    frames = np.arange(len(points)) if frames is None else np.asarray(frames)
+    return MarkerTable(tuple(names), frames, frames / rate, points, rate)
+
+
+@pytest.fixture
+def truth():
+    """Four frames of 14 joints that move."""
+    return np.random.default_rng(0).normal(0, 0.5, (4, len(JOINTS), 3))
+
+
+def test_no_error(truth):
+    e = evaluate_joints(table(truth), table(truth), range(4))
+    assert (e.frames, e.missing_frames, e.missing_reference_values, e.lost_frames) == (4, 0, 0, 0)
+    assert (e.mpjpe_mm, e.median_mm, e.p95_mm) == (0, 0, 0)
+    assert e.pa_mpjpe_mm == pytest.approx(0, abs=1e-9)
+
+
+def test_figures_worked_out_by_hand(truth):
+    estimate = truth.copy()
+    estimate[0, JOINTS.index("left_wrist")] += (0.03, 0.0, 0.04)  # 50 mm
+    estimate[1, JOINTS.index("right_knee"), 1] += 0.2  # 200 mm: lost
+    estimate[:, JOINTS.index("head"), 2] -= 0.5  # no limb joint: counts by itself alone
+    e = evaluate_joints(table(estimate), table(truth), range(4))
+    assert e.mpjpe_mm == pytest.approx((50 + 200) / 48)
+    assert e.median_mm == pytest.approx(0)
+    assert e.lost_frames == 1
+    assert e.per_joint_mm["left_wrist"] == pytest.approx(50 / 4)
+    assert e.per_joint_mm["right_knee"] == pytest.approx(200 / 4)
+    assert e.per_joint_mm["head"] == pytest.approx(500)
+    assert e.per_joint_mm["neck"] == 0
+
+
+def test_percentile(truth):
+    estimate = truth.copy()
+    # 48 distances of 0, 1, ... 47 mm: the 95th percentile lies at 0.95 * 47 = 44.65.
+    estimate[:, :12, 0] += np.arange(48).reshape(4, 12) / 1000
+    e = evaluate_joints(table(estimate), table(truth), range(4))
+    assert e.p95_mm == pytest.approx(44.65)
+    assert e.median_mm == pytest.approx(23.5)
+
+
+def test_missing_frames_and_values(truth):
+    reference = truth.copy()
+    reference[1, JOINTS.index("left_hip")] = np.nan
+    reference[2, JOINTS.index("head")] = np.nan
+    estimate = truth + np.array([0.0, 0.01, 0.0])
+    e = evaluate_joints(table(estimate[[0, 1, 3]], [0, 1, 3]), table(reference), range(1, 4))
+    assert (e.frames, e.missing_frames, e.missing_reference_values, e.lost_frames) == (3, 1, 1, 1)
+    assert e.mpjpe_mm == pytest.approx(10)
+
+
+def test_joints_that_only_one_side_has(truth):
+    some = [JOINTS.index(j) for j in ("left_hip", "left_knee", "neck")]
+    e = evaluate_joints(table(truth + 0.01), table(truth[:, some], names=("left_hip", "left_knee", "neck")), range(4))
+    assert sorted(e.per_joint_mm) == ["left_hip", "left_knee", "neck"]
+    assert e.mpjpe_mm == pytest.approx(np.sqrt(3) * 10)
+    assert e.pa_mpjpe_mm is None  # two limb joints fix no rotation
+
+
+def test_pa_takes_out_each_frames_own_motion(truth):
+    rng = np.random.default_rng(1)
+    moved = np.array([p @ rigid.so3_exp(rng.normal(size=3)).T + rng.normal(size=3) for p in truth])
+    e = evaluate_joints(table(moved), table(truth), range(4))
+    assert e.mpjpe_mm > 100
+    assert e.pa_mpjpe_mm == pytest.approx(0, abs=1e-9)
+    # One motion for all does not help there.
+    assert evaluate_joints(table(moved), table(truth), range(4), "rigid-all").mpjpe_mm > 100
+
+
+def test_pa_does_not_scale_or_mirror(truth):
+    assert evaluate_joints(table(truth * 1.1), table(truth), range(4)).pa_mpjpe_mm > 10
+    assert evaluate_joints(table(truth * (-1, 1, 1)), table(truth), range(4)).pa_mpjpe_mm > 100
+
+
+def test_rigid_all_takes_out_one_motion(truth):
+    T = rigid.transform(rigid.so3_exp(np.array([0.3, -0.2, 1.0])), np.array([1.0, 2.0, 3.0]))
+    estimate = rigid.apply(T, truth)
+    estimate[0, JOINTS.index("head")] += 0.1
+    e = evaluate_joints(table(estimate), table(truth), range(4), "rigid-all")
+    assert e.mpjpe_mm == pytest.approx(0, abs=1e-9)
+    assert e.per_joint_mm["head"] == pytest.approx(np.sqrt(3) * 100 / 4)
+
+
+def test_nothing_in_common(truth):
+    with pytest.raises(FormatError, match="in common"):
+        evaluate_joints(table(truth), table(truth, [10, 11, 12, 13]), range(4))
+
+
+def test_best_rigid_of_a_quarter_turn():
+    source = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    target = source @ np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]).T + (1, 2, 3)
+    T = best_rigid(source, target)
+    np.testing.assert_allclose(T, [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]], atol=1e-12)
+
+
+def test_axes():
+    # A file whose y points up, x forward, z to the right.
+    points = remap_axes(table([[[1.0, 2.0, 3.0]]], names=["a"]), "x,-z,y").points
+    assert points[0, 0].tolist() == [1, -3, 2]
+
+
+@pytest.mark.parametrize("axes", ["x,y", "x,y,y", "x,y,w", "x,,z", "x,y,z,x", ""])
+def test_malformed_axes(axes):
+    with pytest.raises(FormatError, match="three different axes"):
+        remap_axes(table([[[1.0, 2.0, 3.0]]], names=["a"]), axes)
+
+
+def test_axes_that_mirror():
+    with pytest.raises(FormatError, match="mirror"):
+        remap_axes(table([[[1.0, 2.0, 3.0]]], names=["a"]), "x,z,y")
+
+
+def line(n, rate, frames=None):
+    """A point that moves 1 m a second."""
+    frames = np.arange(n) if frames is None else np.asarray(frames)
+    points = np.zeros((len(frames), 1, 3))
+    points[:, 0, 0] = frames / rate
+    return table(points, frames, ["a"], rate)
+
+
+@pytest.mark.parametrize(("file_rate", "fps", "n"), [(60, 30, 5), (30, 60, 17), (100, 60, 5), (50, 30, 5)])
+def test_other_rates_by_time(file_rate, fps, n):
+    moved = at_rate(line(9, file_rate), fps)
+    assert moved.frames.tolist() == list(range(n))
+    np.testing.assert_allclose(moved.points[:, 0, 0], np.arange(n) / fps, atol=1e-12)
+
+
+def test_same_rate_keeps_the_rows():
+    same = line(3, 59.94, [0, 2, 5])
+    assert at_rate(same, 59.95) is same
+
+
+def test_missing_values_do_not_spread_over_rows_that_are_there():
+    source = line(5, 60)
+    source.points[3] = np.nan
+    assert at_rate(source, 30).points[:, 0, 0] == pytest.approx([0, 2 / 60, 4 / 60])
+    assert np.isnan(at_rate(source, 120).points[:, 0, 0]).tolist() == [False] * 5 + [True] * 3 + [False]
+
+
+def pose(model, **degrees):
+    values = model.neutral()
+    for name, angle in degrees.items():
+        values[model.value_names.index(name.replace("__", "."))] = np.radians(angle)
+    return values
+
+
+@pytest.fixture
+def model():
+    return load_model("gavrila22")
+
+
+def test_twist_counts_only_where_it_shows(model):
+    n_parts = len(model.parts)
+    for bend, expected in ((0, 0.0), (19, None), (21, None), (90, None)):
+        true = pose(model, left_elbow__extension=bend)
+        estimate = pose(model, left_elbow__extension=bend, left_shoulder__twist=30)
+        mean, angles = evaluate_poses(model, {0: estimate}, {0: true}, [0])
+        # The forearm's axis swings around the upper arm's by the twist: 2 asin(sin(bend) sin(15)).
+        swing = np.degrees(2 * np.arcsin(np.sin(np.radians(bend)) * np.sin(np.radians(15))))
+        wanted = (swing if bend < 20 else 60.0) / n_parts
+        assert mean == pytest.approx(wanted if expected is None else expected, abs=1e-9)
+        assert angles["left_shoulder.twist"] == pytest.approx(30)
+        assert angles["left_elbow.extension"] == pytest.approx(0)
+        assert "torso.x" not in angles
+
+
+def test_body_turn_counts_whole_for_trunk_and_head(model):
+    # Turning about the vertical leaves all limbs' hanging axes as they are.
+    mean, _ = evaluate_poses(model, {0: pose(model, torso__twist=40)}, {0: pose(model)}, [0])
+    assert mean == pytest.approx(2 * 40 / len(model.parts))
+
+
+def test_angles_go_the_shorter_way_round(model):
+    _, angles = evaluate_poses(model, {0: pose(model, torso__twist=179)}, {0: pose(model, torso__twist=-179)}, [0])
+    assert angles["torso.twist"] == pytest.approx(2)
+
+
+def test_body_size_does_not_matter_to_angles(model):
+    other = load_model("gavrila22", 1.5)
+    mean, _ = evaluate_poses(other, {3: pose(other, left_hip__elevation=10)}, {3: pose(model)}, range(9))
+    assert mean == pytest.approx(2 * 10 / len(model.parts))  # thigh and calf
+
+
+def test_no_frame_in_common(model):
+    with pytest.raises(FormatError, match="no frame in common"):
+        evaluate_poses(model, {0: pose(model)}, {1: pose(model)}, range(3))
+
+
+def test_joints_of_poses(model):
+    poses = {7: pose(model), 2: pose(model, left_elbow__extension=90)}
+    joints = joints_of_poses(model, poses, 30.0)
+    assert joints.names == JOINTS
+    assert joints.frames.tolist() == [2, 7]
+    wrist = joints.points[:, LIMB_JOINTS.index("left_wrist")]
+    np.testing.assert_allclose(wrist[1], model.points_world(poses[7])[model.point_names.index("left_wrist")])
+    assert wrist[0, 2] > wrist[1, 2]
+    assert evaluate_joints(joints, joints, [2, 7]).mpjpe_mm == 0

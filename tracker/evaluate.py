@@ -1,0 +1,239 @@
+"""Errors of an estimated motion against a reference: joints, and angles where the reference has poses."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker import rigid
+from tracker.body import BodyModel
+from tracker.errors import FormatError
+from tracker.formats.trc import MarkerTable
+from tracker.joint_maps import JOINTS, LIMB_JOINTS
+from tracker.rigid import Array
+
+LOST_M = 0.15
+"""A frame with a limb joint farther off than this is lost, metres."""
+BENT_RAD = float(np.radians(20.0))
+"""An elbow or knee bent by less than this does not show its limb's twist."""
+
+Alignment = Literal["none", "rigid-all"]
+
+_RATE_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """How far an estimated motion is from its reference."""
+
+    frames: int
+    """Number of frames looked at."""
+    missing_frames: int
+    """How many of them have no estimate."""
+    missing_reference_values: int
+    """How many positions of limb joints the reference lacks in them; skipped."""
+    lost_frames: int
+    """How many have no estimate, or a limb joint off by more than 150 mm."""
+    mpjpe_mm: float
+    """Mean distance over frames and limb joints."""
+    pa_mpjpe_mm: float | None
+    """The same after the best rotation and translation of each frame (no scale); None where no frame has 3 joints."""
+    median_mm: float
+    """Median distance over frames and limb joints."""
+    p95_mm: float
+    """95th percentile of the distance over frames and limb joints."""
+    per_joint_mm: Mapping[str, float]
+    """Mean distance of each joint that both have, head and neck too."""
+    axis_error_deg: float | None = None
+    """Mean angle between true and estimated part axes; None without true poses."""
+    angle_error_deg: Mapping[str, float] | None = None
+    """Mean size of each angle's error by degree of freedom; None without true poses of the same model."""
+
+
+def evaluate_joints(
+    estimated: MarkerTable, reference: MarkerTable, frames: Sequence[int], align: Alignment = "none"
+) -> Evaluation:
+    """Compare joints frame by frame. Both tables have our names (see `joint_maps.joints_of`) and frame numbers.
+
+    Args:
+        estimated: what was tracked; a frame may be missing.
+        reference: what is taken for true; a frame or a position may be missing.
+        frames: the frames to look at.
+        align: `rigid-all` first moves the estimate as a whole by the best rotation and translation over all frames.
+
+    Raises:
+        FormatError: nothing can be compared.
+    """
+    joints = tuple(j for j in JOINTS if j in estimated.names and j in reference.names)
+    estimate, truth = _gather(estimated, joints, frames), _gather(reference, joints, frames)  # (n, m, 3), NaN: none
+    is_limb = np.array([j in LIMB_JOINTS for j in joints], dtype=bool)
+    both: NDArray[np.bool_] = np.all(np.isfinite(estimate) & np.isfinite(truth), axis=-1)  # (n, m)
+    if not both[:, is_limb].any():
+        raise FormatError(
+            "the estimate and the reference have no limb joint of the same frame in common; "
+            "check --frames, --person and the reference's frame numbers"
+        )
+    if align == "rigid-all":
+        used = both & is_limb
+        estimate = rigid.apply(best_rigid(estimate[used], truth[used]), estimate)
+    error = np.linalg.norm(estimate - truth, axis=-1)  # (n, m), NaN where not comparable
+    limb_error = error[:, is_limb]
+    missing = np.isin(frames, estimated.frames, invert=True)
+    lost = missing | (np.nan_to_num(limb_error) > LOST_M).any(axis=1)
+    aligned = np.concatenate(
+        [_procrustes_error(e[b], t[b]) for e, t, b in zip(estimate, truth, both & is_limb, strict=True)]
+    )
+    found = limb_error[np.isfinite(limb_error)] * 1000
+    return Evaluation(
+        frames=len(frames),
+        missing_frames=int(missing.sum()),
+        missing_reference_values=int(np.isnan(truth[:, is_limb]).any(axis=-1).sum()),
+        lost_frames=int(lost.sum()),
+        mpjpe_mm=float(found.mean()),
+        pa_mpjpe_mm=float(aligned.mean()) * 1000 if len(aligned) else None,
+        median_mm=float(np.median(found)),
+        p95_mm=float(np.percentile(found, 95)),
+        per_joint_mm={j: float(np.nanmean(error[:, i])) * 1000 for i, j in enumerate(joints) if both[:, i].any()},
+    )
+
+
+def evaluate_poses(
+    model: BodyModel, estimated: Mapping[int, Array], true: Mapping[int, Array], frames: Sequence[int]
+) -> tuple[float, dict[str, float]]:
+    """Compare the angles of poses of the same model (its sizes may differ), over the frames that both have.
+
+    A part's error is the angle between its true and estimated long axis (z). The parts next to an elbow or knee
+    count their twist as well, as the angle of the whole rotation, where that joint is bent by more than 20 degrees in
+    the truth; the root and what hangs rigidly on it always do.
+
+    Args:
+        model: the tree of both.
+        estimated: values by frame, each (n_values,).
+        true: values by frame.
+        frames: the frames to look at.
+
+    Returns:
+        The mean over parts and frames, and the mean size of each angle's error by degree of freedom, degrees.
+
+    Raises:
+        FormatError: no frame in common.
+    """
+    common = [f for f in frames if f in estimated and f in true]
+    if not common:
+        raise FormatError("the estimate and the reference have no frame in common; check --frames and --person")
+    part_errors, dof_errors = [], []
+    for f in common:
+        part_errors.append(_part_errors(model, estimated[f], true[f]))
+        step = model.difference(estimated[f], true[f])
+        dof_errors.append(np.abs(np.arctan2(np.sin(step), np.cos(step))))  # by the shorter way round
+    mean = np.degrees(np.mean(dof_errors, axis=0))
+    angles = {n: float(mean[i]) for i, n in enumerate(model.dof_names) if not model.dof_is_length[i]}
+    return float(np.degrees(np.mean(part_errors))), angles
+
+
+def joints_of_poses(model: BodyModel, poses: Mapping[int, Array], rate: float) -> MarkerTable:
+    """Joints of a person's poses under our names, one row per frame.
+
+    Args:
+        model: body model of all poses.
+        poses: values by frame, each (n_values,).
+        rate: frames per second.
+    """
+    names = tuple(j for j in JOINTS if j in model.point_names)
+    columns = [model.point_names.index(n) for n in names]
+    frames = np.array(sorted(poses), dtype=np.int64)
+    points = np.array([model.points_world(poses[f])[columns] for f in frames.tolist()]).reshape(-1, len(names), 3)
+    return MarkerTable(names, frames, frames / rate, points, rate)
+
+
+def remap_axes(table: MarkerTable, axes: str) -> MarkerTable:
+    """Express a file's points in the session's axes.
+
+    Args:
+        table: the points in the file's axes.
+        axes: which of the file's axes are the session's x, y and z, e.g. `x,-z,y` for a file whose y points up.
+
+    Raises:
+        FormatError: not three different axes, or they mirror the world.
+    """
+    matrix = np.zeros((3, 3))
+    words = [w.strip() for w in axes.split(",")]
+    for row, word in enumerate(words[:3]):
+        if word.lstrip("+-") in ("x", "y", "z"):
+            matrix[row, "xyz".index(word[-1])] = -1.0 if word.startswith("-") else 1.0
+    if len(words) != 3 or abs(np.linalg.det(matrix)) != 1:
+        raise FormatError(f"--axes expected three different axes such as x,-z,y, found '{axes}'")
+    if np.linalg.det(matrix) < 0:
+        raise FormatError(f"--axes {axes} would mirror the world, left to right; turn one sign, e.g. x,-z,y")
+    return replace(table, points=table.points @ matrix.T)
+
+
+def at_rate(table: MarkerTable, fps: float) -> MarkerTable:
+    """Bring a file to the frames of a session, by time where its rate is another, linearly between its rows.
+
+    A position between two rows is missing where either is.
+    """
+    if abs(table.rate / fps - 1) < _RATE_TOLERANCE:
+        return table
+    rows = table.frames * (fps / table.rate)  # the session's frame, not whole, of each row
+    frames = np.arange(int(np.floor(rows[-1] + 1e-6)) + 1)
+    after = np.clip(np.searchsorted(rows, frames - 1e-6), 1, len(rows) - 1) if len(rows) > 1 else np.zeros_like(frames)
+    before = np.maximum(after - 1, 0)
+    span = np.maximum(rows[after] - rows[before], 1e-12)
+    weight = np.clip((frames - rows[before]) / span, 0.0, 1.0)[:, None, None]
+    first, second = table.points[before], table.points[after]
+    points = np.where(weight < 1e-6, first, np.where(weight > 1 - 1e-6, second, first + weight * (second - first)))
+    return MarkerTable(table.names, frames, frames / fps, points, fps)
+
+
+def best_rigid(source: Array, target: Array) -> Array:
+    """Rotation and translation, (4, 4), that bring points (n, 3) nearest to others (Kabsch 1976, no scale)."""
+    center_source, center_target = source.mean(axis=0), target.mean(axis=0)
+    U, _, Vt = np.linalg.svd((target - center_target).T @ (source - center_source))
+    R = U @ np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))]) @ Vt
+    return rigid.transform(R, center_target - R @ center_source)
+
+
+def _gather(table: MarkerTable, joints: Sequence[str], frames: Sequence[int]) -> Array:
+    """Positions of joints in frames, (n_frames, n_joints, 3); NaN where missing."""
+    out = np.full((len(frames), len(joints), 3), np.nan)
+    rows: NDArray[np.int64] = np.searchsorted(table.frames, frames)
+    there = np.isin(frames, table.frames)
+    columns = [table.names.index(j) for j in joints]
+    out[there] = table.points[rows[there]][:, columns]
+    return out
+
+
+def _procrustes_error(estimate: Array, truth: Array) -> Array:
+    """Distances (k,) after the best rigid motion; none where fewer than 3 points fix no rotation."""
+    if len(estimate) < 3:
+        return np.zeros(0)
+    return np.linalg.norm(rigid.apply(best_rigid(estimate, truth), estimate) - truth, axis=-1)
+
+
+def _part_errors(model: BodyModel, estimated: Array, true: Array) -> Array:
+    """Angle of each part's error, (n_parts,), rad."""
+    R_estimated = model.kinematics(estimated).Ts_world_part[:, :3, :3]
+    R_true = model.kinematics(true).Ts_world_part[:, :3, :3]
+    axis = _angle(R_estimated[:, :, 2], R_true[:, :, 2])
+    whole = np.linalg.norm(rigid.so3_log(np.swapaxes(R_true, 1, 2) @ R_estimated), axis=-1)
+    return np.where(_shows_twist(model, R_true), whole, axis)
+
+
+def _shows_twist(model: BodyModel, R_world_part: Array) -> NDArray[np.bool_]:
+    """Whether a pose shows how each part is turned about its long axis, (n_parts,)."""
+    shows = np.zeros(len(model.parts), dtype=bool)
+    for part, (joint, parent) in enumerate(zip(model.joints, model.parents, strict=True)):
+        if parent < 0 or (shows[parent] and not joint.dof_names):
+            shows[part] = True
+        elif joint.name.endswith(("elbow", "knee")):
+            bent = _angle(R_world_part[part, :, 2], R_world_part[parent, :, 2]) > BENT_RAD
+            shows[[part, parent]] = bent
+    return shows
+
+
+def _angle(a: Array, b: Array) -> Array:
+    """Angle between unit vectors, (..., 3) to (...), rad; exact for small ones too."""
+    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(a * b, axis=-1))

@@ -1,0 +1,136 @@
+"""Which marker of a foreign file is which joint of the body.
+
+The project's own names are those of `BodyModel.point_names`: `left_shoulder`, `left_wrist`, `neck`, ...
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from tracker.errors import FormatError
+from tracker.files import read_toml
+from tracker.formats.trc import MarkerTable
+
+LIMB_JOINTS = tuple(
+    f"{side}_{j}" for side in ("left", "right") for j in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+)
+"""The joints that errors are averaged over."""
+JOINTS = (*LIMB_JOINTS, "neck", "head")
+
+
+class JointMap(NamedTuple):
+    """A naming convention."""
+
+    name: str
+    markers: Mapping[str, str]
+    """Name of the marker for each joint that the convention knows."""
+
+
+def _sided(**parts: str) -> dict[str, str]:
+    """Markers of both sides from patterns in which `{long}` is Left or Right, `{short}` L or R."""
+    sides = {"left": ("Left", "L"), "right": ("Right", "R")}
+    return {
+        f"{side}_{joint}": pattern.format(long=long, short=short)
+        for joint, pattern in parts.items()
+        for side, (long, short) in sides.items()
+    }
+
+
+OWN = JointMap("our own", {j: j for j in JOINTS})
+CMU = JointMap(
+    "CMU",
+    {
+        **_sided(
+            shoulder="{long}Arm",
+            elbow="{long}ForeArm",
+            wrist="{long}Hand",
+            hip="{long}UpLeg",
+            knee="{long}Leg",
+            ankle="{long}Foot",
+        ),
+        "neck": "Neck",
+        "head": "Head",
+    },
+)
+BODY_25 = JointMap(
+    "BODY_25",
+    {
+        **_sided(
+            shoulder="{short}Shoulder",
+            elbow="{short}Elbow",
+            wrist="{short}Wrist",
+            hip="{short}Hip",
+            knee="{short}Knee",
+            ankle="{short}Ankle",
+        ),
+        "neck": "Neck",
+        "head": "Head",
+    },
+)
+# COCO's own names of the limbs are ours; tools that write COCO joints as TRC take the names of BODY_25.
+KNOWN = (OWN, CMU, BODY_25)
+
+# A file with fewer limb joints than this under a convention's names hardly follows it.
+_FEWEST = 4
+
+
+def guess_joint_map(markers: Sequence[str], source: str) -> JointMap:
+    """Tell the naming convention of a file by its markers; `source` names it in messages.
+
+    Raises:
+        FormatError: the markers are of no known convention.
+    """
+    present = [sum(m.markers[j] in markers for j in LIMB_JOINTS) for m in KNOWN]
+    if max(present) < _FEWEST:
+        raise FormatError(
+            f"the markers of {source} follow no known convention (our own, COCO, CMU, BODY_25): found "
+            f"{', '.join(markers[:8])}{', ...' if len(markers) > 8 else ''}; name the joints with --joint-map FILE.toml"
+        )
+    return KNOWN[present.index(max(present))]
+
+
+def read_joint_map(path: str | Path) -> JointMap:
+    """Read a convention from TOML: one line `left_shoulder = "LSHO"` for each joint that a file has.
+
+    Raises:
+        FormatError: the file is missing or malformed, or names an unknown joint.
+    """
+    data = read_toml(Path(path), "joint map", FormatError)
+    unknown = [j for j in data if j not in JOINTS]
+    if unknown or not data:
+        raise FormatError(
+            f'joint map {path}: expected lines such as left_shoulder = "LSHO" for {", ".join(JOINTS)}, '
+            f"found {unknown[0] if unknown else 'none'}; correct it"
+        )
+    wrong = [j for j, marker in data.items() if not isinstance(marker, str)]
+    if wrong:
+        raise FormatError(f"joint map {path}: expected the name of a marker for '{wrong[0]}', found {data[wrong[0]]!r}")
+    return JointMap(Path(path).name, data)
+
+
+def joints_of(table: MarkerTable, source: str, joint_map: JointMap | None = None) -> MarkerTable:
+    """Keep the body's joints of a file, under our names, in the order of `JOINTS`.
+
+    Args:
+        table: the file's markers.
+        source: names the file in messages.
+        joint_map: its naming convention; guessed by default.
+
+    Raises:
+        FormatError: no convention fits, or the map names a marker that the file lacks.
+    """
+    if joint_map is None:
+        markers = guess_joint_map(table.names, source).markers
+        markers = {j: m for j, m in markers.items() if m in table.names}
+    else:
+        markers = joint_map.markers
+    for marker in markers.values():
+        if marker not in table.names:
+            raise FormatError(
+                f"{source} has no marker '{marker}', which the joint map {joint_map.name if joint_map else ''} names; "
+                f"expected one of {', '.join(table.names)}"
+            )
+    joints = tuple(j for j in JOINTS if j in markers)
+    columns = [table.names.index(markers[j]) for j in joints]
+    return replace(table, names=joints, points=table.points[:, columns])
