@@ -4,3 +4,7 @@
 them a surface; `room` and `furniture` stand around them; `rig` mounts the cameras; `render` and `film` make images;
 `encode` and `record` write them into a session folder.
 """
+
+from tracker.simulate.record import simulate
+
+__all__ = ["simulate"]

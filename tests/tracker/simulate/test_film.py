@@ -5,6 +5,7 @@ import pytest
 from tracker.formats.model_toml import load_model
 from tracker.simulate.film import exposed, film, freeze
 from tracker.simulate.parts import PartsFigure
+from tracker.simulate.render import cast, pixel_means
 from tracker.simulate.rig import make_cameras
 from tracker.simulate.room import see_room
 from tracker.simulate.scenes import cast_of, perform
@@ -29,6 +30,8 @@ def test_the_person_stands_out_and_the_room_stays(backdrops, skin):
         image, mask = film(backdrop, moment)
         assert image.shape == (SIZE[1], SIZE[0], 3)
         assert set(np.unique(mask)) == {0, 1}
+        covered = cast(backdrop.sample_camera, moment.vertices_world, moment.faces).faces >= 0
+        assert np.array_equal(mask == 1, pixel_means(covered.astype(np.float32)) >= 0.5)
         change = np.abs(image - backdrop.image).max(axis=-1)
         assert np.mean(change[mask == 1] > 0.02) > 0.9
         # Elsewhere nothing changes but for the shadow on the floor.

@@ -94,7 +94,9 @@ def test_normals_point_outward():
     assert np.allclose(vertex_normals(ball.vertices, ball.faces), ball.vertices, atol=0.02)
 
 
-def test_a_mesh_behind_the_camera_is_not_seen(straight_camera):
+def test_what_reaches_behind_the_camera_is_not_drawn(straight_camera):
     ball = trimesh.creation.icosphere(subdivisions=2, radius=0.5)
     behind = rigid.apply(rigid.transform(t=np.array([0, 0, -2.0])), ball.vertices)
     assert not (cast(straight_camera, behind, ball.faces).faces >= 0).any()
+    across = np.array([(-0.2, -0.2, 1.0), (0.3, -0.2, 1.0), (-0.2, 0.3, -1.0)])
+    assert not (cast(straight_camera, across, np.array([[0, 1, 2]])).faces >= 0).any()

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tracker.errors import TrackerError
-from tracker.simulate.scenes import SCENES, cast_of, perform
+from tracker.simulate.scenes import HEADING_RAD, SCENES, cast_of, perform
 
 FPS = 25.0
 
@@ -51,6 +51,9 @@ def test_standing_feet_stay_where_they_are(true_model):
     points = points_of(true_model, perform(cast_of("elbow_rotation")[0], true_model, 50, FPS))
     for ankle in ("left_ankle", "right_ankle"):
         assert np.abs(points[ankle] - points[ankle][0]).max() < 1e-3
+    # Side by side under the trunk, whichever way the person faces.
+    to_left = (points["left_ankle"] - points["right_ankle"])[0, :2]
+    assert to_left @ (-np.sin(HEADING_RAD), np.cos(HEADING_RAD)) > 0.98 * np.linalg.norm(to_left)
 
 
 def test_walking_lifts_the_knees_in_turn_and_swings_the_arms(true_model):

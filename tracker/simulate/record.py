@@ -1,0 +1,189 @@
+"""Make a session folder of a simulated recording, with the truth about it."""
+
+import secrets
+import shutil
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Literal, get_args
+
+import cv2
+import numpy as np
+
+from tracker.body import BodyModel
+from tracker.cameras import Camera
+from tracker.errors import SessionError, TrackerError
+from tracker.files import write_text_whole
+from tracker.footage import open_footage
+from tracker.formats.model_toml import format_model, load_model
+from tracker.formats.pose_table import write_pose_table
+from tracker.formats.trc import write_trc
+from tracker.rigid import Array
+from tracker.session import PALETTE, CameraSource, Person, Session, load_session, save_session
+from tracker.simulate.encode import VideoWriter
+from tracker.simulate.film import Image, exposed, film, freeze
+from tracker.simulate.outfit import Outfit
+from tracker.simulate.parts import PartsFigure
+from tracker.simulate.render import Figure
+from tracker.simulate.rig import make_cameras
+from tracker.simulate.room import Backdrop, see_room
+from tracker.simulate.scenes import Role, cast_of, perform
+from tracker.simulate.skeleton import altered_model
+from tracker.simulate.skin import make_skin
+
+BodyKind = Literal["skinned", "model"]
+Progress = Callable[[int, int], None]
+
+PRESET = "gavrila22"
+BACKGROUND_FRAMES = 3
+"""Frames filmed of the empty room, of which the last is kept: the codec has settled by then."""
+
+
+def simulate(
+    out: str | Path,
+    scene: str = "elbow_rotation",
+    n_cameras: int = 4,
+    n_frames: int = 50,
+    seed: int = 0,
+    size: tuple[int, int] = (640, 480),
+    fps: float = 25.0,
+    *,
+    body: BodyKind = "skinned",
+    masks: bool = False,
+    progress: Progress | None = None,
+) -> Session:
+    """Make a session folder of a simulated recording; it appears complete or not at all.
+
+    Besides the session it holds `truth.trc` (joint centres, metres), `truth.csv` (poses of the true skeleton) and
+    `truth_model.toml` (that skeleton); with several people one of each per person, `truth_NAME.trc` and so on. The
+    session's people get the plain preset at the true body height. The same arguments give the same footage.
+
+    Args:
+        out: the folder; must not exist, or be empty.
+        scene: one of `scenes.SCENES`.
+        n_cameras: 4 are FRONT, RIGHT, BACK and LEFT in the corners; others are spread around.
+        n_frames: number of frames.
+        seed: of the room, the small differences of the cameras, and the noise.
+        size: image width and height, px, both even.
+        fps: frame rate, 1/s.
+        body: film a smooth-skinned person whose bones are not the preset's, or the preset's own parts.
+        masks: also write true masks, `masks/CAM/%06d.png`: 0 background, k person k.
+        progress: called with the number of images made and their total.
+
+    Raises:
+        TrackerError: an argument is impossible.
+        SessionError: the folder is in use or cannot be written.
+    """
+    out = Path(out).absolute()
+    _check(out, n_frames, fps, body)
+    cast = cast_of(scene)
+    cameras = make_cameras(n_cameras, size, seed)
+    presets = [load_model(PRESET, role.height_m) for role in cast]
+    models = [altered_model(m) if body == "skinned" else m for m in presets]
+    poses = [perform(role, model, n_frames, fps) for role, model in zip(cast, models, strict=True)]
+    temporary = out.with_name(f".{out.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        temporary.mkdir(parents=True)
+        sources = [_source(temporary, c, masks) for c in cameras]
+        figures = [_figure(model, body) for model in models]
+        _shoot(sources, figures, poses, fps, seed, progress)
+        _write_truth(temporary, cast, models, poses, fps)
+        people = [
+            Person(r.name, m, PALETTE[i % len(PALETTE)]) for i, (r, m) in enumerate(zip(cast, presets, strict=True))
+        ]
+        save_session(Session(temporary, out.name, float(fps), n_frames, tuple(sources), tuple(people)))
+        if out.exists():
+            out.rmdir()
+        temporary.rename(out)
+    except OSError as error:
+        raise SessionError(f"cannot write the session {out}: {error}; choose a folder you may write to") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return load_session(out)
+
+
+def _check(out: Path, n_frames: int, fps: float, body: str) -> None:
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise SessionError(f"{out} exists already and is not an empty folder; choose another name or remove it")
+    if n_frames < 1 or not 0 < fps <= 1000:
+        raise TrackerError(
+            f"expected at least one frame and a rate of 1 to 1000 frames a second, found {n_frames} and {fps:g}"
+        )
+    if body not in get_args(BodyKind):
+        raise TrackerError(f"expected a body that is one of {', '.join(get_args(BodyKind))}, found '{body}'")
+
+
+def _figure(model: BodyModel, body: BodyKind) -> Figure:
+    return make_skin(model, Outfit()) if body == "skinned" else PartsFigure(model)
+
+
+def _source(folder: Path, camera: Camera, masks: bool) -> CameraSource:
+    return CameraSource(
+        camera,
+        folder / f"{camera.name}.mp4",
+        folder / "background" / f"{camera.name}.png",
+        folder / "masks" / camera.name if masks else None,
+    )
+
+
+def _shoot(
+    sources: Sequence[CameraSource],
+    figures: Sequence[Figure],
+    poses: Sequence[Array],
+    fps: float,
+    seed: int,
+    progress: Progress | None,
+) -> None:
+    """Film the empty room, then the people, with all cameras."""
+    rngs = [np.random.default_rng([seed, 3, i]) for i in range(len(sources))]
+    backdrops = [see_room(source.camera, seed) for source in sources]
+    for source, backdrop, rng in zip(sources, backdrops, rngs, strict=True):
+        _shoot_background(source, backdrop, fps, rng)
+    done, total = 0, len(poses[0]) * len(sources)
+    with ExitStack() as stack:
+        writers = [stack.enter_context(VideoWriter(s.footage, s.camera.size, fps)) for s in sources]
+        for k, values in enumerate(zip(*poses, strict=True)):
+            moment = freeze(figures, values)
+            for source, backdrop, rng, writer in zip(sources, backdrops, rngs, writers, strict=True):
+                image, mask = film(backdrop, moment)
+                writer.write(exposed(image, rng))
+                if source.masks is not None:
+                    source.masks.mkdir(parents=True, exist_ok=True)
+                    _write_png(source.masks / f"{k:06d}.png", mask)
+                done += 1
+                if progress is not None:
+                    progress(done, total)
+
+
+def _shoot_background(source: CameraSource, backdrop: Backdrop, fps: float, rng: np.random.Generator) -> None:
+    """Write the empty room as the same camera and codec record it, with noise of its own."""
+    assert source.background is not None
+    source.background.parent.mkdir(exist_ok=True)
+    clip = source.background.with_suffix(".mp4")
+    with VideoWriter(clip, source.camera.size, fps) as writer:
+        for _ in range(BACKGROUND_FRAMES):
+            writer.write(exposed(backdrop.image, rng))
+    image = open_footage(clip, source.camera.name).read(BACKGROUND_FRAMES - 1)
+    assert image is not None
+    _write_png(source.background, np.ascontiguousarray(image[..., ::-1]))
+    clip.unlink()
+
+
+def _write_png(path: Path, image: Image) -> None:
+    """Write a gray (H, W) or BGR (H, W, 3) image."""
+    done, data = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    assert done
+    path.write_bytes(data.tobytes())
+
+
+def _write_truth(
+    folder: Path, cast: Sequence[Role], models: Sequence[BodyModel], poses: Sequence[Array], fps: float
+) -> None:
+    for role, model, values in zip(cast, models, poses, strict=True):
+        suffix = "" if len(cast) == 1 else f"_{role.name}"
+        # The root is a place within the trunk that no marker set knows.
+        kept = [i for i, name in enumerate(model.point_names) if name != model.joints[0].name]
+        points = np.array([model.points_world(v)[kept] for v in values])
+        write_trc(folder / f"truth{suffix}.trc", [model.point_names[i] for i in kept], points, fps)
+        write_pose_table(folder / f"truth{suffix}.csv", model, values)
+        write_text_whole(folder / f"truth_model{suffix}.toml", format_model(model))
