@@ -8,6 +8,8 @@
  */
 
 const HALO = "rgba(0, 0, 0, 0.45)";
+// Joints have their person's colour, as its contours have: bones between them must not look like contours.
+const BONE = "#fff";
 const PIXELS_VISIBLE_FROM = 4;
 const JOINT_RADIUS = 4.5;
 const TORSO_HALF_SIDE = 6.5;
@@ -127,8 +129,8 @@ export function drawSkeleton(context, placed, people) {
       line.moveTo(a.x, a.y);
       line.lineTo(b.x, b.y);
     }
-    context.globalAlpha = 0.85;
-    stroke(context, line, person.color, 2);
+    context.globalAlpha = 0.8;
+    stroke(context, line, BONE, 1.25);
     context.globalAlpha = 1;
   });
 }

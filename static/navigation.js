@@ -81,9 +81,13 @@ export class Navigation {
     }
     this.#anchor.tick = now;
     const due = this.#anchor.frame + Math.floor(((now - this.#anchor.time) * session.fps) / 1000);
-    if (!this.#underWay && due > this.#store.facts.target) this.#request(Math.min(due, this.#last));
-    if (due >= this.#last) this.pause();
-    else requestAnimationFrame((then) => this.#tick(then));
+    if (due >= this.#last) {
+      this.pause();
+      this.#request(this.#last);
+      return;
+    }
+    if (!this.#underWay && due > this.#store.facts.target) this.#request(due);
+    requestAnimationFrame((then) => this.#tick(then));
   }
 
   /** @param {number} frame */

@@ -88,7 +88,7 @@ export class PaneGrid {
       return pane;
     });
     this.#element.replaceChildren(...this.panes.map((pane) => pane.element));
-    this.#store.set({ filled: null, shown: null, overlay: null });
+    this.#store.set({ filled: null });
     this.#layOut();
   }
 

@@ -62,7 +62,9 @@ export class Receiver {
     this.#frames.close();
     this.#frames = new FrameAssembler(session.cameras.length, (shown) => this.#show(shown));
     this.#early = null;
+    const former = this.#store.facts.session?.cameras;
     this.#store.set({ session });
+    if (JSON.stringify(former) !== JSON.stringify(session.cameras)) this.#store.set({ shown: null, overlay: null });
   }
 
   /** @param {import("./store.js").Shown} shown */

@@ -1,7 +1,7 @@
 /** The bar between panes and 3-D view: dragged, moved by arrow keys, put back by a double click; remembered. */
 
 const STORED = "quadrille.panes-fraction";
-const USUAL = 0.65;
+const USUAL = 0.62;
 const LEAST_PANES_PX = 480;
 const LEAST_SCENE_PX = 300;
 const KEY_STEP_PX = 24;

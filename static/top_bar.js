@@ -86,11 +86,10 @@ export class TopBar {
   #showJob(job) {
     const stands = job.running || job.kind !== null;
     const at = stands && job.stage !== null ? job.stages.indexOf(job.stage) : -1;
-    this.#stage.textContent = stands ? (job.stage ?? "starting").replaceAll("_", " ") : job.message;
+    const stage = (job.stage ?? "starting").replaceAll("_", " ");
+    this.#stage.textContent = stands ? `${stage} · ${count(job.evaluations)} poses` : job.message;
     this.#stage.title = this.#stage.textContent;
-    this.#figures.textContent = stands
-      ? `${count(job.evaluations)} poses · ${count(job.per_second)}/s · best ${px(job.best_px)}`
-      : "";
+    this.#figures.textContent = stands ? `best ${px(job.best_px)} · ${count(job.per_second)}/s` : "";
     this.#stages.replaceChildren(
       ...(stands ? job.stages : []).map((_, index) => {
         const mark = document.createElement("i");

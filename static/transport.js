@@ -46,7 +46,7 @@ export class Transport {
   #showSession() {
     const frames = this.#store.facts.session?.n_frames ?? 1;
     this.#frame.max = String(frames - 1);
-    this.#total.textContent = `of 0 – ${frames - 1}`;
+    this.#total.textContent = `/ ${frames - 1}`;
   }
 
   #showFrame() {
@@ -64,7 +64,7 @@ export class Transport {
 
   #showSource() {
     const source = this.#store.facts.state?.source ?? null;
-    this.#source.textContent = source === null ? "no pose in this frame" : `pose ${source}`;
+    this.#source.textContent = source === null ? "No pose yet" : `Pose: ${source}`;
   }
 
   #showLegend() {

@@ -1,0 +1,89 @@
+import os
+import shutil
+
+import pytest
+import pytest_asyncio
+from aiohttp import web
+from driving import listening, shows
+from fake_endpoint import FakeEndpoint
+from playwright.async_api import Error, async_playwright
+
+from app.access import Access
+from app.server import create_app, static_folder
+
+FLAGS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+    "--disable-dev-shm-usage",
+    "--disable-background-networking",
+]
+
+
+def chromium_path():
+    """The browser to drive: the one the environment names, the system's, else (None) Playwright's own."""
+    found = (shutil.which(name) for name in ("chromium", "chromium-browser", "google-chrome"))
+    return os.environ.get("QUADRILLE_CHROMIUM") or next(filter(None, found), None)
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if item.path.parent.name == "browser":
+            item.add_marker(pytest.mark.browser)
+            # One event loop for all: the browser is started once, and the server under test runs beside the test.
+            item.add_marker(pytest.mark.asyncio(loop_scope="session"), append=False)
+
+
+@pytest_asyncio.fixture(loop_scope="session", scope="session")
+async def browser():
+    async with async_playwright() as playwright:
+        try:
+            browser = await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
+        except Error as error:
+            why = f"no Chromium to drive the page with (`make test` finds or installs one): {error}"
+            pytest.fail(why) if os.environ.get("CI") == "true" else pytest.skip(why)
+        yield browser
+        await browser.close()
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def blank_viser():
+    """A 3-D view that is an empty page: quick, and the shell's tests need no more."""
+
+    async def answer(_request):
+        return web.Response(text="<!doctype html><title>3-D</title><body tabindex=0>", content_type="text/html")
+
+    app = web.Application()
+    app.router.add_get("/{path:.*}", answer)
+    async with listening(app) as port:
+        yield port
+
+
+@pytest.fixture
+def endpoint():
+    return FakeEndpoint()
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def address(endpoint, blank_viser):
+    app = create_app(endpoint, blank_viser, Access(), static_folder())
+    async with listening(app) as port:
+        yield f"http://127.0.0.1:{port}/"
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def page(browser, address):
+    """The page with its first frame on the screen; fails the test where the page reports an error."""
+    context = await browser.new_context(viewport={"width": 1440, "height": 900}, color_scheme="dark")
+    page = await context.new_page()
+    errors = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    await page.goto(address)
+    await shows(page, "window.quadrille?.state.overlay?.frame === window.quadrille?.state.shown.frame")
+    page.errors = errors
+    yield page
+    await context.close()
+    assert not errors

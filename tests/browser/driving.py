@@ -1,0 +1,70 @@
+"""How the browser tests drive the page and look at it."""
+
+import asyncio
+from contextlib import asynccontextmanager
+
+from aiohttp import web
+
+
+@asynccontextmanager
+async def listening(app, port=0):
+    """Serve on loopback; gives the port. Ends at once, as when the program is killed."""
+    runner = web.AppRunner(app, shutdown_timeout=0.1)
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", port, reuse_address=True).start()
+    try:
+        yield runner.addresses[0][1]
+    finally:
+        await runner.cleanup()
+
+
+async def shows(page, expression, timeout_s=5.0):
+    """Wait until a JavaScript expression holds and the page has drawn it.
+
+    The page's policy forbids evaluating strings, which Playwright's own waiting does inside the page.
+    """
+    drawn = f"""async () => {{
+      if (!({expression})) return false;
+      await new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve)));
+      return true;
+    }}"""
+    try:
+        async with asyncio.timeout(timeout_s):
+            while not await page.evaluate(drawn):
+                await asyncio.sleep(0.01)
+    except TimeoutError:
+        raise AssertionError(f"after {timeout_s} s the page still does not show: {expression}") from None
+
+
+async def until(condition, timeout_s=5.0):
+    """Wait until a condition of the fake endpoint holds."""
+    async with asyncio.timeout(timeout_s):
+        while not condition():
+            await asyncio.sleep(0.01)
+
+
+async def handle_of(page, camera, point):
+    """Undistorted pixel of a joint, as last drawn."""
+    handles = await page.evaluate("quadrille.state.overlay.handles")
+    return next((h["u"], h["v"]) for h in handles if h["camera"] == camera and h["point"] == point)
+
+
+async def to_client(page, camera, u, v):
+    at = await page.evaluate("([c, u, v]) => quadrille.toClient(c, u, v)", [camera, u, v])
+    return at["x"], at["y"]
+
+
+async def state_of(page):
+    return await page.evaluate("quadrille.state")
+
+
+@asynccontextmanager
+async def dragging(page, camera, point, *steps_px):
+    """Drag a joint along offsets, in undistorted px from where it lies; the button is down inside the block."""
+    u, v = await handle_of(page, camera, point)
+    await page.mouse.move(*await to_client(page, camera, u, v))
+    await page.mouse.down()
+    for du, dv in steps_px:
+        await page.mouse.move(*await to_client(page, camera, u + du, v + dv))
+    yield u, v
+    await page.mouse.up()

@@ -1,0 +1,297 @@
+"""The smallest program that speaks the pane socket (docs/protocol.md): a stick figure, and an ear for the page.
+
+It stands in for the controller in tests of the page alone; `python tests/browser/fake_endpoint.py` serves it on a port.
+"""
+
+import asyncio
+import contextlib
+import json
+import struct
+import sys
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from aiohttp import WSMsgType, web
+
+WIDTH, HEIGHT, N_FRAMES = 640, 480, 120
+CAMERA_NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
+COLORS = ("#ffb454", "#6ccbff")
+REST = {
+    "torso": (0.0, 0.25, 0.0),
+    "head": (0.0, 1.0, 0.0),
+    "l_shoulder": (0.3, 0.7, 0.0),
+    "l_elbow": (0.62, 0.55, 0.1),
+    "l_wrist": (0.9, 0.7, 0.2),
+    "r_shoulder": (-0.3, 0.7, 0.0),
+    "r_elbow": (-0.62, 0.55, 0.1),
+    "r_wrist": (-0.9, 0.7, 0.2),
+    "l_hip": (0.17, -0.1, 0.0),
+    "l_knee": (0.2, -0.7, 0.08),
+    "r_hip": (-0.17, -0.1, 0.0),
+    "r_knee": (-0.2, -0.7, 0.08),
+}
+BONES = [
+    ("l_shoulder", "l_elbow"), ("l_elbow", "l_wrist"), ("r_shoulder", "r_elbow"), ("r_elbow", "r_wrist"),
+    ("l_hip", "l_knee"), ("r_hip", "r_knee"), ("torso", "head"), ("l_shoulder", "r_shoulder"), ("l_hip", "r_hip"),
+]  # fmt: skip
+SCALE = 150.0
+STAGES = ["torso_head", "arms", "legs"]
+
+
+def project(points, camera):
+    """Orthographic views from four sides, (N, 3) to (N, 2) undistorted pixels."""
+    angle = camera * np.pi / 2
+    x = points[:, 0] * np.cos(angle) + points[:, 2] * np.sin(angle)
+    return np.stack([WIDTH / 2 + SCALE * x, HEIGHT / 2 + 20 - SCALE * points[:, 1]], axis=-1)
+
+
+@dataclass
+class FakeEndpoint:
+    """Answers pane sockets; one state for all of them."""
+
+    n_people: int = 1
+    n_cameras: int = 4
+    overlay_delay_s: float = 0.0
+    """How long each overlay takes, to try what a slow program does."""
+    image_delay_s: float = 0.0
+    received: list = field(default_factory=list)
+    """Every message of every page."""
+    sockets: set = field(default_factory=set)
+
+    def __post_init__(self):
+        self.pose = {(p, name): np.add(at, (0.9 * p, 0, 0)) for p in range(self.n_people) for name, at in REST.items()}
+        self.before_drag = None
+        self.seq = 0
+        self.epipolar_of = None
+        self.jpegs = {}
+        self.search_task = None
+        self.state = {
+            "type": "state", "frame": 12, "person": 0, "point": None, "base": "image",
+            "overlays": {"contours": True, "joints": True, "part_edges": False, "skeleton": True},
+            "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
+            "source": "manual", "job": self.idle_job(""), "undo": "drag l_wrist", "redo": None,
+            "saved": True, "save_error": None,
+        }  # fmt: skip
+
+    def idle_job(self, message):
+        return {
+            "running": False, "kind": None, "stage": None, "stages": STAGES, "evaluations": 0, "per_second": 0.0,
+            "best_px": None, "message": message,
+        }  # fmt: skip
+
+    def heard(self, kind):
+        """All messages of a type, in order."""
+        return [m for m in self.received if m["type"] == kind]
+
+    async def serve(self, socket):
+        self.sockets.add(socket)
+        self.seq = 0
+        try:
+            await self.send_all(socket)
+            async for message in socket:
+                if message.type is WSMsgType.TEXT:
+                    self.received.append(json.loads(message.data))
+                    await self.answer(self.received[-1])
+        finally:
+            self.sockets.discard(socket)
+
+    async def answer(self, message):
+        match message["type"]:
+            case "seek":
+                self.state["frame"] = message["frame"]
+                await self.broadcast(self.state)
+                await self.send_frame()
+            case "select":
+                self.state |= {"person": message["person"], "point": message["point"]}
+                await self.broadcast(self.state)
+            case "view":
+                new_base = message["base"] != self.state["base"]
+                self.state |= {"base": message["base"], "overlays": message["overlays"]}
+                await self.broadcast(self.state)
+                if new_base:
+                    await self.send_frame()
+            case "drag":
+                await self.drag(message)
+            case "search":
+                await self.search(message["action"])
+            case "undo" | "redo":
+                await self.broadcast(self.state)
+
+    async def drag(self, message):
+        key = (message["person"], message["point"])
+        self.seq = message["seq"]
+        if message["phase"] == "start":
+            self.before_drag = {k: v.copy() for k, v in self.pose.items()}
+        elif message["phase"] == "cancel":
+            self.pose = self.before_drag
+        angle = message["camera"] * np.pi / 2
+        right = np.array([np.cos(angle), 0, np.sin(angle)])
+        x = (message["u"] - WIDTH / 2) / SCALE
+        y = (HEIGHT / 2 + 20 - message["v"]) / SCALE
+        if message["phase"] in ("move", "end"):
+            point = self.pose[key]
+            moved = right * (x - point @ right) + np.array([0, y - point[1], 0])
+            for other in self.pose:
+                if other == key or (key[1] == "torso" and other[0] == key[0]):
+                    self.pose[other] = self.pose[other] + moved
+        self.epipolar_of = (message["camera"], y) if message["phase"] in ("start", "move") else None
+        await asyncio.sleep(self.overlay_delay_s)
+        await self.send_overlay()
+        if message["phase"] == "end":
+            self.state |= {"undo": f"drag {message['point']}", "source": "manual"}
+            await self.broadcast(self.state)
+
+    async def search(self, action):
+        if self.search_task:
+            self.search_task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self.search_task
+            self.search_task = None
+        if action == "frame":
+            self.search_task = asyncio.create_task(self.run_search())
+            return
+        job = self.idle_job("Stopped at 1.21 px after 512 poses")
+        if action == "step":
+            job |= {"kind": "step", "stage": "torso_head", "evaluations": 11, "best_px": 1.4, "per_second": 0.0}
+        self.state["job"] = job
+        await self.broadcast(self.state)
+
+    async def run_search(self, n_steps=40):
+        for step in range(n_steps):
+            self.state["job"] = self.idle_job("") | {
+                "running": True, "kind": "frame", "stage": STAGES[step * 3 // n_steps], "evaluations": 97 * step,
+                "per_second": 3120.0, "best_px": 1.47 - 0.015 * step,
+            }  # fmt: skip
+            self.state["cost_px"] = 1.47 - 0.015 * step
+            await self.broadcast(self.state)
+            await self.send_overlay(candidate=0.05 * np.sin(step))
+            await asyncio.sleep(0.04)
+        self.state["job"] = self.idle_job("0.88 px after 3,880 poses in 1.6 s")
+        await self.broadcast(self.state)
+
+    async def send_all(self, socket):
+        cameras = [
+            {"name": CAMERA_NAMES[c % 4] + "2" * (c // 4), "width": WIDTH, "height": HEIGHT}
+            for c in range(self.n_cameras)
+        ]
+        people = [
+            {"name": f"person {p}", "color": COLORS[p], "points": list(REST), "bones": BONES}
+            for p in range(self.n_people)
+        ]
+        await socket.send_str(json.dumps({
+            "type": "session", "name": "elbow_rotation", "fps": 30.0, "n_frames": N_FRAMES, "cameras": cameras,
+            "people": people,
+        }))  # fmt: skip
+        await socket.send_str(json.dumps(self.state))
+        sources = ["manual", "searched", "searched", "tracked", "tracked", "tracked", "interpolated", "smoothed"]
+        cells = {
+            k: {
+                "source": sources[k // 10 % 8],
+                "cost_px": 1 + 0.5 * np.sin(k / 7) + (k == 50) * 9,
+                "keyframe": k % 20 == 0,
+            }
+            for k in range(100)
+        }
+        await socket.send_str(json.dumps({"type": "timeline", "cells": cells, "replace": True}))
+        await self.send_frame([socket])
+
+    async def broadcast(self, message):
+        for socket in list(self.sockets):
+            with contextlib.suppress(ConnectionError):
+                await socket.send_str(json.dumps(message))
+
+    async def send_binary(self, header, payload, sockets=None):
+        text = json.dumps(header).encode()
+        for socket in list(self.sockets) if sockets is None else sockets:
+            with contextlib.suppress(ConnectionError):
+                await socket.send_bytes(struct.pack("<I", len(text)) + text + payload)
+
+    async def send_frame(self, sockets=None):
+        frame, base = self.state["frame"], self.state["base"]
+        for camera in range(self.n_cameras):
+            await asyncio.sleep(self.image_delay_s)
+            header = {"type": "image", "camera": camera, "frame": frame, "base": base}
+            await self.send_binary(header, self.jpeg(camera, frame, base), sockets)
+        await self.send_overlay(sockets)
+
+    async def send_overlay(self, sockets=None, candidate=None):
+        paths, segments, handles = [], [], []
+
+        def add(camera, person, kind, color, lines):
+            paths.append({
+                "camera": camera, "person": person, "kind": kind, "color": color, "first": sum(map(len, segments)),
+                "count": len(lines),
+            })  # fmt: skip
+            segments.append(lines)
+
+        for camera in range(self.n_cameras):
+            for person in range(self.n_people):
+                add(camera, person, "model", COLORS[person], self.outline(camera, person, 0.0))
+                if candidate is not None:
+                    add(camera, person, "candidate", "#ffffff", self.outline(camera, person, candidate))
+                for (p, name), at in self.pose.items():
+                    if p != person:
+                        continue
+                    ((u, v),) = project(at[None], camera)
+                    visible = (name.startswith("l_"), name.startswith("r_"))[camera % 2] or name in ("torso", "head")
+                    handles.append({"camera": camera, "person": p, "point": name, "u": u, "v": v, "visible": visible})
+            if self.epipolar_of and self.epipolar_of[0] != camera:
+                v = HEIGHT / 2 + 20 - SCALE * self.epipolar_of[1]
+                add(camera, 0, "epipolar", "#ff5d8f", np.array([[0, v, WIDTH - 1, v]]))
+        header = {
+            "type": "overlay", "frame": self.state["frame"], "seq": self.seq, "job": candidate is not None,
+            "paths": paths, "handles": handles,
+        }  # fmt: skip
+        await self.send_binary(header, np.concatenate(segments).astype("<f4").tobytes(), sockets)
+
+    def outline(self, camera, person, shift):
+        """A capsule round each bone as line segments, (N, 4) px."""
+        around = np.linspace(0, 2 * np.pi, 33)
+        lines = []
+        for names in BONES:
+            ends = project(np.stack([self.pose[person, n] for n in names]) + shift, camera)
+            axis = ends[1] - ends[0]
+            length = np.hypot(*axis) + 1e-9
+            along, across = axis / length, np.array([-axis[1], axis[0]]) / length
+            ring = (
+                ends.mean(axis=0)
+                + np.outer(np.cos(around), along * (length / 2 + 8))
+                + np.outer(np.sin(around), across * 14)
+            )
+            lines.append(np.concatenate([ring[:-1], ring[1:]], axis=1))
+        return np.concatenate(lines)
+
+    def jpeg(self, camera, frame, base):
+        """A room with a bright figure; each frame shows its number."""
+        key = (camera, frame, base)
+        if key not in self.jpegs:
+            rows = np.linspace(90, 50, HEIGHT)[:, None, None] * np.array([1.0, 0.95, 0.9])
+            image = np.broadcast_to(rows, (HEIGHT, WIDTH, 3)).astype(np.uint8).copy()
+            cv2.rectangle(image, (0, 380), (WIDTH, HEIGHT), (70, 78, 84), -1)
+            for x in range(-40, WIDTH, 90):
+                cv2.rectangle(image, (x + 9 * camera, 60), (x + 50 + 9 * camera, 250), (96, 88, 82), 3)
+            for names in BONES:
+                ends = project(np.array([REST[n] for n in names]), camera).round().astype(int)
+                cv2.line(image, ends[0], ends[1], (150, 160, 190), 24, cv2.LINE_AA)
+            cv2.putText(image, str(frame), (280, 460), cv2.FONT_HERSHEY_SIMPLEX, 1.0, (200, 200, 200), 2, cv2.LINE_AA)
+            if base != "image":
+                image = cv2.Canny(image, 40, 80)
+            if base == "distance":
+                image = np.minimum(3 * cv2.distanceTransform(255 - image, cv2.DIST_L2, 5), 255).astype(np.uint8)
+            self.jpegs[key] = cv2.imencode(".jpg", image)[1].tobytes()
+        return self.jpegs[key]
+
+
+async def main(port):
+    from app.access import access_for
+    from app.server import create_app, serve_forever, start_viser, static_folder
+
+    scene = start_viser()
+    access = access_for("127.0.0.1")
+    app: web.Application = create_app(FakeEndpoint(n_people=1), scene.get_port(), access, static_folder())
+    await serve_forever(app, access, "127.0.0.1", port, print)
+
+
+if __name__ == "__main__":
+    asyncio.run(main(int(sys.argv[1]) if len(sys.argv) > 1 else 8080))

@@ -1,0 +1,145 @@
+"""Keys, top bar and timeline against `fake_endpoint`: what they send and what they say."""
+
+import pytest
+from driving import shows, state_of, until
+
+
+@pytest.mark.parametrize(
+    ("key", "frame"),
+    [
+        ("Period", 13), ("Comma", 11), ("Shift+Period", 22), ("Shift+Comma", 2), ("Home", 0), ("End", 119),
+    ],
+)  # fmt: skip
+async def test_frame_keys(page, endpoint, key, frame):
+    await page.keyboard.press(key)
+    await shows(page, f"quadrille.state.shown.frame === {frame}")
+    assert endpoint.heard("seek") == [{"type": "seek", "frame": frame}]
+    assert await page.locator("#frame").input_value() == str(frame)
+
+
+async def test_frames_end_at_the_ends(page, endpoint):
+    for key in ("Home", "Comma", "Shift+Comma"):
+        await page.keyboard.press(key)
+    await shows(page, "quadrille.state.shown.frame === 0")
+    assert {m["frame"] for m in endpoint.heard("seek")} == {0}
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("Control+z", {"type": "undo"}), ("Control+Shift+z", {"type": "redo"}), ("Control+y", {"type": "redo"}),
+        ("s", {"type": "search", "action": "step"}), ("f", {"type": "search", "action": "frame"}),
+    ],
+)  # fmt: skip
+async def test_keys_send_one_message(page, endpoint, key, message):
+    await page.keyboard.press(key)
+    await until(lambda: endpoint.received)
+    assert endpoint.received == [message]
+
+
+async def test_keys_written_into_the_frame_number_go_there(page, endpoint):
+    await page.locator("#frame").click()
+    await page.keyboard.type("33")
+    await page.keyboard.press("s")
+    await page.keyboard.press("Enter")
+    await shows(page, "quadrille.state.shown.frame === 33")
+    assert endpoint.received == [{"type": "seek", "frame": 33}]
+
+
+async def test_a_search_is_watched_and_stopped(page, endpoint):
+    stop = page.locator("#search-stop")
+    assert await stop.is_disabled()
+    await page.locator("#search-frame").click()
+    await shows(page, "quadrille.state.overlay.paths.some((path) => path.kind === 'candidate')")
+    assert await page.locator("#search-frame").is_disabled()
+    assert "/s" in await page.locator("#search-figures").inner_text()
+    await stop.click()
+    await shows(page, "!quadrille.state.state.job.running")
+    assert await page.locator("#search-stage").inner_text() == "Stopped at 1.21 px after 512 poses"
+    assert await stop.is_disabled()
+    assert [m["action"] for m in endpoint.heard("search")] == ["frame", "stop"]
+    await page.keyboard.press("s")
+    await shows(page, "quadrille.state.state.job.kind === 'step'")
+    await page.keyboard.press("Escape")
+    await until(lambda: [m["action"] for m in endpoint.heard("search")] == ["frame", "stop", "step", "stop"])
+
+
+async def test_history_and_saving_say_what_they_would_do(page, endpoint):
+    assert await page.locator("#undo").get_attribute("title") == "Undo drag l_wrist (Ctrl+Z)"
+    assert await page.locator("#redo").is_disabled()
+    assert await page.locator("#saved").inner_text() == "Saved"
+    endpoint.state |= {"saved": False, "save_error": "the disk is full", "undo": None, "redo": "search"}
+    await endpoint.broadcast(endpoint.state)
+    await shows(page, "document.querySelector('#saved').textContent === 'Not saved'")
+    assert await page.locator("#saved").get_attribute("title") == "Not saved: the disk is full"
+    assert await page.locator("#undo").is_disabled()
+
+
+async def test_notices_are_shown_and_dismissed(page, endpoint):
+    notice = {"type": "notice", "level": "error", "text": "the frame 9 is out of range"}
+    await endpoint.broadcast(notice)
+    await endpoint.broadcast(notice)
+    alert = page.get_by_role("alert")
+    await alert.wait_for()
+    assert await alert.count() == 1
+    await alert.get_by_label("Dismiss").click()
+    assert await alert.count() == 0
+
+
+async def test_the_list_of_keys_opens_and_closes(page, endpoint):
+    await page.keyboard.press("?")
+    dialog = page.get_by_role("dialog")
+    await dialog.wait_for()
+    assert await dialog.locator("dt").count() == 15
+    await page.keyboard.press("s")
+    await page.keyboard.press("Escape")
+    await dialog.wait_for(state="hidden")
+    assert not endpoint.received
+
+
+async def test_scrubbing_asks_for_one_frame_at_a_time_and_ends_at_the_last(page, endpoint):
+    endpoint.image_delay_s = 0.05  # 200 ms a frame
+    box = await page.locator("#timeline").bounding_box()
+    y = box["y"] + box["height"] - 14
+    await page.mouse.move(box["x"] + 20, y)
+    await page.mouse.down()
+    for x in range(30, 1200, 20):
+        await page.mouse.move(box["x"] + x, y)
+    await page.mouse.up()
+    wanted = (await state_of(page))["target"]
+    await shows(page, f"quadrille.state.shown.frame === {wanted}")
+    assert wanted > 95
+    assert 2 <= len(endpoint.heard("seek")) < 40
+    assert endpoint.heard("seek")[-1]["frame"] == wanted
+
+
+async def test_playback_keeps_no_backlog_and_stops_at_the_end(page, endpoint):
+    endpoint.image_delay_s = 0.03  # 120 ms a frame, far slower than 30 fps
+    await page.keyboard.press("Shift+Period")
+    for _ in range(7):
+        await page.keyboard.press("Shift+Period")
+    await shows(page, "quadrille.state.shown.frame === 92")
+    endpoint.received.clear()
+    await page.keyboard.press("Space")
+    await shows(page, "!quadrille.state.playing && quadrille.state.shown.frame === 119", timeout_s=10.0)
+    frames = [m["frame"] for m in endpoint.heard("seek")]
+    assert frames == sorted(set(frames))
+    assert len(frames) < 20
+
+
+async def test_nothing_is_cut_off_at_1280_by_720(page):
+    await page.set_viewport_size({"width": 1280, "height": 720})
+    help_box = await page.locator("#show-help").bounding_box()
+    assert help_box["x"] + help_box["width"] <= 1280
+    timeline = await page.locator("#timeline").bounding_box()
+    assert timeline["y"] + timeline["height"] <= 720
+    assert await page.evaluate("document.documentElement.scrollWidth") == 1280
+    await shows(page, "quadrille.state.views[0].scale > 0.55")
+
+
+async def test_every_control_has_a_name_and_a_tooltip(page):
+    unnamed = await page.evaluate(
+        """() => [...document.querySelectorAll("button")].filter((button) =>
+          !(button.title && (button.textContent.trim() || button.ariaLabel))).map((b) => b.outerHTML)"""
+    )
+    assert unnamed == []

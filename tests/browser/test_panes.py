@@ -1,0 +1,205 @@
+"""Panes against `fake_endpoint`: what is drawn where, and what a hand in a pane sends."""
+
+import pytest
+from driving import dragging, handle_of, shows, state_of, to_client, until
+from fake_endpoint import FakeEndpoint, project
+
+
+async def test_all_cameras_are_shown_with_names_and_costs(page):
+    assert await page.locator(".pane").count() == 4
+    assert await page.locator(".pane-label span").all_inner_texts() == ["FRONT", "RIGHT", "BACK", "LEFT"]
+    assert await page.locator(".pane-cost").all_inner_texts() == ["0.84 px", "1.10 px", "2.31 px", "–"]
+    assert await page.locator("#cost").inner_text() == "1.47"
+    assert await page.locator("#session-name").inner_text() == "elbow_rotation"
+    assert await page.locator("#person").is_hidden()
+
+
+async def test_image_and_vectors_are_drawn_where_the_maths_says(page, endpoint):
+    # A model contour's colour lies where the view puts its first segment.
+    segment = endpoint.outline(0, 0, 0.0)[8]
+    x, y = await to_client(page, 0, *segment[:2])
+    found = await page.evaluate(
+        """([x, y]) => {
+          const canvas = document.querySelector(".pane-overlay");
+          const box = canvas.getBoundingClientRect();
+          const at = [Math.round((x - box.left) * devicePixelRatio), Math.round((y - box.top) * devicePixelRatio)];
+          return [...canvas.getContext("2d").getImageData(...at, 1, 1).data];
+        }""",
+        [x, y],
+    )
+    assert found[3] > 200
+    assert found[0] > found[2] + 60  # orange
+
+
+@pytest.mark.parametrize("zoomed", [False, True])
+async def test_a_drag_sends_undistorted_pixels_within_half_a_pixel(page, endpoint, zoomed):
+    if zoomed:
+        at = await to_client(page, 0, *await handle_of(page, 0, "l_wrist"))
+        await page.mouse.move(at[0] - 40, at[1] + 25)
+        await page.mouse.wheel(0, -700)
+        await page.mouse.down(button="middle")
+        await page.mouse.move(at[0] - 90, at[1] + 60, steps=4)
+        await page.mouse.up(button="middle")
+        view = (await state_of(page))["views"][0]
+        assert view["zoom"] == pytest.approx(2.857, rel=0.01)
+    async with dragging(page, 0, "l_wrist", (2, -3), (10.25, -20.5), (17.5, -31.25)) as (u, v):
+        await until(lambda: any(m["u"] == pytest.approx(u + 17.5, abs=0.5) for m in endpoint.heard("drag")))
+    await until(lambda: endpoint.heard("drag")[-1]["phase"] == "end")
+    first, *moves, last = endpoint.heard("drag")
+    assert (first["phase"], first["camera"], first["point"]) == ("start", 0, "l_wrist")
+    assert (first["u"], first["v"]) == (pytest.approx(u), pytest.approx(v))
+    assert {m["phase"] for m in moves} == {"move"}
+    assert last["u"] == pytest.approx(u + 17.5, abs=0.5)
+    assert last["v"] == pytest.approx(v - 31.25, abs=0.5)
+    numbers = [m["seq"] for m in endpoint.heard("drag")]
+    assert numbers == sorted(set(numbers))
+    # The figure follows in every view: what was dragged is drawn where it was dropped.
+    await shows(page, f"quadrille.state.overlay.seq === {numbers[-1]}")
+    assert await handle_of(page, 0, "l_wrist") == pytest.approx((u + 17.5, v - 31.25), abs=0.5)
+    ((u2, v2),) = project(endpoint.pose[0, "l_wrist"][None], 2)
+    assert await handle_of(page, 2, "l_wrist") == pytest.approx((u2, v2), abs=0.01)
+
+
+async def test_a_grab_beside_the_joint_keeps_the_distance(page, endpoint):
+    u, v = await handle_of(page, 1, "head")
+    x, y = await to_client(page, 1, u, v)
+    await page.mouse.move(x + 7, y - 5)
+    await page.mouse.down()
+    await page.mouse.move(x + 7, y + 30, steps=3)
+    await page.mouse.up()
+    await until(lambda: endpoint.heard("drag") and endpoint.heard("drag")[-1]["phase"] == "end")
+    scale = (await state_of(page))["views"][1]["scale"]
+    last = endpoint.heard("drag")[-1]
+    assert (last["u"], last["v"]) == (pytest.approx(u, abs=0.5), pytest.approx(v + 35 / scale, abs=0.5))
+
+
+async def test_beyond_twelve_pixels_nothing_is_grabbed_and_the_view_moves(page, endpoint):
+    u, v = await handle_of(page, 0, "head")
+    x, y = await to_client(page, 0, u, v)
+    await page.mouse.move(x, y - 14)
+    await page.mouse.down()
+    await page.mouse.move(x + 40, y - 14, steps=3)
+    await page.mouse.up()
+    assert await to_client(page, 0, u, v) == pytest.approx((x + 40, y), abs=0.01)
+    assert not endpoint.heard("drag")
+    assert not endpoint.heard("select")
+
+
+async def test_a_click_selects_without_editing(page, endpoint):
+    await page.mouse.click(*await to_client(page, 0, *await handle_of(page, 0, "l_elbow")))
+    await until(lambda: endpoint.heard("select"))
+    assert endpoint.heard("select") == [{"type": "select", "person": 0, "point": "l_elbow"}]
+    assert not endpoint.heard("drag")
+
+
+async def test_escape_takes_a_drag_back(page, endpoint):
+    async with dragging(page, 0, "l_wrist", (5, 5), (30, 30)) as (u, v):
+        await until(lambda: len(endpoint.heard("drag")) >= 2)
+        await page.keyboard.press("Escape")
+        await until(lambda: endpoint.heard("drag")[-1]["phase"] == "cancel")
+        await page.mouse.move(*await to_client(page, 0, u + 60, v + 60))
+    await shows(page, f"quadrille.state.overlay.seq === {endpoint.heard('drag')[-1]['seq']}")
+    assert [m["phase"] for m in endpoint.heard("drag")][-1] == "cancel"
+    assert await handle_of(page, 0, "l_wrist") == pytest.approx((u, v), abs=0.01)
+
+
+async def test_dragging_shows_epipolar_lines_elsewhere_and_measures_itself(page):
+    async with dragging(page, 0, "torso", *[(2 * k, -k) for k in range(1, 12)]):
+        await shows(page, "quadrille.state.overlay.paths.some((path) => path.kind === 'epipolar')")
+        paths = (await state_of(page))["overlay"]["paths"]
+        assert {path["camera"] for path in paths if path["kind"] == "epipolar"} == {1, 2, 3}
+    await shows(page, "!quadrille.state.overlay.paths.some((path) => path.kind === 'epipolar')")
+    latencies = await page.evaluate("quadrille.latencies")
+    assert 5 <= len(latencies) <= 12
+    assert all(0 < ms < 1000 for ms in latencies)
+
+
+async def test_hover_names_the_joint_in_all_panes(page):
+    await page.mouse.move(*await to_client(page, 3, *await handle_of(page, 3, "head")))
+    await shows(page, "quadrille.state.hover?.point === 'head'")
+    await page.mouse.move(5, 5)
+    await shows(page, "quadrille.state.hover === null")
+
+
+async def test_a_pane_fills_the_grid_by_key_and_double_click(page):
+    await page.keyboard.press("3")
+    await shows(page, "quadrille.state.filled === 2")
+    assert [await p.is_visible() for p in await page.locator(".pane").all()] == [False, False, True, False]
+    box = await page.locator(".pane:visible").bounding_box()
+    await page.mouse.dblclick(box["x"] + 60, box["y"] + 200)
+    await shows(page, "quadrille.state.filled === null")
+    assert await page.locator(".pane:visible").count() == 4
+
+
+async def test_zoom_stays_at_the_pointer_and_zero_resets_it(page):
+    # The wheel reports whole pixels: what must stay is what lies under one.
+    x, y = map(round, await to_client(page, 1, 100, 100))
+    pane = await page.locator(".pane").nth(1).bounding_box()
+    view = (await state_of(page))["views"][1]
+    u = (x - pane["x"] - view["origin"]["x"]) / view["scale"]
+    v = (y - pane["y"] - view["origin"]["y"]) / view["scale"]
+    await page.mouse.move(x, y)
+    await page.mouse.wheel(0, -500)
+    await shows(page, "quadrille.state.views[1].zoom > 2")
+    assert await to_client(page, 1, u, v) == pytest.approx((x, y), abs=0.01)
+    views = (await state_of(page))["views"]
+    assert views[1]["zoom"] > 2
+    assert views[0]["zoom"] == 1
+    await page.keyboard.press("0")
+    assert await to_client(page, 1, u, v) == pytest.approx((x, y), abs=0.01)
+    assert (await state_of(page))["views"][1]["zoom"] == 1
+
+
+async def test_layers_are_asked_for_and_shown_at_once(page, endpoint):
+    await page.get_by_text("Distance", exact=True).click()
+    await shows(page, "quadrille.state.shown.base === 'distance'")
+    await page.get_by_text("Contours", exact=True).click()
+    await until(lambda: len(endpoint.heard("view")) == 2)
+    first, second = endpoint.heard("view")
+    assert first["base"] == second["base"] == "distance"
+    assert second["overlays"] == {"contours": False, "joints": True, "part_edges": False, "skeleton": True}
+    await page.get_by_text("Joints", exact=True).click()
+    await page.get_by_text("Skeleton", exact=True).click()
+    await shows(
+        page,
+        """[...document.querySelectorAll(".pane-overlay")].every((canvas) => {
+          const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+          return data.every((value) => value === 0);
+        })""",
+    )
+
+
+async def test_hidden_joints_cannot_be_grabbed(page, endpoint):
+    await page.get_by_text("Joints", exact=True).click()
+    async with dragging(page, 0, "head", (10, 10), (20, 20)):
+        pass
+    assert not endpoint.heard("drag")
+
+
+async def test_the_splitter_moves_by_drag_and_key_within_bounds(page):
+    panes = page.locator("#panes")
+    before = (await panes.bounding_box())["width"]
+    box = await page.locator("#split").bounding_box()
+    await page.mouse.move(box["x"] + 2, 300)
+    await page.mouse.down()
+    await page.mouse.move(700, 300, steps=4)
+    await page.mouse.up()
+    assert (await panes.bounding_box())["width"] == pytest.approx(700, abs=1) != before
+    await page.locator("#split").focus()
+    await page.keyboard.press("ArrowRight")
+    assert (await panes.bounding_box())["width"] == pytest.approx(724, abs=1)
+    for _ in range(40):
+        await page.keyboard.press("ArrowRight")
+    assert (await page.locator("#scene").bounding_box())["width"] >= 290
+
+
+class TestPeople:
+    @pytest.fixture
+    def endpoint(self):
+        return FakeEndpoint(n_people=2, n_cameras=6)
+
+    async def test_six_cameras_and_two_people(self, page, endpoint):
+        assert await page.locator(".pane:visible").count() == 6
+        await page.locator("#person").select_option("1")
+        await until(lambda: endpoint.heard("select"))
+        assert endpoint.heard("select") == [{"type": "select", "person": 1, "point": None}]
