@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tracker.body import IntArray
 from tracker.rigid import Array
-from tracker.simulate.render import SAMPLES, Figure, cast, lit, pixel_means, vertex_normals
+from tracker.simulate.render import Figure, cast, lit, pixel_means, vertex_normals
 from tracker.simulate.room import LAMP_WORLD, Backdrop, floor_shadow
 
 Image = NDArray[np.uint8]
@@ -89,8 +89,8 @@ def exposed(image: NDArray[np.float32], rng: np.random.Generator) -> Image:
 
 def _majority(labels: Image, n_figures: int) -> Image:
     """Mask of pixels from labels of samples: the figure that most samples see, where half of them see any."""
+    assert n_figures < 256
     counts = np.stack([pixel_means((labels == i + 1).astype(np.float32)) for i in range(n_figures)])
     mask = np.argmax(counts, axis=0) + 1
     mask[counts.sum(axis=0) < 0.5] = 0
-    assert SAMPLES**2 * n_figures < 256
     return mask.astype(np.uint8)

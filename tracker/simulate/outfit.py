@@ -47,11 +47,11 @@ class Outfit:
         beyond_seam = (np.abs(points_torso[:, 1]) > 0.095) & (points_torso[:, 2] > 0.075)
         sleeve = (arm & ~hand & (np.abs(points_torso[:, 1]) > 0.095)) | (in_torso & beyond_seam)
         collar = in_torso & (z > 0.176) & (np.hypot(x + 0.004, y) < 0.040)
-        waist = in_torso & (z < -0.102)
+        waist = in_torso & (z < -0.082)
         out[sleeve & (points_torso[:, 1] > 0)] = self.left_sleeve
         out[sleeve & (points_torso[:, 1] < 0)] = self.right_sleeve
         out[leg | waist] = self.trousers
-        out[waist & (z > -0.113)] = np.array(self.shoes) * 0.8  # belt
+        out[waist & (z > -0.093)] = np.array(self.shoes) * 0.8  # belt
         out[foot] = self.shoes
         out[foot & (z < -0.034)] = (0.55, 0.53, 0.50)  # sole
         out[hand | head | collar] = self.skin

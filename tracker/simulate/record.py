@@ -4,6 +4,7 @@ import secrets
 import shutil
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from itertools import cycle
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -88,9 +89,7 @@ def simulate(
         figures = [_figure(model, body) for model in models]
         _shoot(sources, figures, poses, fps, seed, progress)
         _write_truth(temporary, cast, models, poses, fps)
-        people = [
-            Person(r.name, m, PALETTE[i % len(PALETTE)]) for i, (r, m) in enumerate(zip(cast, presets, strict=True))
-        ]
+        people = [Person(r.name, m, color) for r, m, color in zip(cast, presets, cycle(PALETTE), strict=False)]
         save_session(Session(temporary, out.name, float(fps), n_frames, tuple(sources), tuple(people)))
         if out.exists():
             out.rmdir()
@@ -163,7 +162,9 @@ def _shoot_background(source: CameraSource, backdrop: Backdrop, fps: float, rng:
     with VideoWriter(clip, source.camera.size, fps) as writer:
         for _ in range(BACKGROUND_FRAMES):
             writer.write(exposed(backdrop.image, rng))
-    image = open_footage(clip, source.camera.name).read(BACKGROUND_FRAMES - 1)
+    footage = open_footage(clip, source.camera.name)
+    image = footage.read(BACKGROUND_FRAMES - 1)
+    footage.close()
     assert image is not None
     _write_png(source.background, np.ascontiguousarray(image[..., ::-1]))
     clip.unlink()
