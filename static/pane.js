@@ -125,13 +125,13 @@ export class Pane {
     const { shown, state, session, overlay } = this.#store.facts;
     if (width === 0 || height === 0) return;
     if (withImage) {
-      const context = drawing.prepare(this.#image, width, height);
+      const context = drawing.prepare(this.#image, width, height, false);
       const bitmap = shown?.bitmaps[this.#camera];
       if (bitmap) drawing.drawImage(context, this.view, bitmap);
       this.#reset.classList.toggle("is-shown", !this.view.isReset);
       this.#reset.tabIndex = this.view.isReset ? -1 : 0;
     }
-    const context = drawing.prepare(this.#overlay, width, height);
+    const context = drawing.prepare(this.#overlay, width, height, true);
     if (!state || !session || !overlay) return;
     drawing.drawPaths(context, this.view, overlay, this.#camera, state.overlays);
     this.#drawJoints(context, state, session.people);

@@ -97,7 +97,7 @@ export class Timeline {
 
   #drawCells() {
     const { clientWidth, clientHeight } = this.#element;
-    const context = prepare(this.#cells, clientWidth, clientHeight);
+    const context = prepare(this.#cells, clientWidth, clientHeight, true);
     const { timeline, session } = this.#store.facts;
     if (!session) return;
     const style = getComputedStyle(this.#element);
@@ -152,7 +152,7 @@ export class Timeline {
 
   #drawCursor() {
     const { clientWidth, clientHeight } = this.#element;
-    const context = prepare(this.#cursor, clientWidth, clientHeight);
+    const context = prepare(this.#cursor, clientWidth, clientHeight, true);
     const { session, target } = this.#store.facts;
     if (!session) return;
     const style = getComputedStyle(this.#element);
