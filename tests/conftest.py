@@ -1,10 +1,17 @@
 """Fixtures that several test files share."""
 
 import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import configuration, settings
+
+# No time limit: the first call of a numba kernel compiles. No files in the source tree.
+settings.register_profile("quadrille", deadline=None, database=None, derandomize=True)
+settings.load_profile("quadrille")
+configuration.set_hypothesis_home_dir(Path(tempfile.gettempdir()) / "quadrille-hypothesis")
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 

@@ -1,0 +1,204 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tracker import rigid
+from tracker.formats.model_toml import PRESETS, load_model, parse_model
+
+BALLS = """
+version = 1
+name = "balls"
+height_m = 2.0
+joints = [
+    { name = "root", child = "trunk", free = true, kind = "ball" },
+    { name = "shoulder", parent = "trunk", child = "arm", position = [0, 0.1, 0.2], kind = "ball", cone_deg = 100, twist_deg = 60 },
+    { name = "elbow", parent = "arm", child = "forearm", position = [0, 0, -0.2], axes = [
+        { name = "bend", axis = [0, -1, 0], limits_deg = [0, 150] },
+        { name = "roll", axis = [0, 0, 1], limits_deg = [-90, 90] },
+    ] },
+    { name = "grip", parent = "forearm", child = "hand", position = [0, 0, -0.15] },
+]
+parts = [
+    { name = "trunk", half_axes = [0.1, 0.1, 0.2] },
+    { name = "arm", half_axes = [0.03, 0.03, 0.1] },
+    { name = "forearm", half_axes = [0.02, 0.02, 0.08] },
+    { name = "hand", half_axes = [0.02, 0.02, 0.02] },
+]
+landmarks = [{ name = "finger", part = "hand", position = [0.01, 0.02, -0.05] }]
+"""  # noqa: E501
+
+MODELS = {name: load_model(name) for name in PRESETS} | {"balls": parse_model(BALLS, "balls")}
+each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+seeds = st.integers(0, 10_000)
+
+
+def random_values(model, seed, spread=1.0):
+    step = np.random.default_rng(seed).normal(0, spread, model.n_dofs)
+    return model.retract(model.neutral(), step)
+
+
+def slow_kinematics(model, values):
+    """Part poses by matrices and a walk down the tree, straight from the definition."""
+    Ts, at = [], 0
+    for joint, parent in zip(model.joints, model.parents, strict=True):
+        T = np.eye(4) if parent < 0 else Ts[parent]
+        T = T @ rigid.transform(t=np.array(joint.position) * model.height_m)
+        if joint.free:
+            T = rigid.transform(t=values[at : at + 3]) @ T
+            at += 3
+        if joint.kind == "ball":
+            T = T @ rigid.transform(rigid.matrix_from_quaternion(values[at : at + 4]))
+            at += 4
+        for axis in joint.axes:
+            T = T @ rigid.transform(rigid.so3_exp(np.array(axis.direction) * values[at]))
+            at += 1
+        Ts.append(T)
+    assert at == len(values)
+    return np.array(Ts)
+
+
+@each_model
+def test_kinematics_against_the_definition(model):
+    for seed in range(20):
+        values = random_values(model, seed)
+        np.testing.assert_allclose(model.kinematics(values).Ts_world_part, slow_kinematics(model, values), atol=1e-12)
+
+
+@each_model
+@pytest.mark.parametrize("seed", range(5))
+def test_point_jacobian_against_finite_differences(model, seed):
+    values = random_values(model, seed)
+    rng = np.random.default_rng(seed)
+    parts = rng.integers(0, len(model.parts), 40)
+    points_part = rng.normal(0, 0.3, (40, 3))
+
+    def world(v):
+        T = model.kinematics(v).Ts_world_part[parts]
+        return np.einsum("nij,nj->ni", T[:, :3, :3], points_part) + T[:, :3, 3]
+
+    J = model.point_jacobian(model.kinematics(values), parts, world(values))
+    assert J.shape == (40, 3, model.n_dofs)
+    h = 1e-6
+    for i, unit in enumerate(np.eye(model.n_dofs)):
+        numeric = (world(model.retract(values, h * unit)) - world(model.retract(values, -h * unit))) / (2 * h)
+        np.testing.assert_allclose(J[:, :, i], numeric, atol=1e-8, err_msg=model.dof_names[i])
+
+
+@each_model
+@given(seed=seeds)
+def test_difference_undoes_retract(model, seed):
+    values = random_values(model, seed)
+    step = np.random.default_rng(seed + 1).uniform(-1.5, 1.5, model.n_dofs)  # balls: under half a turn
+    moved = model.retract(values, step)
+    np.testing.assert_allclose(model.difference(moved, values), step, atol=1e-9)
+    np.testing.assert_array_equal(model.retract(values, np.zeros(model.n_dofs)), values)
+    np.testing.assert_allclose(model.difference(values, values), 0, atol=1e-12)
+
+
+@each_model
+@given(seed=seeds)
+def test_clip_puts_within_limits_once_and_for_all(model, seed):
+    wild = random_values(model, seed, 3.0)
+    tame = model.clip(wild)
+    np.testing.assert_allclose(model.clip(tame), tame, atol=1e-9)
+    for i, name in enumerate(model.dof_names):
+        if not name.endswith((".rx", ".ry", ".rz")):
+            low, high = model.limits[i]
+            assert low <= tame[model.dof_value[i]] <= high, name
+    calm = model.clip(0.9 * model.neutral() + 0.1 * model.neutral())
+    np.testing.assert_allclose(calm, model.neutral(), atol=1e-12)
+
+
+@given(seed=seeds)
+def test_clipped_ball_is_within_cone_and_twist(seed):
+    model = MODELS["balls"]
+    values = model.clip(random_values(model, seed, 3.0))
+    Ts = model.kinematics(values).Ts_world_part
+    R = Ts[0, :3, :3].T @ Ts[1, :3, :3]  # arm in the trunk's frame
+    assert np.arccos(np.clip(R[2, 2], -1, 1)) <= np.radians(100) + 1e-6
+    # What is left when the shortest swing that tilts z there is taken back is a turn about z.
+    axis = np.cross([0, 0, 1], R[:, 2])
+    angle = np.arctan2(np.linalg.norm(axis), R[2, 2])
+    swing = rigid.so3_exp(axis / max(np.linalg.norm(axis), 1e-12) * angle)
+    twist = rigid.so3_log(swing.T @ R)
+    np.testing.assert_allclose(twist[:2], 0, atol=1e-6)
+    assert abs(twist[2]) <= np.radians(60) + 1e-6
+
+
+def test_ball_within_its_limits_is_left_alone():
+    model = MODELS["balls"]
+    for seed in range(20):
+        values = random_values(model, seed, 0.3)
+        values[model.value_names.index("elbow.bend")] = 0.5
+        values[model.value_names.index("elbow.roll")] = -0.5
+        np.testing.assert_allclose(
+            model.kinematics(model.clip(values)).Ts_world_part, model.kinematics(values).Ts_world_part, atol=1e-9
+        )
+
+
+@each_model
+def test_moves_says_which_parts_a_degree_of_freedom_moves(model):
+    values = random_values(model, 3)
+    before = model.kinematics(values).Ts_world_part
+    for i, unit in enumerate(np.eye(model.n_dofs)):
+        after = model.kinematics(model.retract(values, 0.1 * unit)).Ts_world_part
+        moved = np.abs(after - before).max(axis=(1, 2)) > 1e-9
+        np.testing.assert_array_equal(moved, model.moves[i], err_msg=model.dof_names[i])
+
+
+@each_model
+def test_height_scales_the_body(model):
+    values = model.neutral()
+    double = model.with_height(2 * model.height_m)
+    np.testing.assert_allclose(double.points_world(values), 2 * model.points_world(values), atol=1e-12)
+    np.testing.assert_allclose(double.centers_part, 2 * model.centers_part)
+    assert double.shapes[0].half_axes == tuple(2 * a for a in model.shapes[0].half_axes)
+
+
+def at(model, values, name):
+    return model.points_world(values)[model.point_names.index(name)]
+
+
+def set_deg(model, **degrees):
+    values = model.neutral()
+    for name, angle in degrees.items():
+        values[model.value_names.index(name.replace("__", "."))] = np.radians(angle)
+    return values
+
+
+def test_gavrila_has_the_papers_degrees_of_freedom():
+    model = MODELS["gavrila22"]
+    assert model.n_dofs == len(model.value_names) == 22
+    assert [len(g.dofs) for g in model.search_groups] == [5, 9, 8]
+    assert sorted(d for g in model.search_groups for d in g.dofs) == sorted(model.dof_names)
+
+
+def test_gavrila_stands_with_hanging_arms():
+    model = MODELS["gavrila22"].with_height(2.0)
+    stand = model.neutral()
+    np.testing.assert_allclose(at(model, stand, "left_wrist"), [0, 0.2, 0.296 - 0.324 - 0.309], atol=1e-12)
+    np.testing.assert_allclose(at(model, stand, "right_ankle"), [0, -0.1, -0.296 - 0.485 - 0.5054], atol=1e-12)
+
+
+@pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
+def test_gavrila_joints_turn_the_way_their_names_say(side, sign):
+    model = MODELS["gavrila22"].with_height(1.0)
+    shoulder, hip = np.array([0, sign * 0.1, 0.148]), np.array([0, sign * 0.05, -0.148])
+    arm, leg = 0.162 + 0.1545, 0.2425 + 0.2527
+    # Abduction lifts sideways, elevation forward (x), and a bent elbow or knee brings hand forward or foot back.
+    for degrees, point, expected in [
+        ({"shoulder__abduction": 90}, "wrist", np.add(shoulder, (0, sign * arm, 0))),
+        ({"shoulder__elevation": 90}, "wrist", np.add(shoulder, (arm, 0, 0))),
+        ({"elbow__extension": 90}, "wrist", np.add(shoulder, (0.1545, 0, -0.162))),
+        ({"hip__abduction": 90 * 8 / 9}, "ankle", None),
+        ({"hip__elevation": 90}, "ankle", np.add(hip, (leg, 0, 0))),
+        ({"knee__extension": 90}, "ankle", np.add(hip, (-0.2527, 0, -0.2425))),
+        # The arm hangs, its elbow bent forward: twist turns the hand towards the body's middle or away from it.
+        ({"shoulder__twist": 90, "elbow__extension": 90}, "wrist", np.add(shoulder, (0, sign * 0.1545, -0.162))),
+    ]:
+        values = set_deg(model, **{f"{side}_{k}": v for k, v in degrees.items()})
+        found = at(model, values, f"{side}_{point}")
+        if expected is None:  # 80 degrees is as far as the hip goes
+            expected = np.add(hip, (0, sign * leg * np.sin(np.radians(80)), -leg * np.cos(np.radians(80))))
+        np.testing.assert_allclose(found, expected, atol=1e-12, err_msg=str(degrees))
