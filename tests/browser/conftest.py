@@ -1,31 +1,15 @@
 import os
-import shutil
 
 import pytest
 import pytest_asyncio
 from aiohttp import web
+from chromium import FLAGS, chromium_path
 from driving import listening, shows
 from fake_endpoint import FakeEndpoint
 from playwright.async_api import Error, async_playwright
 
 from app.access import Access
 from app.server import create_app, static_folder
-
-FLAGS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
-    "--disable-dev-shm-usage",
-    "--disable-background-networking",
-]
-
-
-def chromium_path():
-    """The browser to drive: the one the environment names, the system's, else (None) Playwright's own."""
-    found = (shutil.which(name) for name in ("chromium", "chromium-browser", "google-chrome"))
-    return os.environ.get("QUADRILLE_CHROMIUM") or next(filter(None, found), None)
 
 
 def pytest_collection_modifyitems(items):

@@ -1,0 +1,53 @@
+# Everything happens in .venv. Files .venv/.* mark what is done, so that a second run is quick.
+# Needs Python 3.11 or newer with pip, and make; nothing else, and no rights.
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+PYTHON_FILES := app tracker tests
+
+.PHONY: install run test check lint format clean
+
+install: $(VENV)/.installed
+
+run: install
+	$(BIN)/quadrille
+
+test: check
+	$(BIN)/python -m pytest
+
+# What needs no running program: style and types, of Python and of the page.
+check: lint $(VENV)/.typescript
+	$(BIN)/mypy
+	$(BIN)/node node_modules/typescript/bin/tsc
+
+lint: $(VENV)/.tested
+	$(BIN)/ruff check $(PYTHON_FILES)
+	$(BIN)/ruff format --check $(PYTHON_FILES)
+
+format: $(VENV)/.tested
+	$(BIN)/ruff check --fix $(PYTHON_FILES)
+	$(BIN)/ruff format $(PYTHON_FILES)
+
+clean:
+	rm -rf $(VENV) node_modules .mypy_cache .ruff_cache .hypothesis
+
+$(BIN)/python:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Quadrille needs Python 3.11 or newer: make PYTHON=...")'
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed: pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP) install --constraint constraints.txt --editable .
+	touch $@
+
+# .tested: the tools of development, and a browser for the tests.
+$(VENV)/.tested: $(VENV)/.installed tests/browser/chromium.py
+	$(PIP) install --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/python tests/browser/chromium.py
+	touch $@
+
+# The path is for npm's own scripts, which look for node there.
+$(VENV)/.typescript: package.json .npmrc $(VENV)/.tested
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm install --silent
+	touch $@
