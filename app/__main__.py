@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import tyro
 from rich.console import Console
@@ -11,10 +11,9 @@ from rich.console import Console
 from app import commands
 from app.commands import Reporter
 from tracker.errors import TrackerError
-from tracker.rigid import Array
-from tracker.session import Person
 
 SessionArg = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION", help="session folder")]
+T = TypeVar("T")
 _app = tyro.extras.SubcommandApp()
 
 
@@ -146,15 +145,12 @@ def init(
         axes: the file's axes in the session's order, such as x,-z,y.
         json: print one JSON object.
     """
-    from tracker.evaluate import joints_of_frame
+    from tracker.references import read_joints
 
     at = commands.target(session, person, several=False)
     commands.frame_range(f"{frame}:{frame + 1}", at.session)
 
-    def of_person(_: Person) -> dict[str, Array]:
-        return joints_of_frame(joints, frame, at.session.fps, joint_map, axes)
-
-    found = commands.init_from_joints(at, frame, of_person)
+    found = commands.init_from_joints(at, frame, read_joints(joints, at.session.fps, joint_map, axes))
     residual = f"{found['mean_mm']:.1f} mm from {len(found['residual_mm'])} joints on average"
     print(commands.as_json(found) if json else f"{found['person']}, frame {frame}: {residual}")
 
@@ -196,6 +192,47 @@ def track(
 
 
 @_app.command
+def evaluate(
+    session: SessionArg,
+    /,
+    reference: Path,
+    frames: str | None = None,
+    person: str | None = None,
+    joint_map: Path | None = None,
+    axes: str = "x,y,z",
+    align: Literal["none", "rigid-all"] = "none",
+    json: bool = False,
+) -> None:
+    """Compare stored poses with a reference: mean errors of the limb joints, lost frames, angles.
+
+    Args:
+        session: session folder.
+        reference: TRC file, pose table (CSV) or session folder.
+        frames: A:B, half open; from the first to the last pose by default.
+        person: name; needed where there are several.
+        joint_map: TOML file that maps the file's joint names to the body's.
+        axes: the file's axes in the session's order, such as x,-z,y.
+        align: rigid-all moves the whole reference onto the estimate first.
+        json: print one JSON object.
+    """
+    from tracker.references import read_reference
+
+    at = commands.target(session, person, several=False)
+    found = commands.evaluate(at, read_reference(reference, at.session, at.people[0], joint_map, axes), frames, align)
+    if json:
+        print(commands.as_json(found))
+        return
+    print(
+        f"{found['person']}: {found['frames']} frames, {found['missing_frames']} missing, {found['lost_frames']} lost"
+    )
+    print(f"  MPJPE {found['mpjpe_mm']:.1f} mm, median {found['median_mm']:.1f}, 95% {found['p95_mm']:.1f}")
+    for joint, error in found["per_joint_mm"].items():
+        print(f"  {joint.replace('_', ' '):16} {error:6.1f} mm")
+    if found["axis_error_deg"] is not None:
+        print(f"  part axes {found['axis_error_deg']:.2f} deg")
+
+
+@_app.command
 def simulate(
     out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUT")],
     /,
@@ -228,9 +265,9 @@ def simulate(
     print(f"made {out}")
 
 
-def _pairs(words: Sequence[str], option: str, kind: Callable[[str], object]) -> dict[str, object]:
+def _pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> dict[str, T]:
     """Parse NAME=VALUE words."""
-    out: dict[str, object] = {}
+    out: dict[str, T] = {}
     for word in words:
         name, equals, value = word.partition("=")
         try:
@@ -242,9 +279,7 @@ def _pairs(words: Sequence[str], option: str, kind: Callable[[str], object]) -> 
     return out
 
 
-def _common_or_pairs(
-    words: Sequence[str], option: str, kind: Callable[[str], object]
-) -> Mapping[str, object] | object | None:
+def _common_or_pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> Mapping[str, T] | T | None:
     """Parse one value for everybody, or NAME=VALUE words; None where there are none."""
     if len(words) == 1 and "=" not in words[0]:
         try:

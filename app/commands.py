@@ -2,8 +2,8 @@
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import asdict
+from contextlib import closing, contextmanager
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,12 +11,16 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from tracker.annotations import AnnotationStore, PoseChange, PoseRecord
+from tracker.annotations import AnnotationStore, FrameRow, PoseChange, PoseRecord
 from tracker.errors import SessionError, TrackerError
+from tracker.evaluate import Alignment, evaluate_joints, evaluate_poses, joints_of_poses
 from tracker.evidence import Observer
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import format_model
+from tracker.formats.trc import MarkerTable
+from tracker.joint_maps import LIMB_JOINTS
 from tracker.recording import Recording
+from tracker.references import Reference, stored_poses
 from tracker.rigid import Array
 from tracker.session import Person, Session, load_session
 from tracker.session_lock import SessionLock
@@ -76,12 +80,10 @@ def frame_range(text: str | None, session: Session) -> range:
 
 def info(session: Session) -> dict[str, Any]:
     """What a session holds, for people and programs."""
-    with (
-        AnnotationStore(session.annotations_path, read_only=True)
-        if session.annotations_path.exists()
-        else _empty() as (store)
-    ):
-        poses = {p.name: store.frames(p.name) if store is not None else [] for p in session.people}
+    poses: dict[str, list[FrameRow]] = {p.name: [] for p in session.people}
+    if session.annotations_path.exists():
+        with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+            poses = {name: store.frames(name) for name in poses}
     return {
         "name": session.name,
         "folder": str(session.folder),
@@ -113,33 +115,53 @@ def info(session: Session) -> dict[str, Any]:
     }
 
 
-def init_from_joints(at: Target, frame: int, joints: Callable[[Person], dict[str, Array]]) -> dict[str, Any]:
-    """Fit the pose of one person to known joints and store it as a keyframe.
+def init_from_joints(at: Target, frame: int, joints: MarkerTable) -> dict[str, Any]:
+    """Fit the pose of one person to known limb joints and store it as a keyframe.
 
     Args:
         at: the session and the person.
         frame: where.
-        joints: places of the person's points in that frame by name, (3,), metres.
+        joints: places of joints under our names.
 
     Returns:
         The residual of each joint, mm, and their mean.
     """
     session, (index,) = at
     person = session.people[index]
-    known = joints(person)
-    fit = fit_to_points(person.model, known)
-    with SessionLock(session.folder), AnnotationStore(session.annotations_path) as store:
+    row = np.flatnonzero(joints.frames == frame)
+    if not len(row):
+        raise TrackerError(f"expected joints of frame {frame}, found frames 0 to {joints.frames[-1]} in the file")
+    places = dict(zip(joints.names, joints.points[row[0]], strict=True))
+    # Neck and head mean other places in every convention; the limbs pose the trunk as well.
+    limbs = {n: p for n, p in places.items() if n in LIMB_JOINTS and np.all(np.isfinite(p))}
+    fit = fit_to_points(person.model, limbs)
+    with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
         revision = store.add_model_revision(person.name, format_model(person.model))
         sources = ("imported",) * len(fit.values)
         record = PoseRecord(fit.values, sources, revision, keyframe=True, settings={"method": "joints"})
         store.commit(f"init from joints, frame {frame}", [PoseChange(person.name, frame, record)])
     points = dict(zip(person.model.point_names, person.model.points_world(fit.values), strict=True))
-    residuals = {
-        name: float(1000 * np.linalg.norm(points[name] - place))
-        for name, place in known.items()
-        if name in points and np.all(np.isfinite(place))
-    }
-    return {"person": person.name, "frame": frame, "residual_mm": residuals, "mean_mm": _mean(residuals)}
+    residuals = {n: float(1000 * np.linalg.norm(points[n] - p)) for n, p in limbs.items()}
+    mean = float(np.mean(list(residuals.values())))
+    return {"person": person.name, "frame": frame, "residual_mm": residuals, "mean_mm": mean}
+
+
+def evaluate(at: Target, reference: Reference, frames: str | None, align: Alignment) -> dict[str, Any]:
+    """Compare the stored poses of one person with a reference, over the frames that have poses or the given ones.
+
+    Raises:
+        SessionError: there is no pose.
+    """
+    session, (index,) = at
+    person, poses = session.people[index], stored_poses(session, index)
+    if not poses:
+        raise SessionError(f"'{person.name}' has no poses yet; place the body in the page, or use init and track")
+    wanted = range(min(poses), max(poses) + 1) if frames is None else frame_range(frames, session)
+    result = evaluate_joints(joints_of_poses(person.model, poses, session.fps), reference.joints, wanted, align)
+    if reference.poses is not None:
+        axis_error, angle_errors = evaluate_poses(person.model, poses, reference.poses, wanted)
+        result = replace(result, axis_error_deg=axis_error, angle_error_deg=angle_errors)
+    return {"person": person.name, **asdict(result)}
 
 
 def track(at: Target, frames: Sequence[int], settings: TrackSettings, progress: "Reporter") -> dict[str, Any]:
@@ -153,7 +175,7 @@ def track(at: Target, frames: Sequence[int], settings: TrackSettings, progress: 
     session = at.session
     with (
         SessionLock(session.folder),
-        AnnotationStore(session.annotations_path) as store,
+        closing(AnnotationStore(session.annotations_path)) as store,
         Recording(session.cameras) as recording,
     ):
         models = [p.model for p in session.people]
@@ -240,15 +262,6 @@ def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-@contextmanager
-def _empty() -> Iterator[None]:
-    yield None
-
-
-def _mean(values: dict[str, float]) -> float:
-    return float(np.mean(list(values.values())))
-
-
 def _start(store: AnnotationStore, person: Person, frame: int, needed: bool) -> Array:
     """Pose to begin from: that of the frame itself, else of the last frame before it."""
     rows = [row.frame for row in store.frames(person.name) if row.frame <= frame]
@@ -258,8 +271,8 @@ def _start(store: AnnotationStore, person: Person, frame: int, needed: bool) -> 
     if not needed:
         return person.model.neutral()
     raise SessionError(
-        f"expected a pose of '{person.name}' at frame {frame} or before, found none; place the body in the page, or use "
-        "quadrille init"
+        f"expected a pose of '{person.name}' at frame {frame} or before, found none; place the body in the "
+        "page, or use quadrille init"
     )
 
 

@@ -91,14 +91,15 @@ class Job(Generic[T]):
 class Latest(Generic[T]):
     """Hands values to a slow consumer in a thread of its own: per key only the newest that waits, in order of offer."""
 
-    def __init__(self, consume: Callable[[T], None], name: str) -> None:
+    def __init__(self, consume: Callable[[T], None], name: str, rest_s: float = 0.0) -> None:
         """Start the thread.
 
         Args:
             consume: called with one value at a time.
             name: of the thread.
+            rest_s: least time between the end of one call and the begin of the next, seconds.
         """
-        self._consume = consume
+        self._consume, self._rest_s = consume, rest_s
         self._waiting: dict[object, T] = {}
         self._condition = threading.Condition()
         self._closed = False
@@ -127,3 +128,4 @@ class Latest(Generic[T]):
                 self._consume(value)
             except Exception:
                 _LOG.exception("a view failed")
+            time.sleep(self._rest_s)

@@ -14,6 +14,8 @@ from tracker.errors import TrackerError
 
 _REACH_M = 6.0
 """How far from the scene's middle the position sliders go, metres."""
+_REST_S = 0.2
+"""Time between updates of the sliders: nobody reads numbers faster, and the panes go first."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class Panels:
                 self._sliders.append(self._add_sliders(index, person.model, middle))
             self._folders.append(folder)
         self._search = self._add_search_settings()
-        latest = Latest(self._show, "panels")
+        latest = Latest(self._show, "panels", _REST_S)
         controller.subscribe(latest.offer)
         latest.offer(controller.state)
 

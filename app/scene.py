@@ -14,6 +14,8 @@ from tracker.posing import UP_ROTATIONS
 from tracker.session import Session
 
 _FRUSTUM_M = 0.25
+_REST_S = 0.08
+"""Time between updates: drawing the scene costs the browser more than drawing the panes, which go first."""
 
 
 class Scene:
@@ -36,7 +38,7 @@ class Scene:
                 person.model.parts, person.model.shapes, person.model.centers_part, strict=True
             )
         ]
-        latest = Latest(self._show, "scene")
+        latest = Latest(self._show, "scene", _REST_S)
         controller.subscribe(latest.offer)
         latest.offer(controller.state)
 

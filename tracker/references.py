@@ -1,0 +1,92 @@
+"""What an estimate can be held against: joints of a TRC file, poses of our CSV, or another session."""
+
+from collections.abc import Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import NamedTuple
+
+from tracker.annotations import AnnotationStore
+from tracker.body import BodyModel
+from tracker.errors import FormatError, SessionError
+from tracker.evaluate import at_rate, joints_of_poses, remap_axes
+from tracker.formats.model_toml import PRESETS, load_model
+from tracker.formats.pose_table import read_pose_table
+from tracker.formats.trc import MarkerTable, read_trc
+from tracker.joint_maps import joints_of, read_joint_map
+from tracker.rigid import Array
+from tracker.session import SESSION_FILE, Session, load_session
+
+
+class Reference(NamedTuple):
+    """A motion to compare with, in the session's frames and axes."""
+
+    joints: MarkerTable
+    """Joints under our names."""
+    poses: Mapping[int, Array] | None
+    """Poses by frame where they are known and of the same values as the estimate's model, (n_values,) each."""
+
+
+def read_joints(path: Path, fps: float, joint_map: Path | None = None, axes: str = "x,y,z") -> MarkerTable:
+    """Joints of a TRC file under our names, in a session's frames and axes, metres.
+
+    Args:
+        path: the file.
+        fps: frame rate of the session, 1/s.
+        joint_map: TOML file with its naming convention; guessed by default.
+        axes: which of its axes are the session's x, y, z.
+
+    Raises:
+        FormatError: the file or the map is malformed, or no convention fits.
+    """
+    mapping = read_joint_map(joint_map) if joint_map is not None else None
+    return joints_of(at_rate(remap_axes(read_trc(path), axes), fps), str(path), mapping)
+
+
+def read_reference(
+    path: Path, session: Session, person: int, joint_map: Path | None = None, axes: str = "x,y,z"
+) -> Reference:
+    """Read whatever a path holds: a TRC file, a pose table (CSV), or a session folder.
+
+    A pose table's joints are those of the preset it names at its height, or else of the person's own model: exact where
+    the model is, and then only angles can be trusted.
+
+    Raises:
+        FormatError: the file is malformed or of an unknown kind.
+        SessionError: the reference session has no such person.
+    """
+    model = session.people[person].model
+    if path.is_dir() or path.name == SESSION_FILE:
+        return _of_session(path if path.is_dir() else path.parent, session, person)
+    if path.suffix.lower() == ".csv":
+        table = read_pose_table(path)
+        values = table.values_for(model)
+        if values is None:
+            raise FormatError(f"{path} has poses of '{table.model}', not of the person's model '{model.name}'")
+        poses = dict(zip(table.frames.tolist(), values, strict=True))
+        own = load_model(table.model, table.height_m) if table.model in PRESETS else model
+        return Reference(joints_of_poses(own, poses, session.fps), poses)
+    if path.suffix.lower() != ".trc":
+        raise FormatError(f"expected a reference as .trc, .csv or session folder, found '{path}'")
+    return Reference(read_joints(path, session.fps, joint_map, axes), None)
+
+
+def stored_poses(session: Session, person: int) -> dict[int, Array]:
+    """All stored poses of a person by frame, (n_values,) each."""
+    name, model = session.people[person].name, session.people[person].model
+    if not session.annotations_path.exists():
+        return {}
+    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+        records = {row.frame: store.pose(name, row.frame) for row in store.frames(name)}
+    return {f: r.values for f, r in records.items() if r is not None and len(r.values) == len(model.value_names)}
+
+
+def _of_session(folder: Path, session: Session, person: int) -> Reference:
+    other = load_session(folder)
+    name = session.people[person].name
+    index = next((i for i, p in enumerate(other.people) if p.name == name), 0 if len(other.people) == 1 else None)
+    if index is None:
+        raise SessionError(f"expected a person '{name}' in {folder}, found {', '.join(p.name for p in other.people)}")
+    model: BodyModel = other.people[index].model
+    poses = stored_poses(other, index)
+    same = set(model.value_names) == set(session.people[person].model.value_names)
+    return Reference(joints_of_poses(model, poses, session.fps), poses if same else None)
