@@ -5,7 +5,9 @@ sees it: viser itself has no such check and listens on loopback only.
 """
 
 import asyncio
+import contextlib
 import errno
+import io
 import logging
 import weakref
 from collections.abc import AsyncIterator, Callable
@@ -140,7 +142,9 @@ def start_viser() -> viser.ViserServer:
 
     A later `configure_theme` has to say `show_share_button=False` again.
     """
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    # viser prints its own address even where it is told to be quiet; the page's is the only one to open.
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     server.gui.configure_theme(show_share_button=False, show_logo=False)
     return server
 

@@ -11,8 +11,8 @@ const HALO = "rgba(0, 0, 0, 0.45)";
 // Joints have their person's colour, as its contours have: bones between them must not look like contours.
 const BONE = "#fff";
 const PIXELS_VISIBLE_FROM = 4;
-const JOINT_RADIUS = 4.5;
-const TORSO_HALF_SIDE = 6.5;
+const JOINT_RADIUS = 3.5;
+const TORSO_HALF_SIDE = 5.5;
 export const TORSO = "torso";
 
 /** @type {Record<import("./protocol.js").Path["kind"], {width: number, alpha: number, dash: number[]}>} */
@@ -154,14 +154,14 @@ export function drawHandle(context, { handle, x, y }, color, emphasis) {
   }
   // Hidden joints are hollow: a ring of the colour. Visible ones are discs with a white ring.
   context.strokeStyle = HALO;
-  context.lineWidth = 4;
+  context.lineWidth = 3.5;
   context.stroke(outline);
   if (handle.visible) {
     context.fillStyle = color;
     context.fill(outline);
   }
   context.strokeStyle = handle.visible || emphasis !== "plain" ? "#fff" : color;
-  context.lineWidth = emphasis === "plain" ? 1.5 : 2.25;
+  context.lineWidth = emphasis === "plain" ? 1.25 : 2.25;
   context.stroke(outline);
 }
 

@@ -9,7 +9,7 @@ const GAP_MS = 500;
 export class Navigation {
   #store;
   #send;
-  /** @type {{frame: number, since: number} | null} */
+  /** @type {{frame: number} | null} */
   #underWay = null;
   /** @type {number | null} */
   #wish = null;
@@ -94,8 +94,7 @@ export class Navigation {
   #request(frame) {
     this.#store.set({ target: frame });
     this.#wish = frame;
-    if (this.#underWay && performance.now() - this.#underWay.since < GIVE_UP_MS) return;
-    this.#sendWish();
+    if (!this.#underWay) this.#sendWish();
   }
 
   #sendWish() {
@@ -105,8 +104,15 @@ export class Navigation {
     this.#wish = null;
     const { shown, state } = this.#store.facts;
     if (shown?.frame === frame && state?.frame === frame) return;
-    this.#underWay = { frame, since: performance.now() };
+    const request = { frame };
+    this.#underWay = request;
     this.#send({ type: "seek", frame });
+    // Another tab may have led the program elsewhere before it got there: then those images never come.
+    setTimeout(() => {
+      if (this.#underWay !== request) return;
+      this.#sendWish();
+      this.#arrived();
+    }, GIVE_UP_MS);
   }
 
   #arrived() {

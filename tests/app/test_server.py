@@ -263,8 +263,9 @@ def test_page_address_carries_name_and_token():
     assert server.page_address(NAMED, "0.0.0.0", 8080) == "http://lab.example.org:8080/?token=secret"
 
 
-def test_viser_listens_on_loopback_only():
+def test_viser_listens_on_loopback_only_and_quietly(capsys):
     started = server.start_viser()
+    assert capsys.readouterr().out == ""
     try:
         assert started.get_host() == "127.0.0.1"
         with pytest.raises(OSError), socket.create_connection((_own_address(), started.get_port()), timeout=0.5):
