@@ -20,6 +20,8 @@ from tracker.rigid import Array
 
 Outliers = Literal["truncated", "paper"]
 
+_ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernel's arithmetic into float64
+
 
 class Cost(NamedTuple):
     """Undirected normalized chamfer distance (GD96 Eq. 3)."""
@@ -46,7 +48,7 @@ class _Scene(NamedTuple):
     distances: FloatArray
     """The distance images, one after the other, row by row."""
     points: FloatArray
-    """Edge points near the prediction, one view after the other, (N, 2)."""
+    """u and v of the edge points near the prediction, one view after the other, (2, N)."""
     firsts: NDArray[np.int64]
     """Index of the first edge point of each view, and the number of all, (V + 1,)."""
     thetas: Array
@@ -107,7 +109,7 @@ class ChamferCost:
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
             np.concatenate([v.distance.ravel() for v in views]),
-            np.concatenate(points).astype(np.float32).reshape(-1, 2),
+            np.ascontiguousarray(np.concatenate(points).T, dtype=np.float32),
             np.concatenate([[0], np.cumsum([len(p) for p in points])]).astype(np.int64),
             np.array(thetas),
         )
@@ -151,7 +153,7 @@ class ChamferCost:
         """Fresh for each call: several threads may score at a time."""
         contour = contours.contour_buffer(self._widest, len(self.models))
         room = len(contour.parts)
-        longest = max(room, len(self._scene.points))
+        longest = max(room, self._scene.points.shape[1])
         return _Scratch(
             contour, np.empty((2, room), np.float32), np.empty((2, room), np.float32), np.empty(room, np.float32),
             np.empty(room, np.float32), np.empty(longest, np.float32), np.ones(longest, np.float32),
@@ -177,25 +179,35 @@ def _near(view: ViewEvidence, contour: contours.Contour, theta: float) -> FloatA
     steps = np.ascontiguousarray((pieces[:, 2:] - pieces[:, :2]).T)
     inverse = (1 / np.maximum(np.sum(steps**2, axis=0), 1e-12)).astype(np.float32)
     distances = np.empty(len(view.points_px), np.float32)
-    nearest_piece(view.points_px, starts, steps, inverse, len(pieces), distances)
+    u, v = np.ascontiguousarray(view.points_px.T)
+    nearest_piece(u, v, starts, steps, inverse, len(pieces), distances)
     return view.points_px[distances <= theta]
 
 
 @njit(nogil=True, cache=True, fastmath=True)
 def nearest_piece(
-    points: FloatArray, starts: FloatArray, steps: FloatArray, inverse: FloatArray, n: int, distances: FloatArray
+    u: FloatArray, v: FloatArray, starts: FloatArray, steps: FloatArray, inverse: FloatArray, n: int, out: FloatArray
 ) -> None:
-    """Distance of each point (N, 2) to the nearest of n straight pieces; brute force, because it vectorizes."""
-    x, y, dx, dy = starts[0], starts[1], steps[0], steps[1]
-    for i in range(points.shape[0]):
-        px, py = points[i, 0], points[i, 1]
-        best = np.float32(1e12)
-        for k in range(n):
-            ux, uy = px - x[k], py - y[k]
-            t = min(np.float32(1.0), max(np.float32(0.0), (ux * dx[k] + uy * dy[k]) * inverse[k]))
-            ex, ey = ux - t * dx[k], uy - t * dy[k]
-            best = min(best, ex * ex + ey * ey)
-        distances[i] = np.sqrt(best)
+    """Distance of each point (u, v), (N,) each, to the nearest of the first n straight pieces.
+
+    Brute force, and the pieces in the outer loop, because that runs on whole vectors of points: 30 times faster than
+    the other way round.
+    """
+    n_points = u.shape[0]
+    for i in range(n_points):
+        out[i] = np.float32(1e12)
+    for k in range(n):
+        x, y, dx, dy, inverse_k = starts[0, k], starts[1, k], steps[0, k], steps[1, k], inverse[k]
+        for i in range(n_points):
+            from_u, from_v = u[i] - x, v[i] - y
+            t = (from_u * dx + from_v * dy) * inverse_k
+            t = t if t > _ZERO else _ZERO
+            t = t if t < _ONE else _ONE
+            off_u, off_v = from_u - t * dx, from_v - t * dy
+            squared = off_u * off_u + off_v * off_v
+            out[i] = squared if squared < out[i] else out[i]
+    for i in range(n_points):
+        out[i] = np.sqrt(out[i])
 
 
 @njit(nogil=True, cache=True)
@@ -263,9 +275,10 @@ def _score(
                 d[kept] = sample_distance(scene.distances, pixel, width, height, x + 0.5 * dx, y + 0.5 * dy)
                 kept += 1
         directed[view, 0] = _robust_mean(d, scratch.lengths, kept, theta, paper)
-        points = scene.points[scene.firsts[view] : scene.firsts[view + 1]]
-        nearest_piece(points, starts, steps, scratch.inverse, kept, d)
-        directed[view, 1] = _robust_mean(d, scratch.ones, points.shape[0], theta, paper)
+        first, last = scene.firsts[view], scene.firsts[view + 1]
+        u, v = scene.points[0][first:last], scene.points[1][first:last]
+        nearest_piece(u, v, starts, steps, scratch.inverse, kept, d)
+        directed[view, 1] = _robust_mean(d, scratch.ones, last - first, theta, paper)
         pixel += width * height
 
 
