@@ -11,7 +11,9 @@ CORNER_NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
 """Four cameras in the corners, named for the side of the person that each sees."""
 CORNER_DEGREES = (45.0, -45.0, -135.0, 135.0)
 FIELD_OF_VIEW_DEGREES = 67.0
-HEIGHT_M = 2.2
+CORNER_HEIGHT_M = 2.2
+WALL_HEIGHT_M = 2.5
+"""Along the walls cameras look over the racks."""
 WALL_GAP_M = 0.2
 TARGET_WORLD = (0.0, 0.0, 1.0)
 
@@ -36,14 +38,15 @@ def make_cameras(n_cameras: int, size: tuple[int, int], seed: int) -> tuple[Came
     rng = np.random.default_rng([seed, 2])
     degrees = CORNER_DEGREES if n_cameras == 4 else tuple(45.0 - 360.0 * i / n_cameras for i in range(n_cameras))
     names = CORNER_NAMES if n_cameras == 4 else tuple(f"cam{i + 1}" for i in range(n_cameras))
-    return tuple(_mounted(name, np.radians(d), size, rng) for name, d in zip(names, degrees, strict=True))
+    height = CORNER_HEIGHT_M if n_cameras == 4 else WALL_HEIGHT_M
+    return tuple(_mounted(name, np.radians(d), height, size, rng) for name, d in zip(names, degrees, strict=True))
 
 
-def _mounted(name: str, direction: float, size: tuple[int, int], rng: np.random.Generator) -> Camera:
+def _mounted(name: str, direction: float, height_m: float, size: tuple[int, int], rng: np.random.Generator) -> Camera:
     """Mount one camera where a direction from the middle of the room meets the walls."""
     out = np.array([np.cos(direction), np.sin(direction)])
     on_wall = out * (HALF_WIDTH_M - WALL_GAP_M) / np.max(np.abs(out))
-    center = np.array([*on_wall, HEIGHT_M + rng.uniform(-0.05, 0.05)])
+    center = np.array([*on_wall, height_m + rng.uniform(-0.05, 0.05)])
     width, height = size
     focal = width / 2 / np.tan(np.radians(FIELD_OF_VIEW_DEGREES) / 2) * rng.uniform(0.98, 1.02)
     middle = np.array([(width - 1) / 2, (height - 1) / 2]) + rng.uniform(-0.01, 0.01, 2) * width

@@ -3,7 +3,9 @@ import pytest
 
 from tracker.errors import TrackerError
 from tracker.simulate.furniture import HALF_WIDTH_M
+from tracker.simulate.render import SAMPLES
 from tracker.simulate.rig import CORNER_NAMES, make_cameras
+from tracker.simulate.room import see_room
 from tracker.simulate.scenes import HEADING_RAD
 
 
@@ -34,3 +36,14 @@ def test_each_corner_camera_sees_the_side_it_is_named_for():
 def test_impossible_cameras_are_refused(n, size, found):
     with pytest.raises(TrackerError, match=found):
         make_cameras(n, size, 0)
+
+
+@pytest.mark.parametrize("n", [3, 4, 6])
+def test_nothing_in_the_room_hides_a_person_in_its_middle(n):
+    u, v = np.meshgrid(np.linspace(-0.9, 0.9, 7), np.linspace(0.1, 1.8, 7))
+    for camera in make_cameras(n, (320, 240), 0):
+        # A man-sized screen that faces the camera, arms stretched.
+        aside = np.cross(camera.center_world, (0, 0, 1.0))
+        screen = u.ravel()[:, None] * aside / np.linalg.norm(aside) + v.ravel()[:, None] * (0, 0, 1.0)
+        x, y = np.rint(camera.scaled(SAMPLES).project(screen)).astype(int).T
+        assert np.all(see_room(camera, 0).inverse_depths[y, x] < 1.0 / camera.depths(screen))
