@@ -31,15 +31,6 @@ _CHECKED_FRAMES = 16
 _RATE_JITTER = 0.2
 
 
-class _Key(NamedTuple):
-    """A frame from which decoding can start."""
-
-    position: int
-    """Index of its packet in the file."""
-    pts: int
-    """Its presentation time stamp."""
-
-
 class _Index(NamedTuple):
     """What the packets of a video say, without decoding them."""
 
@@ -47,8 +38,8 @@ class _Index(NamedTuple):
     """Presentation time stamps of the frames that are shown, ascending, (n_frames,)."""
     position: dict[int, int]
     """Index in the file of the packet with each presentation time stamp."""
-    keys: tuple[_Key, ...]
-    """In the order of the file."""
+    key_pts: NDArray[np.int64]
+    """Presentation time stamps of the frames at which decoding can start, ascending."""
 
 
 class VideoFile:
@@ -157,7 +148,7 @@ class VideoFile:
         """List the frames from the packets alone, which takes a hundredth of the time of decoding."""
         every: list[int] = []
         shown: list[int] = []
-        keys: list[_Key] = []
+        keys: list[int] = []
         end, damaged = 0, False
         for packet in self._container.demux(self._stream):
             if not packet.size:
@@ -167,10 +158,11 @@ class VideoFile:
                     f"{self._where} has frames without time stamps, so they cannot be found; convert it to MP4"
                 )
             if packet.is_keyframe:
-                keys.append(_Key(len(every), packet.pts))
+                keys.append(packet.pts)
             every.append(packet.pts)
-            # Frames cut off by an edit list are needed to decode others, but never shown.
-            if keys and not packet.is_discard and packet.pts >= keys[0].pts:
+            # Frames cut off by an edit list are needed to decode others, but never shown; nor are frames before the
+            # first key frame, in the order of the file or of display, because they need what is not there.
+            if keys and not packet.is_discard and packet.pts >= keys[0]:
                 shown.append(packet.pts)
             end = max(end, packet.pts + (packet.duration or 0))
             damaged = damaged or packet.is_corrupt
@@ -184,7 +176,7 @@ class VideoFile:
                 f"{self._where} is truncated: its header promises more than the {len(pts)} frames that it holds; "
                 "copy or convert it again"
             )
-        return _Index(pts, {p: i for i, p in enumerate(every)}, tuple(keys))
+        return _Index(pts, {p: i for i, p in enumerate(every)}, np.array(sorted(keys)))
 
     def _promises_more(self, end: int) -> bool:
         """Whether the header speaks of frames that the file does not hold; `end` is where the last one ends, ticks."""
@@ -227,29 +219,29 @@ class VideoFile:
     def _best_key(self, k: int) -> int:
         """Index of the last key frame from which frame k decodes whole.
 
-        A frame shown before a key frame but stored after it may need what came before the key frame.
+        That is the last one shown no later: a frame that is stored after a key frame but shown before it may need
+        what was stored before the key frame.
         """
-        pts, position = int(self._index.pts[k]), self._index.position[int(self._index.pts[k])]
-        fitting = [i for i, key in enumerate(self._index.keys) if key.position <= position and key.pts <= pts]
-        return fitting[-1]
+        return int(np.searchsorted(self._index.key_pts, self._index.pts[k], side="right")) - 1
 
     def _reaches_soon(self, k: int) -> bool:
         """Whether decoding on from here is the shortest way to frame k."""
         if k < self._next:
             return False
-        return self._next == k or self._index.keys[self._best_key(k)].pts <= self._index.pts[self._next]
+        return self._next == k or self._index.key_pts[self._best_key(k)] <= self._index.pts[self._next]
 
     def _seek(self, best: int) -> None:
         """Stand at a key frame, given by its index, or before it."""
         # Some containers land after the time asked for; then ask for an earlier key frame.
-        for key in reversed(self._index.keys[max(0, best - 2) : best + 1]):
+        latest = self._index.position[int(self._index.key_pts[best])]
+        for pts in self._index.key_pts[max(0, best - 2) : best + 1][::-1].tolist():
             try:
-                self._container.seek(key.pts, stream=self._stream)
+                self._container.seek(pts, stream=self._stream)
                 packets = self._container.demux(self._stream)
                 first = next(packets)
             except (av.FFmpegError, StopIteration):
                 continue
-            if first.pts is not None and self._index.position[first.pts] <= self._index.keys[best].position:
+            if first.pts is not None and self._index.position[first.pts] <= latest:
                 self._frames = self._decode(chain([first], packets))
                 return
         self._container.close()

@@ -148,6 +148,9 @@ def test_missing_values_do_not_spread_over_rows_that_are_there():
     source.points[3] = np.nan
     assert at_rate(source, 30).points[:, 0, 0] == pytest.approx([0, 2 / 60, 4 / 60])
     assert np.isnan(at_rate(source, 120).points[:, 0, 0]).tolist() == [False] * 5 + [True] * 3 + [False]
+    source = line(3, 60)
+    source.points[1] = np.nan
+    assert np.isnan(at_rate(source, 120).points[:, 0, 0]).tolist() == [False] + [True] * 3 + [False]
 
 
 def pose(model, **degrees):

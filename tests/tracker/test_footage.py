@@ -58,6 +58,32 @@ def test_every_order_of_access_is_bit_identical(tmp_path, name, settings):
     assert_same_in_any_order(path, frames)
 
 
+@pytest.mark.parametrize("name", ["a.mp4", "a.mkv", "a.avi"])
+def test_random_access_does_not_start_from_the_beginning(tmp_path, name, monkeypatch):
+    settings = {"codec": "mpeg4", "bframes": 0} if name == "a.avi" else {"options": OPEN_GOP}
+    video = VideoFile(encode(tmp_path / name, **settings), "cam")
+    monkeypatch.delattr(VideoFile, "_open")
+    for k in (50, 33, 12, 59, 20):
+        assert abs(number(video.read(k)) - k) <= 1
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "mkv"])
+def test_video_cut_at_an_open_group(tmp_path, suffix):
+    """Leading frames that need what has been cut away cannot be shown, and so are not counted."""
+    whole, path = encode(tmp_path / "whole.mp4", options=OPEN_GOP), tmp_path / f"cut.{suffix}"
+    with av.open(str(whole)) as source, av.open(str(path), "w") as target:
+        stream = target.add_stream_from_template(source.streams.video[0])
+        n_keys = 0
+        for packet in source.demux(video=0):
+            n_keys += packet.is_keyframe
+            if n_keys >= 2 and packet.size:
+                packet.stream = stream
+                target.mux(packet)
+    frames = decode_all(path)
+    assert [number(f) for f in frames] == list(range(10, N))
+    assert_same_in_any_order(path, frames)
+
+
 def with_edit(path, skip, ticks_per_frame=512, duration_ms=None):
     """Let the edit list of an MP4 begin `skip` frames later, in the middle of a group of pictures."""
     data = bytearray(path.read_bytes())
@@ -160,14 +186,15 @@ def test_truncated_video(tmp_path, name, settings):
         VideoFile(path, "cam")
 
 
-def test_damaged_frame_does_not_take_the_others_with_it(tmp_path):
+@pytest.mark.parametrize("kept", [0.0, 0.5])
+def test_damaged_frame_does_not_take_the_others_with_it(tmp_path, kept):
     path = encode(tmp_path / "a.mp4", gop=1, bframes=0)
     frames = decode_all(path)
     with av.open(str(path)) as container:
         packet = next(p for i, p in enumerate(container.demux(video=0)) if i == 30)
         position, size = packet.pos, packet.size
     data = bytearray(path.read_bytes())
-    data[position : position + size] = bytes(size)
+    data[position + int(kept * size) : position + size] = bytes(size - int(kept * size))
     path.write_bytes(data)
     video = VideoFile(path, "cam")
     assert video.n_frames == N

@@ -43,6 +43,13 @@ def test_conventions_of_the_footage_at_hand(data_folder, file, name):
     assert np.dot(across, first["left_shoulder"] - first["right_shoulder"]) > 0
 
 
+def test_cmu_names_a_joint_after_the_bone_that_begins_there():
+    names = ["LeftShoulder", "LeftArm", "LeftForeArm", "LeftHand", "LeftUpLeg", "LeftLeg", "LeftFoot"]
+    joints = joints_of(table(names), "x.trc")
+    assert joints.names == LIMB_JOINTS[:6]
+    assert joints.points[0, :, 0].tolist() == [1, 2, 3, 4, 5, 6]  # LeftShoulder is the collar bone
+
+
 def test_coco_and_our_own_names():
     joints = joints_of(table(COCO), "x.trc")
     assert joints.names == LIMB_JOINTS  # COCO has neither neck nor head

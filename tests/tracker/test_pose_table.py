@@ -44,6 +44,14 @@ def test_people_can_read_it(tmp_path):
     assert float(row["left_elbow.extension_deg"]) == 90
 
 
+def test_quaternions_have_no_unit(tmp_path):
+    model = parse_model(BALL, "ball")
+    write_pose_table(tmp_path / "a.csv", model, model.neutral()[None])
+    lines = (tmp_path / "a.csv").read_text().splitlines()
+    assert lines[3] == "frame,root.x_m,root.y_m,root.z_m,root.qw,root.qx,root.qy,root.qz,hinge.bend_deg"
+    assert lines[4].split(",")[4] == "1.000000000"
+
+
 def test_columns_may_stand_in_any_order(tmp_path):
     model = parse_model(BALL, "ball")
     path = tmp_path / "a.csv"

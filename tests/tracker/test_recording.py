@@ -57,6 +57,17 @@ def test_cache_is_bounded_and_keeps_the_latest(two, frames):
     assert [k for k in range(20) if recording.cached(k)] == list(range(20 - frames // 2, 20))
 
 
+def test_frame_used_last_stays_longest(two):
+    recording = Recording(two, cache_bytes=6 * FRAME_BYTES)
+    for k in (0, 1, 2, 0, 3):
+        recording.read(k)
+    assert [k for k in range(20) if recording.cached(k)] == [0, 2, 3]
+
+
+def test_offset_takes_frames_from_the_end(two):
+    assert Recording([two[0], source("b", two[1].footage, offset=8)]).n_frames == 15
+
+
 def test_cached_frame_is_the_same_array(two):
     recording = Recording(two)
     assert recording.read(4)[0] is recording.read(4)[0]

@@ -67,9 +67,9 @@ def test_saved_again(tmp_path, cameras):
 def test_session_moves_with_what_lies_beside_it(tmp_path, cameras):
     make(tmp_path, cameras)
     (tmp_path / "elsewhere").mkdir()
-    shutil.move(tmp_path / "s", tmp_path / "elsewhere" / "s")
-    front, left = load_session(tmp_path / "elsewhere" / "s").cameras
-    assert front.footage == tmp_path / "elsewhere" / "s" / "front.mp4"
+    shutil.move(tmp_path / "s", tmp_path / "elsewhere" / "t")
+    front, left = load_session(tmp_path / "elsewhere" / "t").cameras
+    assert front.footage == tmp_path / "elsewhere" / "t" / "front.mp4"
     assert left.footage == tmp_path / "elsewhere" / "videos" / "left"
 
 

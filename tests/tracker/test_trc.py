@@ -64,6 +64,12 @@ def test_round_trip(tmp_path, units):
     np.testing.assert_allclose(back.times, np.array(frames) / 59.94, atol=1e-6)
 
 
+def test_frame_numbers_in_the_file_begin_at_one(tmp_path):
+    write_trc(tmp_path / "a.trc", ["a"], np.ones((2, 1, 3)), 25)
+    rows = (tmp_path / "a.trc").read_text().splitlines()[6:]
+    assert [r.split("\t")[:3] for r in rows] == [["1", "0.000000", "1.0000000"], ["2", "0.040000", "1.0000000"]]
+
+
 def test_first_frame_is_kept_by_a_blank_row(tmp_path):
     write_trc(tmp_path / "a.trc", ["a"], np.ones((2, 1, 3)), 30, frames=[40, 41])
     back = read_trc(tmp_path / "a.trc")
