@@ -72,6 +72,7 @@ async def test_history_and_saving_say_what_they_would_do(page, endpoint):
     await endpoint.broadcast(endpoint.state)
     await shows(page, "document.querySelector('#saved').textContent === 'Not saved'")
     assert await page.locator("#saved").get_attribute("title") == "Not saved: the disk is full"
+    assert await page.locator("#saved").get_attribute("class") == "is-failed"
     assert await page.locator("#undo").is_disabled()
 
 

@@ -86,7 +86,11 @@ async def test_beyond_twelve_pixels_nothing_is_grabbed_and_the_view_moves(page, 
 
 
 async def test_a_click_selects_without_editing(page, endpoint):
-    await page.mouse.click(*await to_client(page, 0, *await handle_of(page, 0, "l_elbow")))
+    x, y = await to_client(page, 0, *await handle_of(page, 0, "l_elbow"))
+    await page.mouse.move(x, y)
+    await page.mouse.down()
+    await page.mouse.move(x + 1, y + 2)  # a hand is never quite still
+    await page.mouse.up()
     await until(lambda: endpoint.heard("select"))
     assert endpoint.heard("select") == [{"type": "select", "person": 0, "point": "l_elbow"}]
     assert not endpoint.heard("drag")
@@ -167,6 +171,15 @@ async def test_layers_are_asked_for_and_shown_at_once(page, endpoint):
           return data.every((value) => value === 0);
         })""",
     )
+
+
+async def test_layers_change_before_the_program_answers(page, endpoint):
+    async def silence(_message):
+        pass
+
+    endpoint.answer = silence
+    await page.get_by_text("Contours", exact=True).click()
+    await shows(page, "!quadrille.state.state.overlays.contours")
 
 
 async def test_hidden_joints_cannot_be_grabbed(page, endpoint):
