@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from tracker.annotations import AnnotationStore, FrameRow, PoseChange, PoseRecord
+from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError, TrackerError
 from tracker.evaluate import Alignment, evaluate_joints, evaluate_poses, joints_of_poses
 from tracker.evidence import Observer
@@ -20,6 +20,7 @@ from tracker.formats.model_toml import format_model
 from tracker.formats.trc import MarkerTable
 from tracker.joint_maps import LIMB_JOINTS
 from tracker.recording import Recording
+from tracker.records import FrameRow, PoseChange, PoseRecord
 from tracker.references import Reference, stored_poses
 from tracker.rigid import Array
 from tracker.session import Person, Session, load_session

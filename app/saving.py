@@ -1,13 +1,15 @@
 """Poses of the screen to the store and back."""
 
 from bisect import bisect_left, insort
+from collections.abc import Sequence
 
 import numpy as np
 
 from app.state import Shown, State
-from tracker.annotations import AnnotationStore, PoseChange, PoseRecord
+from tracker.annotations import AnnotationStore
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model
+from tracker.records import HistoryEntry, PoseChange, PoseRecord
 from tracker.rigid import Array
 from tracker.session import Session
 
@@ -87,20 +89,30 @@ class Saver:
         return amend
 
     def undo(self) -> int | None:
-        """Take back the last entry of the history; returns the frame it was about."""
-        return self._moved(self._store.undo())
+        """Take back the last entry of the history; returns the first frame it is about, None where there is none."""
+        entry = self._next_undo()
+        if entry is None:
+            return None
+        self._store.undo()
+        return self._moved(entry)
 
     def redo(self) -> int | None:
-        """Do again what was taken back last; returns the frame it is about."""
-        return self._moved(self._store.redo())
+        """Do again what was taken back last; returns the first frame it is about, None where there is none."""
+        entry = self._next_redo()
+        if entry is None:
+            return None
+        self._store.redo()
+        return self._moved(entry)
 
     def undo_label(self) -> str | None:
         """What undo would take back."""
-        return next((e.label for e in self._store.history(1) if not e.undone), None)
+        entry = self._next_undo()
+        return None if entry is None else entry.label
 
     def redo_label(self) -> str | None:
         """What redo would do again."""
-        return next((e.label for e in reversed(self._store.history(1)) if e.undone), None)
+        entry = self._next_redo()
+        return None if entry is None else entry.label
 
     def timeline(self, since: int) -> dict[int, dict | None]:
         """Cells of the frames that changed after a version of the timeline; all for 0."""
@@ -109,15 +121,20 @@ class Saver:
         frames = {frame for version, frame in self._changes if version > since}
         return {frame: self._cells.get(frame) for frame in frames}
 
-    def _moved(self, moved: object) -> int | None:
-        if moved is None:
-            return None
-        self._reload()
-        return None
+    def _next_undo(self) -> HistoryEntry | None:
+        return next((e for e in self._store.history(1) if not e.undone), None)
 
-    def _reload(self) -> None:
-        """List all frames anew and note those that changed."""
-        before, self._cells = self._cells, {}
+    def _next_redo(self) -> HistoryEntry | None:
+        return next((e for e in self._store.history(1) if e.undone), None)
+
+    def _moved(self, entry: HistoryEntry) -> int | None:
+        frames = self._store.frames_of(entry.edit)
+        self._reload(frames)
+        return frames[0] if frames else None
+
+    def _reload(self, changed: Sequence[int] = ()) -> None:
+        """List all frames anew, and note those that changed."""
+        self._cells = {}
         for person, info in enumerate(self._session.people):
             rows = self._store.frames(info.name)
             self._frames[person] = [row.frame for row in rows]
@@ -126,9 +143,7 @@ class Saver:
                     row.frame, {"source": row.source, "cost_px": row.cost_px, "keyframe": row.keyframe}
                 )
         self.timeline_version += 1
-        for frame in before.keys() | self._cells.keys():
-            if before.get(frame) != self._cells.get(frame):
-                self._changes.append((self.timeline_version, frame))
+        self._changes += [(self.timeline_version, frame) for frame in changed]
 
     def _note(self, frame: int) -> None:
         """Bring the cell of one frame up to date."""

@@ -237,6 +237,11 @@ class AnnotationStore:
             HistoryEntry(e, label, author, time, False) for e, label, author, time in done
         ]
 
+    def frames_of(self, edit: int) -> list[int]:
+        """Frames whose poses or pins an edit changes, ascending."""
+        sql = "SELECT frame FROM pose_changes WHERE edit = ?1 UNION SELECT frame FROM pin_changes WHERE edit = ?1"
+        return sorted(frame for (frame,) in self._all(sql, (edit,)))
+
     def add_model_revision(self, person: str, toml: str) -> int:
         """Keep a body model for good; returns its id, that of the person's latest where nothing has changed."""
         with self._lock, self._errors(), self._transaction():
