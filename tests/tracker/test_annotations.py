@@ -220,6 +220,13 @@ def test_pins_are_part_of_the_history(store):
     assert store.pins("ann", 3) == [Pin("head", "front", (1.0, 2.0))]
 
 
+def test_frames_of_an_edit(store):
+    edit = store.commit("a", [put(9, 1.0), put(2, 1.0), PinChange("ann", 5, "head", "front", (1.0, 2.0))]).edit
+    store.amend(edit, [put(9, 2.0), PinChange("ann", 2, "head", "front", None)])
+    store.commit("b", [put(7, 1.0)])
+    assert store.frames_of(edit) == [2, 5, 9]
+
+
 def test_model_revisions(store):
     first = store.model_revisions("ann")[0]
     assert store.add_model_revision("ann", "a = 1") == first.id  # nothing new
