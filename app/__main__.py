@@ -257,7 +257,7 @@ def simulate(
     from tracker.simulate import simulate as run
 
     reporter = Reporter()
-    with reporter.over(frames, "rendering") as tick:
+    with reporter.over(frames * cameras, "rendering") as tick:  # one tick per image
         run(
             out, scene=scene, n_cameras=cameras, n_frames=frames, seed=seed, body=body, masks=masks,
             progress=lambda *_: tick(),
