@@ -38,15 +38,29 @@ def read_toml(path: Path, what: str, error_type: type[TrackerError]) -> dict[str
     Raises:
         TrackerError: of the given kind; the file is missing, unreadable, or not TOML (the message has the line).
     """
-    text = ""
     try:
         text = path.read_text("utf-8")
-        return tomllib.loads(text)
     except FileNotFoundError as error:
         raise error_type(f"{what} {path} not found; check the path") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise error_type(f"{what} {path} cannot be read as a UTF-8 text file: {error}") from error
+    return parse_toml(text, f"{what} {path}", error_type)
+
+
+def parse_toml(text: str, where: str, error_type: type[TrackerError]) -> dict[str, Any]:
+    """Parse TOML text.
+
+    Args:
+        text: the text.
+        where: what it is to the user, for messages: `calibration lab.toml`.
+        error_type: kind of error to raise.
+
+    Raises:
+        TrackerError: of the given kind; the text is not TOML (the message has the line).
+    """
+    try:
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         # What is open at the end is reported without a line: give the last.
         place = str(error).replace("at end of document", f"at line {max(1, len(text.splitlines()))}, the last")
-        raise error_type(f"{what} {path} is not valid TOML: {place}; correct it") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise error_type(f"{what} {path} cannot be read as a UTF-8 text file: {error}") from error
+        raise error_type(f"{where} is not valid TOML: {place}; correct it") from error

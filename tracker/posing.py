@@ -64,7 +64,9 @@ def grab(model: BodyModel, values: Array, camera: Camera, point: str, pointer_px
     """
     index = model.point_names.index(point)
     place = model.points_world(values)[index]
-    moving = model.moves[:, model.point_parts[index]]
+    moving = model.moves[:, model.point_parts[index]].copy()
+    if index < len(model.joints):
+        moving &= model.dof_joint != index  # a joint turns about itself: that does not move it
     of_root = model.dof_joint == 0
     if index == 0:
         free = of_root & model.dof_is_length

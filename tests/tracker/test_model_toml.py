@@ -144,7 +144,6 @@ def test_malformed(text, expected):
     assert "mine.toml" in str(caught.value)
 
 
-@pytest.mark.xfail(strict=True, reason="the second joint of a part silently takes the place of the first")
 def test_two_joints_for_one_part():
     text = SMALL.replace('dofs = ["root.*", "hinge.bend"]', 'dofs = ["root.*"]')
     with pytest.raises(ModelError, match="one joint for each part, but see: arm"):

@@ -4,7 +4,6 @@ Positions and sizes are fractions of body height, angles are in degrees; `height
 and left out of a preset. See `tracker/models/gavrila22.toml` for an example.
 """
 
-import tomllib
 from fnmatch import fnmatchcase
 from importlib import resources
 from pathlib import Path
@@ -15,6 +14,7 @@ import tomli_w
 
 from tracker.body import Axis, BodyModel, Joint, Landmark, Part, SearchGroup
 from tracker.errors import ModelError
+from tracker.files import parse_toml
 
 VERSION = 1
 DEFAULT_HEIGHT_M = 1.75
@@ -52,17 +52,14 @@ def parse_model(text: str, source: str, height_m: float | None = None) -> BodyMo
     Raises:
         ModelError: syntax, an unknown or missing key, a loop, a missing parent, impossible numbers.
     """
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ModelError(f"body model {source} is not valid TOML: {error}") from error
+    data = parse_toml(text, f"body model {source}", ModelError)
     if int(data.get("version", 0)) > VERSION:
         raise ModelError(
             f"body model {source} has version {data['version']}, this program reads up to {VERSION}; upgrade quadrille"
         )
     try:
         height = float(height_m if height_m is not None else data.get("height_m", DEFAULT_HEIGHT_M))
-        joints = _order(tuple(_joint(j, source) for j in data["joints"]), source)
+        listed = tuple(_joint(j, source) for j in data["joints"])
         parts = {p["name"]: _part(p, source) for p in data["parts"]}
         landmarks = tuple(
             Landmark(m["name"], m["part"], _numbers(m["position"], 3, source, m["name"]))
@@ -77,10 +74,14 @@ def parse_model(text: str, source: str, height_m: float | None = None) -> BodyMo
         ) from error
     if not 0.3 <= height <= 3.0:
         raise ModelError(f"body model {source}: expected a height of 0.3 to 3 metres, found {height:g}")
-    children = [j.child for j in joints]
-    if sorted(children) != sorted(parts) or len(set(children)) != len(children):
-        odd = sorted(set(children) ^ set(parts)) or sorted({c for c in children if children.count(c) > 1})
+    listed_children = [j.child for j in listed]
+    if sorted(listed_children) != sorted(parts):
+        odd = sorted(set(listed_children) ^ set(parts)) or sorted(
+            {c for c in listed_children if listed_children.count(c) > 1}
+        )
         raise ModelError(f"body model {source}: expected exactly one joint for each part, but see: {', '.join(odd)}")
+    joints = _order(listed, source)
+    children = [j.child for j in joints]
     for m in landmarks:
         if m.part not in parts:
             raise ModelError(f"body model {source}: landmark '{m.name}' is on a missing part '{m.part}'")

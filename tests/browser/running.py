@@ -1,0 +1,43 @@
+"""A real program on a real session, as a user starts it."""
+
+import asyncio
+import contextlib
+import os
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Program:
+    """`quadrille open SESSION` in a process of its own."""
+
+    def __init__(self, session: Path, *options: str) -> None:
+        self._words = [sys.executable, "-m", "app", "open", str(session), "--port", "0", "--no-browser", *options]
+        self._process: asyncio.subprocess.Process | None = None
+        self.address = ""
+
+    async def start(self) -> None:
+        self._process = await asyncio.create_subprocess_exec(
+            *self._words, cwd=ROOT, stdout=asyncio.subprocess.PIPE, env={**os.environ, "PYTHONUNBUFFERED": "1"}
+        )
+        async with asyncio.timeout(120):
+            while not self.address:
+                line = (await self._process.stdout.readline()).decode()
+                assert line, "the program ended before it served the page"
+                if ": http://127.0.0.1" in line and "viser" not in line.lower():
+                    self.address = line.partition(": ")[2].strip()
+
+    async def kill(self) -> None:
+        """End it at once, as a crash would."""
+        with contextlib.suppress(ProcessLookupError):
+            self._process.kill()
+        await self._process.wait()
+        self.address = ""
+
+    async def stop(self) -> None:
+        """End it as Ctrl+C does."""
+        with contextlib.suppress(ProcessLookupError):
+            self._process.terminate()
+        await asyncio.wait_for(self._process.wait(), 30)
+        self.address = ""

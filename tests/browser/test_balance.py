@@ -1,0 +1,138 @@
+"""The main job on a real recording: place the model with the mouse, search, correct, undo, and find it all again."""
+
+import asyncio
+
+import numpy as np
+import pytest
+import pytest_asyncio
+from driving import handle_of, shows, state_of, to_client
+from running import Program
+
+from tracker.assemble import assemble
+from tracker.fit import fit_to_points
+from tracker.references import read_joints
+from tracker.session import load_session
+
+JOINTS = ("shoulder", "knee", "ankle", "elbow", "wrist")
+VIEWS = (0, 2)
+
+
+@pytest.fixture(scope="module")
+def balance(data_folder, tmp_path_factory):
+    """A session of the recording, and where its joints are in each view of frame 0, undistorted px."""
+    data = data_folder("balance_real")
+    folder = tmp_path_factory.mktemp("balance") / "session"
+    assemble(
+        folder,
+        calibration=data / "Calib.toml",
+        videos=sorted(data.glob("cam*.mp4")),
+        background=data / "background",
+    )
+    session = load_session(folder)
+    joints = read_joints(data / "reference_joints.trc", session.fps)
+    known = {n: p for n, p in zip(joints.names, joints.points[0], strict=True) if n not in ("neck", "head")}
+    model = session.people[0].model
+    points = model.points_world(fit_to_points(model, known).values)
+    targets = [
+        dict(zip(model.point_names, c.camera.pinhole.project(points).tolist(), strict=True)) for c in session.cameras
+    ]
+    return folder, targets
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def program(balance):
+    running = Program(balance[0])
+    await running.start()
+    yield running
+    await running.kill()
+
+
+async def visit(browser, address):
+    page = await browser.new_page(viewport={"width": 1440, "height": 900}, color_scheme="dark")
+    await page.goto(address)
+    await shows(page, "window.quadrille?.state.overlay && window.quadrille.state.state.cost_px", timeout_s=120)
+    return page
+
+
+async def drag(page, camera, point, target):
+    """Drag a joint to an undistorted pixel with the mouse, and wait until the page says that it is saved."""
+    start = await to_client(page, camera, *await handle_of(page, camera, point))
+    end = await to_client(page, camera, *target)
+    before = (await state_of(page))["state"]["undo"]
+    await page.mouse.move(*start)
+    await page.mouse.down()
+    await page.mouse.move(*end, steps=6)
+    await page.mouse.up()
+    label = f"drag {point.replace('_', ' ')}"
+    await shows(page, f"quadrille.state.state.undo?.startsWith('{label}') && quadrille.state.state.saved", 20)
+    await asyncio.sleep(0.1)
+    return before
+
+
+async def pose_of(page):
+    """The pose as the panes show it: all joints in all views, undistorted px."""
+    handles = await page.evaluate("quadrille.state.overlay.handles")
+    return {(h["camera"], h["point"]): (h["u"], h["v"]) for h in handles}
+
+
+def distance(a, b):
+    assert a.keys() == b.keys()
+    return max(float(np.hypot(*np.subtract(a[k], b[k]))) for k in a)
+
+
+async def place(page, targets):
+    """Pose the model with drags alone, in two views, towards where the joints are."""
+    for view in VIEWS:
+        await drag(page, view, "torso", targets[view]["torso"])
+    for joint in JOINTS:
+        for side in ("left", "right"):
+            for view in VIEWS:
+                name = f"{side}_{joint}"
+                await drag(page, view, name, targets[view][name])
+
+
+async def test_the_main_job(browser, balance, program, tmp_path):
+    targets = balance[1]
+    page = await visit(browser, program.address)
+    await page.screenshot(path=tmp_path / "before.png")
+    before_px = (await state_of(page))["state"]["cost_px"]
+
+    await place(page, targets)
+    placed = await pose_of(page)
+    placed_px = (await state_of(page))["state"]["cost_px"]
+    assert placed_px < before_px
+    errors = [np.hypot(*np.subtract(placed[v, n], targets[v][n])) for v in VIEWS for n in targets[v] if "_" in n]
+    assert np.mean(errors) < 60  # px of a body 900 px tall
+
+    await page.get_by_role("button", name="Frame", exact=True).click()
+    # Contours under test, and a pose that has changed, while the search is still running.
+    await shows(page, "quadrille.state.state.job.running && quadrille.state.overlay.paths.some("
+                "(p) => p.kind === 'candidate' && p.count)", 60)  # fmt: skip
+    async with asyncio.timeout(60):
+        while distance(await pose_of(page), placed) < 1:
+            await asyncio.sleep(0.05)
+    assert (await state_of(page))["state"]["job"]["running"]
+    await shows(page, "!quadrille.state.state.job.running", 120)
+    found_px = (await state_of(page))["state"]["cost_px"]
+    assert found_px < placed_px
+
+    found = await pose_of(page)
+    u, v = found[0, "left_wrist"]
+    await drag(page, 0, "left_wrist", (u + 60, v - 80))
+    assert distance(await pose_of(page), found) > 50
+    await page.keyboard.press("Control+z")
+    await shows(page, "quadrille.state.state.redo?.startsWith('drag left wrist')", 10)
+    await asyncio.sleep(0.3)
+    assert distance(await pose_of(page), found) < 0.01
+    await page.screenshot(path=tmp_path / "after.png")
+    history = (await state_of(page))["state"]["undo"], (await state_of(page))["state"]["redo"]
+
+    await program.kill()
+    await page.close()
+    await program.start()
+    page = await visit(browser, program.address)
+    assert distance(await pose_of(page), found) < 0.01
+    state = (await state_of(page))["state"]
+    assert (state["undo"], state["redo"]) == history
+    await page.close()
+    print(f"cost {before_px:.2f} -> placed {placed_px:.2f} -> found {found_px:.2f} px; pictures in {tmp_path}")
