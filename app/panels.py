@@ -39,7 +39,7 @@ class Panels:
         self._folders: list[viser.GuiFolderHandle] = []
         middle = controller.state.people[0].values[:3]
         for index, person in enumerate(controller.session.people):
-            folder = server.gui.add_folder(f"Pose of {person.name}")
+            folder = server.gui.add_folder(f"Pose of {person.name}", expand_by_default=False)
             with folder:
                 self._sliders.append(self._add_sliders(index, person.model, middle))
             self._folders.append(folder)
