@@ -1,0 +1,44 @@
+"""A real frame, read once: frame 25 of the bundled sample, with the body fitted to its true joints."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from tracker.body import BodyModel
+from tracker.evidence import Observer, ViewEvidence
+from tracker.fit import fit_to_points
+from tracker.formats.model_toml import load_model
+from tracker.recording import Recording
+from tracker.references import read_joints
+from tracker.rigid import Array
+from tracker.session import load_session
+
+SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"
+
+
+class RealFrame(NamedTuple):
+    model: BodyModel
+    values: Array
+    """Pose fitted to the true joints, (n_values,); its bones are not the true ones."""
+    views: tuple[ViewEvidence, ...]
+
+
+@pytest.fixture(scope="session")
+def sample_folder():
+    return SAMPLE
+
+
+@pytest.fixture(scope="session")
+def gavrila():
+    return load_model("gavrila22")
+
+
+@pytest.fixture(scope="session")
+def real_frame(sample_folder):
+    session = load_session(sample_folder)
+    with Recording(session.cameras) as recording:
+        views = Observer(session.cameras, recording).evidence(25)
+    joints = read_joints(sample_folder / "truth.trc", session.fps)
+    model = session.people[0].model
+    return RealFrame(model, fit_to_points(model, dict(zip(joints.names, joints.points[25], strict=True))).values, views)

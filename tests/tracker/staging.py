@@ -1,0 +1,79 @@
+"""Staged scenes of which the answer is known: cameras around a place, simple bodies, edges drawn from contours."""
+
+import cv2
+import numpy as np
+
+from tracker import contours
+from tracker.body import Body
+from tracker.cameras import Camera
+from tracker.evidence import view_evidence
+from tracker.formats.model_toml import parse_model
+
+SIZE = (640, 480)
+
+
+def camera_at(name, center_world, target_world=(0.0, 0.0, 0.0), size=SIZE, focal=520.0):
+    """A pinhole camera that looks at a target; world z appears upwards."""
+    center_world, target_world = np.array(center_world, dtype=float), np.array(target_world, dtype=float)
+    z = (target_world - center_world) / np.linalg.norm(target_world - center_world)
+    x = np.cross(z, (0.0, 0.0, 1.0))
+    x /= np.linalg.norm(x)
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = np.stack([x, np.cross(z, x), z], axis=1), center_world
+    K = np.array([[focal, 0.0, (size[0] - 1) / 2], [0.0, focal, (size[1] - 1) / 2], [0.0, 0.0, 1.0]])
+    return Camera(name, size, K, np.zeros(0), T)
+
+
+def cameras_around(n=3, radius_m=4.0, height_m=0.6, size=SIZE):
+    """Cameras on a circle about the origin, looking at it; evenly spread, none opposite another for odd n."""
+    turns = 2 * np.pi * np.arange(n) / n + 0.3
+    return [camera_at(f"cam{i}", (radius_m * np.cos(a), radius_m * np.sin(a), height_m), size=size)
+            for i, a in enumerate(turns)]  # fmt: skip
+
+
+def solid(half_axes, exponents=(1, 1), name="solid"):
+    """A body of one free part, sizes in metres, whose values are x, y, z and three turns about x, y, z."""
+    return parse_model(
+        f"""
+        version = 1
+        name = "{name}"
+        height_m = 1.0
+        parts = [{{ name = "solid", half_axes = {[float(a) for a in half_axes]}, exponents = {list(exponents)} }}]
+        [[joints]]
+        name = "root"
+        child = "solid"
+        free = true
+        axes = [{{ name = "a", axis = [1, 0, 0] }}, {{ name = "b", axis = [0, 1, 0] }}, {{ name = "c", axis = [0, 0, 1] }}]
+        [[search]]
+        name = "place"
+        dofs = ["root.x", "root.y", "root.z"]
+        """,  # noqa: E501
+        name,
+    )
+
+
+def at(model, *place, turns=(0.0, 0.0, 0.0)):
+    """A solid placed in the world."""
+    return Body(model, np.array([*place, *turns], dtype=float))
+
+
+def edge_map(bodies, camera):
+    """The visible contours of bodies as edges, one pixel thin, (H, W) bool."""
+    seen = contours.trace(bodies, camera)
+    image = np.zeros((camera.height, camera.width), np.uint8)
+    # Without the shift cv2.line would round the ends: half a pixel is much for what is measured here.
+    ends = np.round(seen.pieces_px[~seen.hidden] * 16).astype(int)
+    for x0, y0, x1, y1 in ends:
+        cv2.line(image, (x0, y0), (x1, y1), 255, shift=4)
+    return image > 0
+
+
+def own_evidence(bodies, cameras):
+    """Evidence that shows the visible contours of bodies and nothing else."""
+    return tuple(view_evidence(c, 1.0, edge_map(bodies, c)) for c in cameras)
+
+
+def shaken(model, values, rng, sigma_rad, sigma_m):
+    """A pose displaced at random in all degrees of freedom, within the joint limits."""
+    sigma = np.where(model.dof_is_length, sigma_m, sigma_rad)
+    return model.clip(model.retract(values, sigma * rng.normal(size=model.n_dofs)))

@@ -1,0 +1,83 @@
+import numpy as np
+from scipy.spatial import cKDTree
+from staging import at, camera_at, own_evidence, solid
+
+from tracker import contours
+from tracker.body import Body
+from tracker.chamfer import ChamferCost
+from tracker.occlusion import part_edges, points_hidden
+
+FRONT = camera_at("front", (4.0, 0.0, 0.0))
+RADIUS, HALF_APART = 0.2, 0.12
+
+
+def two_balls():
+    """Two spheres that intersect in a circle in the plane y = 0."""
+    model = solid((RADIUS,) * 3)
+    return [at(model, 0, -HALF_APART, 0), at(model, 0, HALF_APART, 0)]
+
+
+def seam(n=2000):
+    """The circle in which the spheres intersect, its half that faces FRONT, (n, 3)."""
+    a = np.linspace(-np.pi / 2, np.pi / 2, n)
+    return np.sqrt(RADIUS**2 - HALF_APART**2) * np.stack([np.cos(a), 0 * a, np.sin(a)], axis=1)
+
+
+def dense(pieces_px):
+    t = np.linspace(0, 1, 5)[:, None, None]
+    return (pieces_px[:, :2] + t * (pieces_px[:, 2:] - pieces_px[:, :2])).reshape(-1, 2)
+
+
+def test_part_edges_lie_on_both_surfaces():
+    found = dense(part_edges(two_balls(), FRONT))
+    circle = FRONT.project(seam())
+    # The grid's cells are 15 degrees wide: its chords stray by up to 2% of the radius of 26 px.
+    assert cKDTree(circle).query(found)[0].max() < 0.6
+    # Seen from the side, the circle is whole but for its ends at the outline, where the lift off the surfaces ends.
+    side = camera_at("side", (4.0, 1.5, 0.0))
+    from_side = dense(part_edges(two_balls(), side))
+    assert cKDTree(side.project(seam(4000))).query(from_side)[0].max() < 0.6
+    seen = side.project(seam()[400:1600])
+    assert cKDTree(from_side).query(seen)[0].max() < 1.5
+
+
+def test_part_edges_hidden_by_another_body():
+    screen = at(solid((0.05, 0.5, 0.5), name="screen"), 1, 0, 0)
+    assert len(part_edges([*two_balls(), screen], FRONT)) == 0
+    assert len(part_edges([*two_balls(), at(screen.model, -1, 0, 0)], FRONT)) == len(part_edges(two_balls(), FRONT))
+
+
+def test_no_part_edges_between_parts_apart():
+    model = solid((RADIUS,) * 3)
+    assert part_edges([at(model, 0, -0.3, 0), at(model, 0, 0.3, 0)], FRONT).shape == (0, 4)
+
+
+def test_part_edges_never_enter_the_cost():
+    bodies = two_balls()
+    # The seam runs far from the outlines, of which alone the edges are made: were it scored, it would cost.
+    seen = contours.trace(bodies, FRONT)
+    apart = cKDTree(dense(seen.pieces_px[~seen.hidden])).query(dense(part_edges(bodies, FRONT)))[0]
+    assert apart.mean() > 8
+    cost = ChamferCost(own_evidence(bodies, [FRONT]), bodies)([b.values for b in bodies])
+    assert cost.total_px < 0.5
+
+
+def test_points_hidden(gavrila):
+    body = Body(gavrila, gavrila.neutral())
+    place = dict(zip(gavrila.point_names, gavrila.points_world(body.values), strict=True))
+    side = camera_at("side", (0.0, 4.0, 0.0))  # at the body's left
+    hidden = dict(zip(place, points_hidden([body], side, np.stack(list(place.values()))), strict=True))
+    # The left side hides the right: the trunk its arm, the legs one another. The forearm hangs before the hip.
+    assert [n for n, h in hidden.items() if n.startswith("left") and h] == ["left_hip"]
+    assert hidden["right_shoulder"]
+    assert hidden["right_knee"]
+    assert hidden["right_wrist"]
+    # A joint lies within the parts around it; those do not hide it.
+    assert not points_hidden([body], camera_at("front", (4.0, 0.0, 0.0)), np.stack(list(place.values()))).any()
+
+
+def test_points_hidden_by_another_person():
+    points = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.5, 0.0]])  # behind, before and beside
+    screen = at(solid((0.05, 0.3, 0.3)), 1, 0, 0)
+    assert points_hidden([screen], FRONT, points).tolist() == [True, False, False]
+    assert points_hidden([at(screen.model, 6, 0, 0)], FRONT, points).tolist() == [False] * 3  # behind the camera
