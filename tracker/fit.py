@@ -156,8 +156,30 @@ def fit_to_points(model: BodyModel, targets_world: dict[str, Array], near: Array
             starts.append(model.retract(base, step))
     # A weak pull to the start decides what the points leave open, such as the twist of a straight arm.
     rest = np.full(model.n_dofs, 1e-3)
-    fits = [solve(model, start, [block, StayNear(start, rest)], max_iterations=100) for start in starts]
-    return min(fits, key=lambda f: f.cost)
+
+    def fitted(start: Array) -> Fit:
+        return solve(model, start, [block, StayNear(start if near is None else near, rest)], max_iterations=100)
+
+    best = min(map(fitted, starts), key=lambda f: f.cost)
+    # Descent cannot lead a limb that is pressed against a limit around to where it belongs: begin again from there.
+    # Measured on random poses: one in eight was 1 to 10 cm off without; a second round mends the last.
+    limbs = [i for i, j in enumerate(model.joints) if len(j.axes) == 3 and not j.free]
+    for joint in 2 * limbs:
+        best = min(best, fitted(_by_other_angles(model, best.values, joint)), key=lambda f: f.cost)
+    return best
+
+
+def _by_other_angles(model: BodyModel, values: Array, joint: int) -> Array:
+    """The same pose by the other three angles that turn a joint alike, put within its limits.
+
+    Where a joint's three axes are at right angles, (a, b, c) and (a + pi, pi - b, c + pi) are one rotation.
+    """
+    out = np.array(values)
+    at = model.dof_value[model.dof_joint == joint]
+    a, b, c = values[at]
+    # Of the angles that differ by whole turns those within (-pi, pi], where the limits are.
+    out[at] = np.remainder([a, -b, c], 2 * np.pi) - np.pi
+    return model.clip(out)
 
 
 def _stack(model: BodyModel, values: Array, blocks: Sequence[Block]) -> tuple[Array, Array]:
