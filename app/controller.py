@@ -101,6 +101,12 @@ class Controller:
         chosen: Base = next((b for b in BASES if b == base), self.state.base)
         self._set(base=chosen, overlays=frozenset(shown))
 
+    def hold_3d(self, page: int, hold: bool) -> None:
+        """Let the 3-D view and its panels rest while a point is dragged: a page asks for it that draws them slowly."""
+        with self._lock:
+            others = self.state.holding_3d - {page}
+            self._set(holding_3d=others | {page} if hold else others)
+
     # --- posing ------------------------------------------------------------------------------------------------
 
     def begin_drag(self, page: int, camera: int, person: int, point: str, pointer_px: tuple[float, float]) -> None:
@@ -148,6 +154,7 @@ class Controller:
             self._grab = self._edit_of = None
             if checkpointed:
                 self._saver.undo()
+                self._refresh_saving()
             self._set(drag=None)
             self._show(self.state.frame)
 

@@ -154,6 +154,8 @@ class Panels:
         self._controller.set_search(settings, value["theta_px"] or None, value["outliers"])
 
     def _show(self, state: State) -> None:
+        if state.rests_3d:
+            return
         with self._server.atomic():
             for index, (sliders, folder) in enumerate(zip(self._sliders, self._folders, strict=True)):
                 folder.visible = index == state.person

@@ -65,6 +65,7 @@ class _Page:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
             await asyncio.to_thread(self._controller.end_drag, self._number)
+            await asyncio.to_thread(self._controller.hold_3d, self._number, False)
 
     # --- page to controller ------------------------------------------------------------------------------------
 
@@ -99,6 +100,7 @@ class _Page:
             "drag": lambda: self._drag(message),
             "view": lambda: controller.set_view(str(message["base"]), dict(message["overlays"])),
             "search": lambda: self._search(str(message["action"])),
+            "hold_3d": lambda: controller.hold_3d(self._number, bool(message["hold"])),
             "undo": controller.undo,
             "redo": controller.redo,
         }

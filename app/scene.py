@@ -32,6 +32,7 @@ class Scene:
                 np.asarray(shape.mesh().vertices) + center,
                 np.asarray(shape.mesh().faces),
                 color=_rgb(part.color),
+                cast_shadow=False,
             )
             for person in self._session.people
             for part, shape, center in zip(
@@ -44,7 +45,7 @@ class Scene:
 
     def _show(self, state: State) -> None:
         poses = tuple(id(p) for p in state.poses)
-        if poses == self._shown:
+        if poses == self._shown or state.rests_3d:
             return
         self._shown = poses
         bodies = [Body(p.model, v) for p, v in zip(self._session.people, state.poses, strict=True)]
@@ -66,7 +67,7 @@ def _add_surroundings(server: viser.ViserServer, session: Session) -> None:
         cell_size=0.5,
         section_size=1.0,
         wxyz=rigid.quaternion_from_matrix(UP_ROTATIONS[session.up]),
-        shadow_opacity=0.25,
+        shadow_opacity=0.0,  # shadows would double the work of a browser without a graphics card
     )
     for camera in cameras:
         T = camera.T_world_camera

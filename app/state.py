@@ -77,6 +77,8 @@ class State:
     drag: DragState | None = None
     drag_seqs: tuple[tuple[int, int], ...] = ()
     """For each page that drags: its number, and the last of its drag messages that this state takes in."""
+    holding_3d: frozenset[int] = frozenset()
+    """Numbers of the pages that want the 3-D view to rest during a drag."""
     settings: SearchSettings = field(default_factory=SearchSettings)
     theta_px: float | None = None
     """Outlier distance, px; None for the default."""
@@ -88,6 +90,11 @@ class State:
     """Why the last edit is not on disk; None where all is saved."""
     timeline_version: int = 0
     """Rises whenever the stored poses change."""
+
+    @property
+    def rests_3d(self) -> bool:
+        """Whether the 3-D view and its panels wait for the end of a drag."""
+        return self.drag is not None and bool(self.holding_3d)
 
     @property
     def poses(self) -> tuple[Array, ...]:

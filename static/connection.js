@@ -20,9 +20,16 @@ export class Connection {
   /** @type {Listener} */
   #listener;
 
-  /** @param {Listener} listener */
-  constructor(listener) {
+  /** @type {import("./protocol.js").ClientMessage | null} */
+  #greeting;
+
+  /**
+   * @param {Listener} listener
+   * @param {import("./protocol.js").ClientMessage | null} greeting sent first on every connection
+   */
+  constructor(listener, greeting = null) {
     this.#listener = listener;
+    this.#greeting = greeting;
     this.#connect();
     // A laptop that wakes up or finds its network again need not wait for the next attempt.
     addEventListener("online", () => this.#connect());
@@ -46,6 +53,7 @@ export class Connection {
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
       this.#delayMs = FIRST_DELAY_MS;
+      if (this.#greeting) this.send(this.#greeting);
       this.#listener.onOpen(true);
     };
     socket.onmessage = ({ data }) => {

@@ -15,6 +15,7 @@ import { Store } from "./store.js";
 import { Timeline } from "./timeline.js";
 import { TopBar } from "./top_bar.js";
 import { Transport } from "./transport.js";
+import { drawsInSoftware } from "./webgl.js";
 
 // A token has become a cookie by now, and does not belong into the history or a screenshot.
 if (location.search) history.replaceState(null, "", location.pathname);
@@ -51,7 +52,7 @@ scene.addEventListener("load", () => {
 // viser is dark only where its address says so.
 scene.src = matchMedia("(prefers-color-scheme: dark)").matches ? "viser/?darkMode" : "viser/";
 
-const connection = new Connection(receiver);
+const connection = new Connection(receiver, drawsInSoftware() ? { type: "hold_3d", hold: true } : null);
 
 Object.assign(window, {
   quadrille: {

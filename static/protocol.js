@@ -30,6 +30,7 @@
  *     u: number, v: number, seq: number} |
  *   {type: "view", base: Base, overlays: Overlays} |
  *   {type: "search", action: "step" | "frame" | "stop"} |
+ *   {type: "hold_3d", hold: boolean} |
  *   {type: "undo"} | {type: "redo"}} ClientMessage
  */
 

@@ -14,6 +14,11 @@ _REST_WEIGHT = 0.01
 """Pull of the rest of the chain to its pose at the grab, per rad, against 1 per metre for the dragged point: it
 decides what the pointer leaves open and holds the point back by some 0.1 mm."""
 
+_REACHED_M = 0.002
+"""A point this near to where it should be has followed the pointer."""
+_BEND_RAD = 0.35
+"""How far the last joint of a chain is bent to leave a straight limb's dead point."""
+
 UP_ROTATIONS = {
     "z": np.eye(3),
     "-z": np.diag([1.0, -1.0, -1.0]),
@@ -99,7 +104,16 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
         PointTargets(np.array([hand.point]), target[None], np.ones(1)),
         StayNear(hand.values, np.full(model.n_dofs, _REST_WEIGHT)),
     ]
-    return solve(model, values, blocks, free=hand.free, max_iterations=30).values
+    fit = solve(model, values, blocks, free=hand.free, max_iterations=30)
+    if np.linalg.norm(model.points_world(fit.values)[hand.point] - target) < _REACHED_M:
+        return fit.values
+    # A straight limb cannot see that bending would bring the point nearer: begin with its joint bent, either way.
+    joint = model.dof_joint[np.flatnonzero(hand.free)[-1]]
+    for bend in (_BEND_RAD, -_BEND_RAD):
+        start = model.clip(model.retract(values, np.where(hand.free & (model.dof_joint == joint), bend, 0.0)))
+        bent = solve(model, start, blocks, free=hand.free, max_iterations=30)
+        fit = bent if bent.cost < fit.cost else fit
+    return fit.values
 
 
 def standing_pose(model: BodyModel, cameras: list[Camera], up: str = "z") -> Array:

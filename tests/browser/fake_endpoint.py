@@ -56,7 +56,9 @@ class FakeEndpoint:
     """How long each overlay takes, to try what a slow program does."""
     image_delay_s: float = 0.0
     received: list = field(default_factory=list)
-    """Every message of every page."""
+    """Every message of every page, but for what each says when it connects."""
+    greetings: list = field(default_factory=list)
+    """What the pages said when they connected."""
     sockets: set = field(default_factory=set)
 
     def __post_init__(self):
@@ -91,8 +93,9 @@ class FakeEndpoint:
             await self.send_all(socket)
             async for message in socket:
                 if message.type is WSMsgType.TEXT:
-                    self.received.append(json.loads(message.data))
-                    await self.answer(self.received[-1])
+                    told = json.loads(message.data)
+                    (self.greetings if told["type"] == "hold_3d" else self.received).append(told)
+                    await self.answer(told)
         finally:
             self.sockets.discard(socket)
 

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 from aiohttp import ClientSession, WSServerHandshakeError
-from driving import dragging, listening, shows
+from driving import dragging, listening, shows, until
 
 from app.access import Access
 from app.server import create_app, start_viser, static_folder
@@ -100,3 +100,8 @@ async def test_keys_work_while_the_scene_has_the_focus_except_those_of_its_camer
     await page.keyboard.press("Period")
     await shows(page, "quadrille.state.shown.frame === 13")
     assert endpoint.received == [{"type": "seek", "frame": 13}]
+
+
+async def test_a_page_without_a_graphics_card_asks_the_3d_view_to_wait(page, endpoint):
+    """Headless Chromium draws WebGL in software (chromium.FLAGS)."""
+    await until(lambda: endpoint.greetings == [{"type": "hold_3d", "hold": True}])
