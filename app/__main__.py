@@ -129,6 +129,7 @@ def init(
     method: Literal["joints"] = "joints",
     frame: int = 0,
     person: str | None = None,
+    fit_sizes: bool = False,
     joint_map: Path | None = None,
     axes: str = "x,y,z",
     json: bool = False,
@@ -138,9 +139,10 @@ def init(
     Args:
         session: session folder.
         joints: TRC file of 3-D joints.
-        method: joints fits the pose to known joints; the body's sizes stay.
+        method: joints fits the pose to known joints.
         frame: frame to set.
         person: name; needed where there are several.
+        fit_sizes: take the body's segment lengths from the joints of all frames too.
         joint_map: TOML file that maps the file's joint names to the body's.
         axes: the file's axes in the session's order, such as x,-z,y.
         json: print one JSON object.
@@ -150,7 +152,7 @@ def init(
     at = commands.target(session, person, several=False)
     commands.frame_range(f"{frame}:{frame + 1}", at.session)
 
-    found = commands.init_from_joints(at, frame, read_joints(joints, at.session.fps, joint_map, axes))
+    found = commands.init_from_joints(at, frame, read_joints(joints, at.session.fps, joint_map, axes), fit_sizes)
     residual = f"{found['mean_mm']:.1f} mm from {len(found['residual_mm'])} joints on average"
     print(commands.as_json(found) if json else f"{found['person']}, frame {frame}: {residual}")
 

@@ -23,8 +23,9 @@ from tracker.recording import Recording
 from tracker.records import FrameRow, PoseChange, PoseRecord
 from tracker.references import Reference, stored_poses
 from tracker.rigid import Array
-from tracker.session import Person, Session, load_session
+from tracker.session import Person, Session, load_session, save_session
 from tracker.session_lock import SessionLock
+from tracker.sizes import fit_sizes
 from tracker.track import PoseEstimate, TrackSettings, track_chamfer
 
 _SAVE_FRAMES = 10
@@ -116,13 +117,14 @@ def info(session: Session) -> dict[str, Any]:
     }
 
 
-def init_from_joints(at: Target, frame: int, joints: MarkerTable) -> dict[str, Any]:
+def init_from_joints(at: Target, frame: int, joints: MarkerTable, sizes: bool) -> dict[str, Any]:
     """Fit the pose of one person to known limb joints and store it as a keyframe.
 
     Args:
         at: the session and the person.
         frame: where.
         joints: places of joints under our names.
+        sizes: take the body's lengths from all frames of the joints first; a new model revision, that rewrites no pose.
 
     Returns:
         The residual of each joint, mm, and their mean.
@@ -135,8 +137,13 @@ def init_from_joints(at: Target, frame: int, joints: MarkerTable) -> dict[str, A
     places = dict(zip(joints.names, joints.points[row[0]], strict=True))
     # Neck and head mean other places in every convention; the limbs pose the trunk as well.
     limbs = {n: p for n, p in places.items() if n in LIMB_JOINTS and np.all(np.isfinite(p))}
+    if sizes:
+        person = replace(person, model=fit_sizes(person.model, joints))
     fit = fit_to_points(person.model, limbs)
     with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
+        if sizes:
+            people = tuple(person if i == index else p for i, p in enumerate(session.people))
+            save_session(replace(session, people=people))
         revision = store.add_model_revision(person.name, format_model(person.model))
         sources = ("imported",) * len(fit.values)
         record = PoseRecord(fit.values, sources, revision, keyframe=True, settings={"method": "joints"})
