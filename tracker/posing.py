@@ -1,23 +1,39 @@
 """Posing a body by hand: a point of it follows a place in an image, the rest of the chain gives way."""
 
 from dataclasses import dataclass
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel
+from tracker import rigid
+from tracker.body import BodyModel, Kinematics
 from tracker.cameras import Camera
-from tracker.fit import Block, PointTargets, StayNear, fit_to_points, solve
+from tracker.fit import Block, StayNear, fit_to_points, solve
 from tracker.rigid import Array
 
-_REST_WEIGHT = 0.01
+
+class _Solving(TypedDict):
+    max_iterations: int
+    tolerance: float
+
+
+_REST_WEIGHT = 0.003
 """Pull of the rest of the chain to its pose at the grab, per rad, against 1 per metre for the dragged point: it
 decides what the pointer leaves open and holds the point back by some 0.1 mm."""
+_DEPTH_WEIGHT = 0.1
+"""Weight of keeping the point's depth, against 1 for being under the pointer: where the limb's lengths allow only one
+of the two, the point goes where the hand sees it go."""
+_NEAREST_M = 0.05
+"""Depths below this count as this: a point is not dragged through the camera."""
 
-_REACHED_M = 0.002
-"""A point this near to where it should be has followed the pointer."""
+_REACHED_PX = 0.5
+"""A point this near to the pointer has followed it."""
 _BEND_RAD = 0.35
 """How far the last joint of a chain is bent to leave a straight limb's dead point."""
+
+_QUICK: _Solving = {"max_iterations": 15, "tolerance": 1e-4}
+"""A hand makes dozens of moves a second, each from where the last one ended."""
 
 UP_ROTATIONS = {
     "z": np.eye(3),
@@ -83,8 +99,32 @@ def grab(model: BodyModel, values: Array, camera: Camera, point: str, pointer_px
     return Grab(model, camera.pinhole, index, np.array(values), float(camera.depths(place)), offset, free)
 
 
+@dataclass(frozen=True, eq=False)
+class _UnderPointer:
+    """A `Block` that draws the grabbed point to a line of sight and, more weakly, to its depth at the grab."""
+
+    hand: Grab
+    target_world: Array
+    """Where the point should be, (3,), metres: under the pointer, at the depth."""
+
+    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> tuple[Array, Array]:
+        """See `Block`."""
+        hand, T_camera_world = self.hand, self.hand.camera.T_camera_world
+        parts = model.point_parts[[hand.point]]
+        point_world = rigid.apply(kinematics.Ts_world_part[parts[0]], model.points_part[hand.point])
+        x = rigid.apply(T_camera_world, point_world)
+        target = rigid.apply(T_camera_world, self.target_world)
+        J = T_camera_world[:3, :3] @ model.point_jacobian(kinematics, parts, point_world[None])[0]  # (3, n_dofs)
+        z = max(x[2], _NEAREST_M)
+        # Angles times depth, so that both are in metres.
+        across = hand.depth_m * (x[:2] / z - target[:2] / target[2])
+        J_across = hand.depth_m / z * (J[:2] - np.outer(x[:2] / z, J[2]))  # (2, n_dofs)
+        r = np.append(across, _DEPTH_WEIGHT * (x[2] - hand.depth_m))
+        return r, np.concatenate([J_across, _DEPTH_WEIGHT * J[2:]])
+
+
 def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
-    """Let the grabbed point follow the pointer, at the depth it had, within the joint limits.
+    """Let the grabbed point follow the pointer, as near to the depth it had as the limb's lengths allow.
 
     Args:
         hand: from `grab`.
@@ -101,17 +141,18 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
         step[hand.free] = target - model.points_world(hand.values)[0]
         return model.retract(hand.values, step)
     blocks: list[Block] = [
-        PointTargets(np.array([hand.point]), target[None], np.ones(1)),
+        _UnderPointer(hand, target),
         StayNear(hand.values, np.full(model.n_dofs, _REST_WEIGHT)),
     ]
-    fit = solve(model, values, blocks, free=hand.free, max_iterations=30)
-    if np.linalg.norm(model.points_world(fit.values)[hand.point] - target) < _REACHED_M:
+    fit = solve(model, values, blocks, free=hand.free, **_QUICK)
+    joint, first = model.dof_joint[hand.free][[-1, 0]]
+    seen = hand.camera.project(model.points_world(fit.values)[hand.point])
+    if joint == first or np.linalg.norm(seen - hand.camera.project(target)) < _REACHED_PX:
         return fit.values
     # A straight limb cannot see that bending would bring the point nearer: begin with its joint bent, either way.
-    joint = model.dof_joint[np.flatnonzero(hand.free)[-1]]
     for bend in (_BEND_RAD, -_BEND_RAD):
         start = model.clip(model.retract(values, np.where(hand.free & (model.dof_joint == joint), bend, 0.0)))
-        bent = solve(model, start, blocks, free=hand.free, max_iterations=30)
+        bent = solve(model, start, blocks, free=hand.free, **_QUICK)
         fit = bent if bent.cost < fit.cost else fit
     return fit.values
 

@@ -1,0 +1,202 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from staging import camera_at, cameras_around, shaken
+
+from tracker import rigid
+from tracker.posing import UP_ROTATIONS, drag, grab, standing_pose
+
+SIDE = camera_at("side", (3.0, 2.5, 1.0))
+
+
+def place(model, values, point):
+    return model.points_world(values)[model.point_names.index(point)]
+
+
+@pytest.fixture(scope="module")
+def pose(gavrila):
+    """Arms half raised and limbs bent: room to move in every direction."""
+    values = gavrila.neutral()
+    for name, angle in {
+        "left_shoulder.abduction": 0.8, "right_shoulder.abduction": 0.8, "left_shoulder.elevation": 0.3,
+        "left_elbow.extension": 0.9, "right_elbow.extension": 0.9, "left_hip.elevation": 0.5,
+        "left_knee.extension": 0.9, "right_knee.extension": 0.8, "right_hip.elevation": 0.3,
+    }.items():  # fmt: skip
+        values[gavrila.value_names.index(name)] = angle
+    return values
+
+
+@pytest.mark.parametrize("point", ["left_wrist", "right_wrist", "left_elbow", "left_ankle", "right_ankle", "left_knee"])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_dragged_joint_stays_under_the_pointer(gavrila, pose, point, seed):
+    """The pointer goes where the chain can follow: to where another pose of the limb would show the point."""
+    rng = np.random.default_rng(seed)
+    hold = np.array([2.0, -1.0])  # the handle was not hit in its middle
+    start = SIDE.project(place(gavrila, pose, point)) + hold
+    hand = grab(gavrila, pose, SIDE, point, start)
+    other = gavrila.clip(gavrila.retract(pose, np.where(hand.free, rng.normal(0, 0.25, gavrila.n_dofs), 0)))
+    goal = SIDE.project(place(gavrila, other, point)) + hold
+    values = pose
+    for part in (0.25, 0.5, 0.75, 1.0):
+        values = drag(hand, start + part * (goal - start), values)
+        np.testing.assert_allclose(gavrila.clip(values), values, atol=1e-9)
+    assert np.linalg.norm(goal - start) > 2
+    assert np.linalg.norm(SIDE.project(place(gavrila, values, point)) + hold - goal) < 1
+
+
+@pytest.mark.parametrize("way", [(6, 0), (-6, 3), (-3, -5), (10, -10)])
+@pytest.mark.parametrize("point", ["left_wrist", "right_wrist", "left_ankle", "right_ankle"])
+def test_where_two_bones_allow_it_the_depth_is_kept(gavrila, pose, point, way):
+    start = SIDE.project(place(gavrila, pose, point))
+    hand = grab(gavrila, pose, SIDE, point, start)
+    end = place(gavrila, drag(hand, start + way, pose), point)
+    assert SIDE.depths(end) == pytest.approx(hand.depth_m, abs=0.01)
+    assert np.linalg.norm(SIDE.project(end) - start - way) < 0.5
+
+
+def test_where_one_bone_decides_the_depth_the_pointer_is_followed(gavrila, pose):
+    # The elbow moves on a sphere around the shoulder: at its old depth it would stay 4 px behind.
+    start = SIDE.project(place(gavrila, pose, "left_elbow"))
+    hand = grab(gavrila, pose, SIDE, "left_elbow", start)
+    end = place(gavrila, drag(hand, start + np.array([-3, -5]), pose), "left_elbow")
+    assert np.linalg.norm(SIDE.project(end) - start - (-3, -5)) < 0.5
+    assert abs(SIDE.depths(end) - hand.depth_m) > 0.03
+
+
+def test_a_straight_limb_bends(gavrila):
+    camera = camera_at("side", (0.0, 4.0, 0.0))
+    values = gavrila.neutral()
+    start = camera.project(place(gavrila, values, "left_ankle"))
+    hand = grab(gavrila, values, camera, "left_ankle", start)
+    bent = drag(hand, start - np.array([0, 25]), values)
+    assert np.linalg.norm(camera.project(place(gavrila, bent, "left_ankle")) - start + (0, 25)) < 1
+    assert bent[gavrila.value_names.index("left_knee.extension")] > 0.5
+
+
+@pytest.mark.parametrize(
+    ("point", "moves"),
+    [
+        ("left_wrist", {"left_shoulder", "left_elbow"}),
+        ("left_elbow", {"left_shoulder"}),
+        ("right_ankle", {"right_hip", "right_knee"}),
+        ("right_knee", {"right_hip"}),
+        ("head", {"torso"}),
+        ("left_shoulder", {"torso"}),
+        ("torso", {"torso"}),
+    ],
+)
+def test_only_the_chain_moves(gavrila, pose, point, moves):
+    start = SIDE.project(place(gavrila, pose, point))
+    values = drag(grab(gavrila, pose, SIDE, point, start), start + np.array([9, -7]), pose)
+    changed = np.abs(gavrila.difference(values, pose)) > 1e-9
+    assert {n.split(".")[0] for n, c in zip(gavrila.dof_names, changed, strict=True) if c} == moves
+    if point in ("head", "left_shoulder"):  # the body turns about its root, which stays
+        np.testing.assert_array_equal(place(gavrila, values, "torso"), place(gavrila, pose, "torso"))
+
+
+@pytest.mark.parametrize("camera", cameras_around(3))
+def test_the_torso_moves_the_body_parallel_to_the_image(gavrila, pose, camera):
+    start = camera.project(place(gavrila, pose, "torso")) + np.array([4, 4])
+    hand = grab(gavrila, pose, camera, "torso", start)
+    values = drag(hand, start + np.array([80, -50]), pose)
+    shift = place(gavrila, values, "torso") - place(gavrila, pose, "torso")
+    moved = gavrila.points_world(values) - gavrila.points_world(pose)
+    np.testing.assert_allclose(moved, np.broadcast_to(shift, moved.shape))
+    assert camera.depths(place(gavrila, values, "torso")) == pytest.approx(
+        float(camera.depths(place(gavrila, pose, "torso"))), abs=1e-9
+    )
+    np.testing.assert_allclose(camera.project(place(gavrila, values, "torso")), start + np.array([76, -54]), atol=1e-6)
+
+
+@pytest.mark.parametrize("point", ["left_wrist", "right_ankle", "head", "torso"])
+def test_the_way_back_restores_the_pose(gavrila, pose, point):
+    start = SIDE.project(place(gavrila, pose, point))
+    hand = grab(gavrila, pose, SIDE, point, start)
+    values = pose
+    for way in [(10, 0), (15, 10), (5, 20), (-5, 5), (0, 0)]:
+        values = drag(hand, start + way, values)
+    # Within a tenth of a degree and a millimetre: nobody sees it.
+    assert np.abs(gavrila.difference(values, pose)).max() < 0.002
+
+
+def test_without_moving_nothing_moves(gavrila, pose):
+    start = SIDE.project(place(gavrila, pose, "left_wrist")) + np.array([3, 3])
+    values = drag(grab(gavrila, pose, SIDE, "left_wrist", start), start, pose)
+    np.testing.assert_allclose(values, pose, atol=1e-6)
+
+
+def test_limits_hold_however_far_the_pointer_goes(gavrila, pose):
+    rng = np.random.default_rng(0)
+    for point in ("left_wrist", "right_elbow", "left_ankle", "head"):
+        start = SIDE.project(place(gavrila, pose, point))
+        values = drag(grab(gavrila, pose, SIDE, point, start), start + rng.uniform(-400, 400, 2), pose)
+        np.testing.assert_allclose(gavrila.clip(values), values, atol=1e-9)
+        assert np.all(np.isfinite(values))
+
+
+def test_out_of_reach_the_limb_points_at_the_pointer(gavrila, pose):
+    camera = camera_at("ahead", (4.0, 0.0, 0.3), (0.0, 0.0, 0.3))
+    start = camera.project(place(gavrila, pose, "left_wrist"))
+    shoulder = place(gavrila, pose, "left_shoulder")
+    hand = grab(gavrila, pose, camera, "left_wrist", start)
+    goal_px = camera.project(shoulder) + np.array([300, 0])
+    values = pose
+    for _ in range(5):  # the pointer rests there for a few moves
+        values = drag(hand, goal_px, values)
+    goal = camera.back_project(goal_px, hand.depth_m)
+    arm = place(gavrila, values, "left_wrist") - shoulder
+    reach = np.linalg.norm(arm)
+    assert reach > 0.98 * (0.162 + 0.1545) * gavrila.height_m
+    assert np.degrees(np.arccos(arm @ (goal - shoulder) / reach / np.linalg.norm(goal - shoulder))) < 5
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_from_any_pose_the_joint_follows_or_a_limit_holds_it(gavrila, seed):
+    rng = np.random.default_rng(seed)
+    values = shaken(gavrila, gavrila.neutral(), rng, 0.6, 0.3)
+    for point in ("left_wrist", "right_wrist", "left_ankle", "right_ankle"):
+        camera = cameras_around()[seed % 3]
+        start = camera.project(place(gavrila, values, point))
+        way = rng.uniform(-15, 15, 2)
+        moved = drag(grab(gavrila, values, camera, point, start), start + way, values)
+        end = camera.project(place(gavrila, moved, point))
+        assert np.linalg.norm(end - start - way) < np.linalg.norm(way)  # nearer than it was
+
+
+@pytest.mark.parametrize("up", list(UP_ROTATIONS))
+def test_standing_pose(gavrila, up):
+    """Upright along the axis said to be up, where the cameras look, whatever the axes of the world."""
+    R, center = UP_ROTATIONS[up], np.array([1.0, 2.0, 3.0])
+    T = rigid.transform(R, center)
+    cameras = [
+        camera_at(c.name, c.center_world, (0, 0, 0)) for c in cameras_around(3)
+    ]  # they look at the origin of a world whose up is z
+    turned = [_moved(c, T) for c in cameras]
+    values = standing_pose(gavrila, turned, up)
+    np.testing.assert_allclose(place(gavrila, values, "torso"), center, atol=0.02)
+    axis = np.array([{"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}[up[-1]]])[0] * (-1 if up[0] == "-" else 1)
+    points = dict(zip(gavrila.point_names, gavrila.points_world(values) @ axis, strict=True))
+    assert points["head"] > points["left_shoulder"] > points["torso"] > points["left_knee"] > points["left_ankle"]
+    assert points["head"] - points["left_ankle"] == pytest.approx(
+        np.ptp(gavrila.points_world(gavrila.neutral())[:, 2]), abs=0.01
+    )
+    np.testing.assert_allclose(gavrila.clip(values), values, atol=1e-9)
+
+
+def _moved(camera, T_new_world):
+    return replace(camera, T_world_camera=T_new_world @ camera.T_world_camera)
+
+
+def test_standing_pose_before_a_single_camera(gavrila):
+    camera = camera_at("only", (1.0, 0.0, 1.0), (2.0, 0.0, 1.0))
+    values = standing_pose(gavrila, [camera])
+    np.testing.assert_allclose(place(gavrila, values, "torso"), [5.0, 0.0, 1.0], atol=0.01)  # 4 m in front
+
+
+def test_up_rotations_are_rotations():
+    for up, R in UP_ROTATIONS.items():
+        np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(R) == pytest.approx(1)
+        axis = np.eye(3)["xyz".index(up[-1])] * (-1 if up[0] == "-" else 1)
+        np.testing.assert_allclose(R[:, 2], axis)
