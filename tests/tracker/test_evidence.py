@@ -1,0 +1,226 @@
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from staging import camera_at
+
+from tracker.cameras import Camera
+from tracker.errors import RecordingError
+from tracker.evidence import (
+    FOREGROUND_MARGIN,
+    SCENE_SPACING_PX,
+    Observer,
+    default_theta_px,
+    distance_image,
+    match_scale,
+    view_evidence,
+)
+from tracker.recording import Recording
+from tracker.session import CameraSource, load_session
+
+
+class Frames:
+    """Stands for a recording: the same pictures at every frame; None is a damaged one."""
+
+    def __init__(self, *images):
+        self.images = images
+
+    def read(self, k):
+        return self.images
+
+
+def source(camera, **side_files):
+    return CameraSource(camera, footage=None, **side_files)
+
+
+def observe(camera, image, k=0, **side_files):
+    (view,) = Observer([source(camera, **side_files)], Frames(image)).evidence(k)
+    return view
+
+
+def square_picture(camera, half_m=0.5):
+    """A white square of the plane x = 0 on black as the camera films it, lens and all, and its outline in the world."""
+    u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+    rays = camera.rays(np.stack([u, v], axis=-1))
+    hits = camera.center_world - camera.center_world[0] * rays / rays[..., :1]
+    white = np.all(np.abs(hits[..., 1:]) < half_m, axis=-1)
+    t = np.linspace(-half_m, half_m, 200)
+    end = np.full_like(t, half_m)
+    sides = [np.stack([0 * t, y, z], axis=1) for y, z in ((t, end), (t, -end), (end, t), (-end, t))]
+    return np.where(white[..., None], 255, 0).astype(np.uint8).repeat(3, axis=-1), np.concatenate(sides)
+
+
+def off_square(view, outline_world):
+    """Distance of each edge point from the outline as the view's own camera projects it, px."""
+    px = view.camera.project(outline_world)
+    return np.linalg.norm(view.points_px[:, None] - px, axis=-1).min(axis=1)
+
+
+LENS = np.array([-0.1, 0.02, 0.001, -0.001])
+
+
+@pytest.mark.parametrize("size", [(640, 480), (1920, 1080), (1080, 1920), (1023, 771)])
+@pytest.mark.parametrize("lens", [np.zeros(0), LENS], ids=["pinhole", "lens"])
+def test_edges_stay_registered_through_undistortion_and_scaling(size, lens):
+    camera = replace(camera_at("c", (2.5, 0.7, 0.3), size=size, focal=0.8 * size[0]), distortion=lens)
+    image, outline = square_picture(camera)
+    view = observe(camera, image)
+    assert view.camera.is_pinhole
+    assert view.distance.shape == (view.camera.height, view.camera.width)
+    assert view.camera.width * view.camera.height <= 640 * 480 * 1.01
+    assert view.scale == pytest.approx(view.camera.width / camera.width, abs=1e-3)
+    off = off_square(view, outline)
+    assert len(off) > 50
+    # Smoothing rounds the four corners; everywhere else edges are where they belong.
+    assert np.sort(off)[:-8].max() < 1
+    assert off.mean() < 0.6
+
+
+def test_small_images_are_not_enlarged():
+    assert match_scale(camera_at("c", (4, 0, 0), size=(320, 240))) == 1
+    assert match_scale(camera_at("c", (4, 0, 0), size=(640, 480))) == 1
+    assert match_scale(camera_at("c", (4, 0, 0), size=(1280, 960))) == pytest.approx(0.5)
+
+
+def test_theta_is_a_share_of_the_longer_side():
+    assert default_theta_px(camera_at("c", (4, 0, 0), size=(640, 480))) == pytest.approx(19.2)
+    assert default_theta_px(camera_at("c", (4, 0, 0), size=(480, 640))) == pytest.approx(19.2)
+
+
+def test_distance_image():
+    edges = np.zeros((40, 60), dtype=bool)
+    edges[20, 10] = True
+    v, u = np.mgrid[:40, :60]
+    distance = distance_image(edges, 30.0)
+    assert distance.dtype == np.float32
+    np.testing.assert_allclose(distance, np.minimum(np.hypot(u - 10, v - 20), 30), rtol=0.03)
+    assert distance[20, 10] == 0
+    assert distance.max() == 30
+    assert (distance_image(np.zeros((4, 5), dtype=bool), 7.0) == 7).all()
+
+
+def test_scene_points_are_edges_one_to_a_cell():
+    camera = camera_at("c", (4, 0, 0), size=(90, 60))
+    edges = np.zeros((60, 90), dtype=bool)
+    edges[10, 5:80] = edges[20:50, 40] = True
+    view = view_evidence(camera, 1.0, edges)
+    u, v = view.points_px.astype(int).T
+    assert edges[v, u].all()
+    cells = set(zip(u // SCENE_SPACING_PX, v // SCENE_SPACING_PX, strict=True))
+    assert len(cells) == len(u)
+    all_v, all_u = np.nonzero(edges)
+    assert cells == set(zip(all_u // SCENE_SPACING_PX, all_v // SCENE_SPACING_PX, strict=True))
+
+
+def test_a_damaged_frame_has_no_edges():
+    camera = camera_at("c", (4, 0, 0))
+    view = observe(camera, None)
+    assert view.points_px.shape == (0, 2)
+    assert len(np.unique(view.distance)) == 1
+    observer = Observer([source(camera)], Frames(None))
+    assert observer.images(0) == (None,)
+
+
+@pytest.fixture(scope="module")
+def sample(sample_folder):
+    session = load_session(sample_folder)
+    with Recording(session.cameras) as recording:
+        yield session, recording
+
+
+def edge_share(views, masks_px):
+    """Share of the edge points that lie within a mask of each view."""
+    inside = [
+        m[v.points_px[:, 1].astype(int), v.points_px[:, 0].astype(int)] for v, m in zip(views, masks_px, strict=True)
+    ]
+    return np.concatenate(inside).mean()
+
+
+def person_boxes(real_frame, cameras, margin_px=60):
+    """The part of each image where the person is: the box around the fitted body's joints, generously."""
+    boxes = []
+    for camera in cameras:
+        px = camera.pinhole.project(real_frame.model.points_world(real_frame.values))
+        left, top = np.maximum(0, px.min(axis=0).astype(int) - margin_px)
+        right, bottom = px.max(axis=0).astype(int) + margin_px
+        box = np.zeros((camera.height, camera.width), dtype=bool)
+        box[top:bottom, left:right] = True
+        boxes.append(box)
+    return boxes
+
+
+def test_the_background_keeps_edges_to_the_person(sample, real_frame):
+    session, recording = sample
+    boxes = person_boxes(real_frame, [c.camera for c in session.cameras])
+    bare = Observer([replace(c, background=None) for c in session.cameras], recording).evidence(25)
+    with_background = Observer(session.cameras, recording).evidence(25)
+    assert edge_share(with_background, boxes) > 0.95
+    assert edge_share(bare, boxes) < 0.5  # racks and bars
+    for view in with_background:
+        assert 200 < len(view.points_px) < 2000
+
+
+def test_masks_go_before_the_background(sample, tmp_path, real_frame):
+    session, recording = sample
+    cameras = [c.camera for c in session.cameras]
+    discs = []
+    for c in cameras:
+        mask = np.zeros((c.height, c.width), np.uint8)
+        middle = c.project(real_frame.model.points_world(real_frame.values))[0]
+        cv2.circle(mask, tuple(int(x) for x in middle), 40, 1, -1)
+        (tmp_path / c.name).mkdir()
+        cv2.imwrite(str(tmp_path / c.name / "000025.png"), mask)
+        discs.append(mask)
+    observer = Observer([replace(c, masks=tmp_path / c.camera.name) for c in session.cameras], recording)
+    for view, camera, disc in zip(observer.evidence(25), cameras, discs, strict=True):
+        undistorted = camera.undistort_image(disc, nearest=True)
+        outside = cv2.distanceTransform(1 - undistorted, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        u, v = view.points_px.astype(int).T
+        assert outside[v, u].max() <= FOREGROUND_MARGIN * 640 * 1.03
+        assert len(u) > 20
+    # A frame without a mask falls back on the background.
+    without = Observer(session.cameras, recording).evidence(24)
+    for a, b in zip(observer.evidence(24), without, strict=True):
+        np.testing.assert_array_equal(a.points_px, b.points_px)
+
+
+def test_an_empty_mask_says_that_nobody_is_there(sample, tmp_path):
+    session, recording = sample
+    first = session.cameras[0]
+    cv2.imwrite(str(tmp_path / "000025.png"), np.zeros((480, 640), np.uint8))
+    cameras = [replace(first, masks=tmp_path), *session.cameras[1:]]
+    views = Observer(cameras, recording).evidence(25)
+    assert [bool(len(v.points_px)) for v in views] == [False, True, True, True]
+
+
+def test_images_are_undistorted(sample):
+    session, recording = sample
+    raw = recording.read(3)
+    shown = Observer(session.cameras, recording).images(3)
+    for source_, before, after in zip(session.cameras, raw, shown, strict=True):
+        np.testing.assert_array_equal(after, source_.camera.undistort_image(before))
+        assert not np.array_equal(after, before)
+
+
+def test_a_background_of_another_size(sample, tmp_path):
+    session, recording = sample
+    cv2.imwrite(str(tmp_path / "small.png"), np.zeros((24, 32, 3), np.uint8))
+    cameras = [replace(session.cameras[0], background=tmp_path / "small.png"), *session.cameras[1:]]
+    with pytest.raises(RecordingError, match=r"camera 'FRONT'.*640x480.*32x24"):
+        Observer(cameras, recording)
+
+
+def test_same_frame_twice_is_the_same(sample):
+    session, recording = sample
+    observer = Observer(session.cameras, recording)
+    for a, b in zip(observer.evidence(7), observer.evidence(7), strict=True):
+        np.testing.assert_array_equal(a.distance, b.distance)
+
+
+def test_the_matched_camera_is_the_pinhole_scaled():
+    camera = Camera("c", (1920, 1080), np.array([[1500.0, 0, 960], [0, 1500, 540], [0, 0, 1]]), LENS, np.eye(4))
+    view = observe(camera, np.zeros((1080, 1920, 3), np.uint8))
+    expected = camera.pinhole.scaled(match_scale(camera))
+    np.testing.assert_allclose(view.camera.K, expected.K)
+    assert view.camera.size == expected.size

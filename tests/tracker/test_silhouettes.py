@@ -1,0 +1,66 @@
+import numpy as np
+import pytest
+
+from tracker.silhouettes import MIN_DIFFERENCE, grow, subtract_background
+
+
+def room(seed=0, noise=0.0):
+    """A textured room, (80, 100, 3), with the noise of one picture."""
+    texture = np.random.default_rng(0).integers(60, 190, (80, 100, 3)).astype(float)
+    return np.clip(texture + np.random.default_rng(seed).normal(0, noise, texture.shape), 0, 255).astype(np.uint8)
+
+
+def test_finds_what_is_new():
+    background, image = room(), room()
+    image[20:50, 30:60] = (250, 20, 20)
+    found = subtract_background(image, background)
+    assert found.dtype == bool
+    assert found[23:47, 33:57].all()
+    # Smoothing spreads a difference by some 2 px.
+    outside = np.ones_like(found)
+    outside[17:53, 27:63] = False
+    assert not found[outside].any()
+
+
+def test_one_channel_is_enough():
+    background = np.full((40, 40, 3), 100, np.uint8)
+    for channel in range(3):
+        image = background.copy()
+        image[10:30, 10:30, channel] += 40
+        assert subtract_background(image, background)[12:28, 12:28].all()
+
+
+def test_noise_is_no_person_even_where_it_is_strong():
+    for noise in (2.0, 12.0):
+        found = subtract_background(room(1, noise), room(2, noise))
+        assert found.mean() < 0.002, noise
+
+
+def test_single_pixels_and_small_changes_do_not_count():
+    background = np.full((40, 40, 3), 100, np.uint8)
+    image = background.copy()
+    image[20, 20] = 250
+    image[:, 30:] = 100 + int(MIN_DIFFERENCE) - 2
+    found = subtract_background(image, background)
+    assert not found[:, 30:].any()
+    assert found.sum() < 25
+    assert not subtract_background(background, background).any()
+
+
+@pytest.mark.parametrize("radius", [1.0, 4.0, 7.5])
+def test_growing_by_a_radius(radius):
+    mask = np.zeros((60, 60), dtype=bool)
+    mask[30, 25] = True
+    v, u = np.mgrid[:60, :60]
+    distance = np.hypot(u - 25, v - 30)
+    grown = grow(mask, radius)
+    # The 5x5 distance transform is right to 2% or so.
+    assert grown[distance <= 0.97 * radius].all()
+    assert not grown[distance > 1.03 * radius].any()
+
+
+def test_nothing_to_grow():
+    mask = np.zeros((10, 10), dtype=bool)
+    assert not grow(mask, 5).any()
+    mask[5, 5] = True
+    assert grow(mask, 0.5).sum() == 1
