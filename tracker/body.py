@@ -112,6 +112,16 @@ class Tree(NamedTuple):
     """Unit axis of each operation that revolves, (n_ops, 3)."""
 
 
+class _Ball(NamedTuple):
+    """A ball joint's place in the arrays of a pose."""
+
+    joint: Joint
+    dofs: slice
+    """Its three degrees of freedom."""
+    values: slice
+    """Its quaternion."""
+
+
 class Kinematics(NamedTuple):
     """Where a pose puts everything."""
 
@@ -169,7 +179,7 @@ class BodyModel:
         """Names of all degrees of freedom, e.g. `left_shoulder.abduction`."""
         return tuple(n for j in self.joints for n in j.dof_names)
 
-    @property
+    @cached_property
     def n_dofs(self) -> int:
         """Number of degrees of freedom."""
         return len(self.dof_names)
@@ -310,42 +320,49 @@ class BodyModel:
     def retract(self, values: Array, step: Array) -> Array:
         """Move a pose by a step in its degrees of freedom, (n_dofs,); angles and lengths add, balls turn."""
         out = np.array(values, dtype=np.float64)
-        first = 0
-        for j in self.joints:
-            n = len(j.dof_names)
-            at = self.dof_value[first : first + n]
-            n_plain = n - 3 if j.kind == "ball" else n
-            out[at[:n_plain]] += step[first : first + n_plain]
-            if j.kind == "ball":
-                q = slice(at[-1], at[-1] + 4)
-                turn = rigid.quaternion_exp(step[first + n_plain : first + n])
-                out[q] = rigid.quaternion_multiply(out[q], turn)
-            first += n
+        dofs, at = self._plain
+        out[at] += step[dofs]
+        for ball in self._balls:
+            turn = rigid.quaternion_exp(step[ball.dofs])
+            out[ball.values] = rigid.quaternion_multiply(out[ball.values], turn)
         return out
 
     def difference(self, values_to: Array, values_from: Array) -> Array:
         """Step in the degrees of freedom, (n_dofs,), that `retract` needs from one pose to the other."""
-        step = (np.asarray(values_to) - values_from)[self.dof_value].astype(np.float64)
-        for i, j in enumerate(self.joints):
-            if j.kind == "ball":
-                dofs = np.flatnonzero(self.dof_joint == i)[-3:]
-                q = slice(self.dof_value[dofs[0]], self.dof_value[dofs[0]] + 4)
-                back = np.asarray(values_from)[q] * (1.0, -1.0, -1.0, -1.0)
-                step[dofs] = rigid.quaternion_log(rigid.quaternion_multiply(back, np.asarray(values_to)[q]))
+        to, start = np.asarray(values_to, dtype=np.float64), np.asarray(values_from, dtype=np.float64)
+        step = np.empty(self.n_dofs)
+        dofs, at = self._plain
+        step[dofs] = to[at] - start[at]
+        for ball in self._balls:
+            back = start[ball.values] * (1.0, -1.0, -1.0, -1.0)
+            step[ball.dofs] = rigid.quaternion_log(rigid.quaternion_multiply(back, to[ball.values]))
         return step
 
     def clip(self, values: Array) -> Array:
         """Put a pose within the joint limits: angles to their range, balls to their cone and twist."""
         out = np.array(values, dtype=np.float64)
-        for i, j in enumerate(self.joints):
-            dofs = np.flatnonzero(self.dof_joint == i)
-            if j.kind == "ball":
-                at = self.dof_value[dofs[-1]]
-                out[at : at + 4] = _clip_ball(out[at : at + 4], j.cone, j.twist)
-            else:
-                at = self.dof_value[dofs]
-                out[at] = np.clip(out[at], self.limits[dofs, 0], self.limits[dofs, 1])
+        dofs, at = self._plain
+        out[at] = np.minimum(np.maximum(out[at], self.limits[dofs, 0]), self.limits[dofs, 1])
+        for ball in self._balls:
+            out[ball.values] = _clip_ball(out[ball.values], ball.joint.cone, ball.joint.twist)
         return out
+
+    @cached_property
+    def _plain(self) -> tuple[IntArray, IntArray]:
+        """The degrees of freedom that are values themselves, and the index of each into the values."""
+        dofs = np.setdiff1d(np.arange(self.n_dofs), np.concatenate([[], *(np.r_[b.dofs] for b in self._balls)]))
+        return dofs.astype(np.int64), self.dof_value[dofs.astype(np.int64)]
+
+    @cached_property
+    def _balls(self) -> tuple["_Ball", ...]:
+        """Where the ball joints are in the degrees of freedom and in the values."""
+        out = []
+        for i, joint in enumerate(self.joints):
+            if joint.kind == "ball":
+                last = int(np.flatnonzero(self.dof_joint == i)[-1])
+                at = int(self.dof_value[last])
+                out.append(_Ball(joint, slice(last - 2, last + 1), slice(at, at + 4)))
+        return tuple(out)
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,8 +27,8 @@ of the two, the point goes where the hand sees it go."""
 _NEAREST_M = 0.05
 """Depths below this count as this: a point is not dragged through the camera."""
 
-_REACHED_PX = 0.5
-"""A point this near to the pointer has followed it."""
+_REACHED_M = 0.002
+"""A point this near to where it should be has followed the pointer."""
 _BEND_RAD = 0.35
 """How far the last joint of a chain is bent to leave a straight limb's dead point."""
 
@@ -146,8 +146,7 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
     ]
     fit = solve(model, values, blocks, free=hand.free, **_QUICK)
     joint, first = model.dof_joint[hand.free][[-1, 0]]
-    seen = hand.camera.project(model.points_world(fit.values)[hand.point])
-    if joint == first or np.linalg.norm(seen - hand.camera.project(target)) < _REACHED_PX:
+    if joint == first or np.linalg.norm(model.points_world(fit.values)[hand.point] - target) < _REACHED_M:
         return fit.values
     # A straight limb cannot see that bending would bring the point nearer: begin with its joint bent, either way.
     for bend in (_BEND_RAD, -_BEND_RAD):
