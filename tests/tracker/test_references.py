@@ -1,0 +1,149 @@
+import shutil
+
+import numpy as np
+import pytest
+
+from tracker.annotations import AnnotationStore
+from tracker.errors import FormatError, SessionError
+from tracker.formats.model_toml import format_model, load_model
+from tracker.formats.pose_table import write_pose_table
+from tracker.formats.trc import read_trc, write_trc
+from tracker.joint_maps import JOINTS
+from tracker.records import PoseChange, PoseRecord
+from tracker.references import read_joints, read_reference, stored_poses
+from tracker.session import CameraSource, Person, create_session, load_session
+
+
+@pytest.fixture
+def copy(sample_folder, tmp_path):
+    """A working copy of the sample's session, without its footage."""
+    for name in ("session.toml", "calibration.toml", "models"):
+        source = sample_folder / name
+        (shutil.copytree if source.is_dir() else shutil.copy)(source, tmp_path / name)
+    return load_session(tmp_path)
+
+
+def store_poses(session, person, poses, keyframe=False):
+    store = AnnotationStore(session.annotations_path)
+    model = next(p.model for p in session.people if p.name == person)
+    revision = store.add_model_revision(person, format_model(model))
+    changes = [
+        PoseChange(person, f, PoseRecord(v, ("manual",) * len(v), revision, keyframe=keyframe))
+        for f, v in poses.items()
+    ]
+    store.commit("place", changes)
+    store.close()
+
+
+def two_people(tmp_path, copy, names=("ann", "bob"), model="gavrila22"):
+    cameras = [CameraSource(c.camera, c.footage) for c in copy.cameras]
+    people = [Person(n, load_model(model, 1.7), "#112233") for n in names]
+    return create_session(tmp_path / "other", cameras=cameras, people=people, fps=copy.fps, n_frames=copy.n_frames)
+
+
+def test_the_samples_truth_as_joints(sample_folder, copy):
+    reference = read_reference(sample_folder / "truth.trc", copy, 0)
+    assert set(JOINTS) <= set(reference.joints.names)
+    assert reference.joints.frames.tolist() == list(range(50))
+    assert reference.poses is None
+    points = dict(zip(reference.joints.names, reference.joints.points[0], strict=True))
+    assert points["head"][2] > points["left_hip"][2] > points["left_ankle"][2] > 0
+    assert points["left_hip"][1] > points["right_hip"][1]
+
+
+def test_the_samples_truth_as_poses(sample_folder, copy):
+    """The table names no preset: its joints are those of the person's own model, its angles those of the truth."""
+    reference = read_reference(sample_folder / "truth.csv", copy, 0)
+    assert sorted(reference.poses) == list(range(50))
+    model = copy.people[0].model
+    expected = model.points_world(reference.poses[7])[model.point_names.index("left_wrist")]
+    at = reference.joints.names.index("left_wrist")
+    np.testing.assert_allclose(reference.joints.points[7, at], expected, atol=1e-6)
+    # Bones of another length: near the true joints, not on them.
+    true = read_reference(sample_folder / "truth.trc", copy, 0).joints
+    off = np.linalg.norm(true.points[:, true.names.index("left_wrist")] - reference.joints.points[:, at], axis=1)
+    assert 0.001 < off.mean() < 0.1
+
+
+def test_a_table_of_a_presets_poses_has_that_presets_joints(copy, tmp_path):
+    short = load_model("gavrila22", 1.2)
+    write_pose_table(tmp_path / "poses.csv", short, np.tile(short.neutral(), (3, 1)))
+    reference = read_reference(tmp_path / "poses.csv", copy, 0)
+    at = reference.joints.names.index("left_ankle")
+    np.testing.assert_allclose(
+        reference.joints.points[0, at],
+        short.points_world(short.neutral())[short.point_names.index("left_ankle")],
+        atol=1e-6,
+    )
+
+
+def test_a_session_as_reference(copy, tmp_path):
+    other = two_people(tmp_path, copy)
+    model = other.people[1].model
+    poses = {3: model.neutral(), 8: model.neutral() + np.eye(22)[0]}
+    store_poses(other, "bob", poses)
+    people = two_people(tmp_path / "mine", copy)
+    for path in (other.folder, other.folder / "session.toml"):
+        reference = read_reference(path, people, 1)
+        assert sorted(reference.poses) == [3, 8]
+        np.testing.assert_array_equal(reference.poses[8], poses[8])
+        assert reference.joints.frames.tolist() == [3, 8]
+    assert read_reference(other.folder, people, 0).poses == {}  # nobody has placed ann
+
+
+def test_a_session_without_the_person(copy, tmp_path):
+    other = two_people(tmp_path, copy)
+    with pytest.raises(SessionError, match=r"a person 'person' in .*other, found ann, bob"):
+        read_reference(other.folder, copy, 0)
+
+
+def test_a_single_person_may_have_another_name(copy, tmp_path):
+    other = two_people(tmp_path, copy, names=("carl",))
+    store_poses(other, "carl", {0: other.people[0].model.neutral()})
+    assert sorted(read_reference(other.folder, copy, 0).poses) == [0]
+
+
+def test_stored_poses(copy):
+    assert stored_poses(copy, 0) == {}
+    values = copy.people[0].model.neutral()
+    store_poses(copy, "person", {4: values, 2: values + 0.1})
+    found = stored_poses(copy, 0)
+    assert sorted(found) == [2, 4]
+    np.testing.assert_array_equal(found[2], values + 0.1)
+
+
+def test_other_rates_and_axes(tmp_path):
+    # One marker set of our own names at 50 per second, y up.
+    points = np.random.default_rng(0).normal(size=(10, len(JOINTS), 3))
+    write_trc(tmp_path / "joints.trc", JOINTS, points, 50.0)
+    every_second = read_joints(tmp_path / "joints.trc", 25.0, axes="x,-z,y")
+    assert every_second.frames.tolist() == [0, 1, 2, 3, 4]
+    order = [JOINTS.index(n) for n in every_second.names]
+    expected = points[::2][:, order] @ np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], dtype=float).T
+    np.testing.assert_allclose(every_second.points, expected, atol=1e-5)
+    assert len(read_trc(tmp_path / "joints.trc").frames) == 10
+
+
+def test_own_names_by_a_map(tmp_path):
+    points = np.random.default_rng(0).normal(size=(3, 2, 3))
+    write_trc(tmp_path / "joints.trc", ["A", "B"], points, 25.0)
+    with pytest.raises(FormatError):
+        read_joints(tmp_path / "joints.trc", 25.0)
+    (tmp_path / "map.toml").write_text('left_wrist = "A"\nright_wrist = "B"\n')
+    found = read_joints(tmp_path / "joints.trc", 25.0, tmp_path / "map.toml")
+    assert sorted(found.names) == ["left_wrist", "right_wrist"]
+
+
+@pytest.mark.parametrize("name", ["poses.c3d", "poses", "missing.trc", "missing.csv"])
+def test_wrong_references(copy, tmp_path, name):
+    with pytest.raises(FormatError, match=name):
+        read_reference(tmp_path / name, copy, 0)
+
+
+def test_poses_of_another_model(copy, tmp_path):
+    text = (copy.folder / "models" / "person.toml").read_text()
+    (tmp_path / "odd.toml").write_text(text.replace("left_elbow", "left_ellbow"))
+    odd = load_model(tmp_path / "odd.toml")
+    write_pose_table(tmp_path / "poses.csv", odd, odd.neutral()[None])
+    with pytest.raises(FormatError, match="not of the person's model"):
+        read_reference(tmp_path / "poses.csv", copy, 0)
