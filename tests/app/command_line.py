@@ -1,0 +1,26 @@
+"""What the tests of the command line share."""
+
+from pathlib import Path
+
+from tracker.annotations import AnnotationStore
+
+SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"
+
+
+def stored(session, person="person"):
+    store = AnnotationStore(session / "annotations.sqlite", read_only=True)
+    poses = {row.frame: store.pose(person, row.frame) for row in store.frames(person)}
+    store.close()
+    return poses
+
+
+def assert_refused(result, expected):
+    """Status 1, nothing on standard output, and one sentence on standard error that holds the expected words."""
+    status, out, err = result
+    assert status == 1
+    assert out == ""
+    assert err.startswith("quadrille: ")
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+    for words in expected:
+        assert words in err, err

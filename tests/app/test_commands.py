@@ -1,0 +1,173 @@
+"""The command line from end to end: what it prints, its exit status, and what it leaves on disk."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import SAMPLE, assert_refused, stored
+
+from app import commands
+from tracker.annotations import AnnotationStore
+from tracker.records import PoseChange
+from tracker.session import load_session
+
+
+def test_new_info_init_track_evaluate(run, tmp_path):
+    s = tmp_path / "s"
+    videos = sorted(SAMPLE.glob("*.mp4"))
+    status, out, _ = run(
+        "new", s, "--calibration", SAMPLE / "calibration.toml", "--videos", *videos,
+        "--background", SAMPLE / "background", "--height", "1.78", "--people", "ann",
+    )  # fmt: skip
+    assert (status, out) == (0, f"made {s}: 4 cameras, 50 frames at 25 per second\n")
+
+    status, out, err = run("info", s, "--json")
+    told = json.loads(out)
+    assert (status, err) == (0, "")
+    assert (told["frames"], told["fps"], told["up"]) == (50, 25.0, "z")
+    assert [c["name"] for c in told["cameras"]] == ["FRONT", "RIGHT", "BACK", "LEFT"]
+    assert all(c["background"] and not c["masks"] for c in told["cameras"])
+    assert told["people"] == [
+        {"name": "ann", "model": "gavrila22", "height_m": 1.78, "dofs": 22, "poses": 0, "keyframes": 0}
+    ]
+
+    status, out, _ = run("init", s, "--joints", SAMPLE / "truth.trc", "--frame", "20", "--json")
+    told = json.loads(out)
+    assert status == 0
+    assert (told["person"], told["frame"], len(told["residual_mm"])) == ("ann", 20, 12)
+    assert told["mean_mm"] == pytest.approx(np.mean(list(told["residual_mm"].values())))
+    assert 1 < told["mean_mm"] < 40
+
+    status, out, err = run("track", s, "--frames", "20:23", "--json")
+    told = json.loads(out)  # one JSON object and nothing else
+    assert (status, err) == (0, "")
+    assert (told["frames"], told["people"]) == (3, ["ann"])
+    assert 0 < told["mean_cost_px"] < 19.2
+
+    status, out, _ = run("evaluate", s, "--reference", SAMPLE / "truth.trc", "--json")
+    told = json.loads(out)
+    assert status == 0
+    assert (told["frames"], told["missing_frames"], told["lost_frames"]) == (3, 0, 0)
+    assert told["mpjpe_mm"] < 60
+    assert run("evaluate", s, "--reference", SAMPLE / "truth.trc", "--frames", "18:23", "--json")[0] == 0
+
+    _, out, _ = run("info", s)
+    assert "person ann: gavrila22 of 1.78 m, 22 degrees of freedom, 3 poses, 1 keyframes" in out
+    with_angles = json.loads(run("evaluate", s, "--reference", SAMPLE / "truth.csv", "--json")[1])
+    assert with_angles["axis_error_deg"] < 15
+    _, out, _ = run("evaluate", s, "--reference", SAMPLE / "truth.csv")
+    assert "MPJPE" in out
+    assert "part axes" in out
+    assert sorted(p.name for p in s.iterdir()) == ["annotations.sqlite", "calibration.toml", "models", "session.toml"]
+
+
+def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
+    run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
+    run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "2")
+    before = stored(session)
+    status, out, err = run("track", session, "--frames", "0:4")
+    assert status == 0
+    assert out.startswith("tracked person over 4 frames, mean cost ")
+    assert "tracking: 4 of 4" in err  # plain lines where there is no terminal
+    after = stored(session)
+    assert sorted(after) == [0, 1, 2, 3]
+    for k in (0, 2):
+        np.testing.assert_array_equal(after[k].values, before[k].values)
+        assert after[k].keyframe
+        assert after[k].sources[0] == "imported"
+    for k in (1, 3):
+        assert after[k].sources == ("tracked",) * 22
+        assert after[k].settings["method"] == "chamfer"
+        assert after[k].cost_px > 0
+    store = AnnotationStore(session / "annotations.sqlite")
+    assert store.undo() == "track frames 0:4"  # one entry, however many frames
+    assert [row.frame for row in store.frames("person")] == [0, 2]
+    store.close()
+
+
+def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
+    run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
+    original = commands.track_chamfer
+
+    def interrupted(*arguments):
+        for k, estimate in enumerate(original(*arguments)):
+            if k == 3:
+                raise KeyboardInterrupt
+            yield estimate
+
+    monkeypatch.setattr(commands, "track_chamfer", interrupted)
+    assert run("track", session, "--json")[0] == 130
+    assert sorted(stored(session)) == [0, 1, 2]
+    assert not (session / "lock.json").exists()
+    monkeypatch.undo()
+
+
+def test_backward_and_paper(run, session):
+    run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "5")
+    status, out, _ = run("track", session, "--frames", "3:6", "--backward", "--paper", "--theta", "12", "--json")
+    assert (status, json.loads(out)["frames"]) == (0, 3)
+    found = stored(session)
+    assert sorted(found) == [3, 4, 5]
+    assert found[3].settings["outliers"] == "paper"
+    assert found[3].settings["theta_px"] == 12.0
+    assert tuple(found[3].settings["search"]["passes"]) == (1.0,)
+
+
+def test_several_people(run, tmp_path):
+    s = tmp_path / "s"
+    words = ("--calibration", SAMPLE / "calibration.toml", "--videos", *sorted(SAMPLE.glob("*.mp4")))
+    assert run("new", s, *words, "--people", "ann", "bob", "--height", "ann=1.6")[0] == 0
+    assert [p.model.height_m for p in load_session(s).people] == [1.6, 1.75]
+    truth = ("--joints", SAMPLE / "truth.trc")
+    assert_refused(run("init", s, *truth), ["--person", "ann, bob"])
+    assert_refused(run("init", s, *truth, "--person", "eve"), ["ann, bob", "'eve'"])
+    assert run("init", s, *truth, "--person", "bob")[0] == 0
+    assert_refused(run("track", s, "--frames", "0:2"), ["a pose of 'ann' at frame 0"])
+    assert run("track", s, "--frames", "0:2", "--person", "bob", "--json")[0] == 0
+    assert stored(s, "ann") == {}
+    assert sorted(stored(s, "bob")) == [0, 1]
+    assert_refused(run("evaluate", s, "--reference", SAMPLE / "truth.trc", "--person", "ann"), ["'ann' has no poses"])
+
+
+def test_simulate(run, tmp_path):
+    status, out, err = run(
+        "simulate", tmp_path / "sim", "--frames", "2", "--cameras", "2", "--body", "model", "--masks"
+    )
+    assert (status, out) == (0, f"made {tmp_path / 'sim'}\n")
+    assert err.splitlines()[-1] == "rendering: 4 of 4"  # an image of each camera for each frame
+    made = load_session(tmp_path / "sim")
+    assert (made.n_frames, [c.camera.name for c in made.cameras]) == (2, ["cam1", "cam2"])
+    for name in ("truth.trc", "truth.csv", "truth_model.toml", "masks/cam2/000001.png", "background/cam1.png"):
+        assert (tmp_path / "sim" / name).is_file(), name
+    assert run("info", tmp_path / "sim")[0] == 0
+    assert_refused(run("simulate", tmp_path / "sim"), ["exists already"])
+    assert_refused(run("simulate", tmp_path / "no", "--scene", "moonwalk"), ["elbow_rotation"])
+    assert [p.name for p in tmp_path.iterdir()] == ["sim"]
+
+
+def test_without_a_command_the_page_is_opened(run, monkeypatch):
+    asked = []
+    monkeypatch.setattr("app.workbench.open_session", lambda folder, serving, say: asked.append((folder, serving)))
+    monkeypatch.setattr("app.workbench.sample_copy", lambda afresh: Path("sample"))
+    assert run()[0] == 0
+    assert run("some/session", "--port", "0", "--no-browser")[0] == 0
+    assert run("open", "some/session")[0] == 0
+    assert [str(folder) for folder, _ in asked] == ["sample", "some/session", "some/session"]
+    assert (asked[0][1].host, asked[0][1].port) == ("127.0.0.1", 8080)
+    assert (asked[1][1].port, asked[1][1].browser) == (0, False)
+
+
+def test_poses_of_a_reference_that_is_a_session(run, session, tmp_path):
+    other = Path(shutil.copytree(SAMPLE, tmp_path / "other"))
+    for folder in (session, other):
+        run("init", folder, "--joints", SAMPLE / "truth.trc")
+    store = AnnotationStore(other / "annotations.sqlite")
+    record = store.pose("person", 0)
+    moved = record.values + np.pad([0.03, 0.0, 0.04], (0, 19))
+    store.commit("move", [PoseChange("person", 0, type(record)(moved, record.sources, record.model_revision))])
+    store.close()
+    told = json.loads(run("evaluate", session, "--reference", other, "--json")[1])
+    assert told["mpjpe_mm"] == pytest.approx(50)
+    assert told["axis_error_deg"] == pytest.approx(0, abs=1e-6)
