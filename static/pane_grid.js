@@ -12,6 +12,7 @@ export class PaneGrid {
   #latency;
   #element;
   #cameras = "";
+  #choice = "";
 
   /**
    * @param {HTMLElement} element
@@ -65,7 +66,11 @@ export class PaneGrid {
     if (changed.has("session")) this.#build();
     if (changed.has("filled")) this.#layOut();
     const withImage = changed.has("shown");
-    if (withImage || changed.has("overlay") || changed.has("state") || changed.has("hover")) {
+    // A new state comes with every move of a drag; only its choice of what to draw concerns the vectors.
+    const { person, point, overlays } = this.#store.facts.state ?? {};
+    const choice = JSON.stringify([person, point, overlays]);
+    if (withImage || changed.has("overlay") || choice !== this.#choice || changed.has("hover")) {
+      this.#choice = choice;
       for (const pane of this.panes) pane.draw(withImage);
     }
     if (changed.has("overlay")) this.#latency.painted(this.#store.facts.overlay?.seq ?? 0);
