@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from tracker.edges import detect_edges
 
@@ -25,12 +26,22 @@ def test_a_step_gives_one_thin_edge_where_it_is():
     assert edges[5:-5].sum(axis=1).tolist() == [1] * 50
 
 
-def test_equal_brightness_and_different_hue_have_an_edge():
-    red, green = (200, 60, 80), (80, 121, 80)
+@pytest.mark.parametrize(("left", "right"), [((200, 60, 80), (80, 121, 80)), ((200, 90, 10), (191, 90, 89))])
+def test_equal_brightness_and_different_hue_have_an_edge(left, right):
     gray = np.array([0.299, 0.587, 0.114])
-    assert abs(gray @ red - gray @ green) < 1  # no edge in a gray image
-    assert columns(detect_edges(halves(red, green))) <= {COLUMN - 1, COLUMN}
-    assert detect_edges(halves(red, green)).any()
+    assert abs(gray @ left - gray @ right) < 7  # no edge in a gray image
+    assert not detect_edges(halves([gray @ left] * 3, [gray @ right] * 3)).any()
+    edges = detect_edges(halves(left, right))
+    assert columns(edges) <= {COLUMN - 1, COLUMN}
+    assert edges[5:-5].sum() == 50
+
+
+@pytest.mark.parametrize("channel", [0, 1, 2])
+def test_one_channel_is_enough(channel):
+    left = right = np.array([100, 100, 100])
+    edges = detect_edges(halves(left, right + 60 * np.eye(3, dtype=int)[channel]))
+    assert columns(edges) <= {COLUMN - 1, COLUMN}
+    assert edges[5:-5].sum() == 50
 
 
 def test_flat_and_noisy_images_have_no_edges():

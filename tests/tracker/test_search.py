@@ -112,6 +112,31 @@ def test_only_the_stages_own_dofs_move_and_within_bounds(gavrila, start, steps):
         before = step.best[0]
 
 
+def test_limits_hold(gavrila, views, truth):
+    """Elbows and knees as straight as they can be: the lattice's nodes beyond are put back."""
+    straight = np.where([n.endswith("extension") for n in gavrila.value_names], 0.02, truth)
+    seen = set()
+    for step in search(ChamferCost(views, [Body(gavrila, straight)]), [straight], COARSE):
+        bends = step.candidate[0][
+            [gavrila.value_names.index(n) for n in ("left_elbow.extension", "left_knee.extension")]
+        ]
+        assert np.all(bends >= 0)
+        np.testing.assert_array_equal(gavrila.clip(step.best[0]), step.best[0])
+        seen |= set(bends)
+    assert len(seen) > 2
+    # Every candidate, not only the cheapest of each step.
+    asked = []
+
+    class Recording(Counted):
+        def of_person(self, person, candidates, poses):
+            asked.extend(candidates)
+            return super().of_person(person, candidates, poses)
+
+    list(search(Recording(ChamferCost(views, [Body(gavrila, straight)])), [straight], COARSE))
+    for candidate in asked:
+        np.testing.assert_array_equal(gavrila.clip(candidate), candidate)
+
+
 def test_evaluations_are_counted(gavrila, views, start, steps):
     counted = Counted(ChamferCost(views, [Body(gavrila, start)]))
     seen = 0

@@ -39,11 +39,10 @@ def test_noise_is_no_person_even_where_it_is_strong():
 def test_single_pixels_and_small_changes_do_not_count():
     background = np.full((40, 40, 3), 100, np.uint8)
     image = background.copy()
-    image[20, 20] = 250
+    image[20, 20] = 180  # over the threshold even when smoothed, but alone
     image[:, 30:] = 100 + int(MIN_DIFFERENCE) - 2
     found = subtract_background(image, background)
-    assert not found[:, 30:].any()
-    assert found.sum() < 25
+    assert not found.any()
     assert not subtract_background(background, background).any()
 
 
