@@ -8,7 +8,7 @@ from app.jobs import Latest
 from app.state import State
 from tracker import rigid
 from tracker.body import Body
-from tracker.cameras import Camera
+from tracker.cameras import Camera, viewed_point
 from tracker.contours import part_poses
 from tracker.posing import UP_ROTATIONS
 from tracker.session import Session
@@ -86,11 +86,8 @@ def _add_surroundings(server: viser.ViserServer, session: Session) -> None:
 
 def _place_eye(server: viser.ViserServer, cameras: list[Camera], up: str) -> None:
     """Look at the middle of what the cameras see, from beside and above the first."""
-    axes = np.stack([c.T_world_camera[:3, 2] for c in cameras])
-    centers = np.stack([c.center_world for c in cameras])
-    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
-    middle = np.linalg.lstsq(across.sum(axis=0), (across @ centers[..., None]).sum(axis=0)[:, 0], rcond=None)[0]
-    to_first = rigid.so3_exp(UP_ROTATIONS[up][:, 2] * np.radians(25)) @ (centers[0] - middle)
+    middle = viewed_point(cameras)
+    to_first = rigid.so3_exp(UP_ROTATIONS[up][:, 2] * np.radians(25)) @ (cameras[0].center_world - middle)
     server.initial_camera.look_at = tuple(middle)
     server.initial_camera.position = tuple(middle + 0.9 * to_first)
     server.initial_camera.up = tuple(UP_ROTATIONS[up][:, 2])

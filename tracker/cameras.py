@@ -1,5 +1,6 @@
 """A calibrated camera with OpenCV's model of projection and lens distortion."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -168,6 +169,19 @@ class Camera:
         flat = points_px.reshape(-1, 1, 2)
         out = cv2.undistortPoints(flat, self.K, self.distortion, criteria=criteria)
         return np.asarray(out, dtype=np.float64).reshape(points_px.shape)
+
+
+def viewed_point(cameras: Sequence[Camera]) -> Array:
+    """Point that the cameras look at: nearest to all optical axes in the least squares sense, (3,), metres.
+
+    One camera, or parallel ones, leave the depth open: then it is some 4 m in front of the first.
+    """
+    axes = np.stack([c.T_world_camera[:3, 2] for c in cameras])
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    centers = np.stack([c.center_world for c in cameras])
+    front = centers[0] + 4.0 * axes[0]
+    A = across.sum(axis=0) + 1e-3 * np.eye(3)
+    return np.linalg.solve(A, (across @ centers[..., None]).sum(axis=0)[:, 0] + 1e-3 * front)
 
 
 def epipolar_segment(source: Camera, target: Camera, point_px: Array, near_m: float = 0.1) -> Array | None:

@@ -1,5 +1,6 @@
 """Posing a body by hand: a point of it follows a place in an image, the rest of the chain gives way."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypedDict
 
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from tracker import rigid
 from tracker.body import BodyModel, Kinematics
-from tracker.cameras import Camera
+from tracker.cameras import Camera, viewed_point
 from tracker.fit import Block, StayNear, fit_to_points, solve
 from tracker.rigid import Array
 
@@ -156,24 +157,13 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
     return fit.values
 
 
-def standing_pose(model: BodyModel, cameras: list[Camera], up: str = "z") -> Array:
+def standing_pose(model: BodyModel, cameras: Sequence[Camera], up: str = "z") -> Array:
     """Upright pose where the cameras look: where a model stands before anybody has placed it.
-
-    The body's root is put at the point nearest to all optical axes, in the least squares sense.
 
     Args:
         model: the body.
         cameras: the views.
         up: world axis that points up.
     """
-    A, b = np.zeros((3, 3)), np.zeros(3)
-    for camera in cameras:
-        axis = camera.T_world_camera[:3, 2]
-        across = np.eye(3) - np.outer(axis, axis)
-        A += across
-        b += across @ camera.center_world
-    # One camera, or parallel ones, leave the depth open: then 4 m in front of the first is as good as any.
-    front = cameras[0].center_world + 4.0 * cameras[0].T_world_camera[:3, 2]
-    center = np.linalg.solve(A + 1e-3 * np.eye(3), b + 1e-3 * front)
-    points = model.points_world(model.neutral()) @ UP_ROTATIONS[up].T + center
+    points = model.points_world(model.neutral()) @ UP_ROTATIONS[up].T + viewed_point(cameras)
     return fit_to_points(model, dict(zip(model.point_names, points, strict=True))).values

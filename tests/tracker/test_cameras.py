@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from tracker import rigid
-from tracker.cameras import Camera, epipolar_segment
+from tracker.cameras import Camera, epipolar_segment, viewed_point
 from tracker.errors import CalibrationError
 
 K = np.array([[600.0, 0.0, 315.3], [0.0, 610.0, 244.7], [0.0, 0.0, 1.0]])
@@ -186,3 +186,16 @@ def test_epipolar_segment_of_distorted_cameras_lives_in_undistorted_pixels():
 def test_no_epipolar_segment_where_the_ray_leaves_the_view():
     source, target = PAIRS["back to back"]
     assert epipolar_segment(source, target, np.array([320.0, 240.0])) is None
+
+
+def test_the_viewed_point_is_where_the_axes_meet():
+    target = (0.3, -0.2, 1.1)
+    cameras = [looking_at(p, target) for p in ((3.0, 1.0, 1.5), (-2.0, 2.5, 2.0), (0.5, -3.0, 0.4))]
+    np.testing.assert_allclose(viewed_point(cameras), target, atol=2e-3)
+
+
+def test_one_camera_alone_looks_at_what_is_some_metres_ahead():
+    alone = looking_at((3.0, 1.0, 1.5), (0.0, 0.2, 1.0))
+    point = viewed_point([alone])
+    assert alone.depths(point) == pytest.approx(4.0, abs=0.05)
+    np.testing.assert_allclose(alone.project(point), K[:2, 2], atol=1e-6)
