@@ -3,9 +3,10 @@
 import asyncio
 import itertools
 import json
+import logging
 import struct
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from typing import Any
 
 import aiohttp
@@ -17,6 +18,9 @@ from app.controller import Controller
 from app.state import OVERLAYS, State
 from tracker.errors import TrackerError
 
+_LOG = logging.getLogger(__name__)
+_READABLE_S = 0.12
+"""Time between updates of the page's numbers during a drag."""
 _COALESCED = ("seek", "view")
 """Of these only the newest that waits is carried out."""
 
@@ -44,6 +48,8 @@ class _Page:
         self._arrived = asyncio.Event()
         self._waiting: deque[dict[str, Any]] = deque()
         self._sent: State | None = None
+        self._sent_text: dict[str, Any] | None = None
+        self._sent_text_at = 0.0
         self._sent_images: tuple[int, str] | None = None
 
     async def serve(self) -> None:
@@ -54,7 +60,7 @@ class _Page:
 
         unsubscribe = self._controller.subscribe(wake)
         self._changed.set()
-        tasks = [asyncio.create_task(t) for t in (self._send_all(), self._act())]
+        tasks = [asyncio.create_task(self._guarded(t)) for t in (self._send_all(), self._act())]
         try:
             async for message in self._socket:
                 if message.type == aiohttp.WSMsgType.TEXT:
@@ -66,6 +72,16 @@ class _Page:
             await asyncio.gather(*tasks, return_exceptions=True)
             await asyncio.to_thread(self._controller.end_drag, self._number)
             await asyncio.to_thread(self._controller.hold_3d, self._number, False)
+
+    async def _guarded(self, work: Coroutine[Any, Any, None]) -> None:
+        """Close the socket where its work fails: the page connects again and is told everything anew."""
+        try:
+            await work
+        except ConnectionError:
+            _LOG.debug("a page went away in the middle of a message")
+        except Exception:
+            _LOG.exception("a pane socket failed; the page connects again")
+            await self._socket.close(code=aiohttp.WSCloseCode.INTERNAL_ERROR)
 
     # --- page to controller ------------------------------------------------------------------------------------
 
@@ -134,14 +150,25 @@ class _Page:
             state, sent = self._controller.state, self._sent
             self._sent = state
             try:
-                if sent is None or _json_state(state) != _json_state(sent):
-                    await self._send(_json_state(state))
+                await self._send_state(state)
                 await self._send_overlay(state, sent)
                 await self._send_images(state)
                 if sent is None or sent.timeline_version != state.timeline_version:
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
             except TrackerError as error:
                 await self._notice(str(error))
+
+    async def _send_state(self, state: State) -> None:
+        """Send what the page's text shows, if it changed; at a readable rate while a hand drags."""
+        message, loop = _json_state(state), asyncio.get_running_loop()
+        if message == self._sent_text:
+            return
+        wait = self._sent_text_at + _READABLE_S - loop.time()
+        if state.drag is not None and wait > 0 and self._sent_text is not None:
+            loop.call_later(wait, self._changed.set)  # the vectors go first: they are what the hand follows
+            return
+        self._sent_text, self._sent_text_at = message, loop.time()
+        await self._send(message)
 
     async def _send_images(self, state: State) -> None:
         if self._sent_images == (state.frame, state.base):

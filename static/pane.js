@@ -3,7 +3,10 @@
 import * as drawing from "./drawing.js";
 import { PaneView } from "./pane_view.js";
 import { px } from "./text.js";
+import { drawsInSoftware } from "./webgl.js";
 
+// Without a graphics card one opaque canvas is laid on the screen sooner than a transparent one over another.
+const IN_SOFTWARE = drawsInSoftware();
 const WHEEL_ZOOM = 0.0015;
 const PINCH_ZOOM = 0.01;
 const LINE_PX = 16;
@@ -51,7 +54,8 @@ export class Pane {
     this.#reset.setAttribute("aria-label", `Show the whole image of ${info.name}`);
     this.#reset.addEventListener("click", () => this.reset());
 
-    this.element.append(this.#image, this.#overlay, label, this.#cost, this.#reset);
+    if (!IN_SOFTWARE) this.element.append(this.#image);
+    this.element.append(this.#overlay, label, this.#cost, this.#reset);
     this.#overlay.addEventListener("wheel", (event) => this.#zoom(event), { passive: false });
   }
 
@@ -125,13 +129,14 @@ export class Pane {
     const { shown, state, session, overlay } = this.#store.facts;
     if (width === 0 || height === 0) return;
     if (withImage) {
-      const context = drawing.prepare(this.#image, width, height, false);
+      const context = drawing.prepare(this.#image, width, height, IN_SOFTWARE);
       const bitmap = shown?.bitmaps[this.#camera];
       if (bitmap) drawing.drawImage(context, this.view, bitmap);
       this.#reset.classList.toggle("is-shown", !this.view.isReset);
       this.#reset.tabIndex = this.view.isReset ? -1 : 0;
     }
     const context = drawing.prepare(this.#overlay, width, height, true);
+    if (IN_SOFTWARE) context.drawImage(this.#image, 0, 0, width, height);
     if (!state || !session || !overlay) return;
     drawing.drawPaths(context, this.view, overlay, this.#camera, state.overlays);
     this.#drawJoints(context, state, session.people);
