@@ -164,13 +164,21 @@ async def test_layers_are_asked_for_and_shown_at_once(page, endpoint):
     assert second["overlays"] == {"contours": False, "joints": True, "part_edges": False, "skeleton": True}
     await page.get_by_text("Joints", exact=True).click()
     await page.get_by_text("Skeleton", exact=True).click()
-    await shows(
-        page,
-        """[...document.querySelectorAll(".pane-overlay")].every((canvas) => {
-          const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
-          return data.every((value) => value === 0);
-        })""",
-    )
+    await shows(page, f"({DRAWN}) === 0")
+
+
+DRAWN = """[...document.querySelectorAll(".pane-overlay")].reduce((sum, canvas) => {
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  const people = quadrille.state.session.people.map(({ color }) => parseInt(color.slice(1), 16));
+  for (let i = 0; i < data.length; i += 4)
+    if (people.includes((data[i] << 16) | (data[i + 1] << 8) | data[i + 2])) sum++;
+  return sum;
+}, 0)"""
+"""JavaScript: how many pixels of all panes have exactly a person's colour; the images have none."""
+
+
+async def test_contours_and_joints_are_drawn_in_the_persons_colour(page):
+    await shows(page, f"({DRAWN}) > 200")
 
 
 async def test_layers_change_before_the_program_answers(page, endpoint):
