@@ -13,7 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError, TrackerError
-from tracker.evaluate import Alignment, evaluate_joints, evaluate_poses, joints_of_poses
+from tracker.evaluate import Alignment, evaluate_joints, evaluate_poses
 from tracker.evidence import Observer
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import format_model
@@ -21,7 +21,7 @@ from tracker.formats.trc import MarkerTable
 from tracker.joint_maps import LIMB_JOINTS
 from tracker.recording import Recording
 from tracker.records import FrameRow, PoseChange, PoseRecord
-from tracker.references import Reference, stored_poses
+from tracker.references import Reference, stored_motion
 from tracker.rigid import Array
 from tracker.session import Person, Session, load_session, save_session
 from tracker.session_lock import SessionLock
@@ -161,11 +161,12 @@ def evaluate(at: Target, reference: Reference, frames: str | None, align: Alignm
         SessionError: there is no pose.
     """
     session, (index,) = at
-    person, poses = session.people[index], stored_poses(session, index)
+    person = session.people[index]
+    joints, poses = stored_motion(session, index)
     if not poses:
         raise SessionError(f"'{person.name}' has no poses yet; place the body in the page, or use init and track")
     wanted = range(min(poses), max(poses) + 1) if frames is None else frame_range(frames, session)
-    result = evaluate_joints(joints_of_poses(person.model, poses, session.fps), reference.joints, wanted, align)
+    result = evaluate_joints(joints, reference.joints, wanted, align)
     if reference.poses is not None:
         axis_error, angle_errors = evaluate_poses(person.model, poses, reference.poses, wanted)
         result = replace(result, axis_error_deg=axis_error, angle_error_deg=angle_errors)

@@ -1,15 +1,17 @@
 """What an estimate can be held against: joints of a TRC file, poses of our CSV, or another session."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
 
 from tracker.annotations import AnnotationStore
 from tracker.body import BodyModel
 from tracker.errors import FormatError, SessionError
 from tracker.evaluate import at_rate, joints_of_poses, remap_axes
-from tracker.formats.model_toml import PRESETS, load_model
+from tracker.formats.model_toml import PRESETS, load_model, parse_model
 from tracker.formats.pose_table import read_pose_table
 from tracker.formats.trc import MarkerTable, read_trc
 from tracker.joint_maps import joints_of, read_joint_map
@@ -70,14 +72,32 @@ def read_reference(
     return Reference(read_joints(path, session.fps, joint_map, axes), None)
 
 
-def stored_poses(session: Session, person: int) -> dict[int, Array]:
-    """All stored poses of a person by frame, (n_values,) each."""
+def stored_motion(session: Session, person: int) -> Reference:
+    """The stored poses of a person, and the joints of each in the body that it was made with.
+
+    The sizes of a body may have changed since: a pose is angles, and belongs to the model revision that it names.
+    """
     name, model = session.people[person].name, session.people[person].model
-    if not session.annotations_path.exists():
-        return {}
-    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
-        records = {row.frame: store.pose(name, row.frame) for row in store.frames(name)}
-    return {f: r.values for f, r in records.items() if r is not None and len(r.values) == len(model.value_names)}
+    by_revision: dict[int, dict[int, Array]] = {}
+    models: dict[int, BodyModel] = {}
+    if session.annotations_path.exists():
+        with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+            for row in store.frames(name):
+                record = store.pose(name, row.frame)
+                if record is not None and len(record.values) == len(model.value_names):
+                    by_revision.setdefault(record.model_revision, {})[row.frame] = record.values
+            models = {r: parse_model(store.model_revision(r).toml, f"of '{name}', revision {r}") for r in by_revision}
+    tables = [joints_of_poses(models[r], poses, session.fps) for r, poses in by_revision.items()]
+    poses = {frame: values for some in by_revision.values() for frame, values in some.items()}
+    return Reference(_merged(tables) if tables else joints_of_poses(model, {}, session.fps), poses)
+
+
+def _merged(tables: Sequence[MarkerTable]) -> MarkerTable:
+    """Rows of several tables of the same joints, by frame."""
+    frames = np.concatenate([t.frames for t in tables])
+    order = np.argsort(frames)
+    times, points = (np.concatenate([getattr(t, part) for t in tables])[order] for part in ("times", "points"))
+    return MarkerTable(tables[0].names, frames[order], times, points, tables[0].rate)
 
 
 def _of_session(folder: Path, session: Session, person: int) -> Reference:
@@ -86,7 +106,6 @@ def _of_session(folder: Path, session: Session, person: int) -> Reference:
     index = next((i for i, p in enumerate(other.people) if p.name == name), 0 if len(other.people) == 1 else None)
     if index is None:
         raise SessionError(f"expected a person '{name}' in {folder}, found {', '.join(p.name for p in other.people)}")
-    model: BodyModel = other.people[index].model
-    poses = stored_poses(other, index)
-    same = set(model.value_names) == set(session.people[person].model.value_names)
-    return Reference(joints_of_poses(model, poses, session.fps), poses if same else None)
+    found = stored_motion(other, index)
+    same = set(other.people[index].model.value_names) == set(session.people[person].model.value_names)
+    return found if same else found._replace(poses=None)

@@ -1,4 +1,5 @@
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from tracker.formats.pose_table import write_pose_table
 from tracker.formats.trc import read_trc, write_trc
 from tracker.joint_maps import JOINTS
 from tracker.records import PoseChange, PoseRecord
-from tracker.references import read_joints, read_reference, stored_poses
+from tracker.references import read_joints, read_reference, stored_motion
 from tracker.session import CameraSource, Person, create_session, load_session
 
 
@@ -104,10 +105,10 @@ def test_a_single_person_may_have_another_name(copy, tmp_path):
 
 
 def test_stored_poses(copy):
-    assert stored_poses(copy, 0) == {}
+    assert stored_motion(copy, 0).poses == {}
     values = copy.people[0].model.neutral()
     store_poses(copy, "person", {4: values, 2: values + 0.1})
-    found = stored_poses(copy, 0)
+    found = stored_motion(copy, 0).poses
     assert sorted(found) == [2, 4]
     np.testing.assert_array_equal(found[2], values + 0.1)
 
@@ -147,3 +148,20 @@ def test_poses_of_another_model(copy, tmp_path):
     write_pose_table(tmp_path / "poses.csv", odd, odd.neutral()[None])
     with pytest.raises(FormatError, match="not of the person's model"):
         read_reference(tmp_path / "poses.csv", copy, 0)
+
+
+def test_a_pose_keeps_the_body_it_was_made_with(copy):
+    """A taller body for later frames moves no joint of earlier ones."""
+    values = copy.people[0].model.neutral()
+    store_poses(copy, "person", {0: values, 2: values})
+    taller = replace(copy.people[0], model=copy.people[0].model.with_height(2.0))
+    grown = replace(copy, people=(taller,))
+    store_poses(grown, "person", {1: values})
+    joints = stored_motion(grown, 0).joints
+    assert joints.frames.tolist() == [0, 1, 2]
+    at = joints.names.index("left_ankle")
+    before, after = (
+        p.model.points_world(values)[p.model.point_names.index("left_ankle")] for p in (copy.people[0], taller)
+    )
+    np.testing.assert_allclose(joints.points[[0, 2], at], [before, before])
+    np.testing.assert_allclose(joints.points[1, at], after)
