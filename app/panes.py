@@ -19,7 +19,7 @@ from app.state import OVERLAYS, State
 from tracker.errors import TrackerError
 
 _LOG = logging.getLogger(__name__)
-_READABLE_S = 0.12
+_READABLE_S = 0.2
 """Time between updates of the page's numbers during a drag."""
 _COALESCED = ("seek", "view")
 """Of these only the newest that waits is carried out."""

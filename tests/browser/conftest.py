@@ -66,7 +66,9 @@ async def page(browser, address):
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     await page.goto(address)
-    await shows(page, "window.quadrille?.state.overlay?.frame === window.quadrille?.state.shown.frame")
+    await shows(
+        page, "window.quadrille?.state.overlay && quadrille.state.overlay.frame === quadrille.state.shown.frame"
+    )
     page.errors = errors
     yield page
     await context.close()
