@@ -11,7 +11,15 @@ ROOT = Path(__file__).resolve().parents[1]
 # down. A new module takes its place here; one that finds none is two concepts, or in the wrong file.
 ORDER = [
     ["tracker", "tracker.formats", "tracker.errors", "tracker.rigid", "tracker.silhouettes"],
-    ["tracker.cameras", "tracker.shapes", "tracker.edges", "tracker.files", "tracker.footage", "tracker.records"],
+    [
+        "tracker.cameras",
+        "tracker.shapes",
+        "tracker.kinematics",
+        "tracker.edges",
+        "tracker.files",
+        "tracker.footage",
+        "tracker.records",
+    ],
     ["tracker.session_lock", "tracker.annotations", "tracker.body"],
     ["tracker.formats.anipose", "tracker.formats.trc", "tracker.formats.model_toml", "tracker.formats.pose_table"],
     ["tracker.contours", "tracker.fit", "tracker.joint_maps"],

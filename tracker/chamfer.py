@@ -13,9 +13,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker import contours
-from tracker.body import Body, BodyModel, Tree, forward_kinematics
+from tracker.body import Body, BodyModel
 from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence, default_theta_px
+from tracker.kinematics import Tree, forward_kinematics
 from tracker.rigid import Array
 
 Outliers = Literal["truncated", "paper"]

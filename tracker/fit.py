@@ -12,8 +12,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel, IntArray, Kinematics
+from tracker.body import BodyModel
 from tracker.errors import TrackerError
+from tracker.kinematics import IntArray, Kinematics
 from tracker.rigid import Array
 
 

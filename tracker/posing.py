@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker import rigid
-from tracker.body import BodyModel, Kinematics
+from tracker.body import BodyModel
 from tracker.cameras import Camera, viewed_point
 from tracker.fit import Block, StayNear, fit_to_points, solve
+from tracker.kinematics import Kinematics
 from tracker.rigid import Array
 
 
