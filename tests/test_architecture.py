@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # From the bottom up. A module may import from the rows above its own in this list, never from its own row or further
 # down. A new module takes its place here; one that finds none is two concepts, or in the wrong file.
 ORDER = [
-    ["tracker", "tracker.formats", "tracker.errors", "tracker.rigid", "tracker.silhouettes"],
+    ["tracker", "tracker.formats", "tracker.errors", "tracker.rigid", "tracker.silhouettes", "tracker.store_schema"],
     [
         "tracker.cameras",
         "tracker.shapes",

@@ -13,16 +13,21 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import cache
 from importlib import metadata
+from math import isfinite
 from pathlib import Path
+from struct import iter_unpack
 from typing import Any
 
 import numpy as np
 
+from tracker import store_schema
 from tracker.errors import SessionError
 from tracker.records import (
     SOURCES,
+    STATUSES,
     Change,
     Committed,
+    FrameNumbers,
     FrameRow,
     HistoryEntry,
     ModelRevision,
@@ -31,53 +36,7 @@ from tracker.records import (
     PoseChange,
     PoseRecord,
 )
-
-VERSION = 1
-
-_SCHEMA = """
-CREATE TABLE edits (
-    id INTEGER PRIMARY KEY AUTOINCREMENT,
-    parent INTEGER REFERENCES edits,          -- NULL for the first
-    label TEXT NOT NULL, author TEXT NOT NULL, time TEXT NOT NULL, program TEXT NOT NULL
-);
-CREATE INDEX edits_parent ON edits (parent);
--- One row; NULL: nothing is done.
-CREATE TABLE head (edit INTEGER REFERENCES edits);
-INSERT INTO head VALUES (NULL);
-CREATE TABLE moves (                                             -- undo and redo, as they happened
-    id INTEGER PRIMARY KEY AUTOINCREMENT,
-    kind TEXT NOT NULL, edit INTEGER NOT NULL REFERENCES edits, time TEXT NOT NULL
-);
-CREATE TABLE model_revisions (
-    id INTEGER PRIMARY KEY AUTOINCREMENT, person TEXT NOT NULL, toml TEXT NOT NULL, time TEXT NOT NULL
-);
-CREATE TABLE pose_changes (
-    id INTEGER PRIMARY KEY AUTOINCREMENT,
-    edit INTEGER NOT NULL REFERENCES edits,
-    previous INTEGER REFERENCES pose_changes,                    -- what the frame showed before; NULL: nothing
-    person TEXT NOT NULL, frame INTEGER NOT NULL,
-    numbers BLOB,                                                -- little-endian float64; NULL: cleared
-    sources BLOB, keyframe INTEGER, status TEXT, cost_px REAL,
-    model_revision INTEGER REFERENCES model_revisions, settings TEXT
-);
-CREATE INDEX pose_changes_edit ON pose_changes (edit);
-CREATE TABLE poses (
-    person TEXT, frame INTEGER, change INTEGER NOT NULL REFERENCES pose_changes, PRIMARY KEY (person, frame)
-) WITHOUT ROWID;
-CREATE TABLE pin_changes (
-    id INTEGER PRIMARY KEY AUTOINCREMENT,
-    edit INTEGER NOT NULL REFERENCES edits,
-    previous INTEGER REFERENCES pin_changes,
-    person TEXT NOT NULL, frame INTEGER NOT NULL, point TEXT NOT NULL, camera TEXT NOT NULL,
-    u REAL, v REAL                                               -- original pixels; NULL: cleared
-);
-CREATE INDEX pin_changes_edit ON pin_changes (edit);
-CREATE TABLE pins (
-    person TEXT, frame INTEGER, point TEXT, camera TEXT, change INTEGER NOT NULL REFERENCES pin_changes,
-    PRIMARY KEY (person, frame, point, camera)
-) WITHOUT ROWID;
-CREATE TABLE settings (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
-"""
+from tracker.rigid import Array
 
 # What each kind of current state is found by, and the column that is NULL where a change clears.
 _KEYS = {"pose": ("person, frame", "numbers"), "pin": ("person, frame, point, camera", "u")}
@@ -90,7 +49,7 @@ class AnnotationStore:
     """
 
     def __init__(self, path: str | Path, read_only: bool = False) -> None:
-        """Open a store; a missing one is made, unless it is only to be read.
+        """Open a store; a missing one is made and an older one brought up to date, unless it is only to be read.
 
         Raises:
             SessionError: the file is missing, not a store, or newer than this program.
@@ -113,17 +72,13 @@ class AnnotationStore:
             self._db.execute("PRAGMA journal_mode = DELETE")
             self._db.execute("PRAGMA synchronous = EXTRA")
             self._db.execute("PRAGMA foreign_keys = ON")
-            version = self._db.execute("PRAGMA user_version").fetchone()[0]
-            if version == 0 and not read_only:
-                with self._transaction():
-                    for statement in _SCHEMA.split(";\n"):
-                        self._db.execute(statement)
-                    self._db.execute(f"PRAGMA user_version = {VERSION}")
-                version = VERSION
-        if version != VERSION:
+            version = self._prepared(read_only)
+        if version != store_schema.VERSION:
             self._db.close()
             what = "is not a store of annotations" if version == 0 else f"has version {version}"
-            raise SessionError(f"annotations {path} {what}, this program reads version {VERSION}; upgrade quadrille")
+            raise SessionError(
+                f"annotations {path} {what}, this program reads up to version {store_schema.VERSION}; upgrade quadrille"
+            )
 
     def close(self) -> None:
         """Release the file."""
@@ -133,27 +88,39 @@ class AnnotationStore:
     def pose(self, person: str, frame: int) -> PoseRecord | None:
         """The pose of a person in a frame, or None."""
         row = self._one(
-            "SELECT c.numbers, c.sources, c.model_revision, c.keyframe, c.status, c.cost_px, c.settings, e.author, "
-            "e.time, e.program FROM poses p JOIN pose_changes c ON c.id = p.change JOIN edits e ON e.id = c.edit "
-            "WHERE p.person = ? AND p.frame = ?",
+            "SELECT c.numbers, c.sources, c.views_px, c.parts_px, c.model_revision, c.keyframe, c.status, c.cost_px, "
+            "c.settings, e.author, e.time, e.program, c.remark FROM poses p JOIN pose_changes c ON c.id = p.change "
+            "JOIN edits e ON e.id = c.edit WHERE p.person = ? AND p.frame = ?",
             (person, frame),
         )
         if row is None:
             return None
-        numbers, sources, revision, keyframe, status, cost, settings, *made = row
-        values = np.frombuffer(numbers, dtype="<f8").astype(np.float64)
-        values.setflags(write=False)
-        labels = tuple(SOURCES[i] for i in sources)
-        return PoseRecord(values, labels, revision, bool(keyframe), status, cost, json.loads(settings), *made)
+        numbers, sources, views, parts, revision, keyframe, status, cost, settings, author, time, program, remark = row
+        return PoseRecord(
+            _array(numbers), tuple(SOURCES[i] for i in sources), revision, bool(keyframe), status, cost,
+            json.loads(settings), author, time, program, _costs(views), _costs(parts), remark or "",
+        )  # fmt: skip
 
     def frames(self, person: str) -> list[FrameRow]:
         """All frames in which the person has a pose, ascending, in short."""
         rows = self._all(
-            "SELECT c.frame, c.sources, c.status, c.cost_px, c.keyframe FROM poses p "
+            "SELECT c.frame, c.sources, c.status, c.cost_px, c.keyframe, c.views_px, c.remark FROM poses p "
             "JOIN pose_changes c ON c.id = p.change WHERE p.person = ? ORDER BY p.frame",
             (person,),
         )
-        return [FrameRow(f, SOURCES[min(s)], status, cost, bool(key)) for f, s, status, cost, key in rows]
+        return [
+            FrameRow(frame, SOURCES[min(sources)], status, cost, bool(keyframe), _costs(views), remark or "")
+            for frame, sources, status, cost, keyframe, views, remark in rows
+        ]
+
+    def numbers(self, person: str, frames: range) -> list[FrameNumbers]:
+        """Poses and costs of a person in those frames of a range that have a pose, ascending: what a curve shows."""
+        rows = self._all(
+            "SELECT c.frame, c.numbers, c.cost_px, c.views_px FROM poses p JOIN pose_changes c ON c.id = p.change "
+            "WHERE p.person = ? AND p.frame BETWEEN ? AND ? ORDER BY p.frame",
+            (person, frames.start, frames.stop - 1),
+        )
+        return [FrameNumbers(frame, _array(numbers), cost, _costs(views)) for frame, numbers, cost, views in rows]
 
     def pins(self, person: str, frame: int) -> list[Pin]:
         """The pins of a person in a frame, by point and camera."""
@@ -275,6 +242,19 @@ class AnnotationStore:
         with self._lock, self._errors(), self._transaction():
             self._db.execute("INSERT OR REPLACE INTO settings VALUES (?, ?)", (key, json.dumps(value)))
 
+    def _prepared(self, read_only: bool) -> int:
+        """Make a new store, bring an older one up to date; returns the version it then has.
+
+        An older store that is only to be read stays as it is on the disk and is read as if it were new.
+        """
+        if read_only:
+            return store_schema.show_as_new(self._db)
+        version = store_schema.version(self._db)
+        if version < store_schema.VERSION:
+            with self._transaction():  # all of it or nothing: a power cut leaves the older file
+                version = store_schema.upgrade(self._db)
+        return version
+
     def _apply(self, edit: int, changes: Sequence[Change], by_program: bool) -> tuple[tuple[str, int], ...]:
         skipped = []
         for change in changes:
@@ -294,10 +274,11 @@ class AnnotationStore:
     def _set_pose(self, edit: int, change: PoseChange) -> None:
         pose = change.pose
         if pose is None:
-            content: tuple[Any, ...] = (None,) * 7
+            content: tuple[Any, ...] = (None,) * 10
         else:
             assert len(pose.sources) == len(pose.values)
             assert np.all(np.isfinite(pose.values))
+            assert pose.status in STATUSES, pose.status
             content = (
                 np.asarray(pose.values, dtype="<f8").tobytes(),
                 bytes(SOURCES.index(s) for s in pose.sources),
@@ -306,11 +287,14 @@ class AnnotationStore:
                 pose.cost_px,
                 pose.model_revision,
                 json.dumps(dict(pose.settings)),
+                _blob(pose.views_px),
+                _blob(pose.parts_px),
+                pose.remark,
             )
         row = self._db.execute(
             "INSERT INTO pose_changes (edit, previous, person, frame, numbers, sources, keyframe, status, cost_px, "
-            "model_revision, settings) VALUES (?1, (SELECT change FROM poses WHERE (person, frame) = (?2, ?3)), "
-            "?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
+            "model_revision, settings, views_px, parts_px, remark) VALUES (?1, (SELECT change FROM poses WHERE "
+            "(person, frame) = (?2, ?3)), ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
             (edit, change.person, change.frame, *content),
         ).lastrowid
         self._show("pose", row, row)
@@ -382,6 +366,23 @@ class AnnotationStore:
             raise SessionError(
                 f"annotations {self._path} cannot be read or written: {error}; check the disk and who has the file open"
             ) from error
+
+
+def _array(blob: bytes) -> Array:
+    """Numbers as stored, not writable."""
+    values = np.frombuffer(blob, dtype="<f8").astype(np.float64)
+    values.setflags(write=False)
+    return values
+
+
+def _blob(costs_px: Sequence[float | None]) -> bytes | None:
+    """Costs as stored: NaN for None, nothing where there are none."""
+    return np.array([np.nan if c is None else c for c in costs_px], dtype="<f8").tobytes() if costs_px else None
+
+
+def _costs(blob: bytes | None) -> tuple[float | None, ...]:
+    """Costs from what is stored."""
+    return () if blob is None else tuple(c if isfinite(c) else None for (c,) in iter_unpack("<d", blob))
 
 
 def _now() -> str:

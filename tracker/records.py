@@ -8,6 +8,8 @@ from tracker.rigid import Array
 
 # From a person's hand to a foreign file. Stored by index: add at the end, never reorder.
 SOURCES = ("manual", "pinned", "searched", "fitted", "tracked", "interpolated", "smoothed", "imported")
+# How good a pose is, as its tracker judges; empty where nobody has judged it.
+STATUSES = ("", "good", "doubtful", "lost")
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +25,7 @@ class PoseRecord:
     keyframe: bool = False
     """Whether a person set or verified the frame, so that no program may change it."""
     status: str = ""
-    """How the tracker or a reviewer judges it, e.g. `ok`, `lost`."""
+    """How good it is as its tracker judges, one of `STATUSES`."""
     cost_px: float | None = None
     """Mean cost over the views, px; None where nobody has computed it."""
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -34,6 +36,12 @@ class PoseRecord:
     """When the edit was made, ISO 8601, UTC."""
     program: str = ""
     """Version of the program that made the edit."""
+    views_px: tuple[float | None, ...] = ()
+    """Cost of each view in the order of the session's cameras, px; None without edges, empty where unknown."""
+    parts_px: tuple[float | None, ...] = ()
+    """Cost of each part in the order of the body model's, px; None for an unseen part, empty where unknown."""
+    remark: str = ""
+    """What the tracker did on the frame, for people to read: `left arm searched anew`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +96,21 @@ class FrameRow(NamedTuple):
     status: str
     cost_px: float | None
     keyframe: bool
+    views_px: tuple[float | None, ...] = ()
+    """Cost of each view, px; None without edges, empty where unknown."""
+    remark: str = ""
+    """What the tracker did on the frame."""
+
+
+class FrameNumbers(NamedTuple):
+    """The numbers of a frame that has a pose, for curves."""
+
+    frame: int
+    values: Array
+    """Pose, (n_values,), of the body model that it was made with."""
+    cost_px: float | None
+    views_px: tuple[float | None, ...]
+    """Cost of each view, px; None without edges, empty where unknown."""
 
 
 class HistoryEntry(NamedTuple):

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tracker.annotations import VERSION, AnnotationStore
+from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
 from tracker.records import FrameRow, Pin, PinChange, PoseChange, PoseRecord
 
@@ -41,12 +41,17 @@ def xs(store, person="ann"):
 
 
 def test_pose_comes_back_whole(store, path):
-    full = pose(0.1, keyframe=True, status="lost", cost_px=1.25, settings={"step_deg": 5, "tree": ["arms"]})
+    full = pose(
+        0.1, keyframe=True, status="lost", cost_px=1.25, settings={"step_deg": 5, "tree": ["arms"]},
+        views_px=(0.5, None, 2.0), parts_px=(None, 0.25), remark="left arm searched anew",
+    )  # fmt: skip
     store.commit("Place", [PoseChange("ann", 7, full)], author="eve")
     store.close()
     back = AnnotationStore(path, read_only=True).pose("ann", 7)
     np.testing.assert_array_equal(back.values, full.values)  # to the bit
-    for name in ("sources", "model_revision", "keyframe", "status", "cost_px", "settings"):
+    for name in (
+        "sources", "model_revision", "keyframe", "status", "cost_px", "settings", "views_px", "parts_px", "remark",
+    ):  # fmt: skip
         assert getattr(back, name) == getattr(full, name), name
     assert back.author == "eve"
     assert back.time.startswith("20")
@@ -68,12 +73,27 @@ def test_people_have_their_own_poses(store):
 
 
 def test_frames_in_short(store):
-    searched = PoseRecord(np.zeros(2), ("tracked", "searched"), 1, status="ok", cost_px=0.5)
+    searched = PoseRecord(
+        np.zeros(2), ("tracked", "searched"), 1, status="good", cost_px=0.5, views_px=(None, 0.5), remark="twice"
+    )
     store.commit("a", [put(9, 1.0, keyframe=True), PoseChange("ann", 3, searched)])
     assert store.frames("ann") == [
-        FrameRow(3, "searched", "ok", 0.5, False),
+        FrameRow(3, "searched", "good", 0.5, False, (None, 0.5), "twice"),
         FrameRow(9, "manual", "", None, True),
     ]
+
+
+def test_numbers_of_a_range(store):
+    store.commit("a", [put(k, float(k), cost_px=0.5 * k, views_px=(1.0, None)) for k in (1, 4, 6)])
+    rows = store.numbers("ann", range(2, 6))
+    assert [(row.frame, row.cost_px, row.views_px) for row in rows] == [(4, 2.0, (1.0, None))]
+    np.testing.assert_array_equal(rows[0].values, [4.0, 2.0, 1 / 3])
+    assert [row.frame for row in store.numbers("ann", range(7))] == [1, 4, 6]
+
+
+def test_a_status_is_one_of_those_known(store):
+    with pytest.raises(AssertionError, match="fine"):
+        store.commit("a", [put(1, 1.0, status="fine")])
 
 
 def test_one_commit_is_one_undo(store):
@@ -312,15 +332,6 @@ def test_read_only(store, path):
     assert xs(reader) == {1: 1.0}
     with pytest.raises(SessionError, match="readonly"):
         reader.commit("b", [put(1, 2.0)])
-
-
-def test_newer_version(path):
-    AnnotationStore(path).close()
-    db = sqlite3.connect(path)
-    db.execute(f"PRAGMA user_version = {VERSION + 1}")
-    db.close()
-    with pytest.raises(SessionError, match=f"version {VERSION + 1}.*upgrade"):
-        AnnotationStore(path)
 
 
 def test_not_a_store(path):

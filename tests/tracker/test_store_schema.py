@@ -1,0 +1,87 @@
+import sqlite3
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tracker import store_schema
+from tracker.annotations import AnnotationStore
+from tracker.errors import SessionError
+from tracker.records import Pin, PoseChange, PoseRecord
+from tracker.store_schema import VERSION
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "annotations.sqlite"
+
+
+def xs(store):
+    """First value of every frame that has a pose."""
+    return {row.frame: store.pose("ann", row.frame).values[0] for row in store.frames("ann")}
+
+
+@pytest.fixture
+def version_1(path):
+    """A store as its version 1 was written: four edits, one amended and the last undone."""
+    db = sqlite3.connect(path)
+    db.executescript(Path(__file__).with_name("store_version_1.sql").read_text("utf-8"))
+    db.close()
+    return path
+
+
+def test_older_version_keeps_everything(version_1):
+    store = AnnotationStore(version_1)
+    assert xs(store) == {1: 0.3, 2: 2.0, 3: 3.0}
+    assert [(h.label, h.undone) for h in store.history()] == [
+        ("clear", True), ("track", False), ("drag", False), ("place", False),
+    ]  # fmt: skip
+    assert store.pins("ann", 1) == [Pin("left_wrist", "front", (10.25, -3.5))]
+    assert store.setting("tree") == {"arms": [1]}
+    back = store.pose("ann", 3)
+    assert (back.cost_px, back.views_px, back.parts_px, back.remark, back.program) == (1.5, (), (), "", "0.1.0")
+    assert store.undo() == "track"
+    assert store.undo() == "drag"
+    assert xs(store) == {1: 0.1}
+    assert (store.pose("ann", 1).settings, store.pose("ann", 1).author) == ({"step_deg": 5}, "eve")
+    assert [store.redo(), store.redo(), store.redo(), store.redo()] == ["drag", "track", "clear", None]
+    assert xs(store) == {1: 0.3, 3: 3.0}
+    record = PoseRecord(np.array([5.0]), ("manual",), 1, views_px=(1.0,), remark="both")
+    store.commit("new", [PoseChange("ann", 5, record)])
+    assert store.undo() == "new"
+    store.close()
+    again = AnnotationStore(version_1)
+    assert xs(again) == {1: 0.3, 3: 3.0}
+    assert again.redo() == "new"
+    assert again.pose("ann", 5).remark == "both"
+
+
+def test_older_version_that_is_only_read_stays_as_it_is(version_1):
+    before = version_1.read_bytes()
+    store = AnnotationStore(version_1, read_only=True)
+    assert store.pose("ann", 2).remark == ""
+    assert [row.views_px for row in store.frames("ann")] == [(), (), ()]
+    assert [row.frame for row in store.numbers("ann", range(9))] == [1, 2, 3]
+    assert [h.label for h in store.history()] == ["clear", "track", "drag", "place"]
+    store.close()
+    assert version_1.read_bytes() == before
+
+
+def test_upgrade_is_whole_or_not_at_all(version_1, monkeypatch):
+    before = version_1.read_bytes()
+    broken = (*store_schema._UPGRADES[1][:2], "ALTER TABLE no_such_table ADD COLUMN x TEXT")
+    monkeypatch.setitem(store_schema._UPGRADES, 1, broken)
+    with pytest.raises(SessionError, match="no_such_table"):
+        AnnotationStore(version_1)
+    monkeypatch.undo()
+    assert version_1.read_bytes() == before
+    assert AnnotationStore(version_1).undo() == "track"
+
+
+def test_newer_version(path):
+    AnnotationStore(path).close()
+    db = sqlite3.connect(path)
+    db.execute(f"PRAGMA user_version = {VERSION + 1}")
+    db.close()
+    with pytest.raises(SessionError, match=f"version {VERSION + 1}.*upgrade"):
+        AnnotationStore(path)
