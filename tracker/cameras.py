@@ -14,6 +14,9 @@ from tracker.rigid import Array
 
 DISTORTION_COUNTS = (0, 4, 5, 8)
 
+Region = tuple[int, int, int, int]
+"""A box in an image: first column, first row, and those after the last, px."""
+
 
 @dataclass(frozen=True, eq=False)
 class Camera:
@@ -85,6 +88,15 @@ class Camera:
         K[:2, 2] += (s - 1.0) / 2.0
         return replace(self, size=size, K=K)
 
+    def cropped(self, region: Region) -> "Camera":
+        """Return the camera of a region cut out of the image: the same rays, pixels counted from its corner."""
+        u0, v0, u1, v1 = region
+        assert u0 < u1, region
+        assert v0 < v1, region
+        K = self.K.copy()
+        K[:2, 2] -= (u0, v0)
+        return replace(self, size=(u1 - u0, v1 - v0), K=K)
+
     def depths(self, points_world: Array) -> Array:
         """Distances along the optical axis, `(..., 3)` to `(...)`, metres; positive in front of the camera."""
         return rigid.apply(self.T_camera_world, points_world)[..., 2]
@@ -125,19 +137,12 @@ class Camera:
             return np.asarray(points_px, dtype=np.float64)
         return self._normalized_to_px(self.pinhole._px_to_normalized(np.asarray(points_px, dtype=np.float64)))
 
-    def undistort_image(self, image: NDArray[np.uint8], nearest: bool = False) -> NDArray[np.uint8]:
-        """Resample an image as filmed, `(H, W[, C])`, to undistorted pixels of the same size.
-
-        Args:
-            image: the image; its size must be that of the camera.
-            nearest: take the nearest pixel instead of interpolating, as masks need.
-        """
+    def undistort_image(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Resample an image as filmed, `(H, W[, C])`, to undistorted pixels of the same size."""
         assert image.shape[:2] == (self.height, self.width), (image.shape, self.size)
         if self.is_pinhole:
             return image
-        return cv2.remap(  # type: ignore[return-value]
-            image, *self._undistort_maps, cv2.INTER_NEAREST if nearest else cv2.INTER_LINEAR
-        )
+        return cv2.remap(image, *self._undistort_maps, cv2.INTER_LINEAR)  # type: ignore[return-value]
 
     @cached_property
     def _undistort_maps(self) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:

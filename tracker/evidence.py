@@ -1,77 +1,143 @@
-"""What a frame shows: per view the edges that poses are scored against, and their distance image."""
+"""What a frame shows: per view the edges that poses are scored against, and their distance image.
 
+The observer works only in the regions asked for, on several views at a time, and one frame ahead.
+"""
+
+import threading
+from collections import OrderedDict
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from tracker import silhouettes
-from tracker.cameras import Camera
-from tracker.edges import detect_edges
+from tracker.cameras import Camera, Region
+from tracker.edges import Levels, detect_edges, levels
+from tracker.matched import MatchedView, fit_region
+from tracker.probes import Probes, Readings
 from tracker.recording import Recording, read_background, read_mask
 from tracker.session import CameraSource
-from tracker.silhouettes import Image
+from tracker.silhouettes import Image, Mask
 
 FloatArray = NDArray[np.float32]
 
 SCENE_SPACING_PX = 3
 """Scene edges are thinned to one point per cell of this many pixels a side."""
-MATCH_AREA_PX = 640 * 480
-"""Frames are matched at a scale at which they have about this many pixels, and never enlarged."""
+
 FOREGROUND_MARGIN = 0.012
 """How far around the silhouette edges are kept, as a fraction of the longer side of the image."""
+_WORKERS = 2
+_FRAMES_AHEAD = 2
 
 
 @dataclass(frozen=True, eq=False)
 class ViewEvidence:
-    """The edges of one view, as they are matched."""
+    """The edges of one view, or of a region of it, as they are matched."""
 
     camera: Camera
-    """The view without lens distortion, at the scale of matching."""
+    """The view without lens distortion, at the scale of matching, of the region: pixels count from its corner."""
     scale: float
     """Matched pixels per pixel of the footage, at most 1."""
     points_px: FloatArray
-    """Edge points for the image-to-model direction, thinned, (N, 2), matched px."""
+    """Edge points for the image-to-model direction, thinned, (N, 2), matched px of the region."""
     distance: FloatArray
     """Distance to the nearest edge, cut off at the limit it was made with, (H, W), matched px."""
+    corner_px: tuple[int, int] = (0, 0)
+    """Where the region's first pixel lies in the whole image, matched px."""
+    image_size: tuple[int, int] | None = None
+    """Width and height of the whole image, matched px; None where the region is all of it."""
+
+    @property
+    def theta_px(self) -> float:
+        """Distance beyond which an edge says nothing, matched px; that of the whole image, whatever the region."""
+        return _theta_px(self.image_size or self.camera.size)
 
 
 def default_theta_px(camera: Camera) -> float:
     """Distance beyond which an edge says nothing: 3% of the longer side of the image (20 px at 640x480)."""
-    return 0.03 * max(camera.size)
+    return _theta_px(camera.size)
 
 
-def distance_image(edge_map: NDArray[np.bool_], limit_px: float) -> FloatArray:
-    """Distance of each pixel to the nearest edge, `(H, W)` bool to `(H, W)` float32, cut off at the limit."""
-    if not edge_map.any():
+def _theta_px(size: tuple[int, int]) -> float:
+    return 0.03 * max(size)
+
+
+def distance_image(edge_map: NDArray[np.bool_] | NDArray[np.uint8], limit_px: float) -> FloatArray:
+    """Distance of each pixel to the nearest edge, `(H, W)` to `(H, W)` float32, cut off at the limit."""
+    edge_map = edge_map.view(np.uint8)
+    if not cv2.countNonZero(edge_map):
         return np.full(edge_map.shape, limit_px, np.float32)
-    background = np.where(edge_map, 0, 255).astype(np.uint8)
-    distance = cv2.distanceTransform(background, cv2.DIST_L2, cv2.DIST_MASK_5)
-    return np.minimum(distance, np.float32(limit_px))
+    free = (edge_map == 0).view(np.uint8)
+    distance = np.asarray(cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_5), dtype=np.float32)
+    return np.minimum(distance, np.float32(limit_px), out=distance)
 
 
-def view_evidence(camera: Camera, scale: float, edge_map: NDArray[np.bool_]) -> ViewEvidence:
+def view_evidence(
+    camera: Camera,
+    scale: float,
+    edge_map: NDArray[np.bool_] | NDArray[np.uint8],
+    corner_px: tuple[int, int] = (0, 0),
+    image_size: tuple[int, int] | None = None,
+) -> ViewEvidence:
     """Make the evidence of a view from its edge map.
 
     Args:
         camera: the view without lens distortion at the scale of the edge map.
         scale: pixels of the edge map per pixel of the footage.
-        edge_map: (H, W) bool.
+        edge_map: (H, W), edges are not 0.
+        corner_px: see `ViewEvidence`.
+        image_size: see `ViewEvidence`.
     """
     assert edge_map.shape == (camera.height, camera.width), (edge_map.shape, camera.size)
-    v, u = np.nonzero(edge_map)
-    cells = (v // SCENE_SPACING_PX) * camera.width + u // SCENE_SPACING_PX
-    _, first = np.unique(cells, return_index=True)
-    points = np.stack([u[first], v[first]], axis=-1).astype(np.float32)
+    found = cv2.findNonZero(edge_map.view(np.uint8))
+    points = np.empty((0, 2), np.float32) if found is None else _thinned(found, camera.width, camera.height)
     # Beyond twice theta nothing asks for the distance any more.
-    return ViewEvidence(camera, scale, points, distance_image(edge_map, 2 * default_theta_px(camera)))
+    limit_px = 2 * _theta_px(image_size or camera.size)
+    return ViewEvidence(camera, scale, points, distance_image(edge_map, limit_px), corner_px, image_size)
 
 
-def match_scale(camera: Camera) -> float:
-    """Scale at which the frames of a camera are matched: 1 up to 640x480, smaller above."""
-    return min(1.0, float(np.sqrt(MATCH_AREA_PX / (camera.width * camera.height))))
+@njit(nogil=True, cache=True)
+def _thinned(points: NDArray[np.int32], width: int, height: int) -> FloatArray:
+    """The first of the points (N, 2) in each cell of the scene spacing, (M, 2)."""
+    columns = width // SCENE_SPACING_PX + 1
+    taken = np.zeros((height // SCENE_SPACING_PX + 1) * columns, np.bool_)
+    kept = np.empty((points.shape[0], 2), np.float32)
+    n = 0
+    for i in range(points.shape[0]):
+        u, v = points[i, 0], points[i, 1]
+        cell = (v // SCENE_SPACING_PX) * columns + u // SCENE_SPACING_PX
+        if not taken[cell]:
+            taken[cell] = True
+            kept[n, 0], kept[n, 1] = u, v
+            n += 1
+    return kept[:n].copy()
+
+
+class _Prepared(NamedTuple):
+    """A view of a frame, and what of it does not depend on a region."""
+
+    frame: Image
+    """As filmed, (H, W, 3) RGB."""
+    mask: NDArray[np.uint8] | None
+    """As filmed, (H, W); None where there is none."""
+    bounds: Levels
+    """Thresholds of edges."""
+    threshold: float
+    """Difference from the background that is a change, gray levels."""
+
+
+class _Empty(NamedTuple):
+    """The empty scene of a view."""
+
+    smooth: Image
+    """Smoothed, in matched pixels, (H, W, 3)."""
+    readings: Readings
+    """What the probes show of it."""
 
 
 class Observer:
@@ -89,12 +155,19 @@ class Observer:
         """
         self.cameras = tuple(cameras)
         self._recording = recording
-        self._scales = [match_scale(c.camera) for c in cameras]
-        self._matched = [c.camera.pinhole.scaled(s) for c, s in zip(cameras, self._scales, strict=True)]
-        self._backgrounds = [
-            None if image is None else _matched(source.camera, matched, image)
-            for source, matched, image in zip(cameras, self._matched, map(read_background, self.cameras), strict=True)
-        ]
+        self._views = [MatchedView(c.camera) for c in cameras]
+        self._probes = [Probes(v.source.size, v.scale) for v in self._views]
+        self._empty = [self._empty_scene(i, read_background(c)) for i, c in enumerate(self.cameras)]
+        # OpenCV's own threads would only be in the way of those that work on other views.
+        self._pool = ThreadPoolExecutor(_WORKERS, "observe", initializer=cv2.setNumThreads, initargs=(1,))
+        self._reader = ThreadPoolExecutor(1, "ahead")
+        self._ahead: OrderedDict[int, Future[list[_Prepared | None]]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    @property
+    def matched_cameras(self) -> tuple[Camera, ...]:
+        """The views as they are matched, whole: without lens distortion, at the scale of matching."""
+        return tuple(v.camera for v in self._views)
 
     def images(self, k: int) -> tuple[Image | None, ...]:
         """Frame k of each camera in undistorted pixels, (H, W, 3) RGB; None where it is damaged."""
@@ -103,33 +176,72 @@ class Observer:
             for source, image in zip(self.cameras, self._recording.read(k), strict=True)
         )
 
-    def evidence(self, k: int) -> tuple[ViewEvidence, ...]:
+    def prefetch(self, k: int) -> None:
+        """Begin to decode frame k, and to do with it what needs no region; `evidence` will find it done.
+
+        At most two frames are kept so. A frame that cannot be read is reported when its evidence is asked for.
+        """
+        with self._lock:
+            if k not in self._ahead:
+                self._ahead[k] = self._reader.submit(self._prepare, k)
+            while len(self._ahead) > _FRAMES_AHEAD:
+                self._ahead.popitem(last=False)[1].cancel()
+
+    def evidence(self, k: int, regions: Sequence[Region | None] | None = None) -> tuple[ViewEvidence, ...]:
         """The edges of frame k in each view, kept to the foreground where masks or a background tell it.
 
         A damaged frame has no edges: the view has no say in the cost.
+
+        Args:
+            k: the frame.
+            regions: where to look in each view, matched px, see `matched.region_around`; None is the whole image.
         """
-        frames = self._recording.read(k)
-        return tuple(self._observe(i, image, k) for i, image in enumerate(frames))
+        with self._lock:
+            ahead = self._ahead.pop(k, None)
+        prepared = self._prepare(k) if ahead is None else ahead.result()
+        boxes = [None] * len(self.cameras) if regions is None else regions
+        return tuple(self._pool.map(self._observe, range(len(self.cameras)), prepared, boxes))
 
-    def _observe(self, i: int, image: Image | None, k: int) -> ViewEvidence:
-        source, matched = self.cameras[i], self._matched[i]
-        if image is None:
-            return view_evidence(matched, self._scales[i], np.zeros((matched.height, matched.width), dtype=bool))
-        frame = _matched(source.camera, matched, image)
-        mask, background, foreground = read_mask(source, k), self._backgrounds[i], None
-        if mask is not None:
-            undistorted = source.camera.undistort_image(mask, nearest=True)
-            foreground = cv2.resize(undistorted, matched.size, interpolation=cv2.INTER_NEAREST) > 0
-        elif background is not None:
-            foreground = silhouettes.subtract_background(frame, background)
-        if foreground is not None:
-            foreground = silhouettes.grow(foreground, FOREGROUND_MARGIN * max(matched.size))
-        return view_evidence(matched, self._scales[i], detect_edges(frame, foreground))
+    def _prepare(self, k: int) -> list[_Prepared | None]:
+        return [
+            None if frame is None else self._prepare_view(i, frame, k)
+            for i, frame in enumerate(self._recording.read(k))
+        ]
 
+    def _prepare_view(self, i: int, frame: Image, k: int) -> _Prepared:
+        empty, mask = self._empty[i], read_mask(self.cameras[i], k)
+        readings = self._probes[i].read(frame)
+        bounds = levels(readings.strengths, restricted=empty is not None or mask is not None)
+        if empty is None:
+            return _Prepared(frame, mask, bounds, 0.0)
+        differences = np.abs(readings.colors - empty.readings.colors).max(axis=-1)
+        return _Prepared(frame, mask, bounds, silhouettes.change_threshold(differences))
 
-def _matched(camera: Camera, matched: Camera, image: Image) -> Image:
-    """Undistort an image as filmed and bring it to the scale of matching."""
-    undistorted = camera.undistort_image(image)
-    if matched.size == camera.size:
-        return undistorted
-    return np.asarray(cv2.resize(undistorted, matched.size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    def _empty_scene(self, i: int, background: Image | None) -> _Empty | None:
+        if background is None:
+            return None
+        view = self._views[i]
+        return _Empty(silhouettes.smoothed(view.image(background, view.whole)), self._probes[i].read(background))
+
+    def _observe(self, i: int, prepared: _Prepared | None, region: Region | None) -> ViewEvidence:
+        view = self._views[i]
+        box = view.whole if region is None else fit_region(region, view.camera.size)
+        camera = view.camera.cropped(box)
+        if prepared is None:
+            found = np.zeros((camera.height, camera.width), np.uint8)
+        else:
+            smooth = silhouettes.smoothed(view.image(prepared.frame, box))
+            found = detect_edges(smooth, prepared.bounds, self._foreground(i, prepared, smooth, box)).found
+        return view_evidence(camera, view.scale, found, box[:2], view.camera.size)
+
+    def _foreground(self, i: int, prepared: _Prepared, smooth: Image, box: Region) -> Mask | None:
+        """Where a person may be, (H, W), generously; None where nothing tells."""
+        u0, v0, u1, v1 = box
+        view, empty = self._views[i], self._empty[i]
+        if prepared.mask is not None:
+            inside = view.mask(prepared.mask, box)
+        elif empty is not None:
+            inside = silhouettes.subtract_background(smooth, empty.smooth[v0:v1, u0:u1], prepared.threshold)
+        else:
+            return None
+        return silhouettes.grow(inside, FOREGROUND_MARGIN * max(view.camera.size))

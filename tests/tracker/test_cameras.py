@@ -91,11 +91,12 @@ def test_undistorted_image_shows_each_point_where_the_pinhole_sees_it(count):
         assert np.abs(undistorted[grid[:, 1], grid[:, 0]] - expected).max() < 1.5
 
 
-def test_nearest_keeps_labels():
-    mask = np.zeros((480, 640), np.uint8)
-    mask[100:200, 100:200] = 255
-    assert set(np.unique(camera().undistort_image(mask, nearest=True))) == {0, 255}
-    assert len(np.unique(camera().undistort_image(mask))) > 2
+def test_cropped_camera_counts_pixels_from_the_corner_of_the_region():
+    c, points = camera(), cloud()
+    part = c.cropped((100, 40, 300, 390))
+    assert part.size == (200, 350)
+    np.testing.assert_allclose(part.project(points), c.project(points) - (100, 40), atol=1e-9)
+    np.testing.assert_allclose(part.rays(np.array([7.0, 9.0])), c.rays(np.array([107.0, 49.0])), atol=1e-9)
 
 
 @pytest.mark.parametrize("scale", [0.5, 2.0])

@@ -13,9 +13,9 @@ from tracker.evidence import (
     Observer,
     default_theta_px,
     distance_image,
-    match_scale,
     view_evidence,
 )
+from tracker.matched import MatchedView, match_scale, region_around
 from tracker.recording import Recording
 from tracker.session import CameraSource, load_session
 
@@ -28,6 +28,19 @@ class Frames:
 
     def read(self, k):
         return self.images
+
+
+class FailingFrames:
+    """A recording that knows only frame 0."""
+
+    def __init__(self, image):
+        self.image, self.reads = image, []
+
+    def read(self, k):
+        self.reads.append(k)
+        if k:
+            raise RecordingError(f"expected frame 0, found {k}")
+        return (self.image,)
 
 
 def source(camera, **side_files):
@@ -174,10 +187,11 @@ def test_masks_go_before_the_background(sample, tmp_path, real_frame):
         discs.append(mask)
     observer = Observer([replace(c, masks=tmp_path / c.camera.name) for c in session.cameras], recording)
     for view, camera, disc in zip(observer.evidence(25), cameras, discs, strict=True):
-        undistorted = camera.undistort_image(disc, nearest=True)
-        outside = cv2.distanceTransform(1 - undistorted, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        matched = MatchedView(camera)
+        inside = matched.mask(disc, matched.whole)
+        outside = cv2.distanceTransform((~inside).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
         u, v = view.points_px.astype(int).T
-        assert outside[v, u].max() <= FOREGROUND_MARGIN * 640 * 1.03
+        assert outside[v, u].max() <= FOREGROUND_MARGIN * 640 * 1.15
         assert len(u) > 20
     # A frame without a mask falls back on the background.
     without = Observer(session.cameras, recording).evidence(24)
@@ -224,3 +238,57 @@ def test_the_matched_camera_is_the_pinhole_scaled():
     expected = camera.pinhole.scaled(match_scale(camera))
     np.testing.assert_allclose(view.camera.K, expected.K)
     assert view.camera.size == expected.size
+
+
+def test_a_region_shows_what_the_whole_image_shows_there(sample, real_frame):
+    session, recording = sample
+    observer = Observer(session.cameras, recording)
+    boxes = [
+        region_around(c.project(real_frame.model.points_world(real_frame.values)), 60, c.size)
+        for c in observer.matched_cameras
+    ]
+    for whole, part, (u0, v0, u1, v1) in zip(observer.evidence(25), observer.evidence(25, boxes), boxes, strict=True):
+        assert part.camera.size == (u1 - u0, v1 - v0) == part.distance.shape[::-1]
+        assert part.corner_px == (u0, v0)
+        assert part.theta_px == whole.theta_px == default_theta_px(whole.camera)
+        joints = real_frame.model.points_world(real_frame.values)
+        np.testing.assert_allclose(part.camera.project(joints) + np.array([u0, v0]), whole.camera.project(joints))
+        inner = (slice(v0 + 8, v1 - 8), slice(u0 + 8, u1 - 8))
+        same = (part.distance[8:-8, 8:-8] == 0) == (whole.distance[inner] == 0)
+        assert same.mean() > 0.9995
+        assert (part.distance == 0).any()
+
+
+def test_views_can_be_looked_at_in_part_or_whole(sample):
+    session, recording = sample
+    observer = Observer(session.cameras, recording)
+    views = observer.evidence(3, [(100, 50, 300, 400), None, (-500, -500, -400, -400), (600, 440, 900, 900)])
+    assert [v.camera.size for v in views] == [(200, 350), (640, 480), (16, 16), (40, 40)]
+    assert [v.corner_px for v in views] == [(100, 50), (0, 0), (0, 0), (600, 440)]
+
+
+def test_a_frame_read_ahead_is_the_same(sample):
+    session, recording = sample
+    observer = Observer(session.cameras, recording)
+    expected = observer.evidence(7)
+    for k in (5, 6, 7):
+        observer.prefetch(k)
+    for a, b in zip(observer.evidence(7), expected, strict=True):
+        np.testing.assert_array_equal(a.distance, b.distance)
+        np.testing.assert_array_equal(a.points_px, b.points_px)
+
+
+def test_a_frame_read_ahead_is_read_once():
+    frames = FailingFrames(np.zeros((480, 640, 3), np.uint8))
+    observer = Observer([source(camera_at("c", (4, 0, 0)))], frames)
+    observer.prefetch(0)
+    observer.prefetch(0)
+    observer.evidence(0)
+    assert frames.reads == [0]
+
+
+def test_what_is_wrong_with_a_frame_read_ahead_is_told_when_it_is_asked_for():
+    observer = Observer([source(camera_at("c", (4, 0, 0)))], FailingFrames(np.zeros((480, 640, 3), np.uint8)))
+    observer.prefetch(5)
+    with pytest.raises(RecordingError, match="found 5"):
+        observer.evidence(5)

@@ -1,0 +1,125 @@
+"""Footage to matched pixels: without lens distortion, at the scale of matching, and only the region asked for.
+
+All image work is done in the region around the predicted bodies (GD96 Sect. 4.2); the rest is never computed.
+"""
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.cameras import Camera, Region
+from tracker.rigid import Array
+from tracker.silhouettes import Image, Mask
+
+MATCH_AREA_PX = 640 * 480
+"""Frames are matched at a scale at which they have about this many pixels, and never enlarged."""
+MIN_REGION_PX = 16
+"""Regions are at least this wide and high; edges and distances need neighbours."""
+_REGION_STEP_PX = 8
+# Pixels around a region of the footage that bilinear interpolation may ask for.
+_MARGIN_PX = 2
+
+
+def match_scale(camera: Camera) -> float:
+    """Scale at which the frames of a camera are matched: 1 up to 640x480, smaller above."""
+    return min(1.0, float(np.sqrt(MATCH_AREA_PX / (camera.width * camera.height))))
+
+
+def fit_region(region: Region, size: tuple[int, int]) -> Region:
+    """Bring a region into an image of a width and height, px, at least `MIN_REGION_PX` wide and high.
+
+    A region beside the image becomes the nearest strip of it: edges there are none of the body's, but harmless.
+    """
+    spans = []
+    for low, high, length in zip(region[:2], region[2:], size, strict=True):
+        least = min(MIN_REGION_PX, length)
+        first = min(max(low, 0), length - least)
+        spans.append((first, max(min(high, length), first + least)))
+    return spans[0][0], spans[1][0], spans[0][1], spans[1][1]
+
+
+def region_around(points_px: Array, margin_px: float, size: tuple[int, int]) -> Region:
+    """The region of an image that holds points and a margin around them.
+
+    Its borders lie at multiples of 8 px, so that it does not change with every small motion.
+
+    Args:
+        points_px: (N, 2), N > 0, matched px; they may lie outside the image.
+        margin_px: what to add on each side, px.
+        size: image width and height, px.
+    """
+    step = _REGION_STEP_PX
+    # Far outside, where a point near the plane of the camera may lie, integers would overflow.
+    reach = 2 * max(size)
+    points = np.clip(points_px, -reach, reach)
+    u0, v0 = np.floor((points.min(axis=0) - margin_px) / step).astype(int) * step
+    u1, v1 = np.ceil((points.max(axis=0) + margin_px) / step).astype(int) * step
+    return fit_region((int(u0), int(v0), int(u1), int(v1)), size)
+
+
+class MatchedView:
+    """One camera's way from footage to matched pixels. Immutable, so safe to use from several threads."""
+
+    source: Camera
+    """The camera as calibrated, of the size of the footage."""
+    camera: Camera
+    """The same without lens distortion, at the scale of matching."""
+    scale: float
+    """Matched pixels per pixel of the footage, at most 1."""
+
+    def __init__(self, source: Camera) -> None:
+        """Compute the maps of all pixels once; a region takes its part of them."""
+        self.source = source
+        self.scale = match_scale(source)
+        self.camera = source.pinhole.scaled(self.scale)
+        # Larger footage is first reduced by a whole factor, averaging areas, which is fast; the map does the rest.
+        self._reduction = int(1 / self.scale)
+        self._plain = source.is_pinhole and self.scale == 1
+        if self._plain:
+            return
+        u, v = cv2.initUndistortRectifyMap(
+            source.K, source.distortion, np.eye(3), self.camera.K, self.camera.size, cv2.CV_32FC1
+        )
+        self._nearest, self._no_fractions = cv2.convertMaps(u, v, cv2.CV_16SC2, nninterpolation=True)
+        f = self._reduction
+        u, v = ((m + np.float32(0.5)) / np.float32(f) - np.float32(0.5) for m in (u, v))
+        self._cells, self._fractions = cv2.convertMaps(u, v, cv2.CV_16SC2)
+
+    @property
+    def whole(self) -> Region:
+        """The region of the whole image."""
+        return 0, 0, self.camera.width, self.camera.height
+
+    def image(self, frame: Image, region: Region) -> Image:
+        """Region of a frame as filmed, `(H, W, 3)`, in matched pixels, (v1 - v0, u1 - u0, 3)."""
+        u0, v0, u1, v1 = region
+        if self._plain:
+            return frame[v0:v1, u0:u1]
+        cells, fractions = self._cells[v0:v1, u0:u1], self._fractions[v0:v1, u0:u1]
+        f = self._reduction
+        if f > 1:
+            left, top, right, bottom = self._needed(cells, frame.shape[1] // f, frame.shape[0] // f)
+            part = frame[top * f : bottom * f, left * f : right * f]
+            frame = np.asarray(cv2.resize(part, (right - left, bottom - top), interpolation=cv2.INTER_AREA), np.uint8)
+            cells = cells - np.array([left, top], np.int16)
+        # Beyond the footage its border goes on: a black frame around the image would have edges.
+        out = cv2.remap(frame, cells, fractions, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(out, np.uint8)
+
+    def mask(self, mask: NDArray[np.uint8], region: Region) -> Mask:
+        """Region of a mask as filmed, `(H, W)`, in matched pixels, (v1 - v0, u1 - u0); True where it is not 0."""
+        u0, v0, u1, v1 = region
+        if self._plain:
+            return mask[v0:v1, u0:u1] > 0
+        return np.asarray(cv2.remap(mask, self._nearest[v0:v1, u0:u1], self._no_fractions, cv2.INTER_NEAREST)) > 0
+
+    @staticmethod
+    def _needed(cells: NDArray[Any], width: int, height: int) -> Region:
+        """The part of the reduced footage that a map reads; a lens has its extremes on the border of a region."""
+        border = np.concatenate([cells[0], cells[-1], cells[:, 0], cells[:, -1]])
+        (left, top), (right, bottom) = border.min(axis=0).tolist(), border.max(axis=0).tolist()
+        m = _MARGIN_PX
+        left, top = min(max(left - m, 0), width - 1), min(max(top - m, 0), height - 1)
+        return left, top, max(min(right + m + 1, width), left + 1), max(min(bottom + m + 1, height), top + 1)
