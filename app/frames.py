@@ -48,7 +48,7 @@ class Frames:
 
     def __init__(self, observer: Observer) -> None:
         """Wrap an observer; nothing is read yet."""
-        self._observer = observer
+        self.observer = observer
         self._images = _Recent(observer.images)
         self._evidence = _Recent(observer.evidence)
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="evidence")
@@ -83,7 +83,7 @@ class Frames:
         if base == "image":
             image = self._images.get(frame)[camera]
             if image is None:
-                return _encode(_blank(self._observer.cameras[camera].camera.size, "frame damaged"))
+                return _encode(_blank(self.observer.cameras[camera].camera.size, "frame damaged"))
             return _encode(image)
         view = self._evidence.get(frame)[camera]
         if base == "edges":

@@ -4,7 +4,6 @@ import asyncio
 import itertools
 import json
 import logging
-import struct
 from collections import deque
 from collections.abc import Callable, Coroutine
 from typing import Any
@@ -13,9 +12,9 @@ import aiohttp
 import numpy as np
 from aiohttp import web
 
-from app import overlays
+from app import curves, messages
 from app.controller import Controller
-from app.state import OVERLAYS, State
+from app.state import State
 from tracker.errors import TrackerError
 
 _LOG = logging.getLogger(__name__)
@@ -51,14 +50,12 @@ class _Page:
         self._sent_text: dict[str, Any] | None = None
         self._sent_text_at = 0.0
         self._sent_images: tuple[int, str] | None = None
+        self._curves: str | None = None
+        self._sent_curves: tuple[str, int, int] | None = None  # group, person, version of the timeline
+        self._loop = asyncio.get_running_loop()
 
     async def serve(self) -> None:
-        loop = asyncio.get_running_loop()
-
-        def wake(_: State) -> None:
-            loop.call_soon_threadsafe(self._changed.set)
-
-        unsubscribe = self._controller.subscribe(wake)
+        unsubscribe = self._controller.subscribe(self._wake)
         self._changed.set()
         tasks = [asyncio.create_task(self._guarded(t)) for t in (self._send_all(), self._act())]
         try:
@@ -72,6 +69,10 @@ class _Page:
             await asyncio.gather(*tasks, return_exceptions=True)
             await asyncio.to_thread(self._controller.end_drag, self._number)
             await asyncio.to_thread(self._controller.hold_3d, self._number, False)
+
+    def _wake(self, _: State) -> None:
+        """Let the sender look again; called from any thread."""
+        self._loop.call_soon_threadsafe(self._changed.set)
 
     async def _guarded(self, work: Coroutine[Any, Any, None]) -> None:
         """Close the socket where its work fails: the page connects again and is told everything anew."""
@@ -116,6 +117,9 @@ class _Page:
             "drag": lambda: self._drag(message),
             "view": lambda: controller.set_view(str(message["base"]), dict(message["overlays"])),
             "search": lambda: self._search(str(message["action"])),
+            "track": lambda: self._track(str(message["action"]), message.get("until")),
+            "follow": lambda: controller.follow(bool(message["follow"])),
+            "curves": lambda: self._open_curves(message["group"]),
             "hold_3d": lambda: controller.hold_3d(self._number, bool(message["hold"])),
             "undo": controller.undo,
             "redo": controller.redo,
@@ -128,7 +132,14 @@ class _Page:
         if not np.all(np.isfinite(pointer_px)):
             raise ValueError("a position that is not a number")
         if phase == "start":
-            controller.begin_drag(page, int(message["camera"]), int(message["person"]), message["point"], pointer_px)
+            controller.begin_drag(
+                page,
+                int(message["camera"]),
+                int(message["person"]),
+                message["point"],
+                pointer_px,
+                int(message["frame"]),
+            )
         if phase == "cancel":
             controller.cancel_drag(page)
         else:
@@ -140,10 +151,27 @@ class _Page:
         controller = self._controller
         {"step": controller.search_step, "frame": controller.search_frame, "stop": controller.stop}[action]()
 
+    def _track(self, action: str, until: Any) -> None:
+        controller = self._controller
+        last = None if until is None else int(until)
+        {
+            "forward": lambda: controller.track(False, last),
+            "backward": lambda: controller.track(True, last),
+            "pause": controller.pause_tracking,
+            "go_on": controller.go_on_tracking,
+            "stop": controller.stop,
+        }[action]()
+
+    def _open_curves(self, group: str | None) -> None:
+        if group is not None and group not in curves.GROUPS:
+            raise ValueError(f"'{group}' is no group of curves")
+        self._curves = group
+        self._wake(self._controller.state)
+
     # --- controller to page ------------------------------------------------------------------------------------
 
     async def _send_all(self) -> None:
-        await self._send(_session_message(self._controller))
+        await self._send(messages.session(self._controller.session))
         while True:
             await self._changed.wait()
             self._changed.clear()
@@ -155,12 +183,13 @@ class _Page:
                 await self._send_images(state)
                 if sent is None or sent.timeline_version != state.timeline_version:
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
+                await self._send_curves(state)
             except TrackerError as error:
                 await self._notice(str(error))
 
     async def _send_state(self, state: State) -> None:
         """Send what the page's text shows, if it changed; at a readable rate while a hand drags."""
-        message, loop = _json_state(state), asyncio.get_running_loop()
+        message, loop = messages.state(state), self._loop
         if message == self._sent_text:
             return
         wait = self._sent_text_at + _READABLE_S - loop.time()
@@ -176,41 +205,40 @@ class _Page:
         self._sent_images = (state.frame, state.base)
         jpeg, cameras = self._controller.frames.jpeg, range(len(self._controller.session.cameras))
         pictures = await asyncio.gather(*(asyncio.to_thread(jpeg, state.frame, c, state.base) for c in cameras))
-        if self._controller.state.frame != state.frame:
+        now = self._controller.state
+        if now.frame != state.frame and not now.track.running:
             self._sent_images = None
-            return  # the page is elsewhere by now
+            return  # the page is elsewhere by now; a tracker always is, and is to be watched
         for camera, data in zip(cameras, pictures, strict=True):
             header = {"type": "image", "camera": camera, "frame": state.frame, "base": state.base}
-            await self._socket.send_bytes(_binary(header, data))
+            await self._socket.send_bytes(messages.binary(header, data))
 
     async def _send_overlay(self, state: State, sent: State | None) -> None:
         if sent is not None and _drawn(state) == _drawn(sent):
             return
-        await self._socket.send_bytes(await asyncio.to_thread(self._overlay, state))
-
-    def _overlay(self, state: State) -> bytes:
-        session, segments, rows, first = self._controller.session, [], [], 0
-        for path in overlays.paths(session, state):
-            count = len(path.segments_px)
-            rows.append({**path._asdict(), "first": first, "count": count})
-            del rows[-1]["segments_px"]
-            segments.append(path.segments_px)
-            first += count
-        joints = not state.overlays.isdisjoint(("joints", "skeleton"))
-        header = {
-            "type": "overlay",
-            "frame": state.frame,
-            "seq": dict(state.drag_seqs).get(self._number, 0),
-            "job": state.job.running,
-            "paths": rows,
-            "handles": [h._asdict() for h in overlays.handles(session, state)] if joints else [],
-        }
-        data = np.concatenate(segments).astype("<f4").tobytes() if segments else b""
-        return _binary(header, data)
+        message = await asyncio.to_thread(messages.overlay, self._controller.session, state, self._number)
+        await self._socket.send_bytes(message)
 
     async def _send_timeline(self, since: int) -> None:
         cells = {str(k): cell for k, cell in self._controller.timeline(since).items()}
         await self._send({"type": "timeline", "cells": cells, "replace": since == 0})
+
+    async def _send_curves(self, state: State) -> None:
+        """Send the open group of curves: whole where it is another than before, else the frames that changed."""
+        if self._curves is None:
+            self._sent_curves = None
+            return
+        wanted, sent = (self._curves, state.person, state.timeline_version), self._sent_curves
+        if wanted == sent:
+            return
+        self._sent_curves = wanted
+        since = sent[2] if sent is not None and sent[:2] == wanted[:2] else 0
+        group, person = wanted[:2]
+        frames, rows = await asyncio.to_thread(self._controller.numbers, person, since)
+        message = await asyncio.to_thread(
+            messages.curves, self._controller.session, person, group, frames, rows, since == 0
+        )
+        await self._socket.send_bytes(message)
 
     async def _notice(self, text: str) -> None:
         await self._send({"type": "notice", "level": "error", "text": text})
@@ -224,60 +252,3 @@ def _drawn(state: State) -> tuple[object, ...]:
     poses = tuple(id(p.values) for p in state.people)
     candidate = None if state.job.candidate is None else tuple(id(c) for c in state.job.candidate)
     return state.frame, poses, candidate, state.job.running, state.overlays, state.drag, state.drag_seqs
-
-
-def _session_message(controller: Controller) -> dict[str, Any]:
-    session = controller.session
-    return {
-        "type": "session",
-        "name": session.name,
-        "fps": session.fps,
-        "n_frames": session.n_frames,
-        "cameras": [
-            {"name": c.camera.name, "width": c.camera.width, "height": c.camera.height} for c in session.cameras
-        ],
-        "people": [
-            {
-                "name": p.name,
-                "color": p.color,
-                "points": list(p.model.point_names),
-                "bones": [list(b) for b in overlays.bones(p.model)],
-            }
-            for p in session.people
-        ],
-    }
-
-
-def _json_state(state: State) -> dict[str, Any]:
-    job = state.job
-    sources = [p.source for p in state.people]
-    return {
-        "type": "state",
-        "frame": state.frame,
-        "person": state.person,
-        "point": state.point,
-        "base": state.base,
-        "overlays": {name: name in state.overlays for name in OVERLAYS},
-        "cost_px": state.cost_px,
-        "view_costs_px": list(state.view_costs_px),
-        "source": sources[state.person],
-        "job": {
-            "running": job.running,
-            "kind": job.kind,
-            "stage": job.stage,
-            "stages": list(job.stages),
-            "evaluations": job.evaluations,
-            "per_second": job.per_second,
-            "best_px": job.best_px,
-            "message": job.message,
-        },
-        "undo": state.undo,
-        "redo": state.redo,
-        "saved": state.save_error is None,
-        "save_error": state.save_error,
-    }
-
-
-def _binary(header: dict[str, Any], payload: bytes) -> bytes:
-    head = json.dumps(header).encode()
-    return struct.pack("<I", len(head)) + head + payload

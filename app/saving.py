@@ -1,19 +1,23 @@
 """Poses of the screen to the store and back."""
 
-from bisect import bisect_left, insort
-from collections.abc import Sequence
+from bisect import bisect_left
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict
 
 import numpy as np
 
-from app.state import Shown, State
+from app.state import Shown, State, finite_or_none
 from tracker.annotations import AnnotationStore
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model
-from tracker.records import HistoryEntry, PoseChange, PoseRecord
+from tracker.records import SOURCES, FrameNumbers, FrameRow, HistoryEntry, PoseChange, PoseRecord
 from tracker.rigid import Array
 from tracker.session import Session
+from tracker.track import PoseEstimate, TrackSettings
 
-_PREFERRED = ("manual", "pinned", "searched", "fitted", "tracked")
+_WORST_FIRST = ("lost", "doubtful", "good", "")
+_READ_FRAMES = 2000
+"""Frames whose numbers are read at once."""
 
 
 class Saver:
@@ -37,7 +41,21 @@ class Saver:
         record = self._store.pose(self._session.people[person].name, frame)
         if record is None or len(record.values) != len(self._session.people[person].model.value_names):
             return None
-        return Shown(record.values, _summary(record.sources))
+        return Shown(record.values, _summary(record.sources), record.status, record.remark, record.parts_px)
+
+    def frames(self, person: int) -> list[int]:
+        """The frames on which a person has a stored pose, ascending."""
+        return list(self._frames[person])
+
+    def keyframes(self, frames: Collection[int]) -> dict[int, dict[int, Array]]:
+        """Poses of the keyframes among some frames, by frame and person."""
+        found: dict[int, dict[int, Array]] = {}
+        for person, info in enumerate(self._session.people):
+            for row in self._store.frames(info.name):
+                stored = self.pose(person, row.frame) if row.keyframe and row.frame in frames else None
+                if stored is not None:
+                    found.setdefault(row.frame, {})[person] = stored.values
+        return found
 
     def nearest_pose(self, person: int, frame: int) -> Array | None:
         """The stored pose nearest in time, the earlier one where two are as near; None where there is none."""
@@ -46,6 +64,16 @@ class Saver:
         near = sorted(frames[max(0, at - 1) : at + 1], key=lambda f: (abs(f - frame), f))
         found = self.pose(person, near[0]) if near else None
         return None if found is None else found.values
+
+    def numbers(self, person: int, frames: Sequence[int]) -> list[FrameNumbers]:
+        """What is stored on those of some frames, ascending, that have a pose. Needs no lock of the controller."""
+        name, found, first = self._session.people[person].name, [], 0
+        for i, frame in enumerate(frames):
+            # Read in pieces: whoever wants to write waits for one at most.
+            if i + 1 == len(frames) or frames[i + 1] != frame + 1 or i - first >= _READ_FRAMES:
+                found += self._store.numbers(name, range(frames[first], frame + 1))
+                first = i + 1
+        return found
 
     def save(self, state: State, label: str, source: str, amend: int | None) -> int | None:
         """Write the poses shown that are not drafts and differ from the stored ones.
@@ -72,35 +100,70 @@ class Saver:
             )
             keyframe = source == "manual" or (stored is not None and stored.keyframe)
             told = {"theta_px": state.theta_px, "outliers": state.outliers} if source == "searched" else {}
-            record = PoseRecord(shown.values, sources, revision, keyframe, "", state.cost_px, told)
+            record = PoseRecord(
+                shown.values, sources, revision, keyframe, "", state.cost_px, told, views_px=state.view_costs_px
+            )
             changes.append(PoseChange(name, state.frame, record))
-        if not changes:
-            return amend
-        try:
-            if amend is None:
-                amend = self._store.commit(f"{label}, frame {state.frame}", changes).edit
-            else:
-                self._store.amend(amend, changes)
-            self.error = None
-        except TrackerError as error:
-            self.error = str(error)
-            return None
-        self._note(state.frame)
-        return amend
+        return self._write(f"{label}, frame {state.frame}", changes, amend, by_program=False)
 
-    def undo(self) -> int | None:
-        """Take back the last entry of the history; returns the first frame it is about, None where there is none."""
+    def save_tracked(
+        self,
+        estimates: Sequence[PoseEstimate],
+        people: Sequence[int],
+        fixed: Mapping[int, Mapping[int, Array]],
+        settings: TrackSettings,
+        label: str,
+        amend: int | None,
+    ) -> int | None:
+        """Write what a tracker has found, but for the keyframes that it was given.
+
+        Args:
+            estimates: poses of frames.
+            people: whom the tracker tracked.
+            fixed: keyframes that the tracker took as they are, by frame and person.
+            settings: what it was told.
+            label: what the history says.
+            amend: the entry of the history to add to; None makes a new one.
+
+        Returns:
+            Id of the entry; None where nothing was written. Where writing fails, `error` says why.
+        """
+        told = {"method": "chamfer", **asdict(settings)}
+        changes = [
+            PoseChange(
+                self._session.people[i].name,
+                found.frame,
+                PoseRecord(
+                    found.poses[i],
+                    ("tracked",) * len(found.poses[i]),
+                    self._revisions[i],
+                    status=found.statuses[i],
+                    cost_px=finite_or_none(found.cost_px),
+                    settings=told,
+                    views_px=tuple(finite_or_none(c) for c in found.views_px),
+                    parts_px=tuple(finite_or_none(c) for c in found.parts_px[i]),
+                    remark=found.remarks[i],
+                ),
+            )
+            for found in estimates
+            for i in people
+            if i not in fixed.get(found.frame, {})
+        ]
+        return self._write(label, changes, amend, by_program=True)
+
+    def undo(self) -> list[int]:
+        """Take back the last entry of the history; returns the frames it is about, ascending."""
         entry = self._next_undo()
         if entry is None:
-            return None
+            return []
         self._store.undo()
         return self._moved(entry)
 
-    def redo(self) -> int | None:
-        """Do again what was taken back last; returns the first frame it is about, None where there is none."""
+    def redo(self) -> list[int]:
+        """Do again what was taken back last; returns the frames it is about, ascending."""
         entry = self._next_redo()
         if entry is None:
-            return None
+            return []
         self._store.redo()
         return self._moved(entry)
 
@@ -118,7 +181,7 @@ class Saver:
         """Cells of the frames that changed after a version of the timeline; all for 0."""
         if since <= 0:
             return dict(self._cells)
-        frames = {frame for version, frame in self._changes if version > since}
+        frames = {frame for _, frame in self._changes[bisect_left(self._changes, (since + 1, 0)) :]}
         return {frame: self._cells.get(frame) for frame in frames}
 
     def _next_undo(self) -> HistoryEntry | None:
@@ -127,37 +190,70 @@ class Saver:
     def _next_redo(self) -> HistoryEntry | None:
         return next((e for e in self._store.history(1) if e.undone), None)
 
-    def _moved(self, entry: HistoryEntry) -> int | None:
+    def _moved(self, entry: HistoryEntry) -> list[int]:
         frames = self._store.frames_of(entry.edit)
         self._reload(frames)
-        return frames[0] if frames else None
+        return frames
+
+    def _write(self, label: str, changes: Sequence[PoseChange], amend: int | None, by_program: bool) -> int | None:
+        """Commit changes, or add them to an entry; returns its id, None where nothing was written."""
+        if not changes:
+            return amend
+        try:
+            if amend is None:
+                amend = self._store.commit(label, changes, by_program=by_program).edit
+            else:
+                self._store.amend(amend, changes, by_program)
+            self.error = None
+        except TrackerError as error:
+            self.error = str(error)
+            return None
+        self._note(sorted({change.frame for change in changes}))
+        return amend
 
     def _reload(self, changed: Sequence[int] = ()) -> None:
         """List all frames anew, and note those that changed."""
-        self._cells = {}
+        rows: dict[int, dict[str, FrameRow]] = {}
         for person, info in enumerate(self._session.people):
-            rows = self._store.frames(info.name)
-            self._frames[person] = [row.frame for row in rows]
-            for row in rows:
-                self._cells.setdefault(
-                    row.frame, {"source": row.source, "cost_px": row.cost_px, "keyframe": row.keyframe}
-                )
-        self.timeline_version += 1
-        self._changes += [(self.timeline_version, frame) for frame in changed]
+            found = self._store.frames(info.name)
+            self._frames[person] = [row.frame for row in found]
+            for row in found:
+                rows.setdefault(row.frame, {})[info.name] = row
+        self._cells = {frame: _cell(people) for frame, people in rows.items()}
+        self._mark(changed)
 
-    def _note(self, frame: int) -> None:
-        """Bring the cell of one frame up to date."""
+    def _note(self, frames: Sequence[int]) -> None:
+        """Bring the cells of some frames, in which poses were set, up to date."""
+        rows: dict[int, dict[str, FrameRow]] = {}
         for person, info in enumerate(self._session.people):
-            record = self._store.pose(info.name, frame)
-            if record is not None:
-                source = _summary(record.sources)
-                self._cells[frame] = {"source": source, "cost_px": record.cost_px, "keyframe": record.keyframe}
-                if frame not in self._frames[person][bisect_left(self._frames[person], frame) :][:1]:
-                    insort(self._frames[person], frame)
+            listed = self._frames[person]
+            for row in self._store.frames(info.name, range(frames[0], frames[-1] + 1)):
+                rows.setdefault(row.frame, {})[info.name] = row
+                at = bisect_left(listed, row.frame)
+                if listed[at : at + 1] != [row.frame]:
+                    listed.insert(at, row.frame)
+        self._cells |= {frame: _cell(people) for frame, people in rows.items()}
+        self._mark(frames)
+
+    def _mark(self, frames: Sequence[int]) -> None:
+        """Begin a new version of the timeline, in which the cells of some frames have changed."""
         self.timeline_version += 1
-        self._changes.append((self.timeline_version, frame))
+        self._changes += [(self.timeline_version, frame) for frame in frames]
+
+
+def _cell(rows: Mapping[str, FrameRow]) -> dict:
+    """What the timeline says of a frame: of several people the worst, and the source nearest to a person's hand."""
+    costs = [row.cost_px for row in rows.values() if row.cost_px is not None]
+    remarks = [row.remark if len(rows) == 1 else f"{name}: {row.remark}" for name, row in rows.items() if row.remark]
+    return {
+        "source": min((row.source for row in rows.values()), key=SOURCES.index),
+        "cost_px": round(max(costs), 3) if costs else None,
+        "keyframe": any(row.keyframe for row in rows.values()),
+        "status": min((row.status for row in rows.values()), key=_WORST_FIRST.index),
+        "remark": "; ".join(remarks),
+    }
 
 
 def _summary(sources: tuple[str, ...]) -> str:
     """One word for where a pose came from: that of the values nearest to a person's hand."""
-    return next((s for s in _PREFERRED if s in sources), sources[0])
+    return min(sources, key=SOURCES.index)

@@ -21,6 +21,12 @@ class Shown:
     """Pose, (n_values,)."""
     source: str | None
     """Who set it; None for a draft that is not stored: the pose of the nearest frame that has one."""
+    status: str = ""
+    """How good it is as its tracker judges: `good`, `doubtful`, `lost`, or empty."""
+    remark: str = ""
+    """What the tracker did on the frame, for people to read."""
+    parts_px: tuple[float | None, ...] = ()
+    """Cost of each part, px; None for an unseen part, empty where unknown."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +50,31 @@ class JobState:
     """Pose of each person under test."""
     message: str = ""
     """How the last one ended."""
+
+
+@dataclass(frozen=True)
+class TrackState:
+    """The tracking run that is at work or paused."""
+
+    running: bool = False
+    first: int | None = None
+    """First frame of the run in the order of tracking; None where no run stands."""
+    last: int | None = None
+    """Last frame of the run; before `first` where it runs backward."""
+    at: int | None = None
+    """The frame tracked last; None before the first."""
+    done: int = 0
+    """Number of frames tracked."""
+    total: int = 0
+    """Number of frames to track."""
+    per_second: float = 0.0
+    """Frames tracked per second of work."""
+    doubtful: int = 0
+    """Number of frames called doubtful."""
+    lost: int = 0
+    """Number of frames called lost."""
+    message: str = ""
+    """How the last run ended."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +105,9 @@ class State:
     view_costs_px: tuple[float | None, ...] = ()
     """Cost of each view, px; None for a view without edges."""
     job: JobState = field(default_factory=JobState)
+    track: TrackState = field(default_factory=TrackState)
+    follow: bool = True
+    """Whether the frame that is being tracked is shown, or the user looks around meanwhile."""
     drag: DragState | None = None
     drag_seqs: tuple[tuple[int, int], ...] = ()
     """For each page that drags: its number, and the last of its drag messages that this state takes in."""

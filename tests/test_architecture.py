@@ -35,8 +35,10 @@ ORDER = [
     ["tracker.track"],
     # The program: what the screen shows, then who may change it, then who shows it.
     ["app", "app.access", "app.jobs", "app.viser_proxy", "app.state"],
-    ["app.commands", "app.frames", "app.overlays", "app.saving", "app.server"],
-    ["app.controller"],
+    ["app.commands", "app.curves", "app.frames", "app.overlays", "app.saving", "app.server"],
+    ["app.screen"],
+    ["app.searching", "app.tracking"],
+    ["app.controller", "app.messages"],
     ["app.panes", "app.scene", "app.panels"],
     ["app.workbench"],
     ["app.__main__"],
@@ -119,8 +121,9 @@ def test_the_tracker_knows_no_screen(module):
 
 
 def test_the_controller_imports_no_view():
-    views = {"app.panes", "app.scene", "app.panels", "app.overlays", "app.server", "app.workbench"}
-    for module in ("app.controller", "app.saving", "app.frames", "app.state", "app.jobs"):
+    views = {"app.messages", "app.panes", "app.scene", "app.panels", "app.overlays", "app.server", "app.workbench"}
+    below = ("app.screen", "app.searching", "app.tracking", "app.saving", "app.frames", "app.state", "app.jobs")
+    for module in ("app.controller", *below):
         assert views & set(OWN[module]) == set(), module
         assert {name.split(".")[0] for name in IMPORTS[module]} & {"viser", "aiohttp", "tyro"} == set(), module
 

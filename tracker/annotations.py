@@ -101,12 +101,12 @@ class AnnotationStore:
             json.loads(settings), author, time, program, _costs(views), _costs(parts), remark or "",
         )  # fmt: skip
 
-    def frames(self, person: str) -> list[FrameRow]:
-        """All frames in which the person has a pose, ascending, in short."""
+    def frames(self, person: str, within: range = range(1 << 31)) -> list[FrameRow]:
+        """The frames of a range in which the person has a pose, ascending, in short; by default of all frames."""
         rows = self._all(
             "SELECT c.frame, c.sources, c.status, c.cost_px, c.keyframe, c.views_px, c.remark FROM poses p "
-            "JOIN pose_changes c ON c.id = p.change WHERE p.person = ? ORDER BY p.frame",
-            (person,),
+            "JOIN pose_changes c ON c.id = p.change WHERE p.person = ? AND p.frame BETWEEN ? AND ? ORDER BY p.frame",
+            (person, within.start, within.stop - 1),
         )
         return [
             FrameRow(frame, SOURCES[min(sources)], status, cost, bool(keyframe), _costs(views), remark or "")

@@ -6,8 +6,16 @@ from pathlib import Path
 
 import pytest
 from command_line import SAMPLE
+from hands import wait_for
 
 from app import __main__
+from app.controller import Controller
+from app.frames import Frames
+from app.saving import Saver
+from tracker.annotations import AnnotationStore
+from tracker.evidence import Observer
+from tracker.recording import Recording
+from tracker.session import load_session
 
 
 @pytest.fixture
@@ -31,3 +39,29 @@ def run(monkeypatch, capsys):
 def session(tmp_path):
     """A working copy of the sample."""
     return Path(shutil.copytree(SAMPLE, tmp_path / "session"))
+
+
+@pytest.fixture
+def opened(session):
+    """Open the session anew; as often as wanted, each time as a restart."""
+    open_now = []
+
+    def close():
+        while open_now:
+            controller, recording, store = open_now.pop()
+            controller.close()
+            recording.close()
+            store.close()
+
+    def open_it():
+        close()
+        loaded = load_session(session)
+        recording = Recording(loaded.cameras)
+        store = AnnotationStore(loaded.annotations_path)
+        controller = Controller(loaded, Saver(loaded, store), Frames(Observer(loaded.cameras, recording)))
+        open_now.append((controller, recording, store))
+        wait_for(lambda: controller.state.cost_px is not None)
+        return controller
+
+    yield open_it
+    close()

@@ -1,77 +1,15 @@
 """The controller without a screen: gestures, searches, undo, and what is on disk after each."""
 
-import shutil
 import threading
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
+from hands import FRONT, PAGE, drag, pixel_of, wait_for
 
-from app.controller import Controller
-from app.frames import Frames
-from app.saving import Saver
 from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
-from tracker.evidence import Observer
-from tracker.recording import Recording
 from tracker.search import SearchSettings
-from tracker.session import load_session
-
-SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"
-PAGE, FRONT = 1, 0
-
-
-def wait_for(condition, timeout_s=60.0):
-    end = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < end, "it did not happen"
-        time.sleep(0.01)
-
-
-@pytest.fixture
-def folder(tmp_path):
-    return Path(shutil.copytree(SAMPLE, tmp_path / "session"))
-
-
-@pytest.fixture
-def opened(folder):
-    """Open the session anew; as often as wanted, each time as a restart."""
-    open_now = []
-
-    def close():
-        while open_now:
-            controller, recording, store = open_now.pop()
-            controller.close()
-            recording.close()
-            store.close()
-
-    def open_it():
-        close()
-        session = load_session(folder)
-        recording = Recording(session.cameras)
-        store = AnnotationStore(session.annotations_path)
-        controller = Controller(session, Saver(session, store), Frames(Observer(session.cameras, recording)))
-        open_now.append((controller, recording, store))
-        wait_for(lambda: controller.state.cost_px is not None)
-        return controller
-
-    yield open_it
-    close()
-
-
-def pixel_of(controller, point, camera=FRONT):
-    model = controller.models[0]
-    place = model.points_world(controller.state.poses[0])[model.point_names.index(point)]
-    return controller.session.cameras[camera].camera.pinhole.project(place)
-
-
-def drag(controller, point, by, camera=FRONT):
-    start = pixel_of(controller, point, camera)
-    controller.begin_drag(PAGE, camera, 0, point, tuple(start))
-    for t in (0.5, 1.0):
-        controller.move_drag(PAGE, tuple(start + t * np.array(by)), int(10 * t))
-    controller.end_drag(PAGE)
 
 
 def test_a_fresh_session_shows_a_draft_that_is_not_stored(opened):
@@ -114,13 +52,13 @@ def test_a_cancelled_drag_leaves_nothing(opened):
     assert controller.state.undo is None
 
 
-def test_a_long_drag_is_on_disk_before_it_ends(opened, folder, monkeypatch):
+def test_a_long_drag_is_on_disk_before_it_ends(opened, session, monkeypatch):
     monkeypatch.setattr("app.controller._CHECKPOINT_S", 0.0)
     controller = opened()
     start = pixel_of(controller, "torso")
     controller.begin_drag(PAGE, FRONT, 0, "torso", tuple(start))
     controller.move_drag(PAGE, tuple(start + 40), 1)
-    other = AnnotationStore(folder / "annotations.sqlite", read_only=True)
+    other = AnnotationStore(session / "annotations.sqlite", read_only=True)
     np.testing.assert_array_equal(other.pose("person", 0).values, controller.state.poses[0])
     other.close()
     controller.move_drag(PAGE, tuple(start + 60), 2)
@@ -177,13 +115,13 @@ def test_a_slider_is_one_entry_however_often_it_moves(opened):
     assert controller.state.undo is None
 
 
-def test_values_nobody_touched_keep_their_source(opened, folder):
+def test_values_nobody_touched_keep_their_source(opened, session):
     controller = opened()
     drag(controller, "torso", (10.0, 0.0))
     controller.search_step()
     wait_for(lambda: controller.state.job.evaluations and not controller.state.job.running)
     drag(controller, "left_wrist", (10.0, 0.0))
-    store = AnnotationStore(folder / "annotations.sqlite", read_only=True)
+    store = AnnotationStore(session / "annotations.sqlite", read_only=True)
     sources = store.pose("person", 0).sources
     store.close()
     names = controller.models[0].value_names
@@ -220,14 +158,14 @@ def test_a_search_to_its_end_lowers_the_cost_and_is_one_entry(opened):
     assert controller.state.undo is None
 
 
-def test_a_stopped_search_keeps_the_best_so_far_on_disk(opened, folder):
+def test_a_stopped_search_keeps_the_best_so_far_on_disk(opened, session):
     controller = opened()
     controller.search_frame()
     wait_for(lambda: controller.state.job.evaluations > 30)
     controller.stop()
     assert not controller.state.job.running
     assert controller.state.job.kind == "search"  # it stands, and can go on
-    store = AnnotationStore(folder / "annotations.sqlite", read_only=True)
+    store = AnnotationStore(session / "annotations.sqlite", read_only=True)
     np.testing.assert_array_equal(store.pose("person", 0).values, controller.state.poses[0])
     store.close()
     evaluations = controller.state.job.evaluations

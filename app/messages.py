@@ -1,0 +1,159 @@
+"""What the program tells a page, as pure functions of the state (docs/protocol.md)."""
+
+import json
+import struct
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from app import overlays
+from app.curves import plots_of, samples
+from app.state import OVERLAYS, JobState, State, TrackState
+from tracker.records import FrameNumbers
+from tracker.session import Session
+
+
+def session(session: Session) -> dict[str, Any]:
+    """What a page needs to know of the session, once."""
+    return {
+        "type": "session",
+        "name": session.name,
+        "fps": session.fps,
+        "n_frames": session.n_frames,
+        "cameras": [
+            {"name": c.camera.name, "width": c.camera.width, "height": c.camera.height} for c in session.cameras
+        ],
+        "people": [
+            {
+                "name": p.name,
+                "color": p.color,
+                "points": list(p.model.point_names),
+                "bones": [list(b) for b in overlays.bones(p.model)],
+                "parts": [part.name for part in p.model.parts],
+            }
+            for p in session.people
+        ],
+    }
+
+
+def state(state: State) -> dict[str, Any]:
+    """The texts and figures of the page."""
+    shown = state.people[state.person]
+    return {
+        "type": "state",
+        "frame": state.frame,
+        "person": state.person,
+        "point": state.point,
+        "base": state.base,
+        "overlays": {name: name in state.overlays for name in OVERLAYS},
+        "cost_px": state.cost_px,
+        "view_costs_px": list(state.view_costs_px),
+        "source": shown.source,
+        "status": shown.status,
+        "remark": shown.remark,
+        "parts_px": list(shown.parts_px),
+        "job": _job(state.job),
+        "track": _track(state.track),
+        "follow": state.follow,
+        "undo": state.undo,
+        "redo": state.redo,
+        "saved": state.save_error is None,
+        "save_error": state.save_error,
+    }
+
+
+def overlay(session: Session, state: State, page: int) -> bytes:
+    """The vectors over all views.
+
+    Args:
+        session: with its cameras and people.
+        state: what to draw.
+        page: number of the page, whose drags the message answers.
+    """
+    segments, rows, first = [], [], 0
+    for path in overlays.paths(session, state):
+        count = len(path.segments_px)
+        rows.append(
+            {
+                "camera": path.camera,
+                "person": path.person,
+                "kind": path.kind,
+                "color": path.color,
+                "first": first,
+                "count": count,
+            }
+        )
+        segments.append(path.segments_px)
+        first += count
+    joints = not state.overlays.isdisjoint(("joints", "skeleton"))
+    header = {
+        "type": "overlay",
+        "frame": state.frame,
+        "seq": dict(state.drag_seqs).get(page, 0),
+        "job": state.job.running,
+        "paths": rows,
+        "handles": [h._asdict() for h in overlays.handles(session, state)] if joints else [],
+    }
+    return binary(header, np.concatenate(segments).astype("<f4").tobytes() if segments else b"")
+
+
+def curves(
+    session: Session, person: int, group: str, frames: Sequence[int], rows: Sequence[FrameNumbers], replace: bool
+) -> bytes:
+    """A group of curves of one person on some frames; NaN where a frame has no pose.
+
+    Args:
+        session: with its cameras and people.
+        person: whose.
+        group: one of `curves.GROUPS`.
+        frames: the frames that the message is about, ascending.
+        rows: what is stored on those of them that have a pose.
+        replace: whether all other frames have no pose.
+    """
+    model, cameras = session.people[person].model, [c.camera.name for c in session.cameras]
+    plots = plots_of(model, cameras, group)
+    header = {
+        "type": "curves",
+        "group": group,
+        "person": person,
+        "replace": replace,
+        "count": len(frames),
+        "plots": [{"title": p.title, "unit": p.unit, "labels": list(p.labels)} for p in plots],
+    }
+    values = samples(model, plots, frames, rows)
+    return binary(header, np.asarray(frames, dtype="<u4").tobytes() + values.astype("<f4").tobytes())
+
+
+def binary(header: dict[str, Any], payload: bytes) -> bytes:
+    """`[uint32 LE length of the header][header: JSON, UTF-8][payload]`."""
+    head = json.dumps(header).encode()
+    return struct.pack("<I", len(head)) + head + payload
+
+
+def _job(job: JobState) -> dict[str, Any]:
+    return {
+        "running": job.running,
+        "kind": job.kind,
+        "stage": job.stage,
+        "stages": list(job.stages),
+        "evaluations": job.evaluations,
+        "per_second": job.per_second,
+        "best_px": job.best_px,
+        "message": job.message,
+    }
+
+
+def _track(track: TrackState) -> dict[str, Any]:
+    return {
+        "running": track.running,
+        "first": track.first,
+        "last": track.last,
+        "at": track.at,
+        "done": track.done,
+        "total": track.total,
+        "per_second": track.per_second,
+        "doubtful": track.doubtful,
+        "lost": track.lost,
+        "message": track.message,
+    }

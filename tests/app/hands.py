@@ -1,0 +1,28 @@
+"""What a hand in the page does to a controller, and waiting for what comes of it."""
+
+import time
+
+import numpy as np
+
+PAGE, FRONT = 1, 0
+
+
+def wait_for(condition, timeout_s=60.0):
+    end = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < end, "it did not happen"
+        time.sleep(0.01)
+
+
+def pixel_of(controller, point, camera=FRONT):
+    model = controller.models[0]
+    place = model.points_world(controller.state.poses[0])[model.point_names.index(point)]
+    return controller.session.cameras[camera].camera.pinhole.project(place)
+
+
+def drag(controller, point, by, camera=FRONT):
+    start = pixel_of(controller, point, camera)
+    controller.begin_drag(PAGE, camera, 0, point, tuple(start))
+    for t in (0.5, 1.0):
+        controller.move_drag(PAGE, tuple(start + t * np.array(by)), int(10 * t))
+    controller.end_drag(PAGE)
