@@ -26,6 +26,44 @@ export class Actions {
     this.#send({ type: "search", action });
   }
 
+  /**
+   * Track from the shown frame to the end of the recording, or of the marked range where that lies ahead.
+   *
+   * @param {"forward" | "backward"} way
+   */
+  track(way) {
+    const { range, state } = this.#store.facts;
+    if (!state) return;
+    const end = way === "forward" ? range?.last : range?.first;
+    const isAhead = end !== undefined && (way === "forward" ? end > state.frame : end < state.frame);
+    this.#send({ type: "track", action: way, until: isAhead ? end : null });
+  }
+
+  /** Pause a tracking run that is at work, go on with one that is paused. */
+  togglePause() {
+    const { state } = this.#store.facts;
+    if (hasTrack(state)) this.#send({ type: "track", action: state?.track.running ? "pause" : "go_on" });
+  }
+
+  stopTracking() {
+    this.#send({ type: "track", action: "stop" });
+  }
+
+  /** @param {boolean} follow */
+  follow(follow) {
+    this.#send({ type: "follow", follow });
+  }
+
+  toggleFollow() {
+    const { state } = this.#store.facts;
+    if (state && hasTrack(state)) this.follow(!state.follow);
+  }
+
+  /** @param {import("./protocol.js").CurveGroup | null} group */
+  openCurves(group) {
+    this.#send({ type: "curves", group });
+  }
+
   /** @param {number} person */
   selectPerson(person) {
     this.#send({ type: "select", person, point: null });
@@ -66,4 +104,13 @@ export class Actions {
  */
 export function hasSearch(state) {
   return !!state && (state.job.running || state.job.kind !== null);
+}
+
+/**
+ * Whether there is a tracking run: one at work, or one that is paused.
+ *
+ * @param {import("./protocol.js").StateMessage | null} state
+ */
+export function hasTrack(state) {
+  return !!state && state.track.first !== null;
 }

@@ -9,8 +9,7 @@ const LONGEST_DELAY_MS = 5000;
  * @typedef {object} Listener
  * @property {(open: boolean) => void} onOpen called when the connection opens and when it is lost
  * @property {(message: import("./protocol.js").TextMessage) => void} onText
- * @property {(header: import("./protocol.js").ImageHeader | import("./protocol.js").OverlayHeader,
- *   payload: ArrayBuffer) => void} onBinary
+ * @property {(header: import("./protocol.js").BinaryHeader, payload: ArrayBuffer) => void} onBinary
  */
 
 export class Connection {

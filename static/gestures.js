@@ -10,7 +10,7 @@ const DRAG_THRESHOLD = 3;
 
 /**
  * @typedef {import("./drawing.js").PlacedHandle} PlacedHandle
- * @typedef {{pane: import("./pane.js").Pane, camera: number, pointer: number, person: number, point: string,
+ * @typedef {{pane: import("./pane.js").Pane, frame: number, camera: number, pointer: number, person: number, point: string,
  *   start: {x: number, y: number}, grabbed: {u: number, v: number}, at: {u: number, v: number},
  *   offset: {u: number, v: number}, begun: boolean}} Drag
  */
@@ -106,6 +106,7 @@ export class Gestures {
     const pointer = pane.view.toImage(at.x, at.y);
     this.#drag = {
       pane,
+      frame: this.#store.facts.shown?.frame ?? 0,
       camera,
       pointer: event.pointerId,
       person,
@@ -189,9 +190,9 @@ export class Gestures {
    * @returns the message's number
    */
   #message(phase, { u, v }) {
-    const { camera, person, point } = /** @type {Drag} */ (this.#drag);
+    const { frame, camera, person, point } = /** @type {Drag} */ (this.#drag);
     this.#seq += 1;
-    this.#send({ type: "drag", phase, camera, person, point, u, v, seq: this.#seq });
+    this.#send({ type: "drag", phase, frame, camera, person, point, u, v, seq: this.#seq });
     return this.#seq;
   }
 

@@ -1,6 +1,6 @@
 /** The keys: one table that is both obeyed and shown to whoever asks with `?`. */
 
-import { hasSearch } from "./actions.js";
+import { hasSearch, hasTrack } from "./actions.js";
 
 /**
  * @typedef {object} Binding
@@ -47,6 +47,7 @@ function control(key, shift) {
  * @property {import("./navigation.js").Navigation} navigation
  * @property {import("./pane_grid.js").PaneGrid} grid
  * @property {import("./gestures.js").Gestures} gestures
+ * @property {import("./curves.js").Curves} curves
  * @property {() => void} showHelp
  */
 
@@ -54,14 +55,23 @@ function control(key, shift) {
  * @param {Parts} parts
  * @returns {Binding[]}
  */
-export function bindings({ store, actions, navigation, grid, gestures, showHelp }) {
+export function bindings({ store, actions, navigation, grid, gestures, curves, showHelp }) {
   const escape = () => {
     if (gestures.cancel()) return;
-    if (hasSearch(store.facts.state)) actions.search("stop");
+    if (hasTrack(store.facts.state)) actions.stopTracking();
+    else if (hasSearch(store.facts.state)) actions.search("stop");
     else if (store.facts.filled !== null) grid.toggleFill(store.facts.filled);
   };
   const search = (/** @type {"step" | "frame"} */ action) => () => {
     if (store.facts.connected && !store.facts.state?.job.running) actions.search(action);
+  };
+  const track = (/** @type {"forward" | "backward"} */ way) => () => {
+    if (store.facts.connected && !store.facts.state?.track.running) actions.track(way);
+  };
+  const mark = (/** @type {"first" | "last"} */ end) => () => {
+    const { range, target } = store.facts;
+    const other = end === "first" ? (range?.last ?? target) : (range?.first ?? target);
+    store.set({ range: { first: Math.min(target, other), last: Math.max(target, other) } });
   };
   return [
     { keys: [","], label: "Previous frame", matches: plain(",", "Comma"), run: () => navigation.step(-1) },
@@ -80,7 +90,21 @@ export function bindings({ store, actions, navigation, grid, gestures, showHelp 
     },
     { keys: ["S"], label: "Search: one step", matches: plain("s"), run: search("step") },
     { keys: ["F"], label: "Search: this frame", matches: plain("f"), run: search("frame") },
-    { keys: ["Esc"], label: "Cancel the drag, else stop the search", matches: plain("escape"), run: escape },
+    { keys: ["Esc"], label: "Cancel the drag, else stop what is at work", matches: plain("escape"), run: escape },
+    { keys: ["T"], label: "Track forward", matches: plain("t"), run: track("forward") },
+    { keys: ["Shift T"], label: "Track backward", matches: plain("t", undefined, true), run: track("backward") },
+    { keys: ["P"], label: "Pause tracking, or go on", matches: plain("p"), run: () => actions.togglePause() },
+    { keys: ["L"], label: "Follow the tracker, or not", matches: plain("l"), run: () => actions.toggleFollow() },
+    { keys: ["N"], label: "Next doubtful or lost frame", matches: plain("n"), run: () => navigation.toDoubt(1) },
+    {
+      keys: ["Shift N"],
+      label: "Former doubtful or lost frame",
+      matches: plain("n", undefined, true),
+      run: () => navigation.toDoubt(-1),
+    },
+    { keys: ["["], label: "A range begins here", matches: plain("[", "BracketLeft"), run: mark("first") },
+    { keys: ["]"], label: "The range ends here", matches: plain("]", "BracketRight"), run: mark("last") },
+    { keys: ["C"], label: "Curves", matches: plain("c"), run: () => curves.toggle() },
     {
       keys: ["1 – 9"],
       label: "Fill the grid with a camera, and back",

@@ -2,7 +2,9 @@
 
 import { Actions } from "./actions.js";
 import { Connection } from "./connection.js";
+import { Curves } from "./curves.js";
 import { button, byId } from "./elements.js";
+import { FrameCard } from "./frame_card.js";
 import { Gestures } from "./gestures.js";
 import * as keys from "./keys.js";
 import { Latency } from "./latency.js";
@@ -14,6 +16,7 @@ import { makeSplitter } from "./splitter.js";
 import { Store } from "./store.js";
 import { Timeline } from "./timeline.js";
 import { TopBar } from "./top_bar.js";
+import { TrackBar } from "./track_bar.js";
 import { Transport } from "./transport.js";
 import { drawsInSoftware } from "./webgl.js";
 
@@ -33,12 +36,15 @@ const navigation = new Navigation(store, send);
 const grid = new PaneGrid(byId("panes", HTMLElement), store, gestures, latency);
 new TopBar(store, actions);
 new Transport(store, navigation);
+new TrackBar(store, actions, navigation);
+new FrameCard(store);
+const curves = new Curves(store, navigation, actions);
 new Timeline(byId("timeline", HTMLElement), store, navigation);
 watchConnection(byId("banner", HTMLElement), store);
 makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement));
 
 const help = byId("help", HTMLDialogElement);
-const table = keys.bindings({ store, actions, navigation, grid, gestures, showHelp: () => help.showModal() });
+const table = keys.bindings({ store, actions, navigation, grid, gestures, curves, showHelp: () => help.showModal() });
 keys.describe(byId("help-keys", HTMLElement), table);
 button("show-help", () => help.showModal());
 help.addEventListener("click", (event) => event.target === help && help.close());

@@ -3,6 +3,8 @@
  * scrubs or a clip plays, the program is never more than one frame behind.
  */
 
+import { isDoubt } from "./protocol.js";
+
 const GIVE_UP_MS = 2000;
 const GAP_MS = 500;
 
@@ -49,6 +51,22 @@ export class Navigation {
   step(count) {
     this.pause();
     this.goTo(this.#store.facts.target + count);
+  }
+
+  /**
+   * Go to the nearest frame in one direction that the tracker calls doubtful or lost.
+   *
+   * @param {1 | -1} way
+   */
+  toDoubt(way) {
+    const { timeline, target } = this.#store.facts;
+    let nearest = null;
+    for (const [frame, { status }] of timeline) {
+      const isAhead = way * (frame - target) > 0;
+      if (isAhead && isDoubt(status) && (nearest === null || way * (frame - nearest) < 0)) nearest = frame;
+    }
+    this.pause();
+    if (nearest !== null) this.goTo(nearest);
   }
 
   first() {

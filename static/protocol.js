@@ -4,16 +4,21 @@
  * @typedef {"image" | "edges" | "distance"} Base
  * @typedef {{contours: boolean, joints: boolean, part_edges: boolean, skeleton: boolean}} Overlays
  * @typedef {{name: string, width: number, height: number}} CameraInfo
- * @typedef {{name: string, color: string, points: string[], bones: [string, string][]}} PersonInfo
+ * @typedef {{name: string, color: string, points: string[], bones: [string, string][],
+ *   parts: string[]}} PersonInfo
  * @typedef {{type: "session", name: string, fps: number, n_frames: number, cameras: CameraInfo[],
  *   people: PersonInfo[]}} SessionMessage
  * @typedef {{running: boolean, kind: string | null, stage: string | null, stages: string[], evaluations: number,
  *   per_second: number, best_px: number | null, message: string}} Job
+ * @typedef {"" | "good" | "doubtful" | "lost"} Status
+ * @typedef {{running: boolean, first: number | null, last: number | null, at: number | null, done: number, total: number,
+ *   per_second: number, doubtful: number, lost: number, message: string}} Track
  * @typedef {{type: "state", frame: number, person: number, point: string | null, base: Base, overlays: Overlays,
- *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, job: Job, undo: string | null,
- *   redo: string | null, saved: boolean, save_error: string | null}} StateMessage
+ *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
+ *   parts_px: (number | null)[], job: Job, track: Track, follow: boolean, undo: string | null, redo: string | null,
+ *   saved: boolean, save_error: string | null}} StateMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
- * @typedef {{source: string, cost_px: number | null, keyframe: boolean}} Cell
+ * @typedef {{source: string, cost_px: number | null, keyframe: boolean, status: Status, remark: string}} Cell
  * @typedef {{type: "timeline", cells: Record<string, Cell | null>, replace: boolean}} TimelineMessage
  * @typedef {SessionMessage | StateMessage | NoticeMessage | TimelineMessage} TextMessage
  *
@@ -23,13 +28,22 @@
  * @typedef {{camera: number, person: number, point: string, u: number, v: number, visible: boolean}} Handle
  * @typedef {{type: "overlay", frame: number, seq: number, job: boolean, paths: Path[], handles: Handle[]}} OverlayHeader
  * @typedef {OverlayHeader & {segments: Float32Array}} Overlay
+ * @typedef {"arms" | "torso" | "legs" | "cost"} CurveGroup
+ * @typedef {{title: string, unit: "deg" | "cm" | "px", labels: string[]}} Plot
+ * @typedef {{type: "curves", group: CurveGroup, person: number, replace: boolean, count: number,
+ *   plots: Plot[]}} CurvesHeader
+ * @typedef {ImageHeader | OverlayHeader | CurvesHeader} BinaryHeader
  *
  * @typedef {{type: "seek", frame: number} |
  *   {type: "select", person: number, point: string | null} |
- *   {type: "drag", phase: "start" | "move" | "end" | "cancel", camera: number, person: number, point: string,
- *     u: number, v: number, seq: number} |
+ *   {type: "drag", phase: "start" | "move" | "end" | "cancel", frame: number, camera: number, person: number,
+ *     point: string, u: number, v: number, seq: number} |
  *   {type: "view", base: Base, overlays: Overlays} |
  *   {type: "search", action: "step" | "frame" | "stop"} |
+ *   {type: "track", action: "forward" | "backward", until: number | null} |
+ *   {type: "track", action: "pause" | "go_on" | "stop"} |
+ *   {type: "follow", follow: boolean} |
+ *   {type: "curves", group: CurveGroup | null} |
  *   {type: "hold_3d", hold: boolean} |
  *   {type: "undo"} | {type: "redo"}} ClientMessage
  */
@@ -40,10 +54,19 @@ const decoder = new TextDecoder();
  * Take a binary message apart: `[uint32 LE header length][header JSON][payload]`.
  *
  * @param {ArrayBuffer} buffer
- * @returns {{header: ImageHeader | OverlayHeader, payload: ArrayBuffer}}
+ * @returns {{header: BinaryHeader, payload: ArrayBuffer}}
  */
 export function decodeBinary(buffer) {
   const headerLength = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(decoder.decode(new Uint8Array(buffer, 4, headerLength)));
   return { header, payload: buffer.slice(4 + headerLength) };
+}
+
+/**
+ * Whether a frame of this status should be looked at.
+ *
+ * @param {Status} status
+ */
+export function isDoubt(status) {
+  return status === "doubtful" || status === "lost";
 }

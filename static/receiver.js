@@ -1,13 +1,16 @@
 /** Puts the program's messages into the store. */
 
 import { FrameAssembler } from "./frames.js";
+import { mergeCurves } from "./series.js";
+
+const MOST_EARLY = 8;
 
 export class Receiver {
   #store;
   #notify;
   #frames = new FrameAssembler(0, () => {});
-  /** @type {import("./protocol.js").Overlay | null} vectors that came before the images of their frame */
-  #early = null;
+  /** @type {Map<number, import("./protocol.js").Overlay>} vectors that came before the images of their frame */
+  #early = new Map();
 
   /**
    * @param {import("./store.js").Store} store
@@ -42,26 +45,48 @@ export class Receiver {
   }
 
   /**
-   * @param {import("./protocol.js").ImageHeader | import("./protocol.js").OverlayHeader} header
+   * @param {import("./protocol.js").BinaryHeader} header
    * @param {ArrayBuffer} payload
    */
   onBinary(header, payload) {
-    if (header.type === "image") {
-      this.#frames.receive(header, payload);
-    } else {
-      const overlay = { ...header, segments: new Float32Array(payload) };
-      // Vectors never lie over the image of another frame: the newest wait for theirs.
-      const fits = this.#store.facts.shown?.frame === header.frame;
-      this.#early = fits ? null : overlay;
-      if (fits) this.#store.set({ overlay });
+    switch (header.type) {
+      case "image":
+        this.#frames.receive(header, payload);
+        break;
+      case "overlay":
+        this.#takeOverlay({ ...header, segments: new Float32Array(payload) });
+        break;
+      case "curves":
+        this.#store.set({ curves: mergeCurves(this.#store.facts.curves, header, payload, this.#frameCount) });
+        break;
     }
+  }
+
+  get #frameCount() {
+    return this.#store.facts.session?.n_frames ?? 0;
+  }
+
+  /**
+   * Vectors never lie over the image of another frame: they wait for theirs.
+   *
+   * @param {import("./protocol.js").Overlay} overlay
+   */
+  #takeOverlay(overlay) {
+    if (this.#store.facts.shown?.frame === overlay.frame) {
+      this.#store.set({ overlay });
+      return;
+    }
+    this.#early.delete(overlay.frame);
+    this.#early.set(overlay.frame, overlay);
+    // A tracker may be some frames ahead of the decoder. What is older belongs to frames that were skipped.
+    for (const frame of this.#early.keys()) if (this.#early.size > MOST_EARLY) this.#early.delete(frame);
   }
 
   /** @param {import("./protocol.js").SessionMessage} session */
   #begin(session) {
     this.#frames.close();
     this.#frames = new FrameAssembler(session.cameras.length, (shown) => this.#show(shown));
-    this.#early = null;
+    this.#early.clear();
     const former = this.#store.facts.session?.cameras;
     this.#store.set({ session });
     if (JSON.stringify(former) !== JSON.stringify(session.cameras)) this.#store.set({ shown: null, overlay: null });
@@ -71,16 +96,18 @@ export class Receiver {
   #show(shown) {
     const former = this.#store.facts.shown;
     this.#store.set({ shown });
-    if (this.#early?.frame === shown.frame) {
-      this.#store.set({ overlay: this.#early });
-      this.#early = null;
+    const overlay = this.#early.get(shown.frame);
+    if (overlay) {
+      this.#store.set({ overlay });
+      this.#early.delete(shown.frame);
     }
     former?.bitmaps.forEach((bitmap) => bitmap.close());
   }
 
   /** @param {import("./protocol.js").TimelineMessage} message */
   #mergeTimeline({ cells, replace }) {
-    const timeline = replace ? new Map() : new Map(this.#store.facts.timeline);
+    // Changed in place: a long recording has a hundred thousand cells, and a tracker changes some twice a second.
+    const timeline = replace ? new Map() : this.#store.facts.timeline;
     for (const [frame, cell] of Object.entries(cells)) {
       if (cell) timeline.set(Number(frame), cell);
       else timeline.delete(Number(frame));

@@ -12,6 +12,8 @@
  * @property {import("./protocol.js").SessionMessage | null} session
  * @property {import("./protocol.js").StateMessage | null} state
  * @property {Map<number, import("./protocol.js").Cell>} timeline the known cells by frame
+ * @property {import("./series.js").Curves | null} curves the group of curves that came last
+ * @property {{first: number, last: number} | null} range the frames that the user has marked
  * @property {Shown | null} shown the images on the screen
  * @property {import("./protocol.js").Overlay | null} overlay the vectors on the screen
  * @property {Joint | null} hover the joint under the pointer
@@ -28,6 +30,8 @@ export class Store {
     session: null,
     state: null,
     timeline: new Map(),
+    curves: null,
+    range: null,
     shown: null,
     overlay: null,
     hover: null,
@@ -65,10 +69,11 @@ export class Store {
 
   /**
    * Whether the vectors on the screen belong to the images under them and to the program's frame: only then does a hand
-   * that grabs a joint mean what it sees.
+   * that grabs a joint mean what it sees. While a tracker is followed the program is always a little ahead.
    */
   get isSettled() {
     const { state, shown, overlay, connected } = this.facts;
-    return connected && !!state && shown?.frame === state.frame && overlay?.frame === state.frame;
+    const isThere = shown?.frame === state?.frame || (state?.track.running && state.follow);
+    return connected && !!state && !!isThere && overlay?.frame === shown?.frame;
   }
 }

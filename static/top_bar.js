@@ -1,6 +1,6 @@
 /** The bar at the top: layers, search, cost, history. */
 
-import { hasSearch } from "./actions.js";
+import { hasSearch, hasTrack } from "./actions.js";
 import { button, byId } from "./elements.js";
 import { count, px } from "./text.js";
 
@@ -78,7 +78,8 @@ export class TopBar {
     }
     this.#person.value = String(state.person);
     this.#cost.textContent = state.cost_px === null ? "–" : state.cost_px.toFixed(2);
-    this.#showJob(state.job);
+    if (hasTrack(state) || state.track.message) this.#showTrack(state.track);
+    else this.#showJob(state.job);
     this.#showSaved(state);
   }
 
@@ -97,6 +98,21 @@ export class TopBar {
         return mark;
       }),
     );
+  }
+
+  /** @param {import("./protocol.js").Track} track */
+  #showTrack({ running, first, last, at, done, total, per_second, doubtful, lost, message }) {
+    const what = running ? "tracking" : "paused";
+    const where = at === null ? `from frame ${first}` : `frame ${at}`;
+    this.#stage.textContent = first === null ? message : `${what}: ${where}, ${done} of ${total} to ${last}`;
+    this.#stage.title = this.#stage.textContent;
+    const counts = [doubtful && `${doubtful} doubtful`, lost && `${lost} lost`].filter(Boolean);
+    const figures = [`${per_second.toFixed(1)} frames/s`, ...counts].join(" · ");
+    this.#figures.textContent = first === null ? "" : figures;
+    const bar = document.createElement("i");
+    bar.style.setProperty("--done", `${(100 * done) / Math.max(1, total)}%`);
+    bar.className = "is-share";
+    this.#stages.replaceChildren(...(first === null ? [] : [bar]));
   }
 
   /** @param {import("./protocol.js").StateMessage} state */

@@ -3,6 +3,7 @@
 import { button, byId } from "./elements.js";
 import { clock } from "./text.js";
 import { SOURCES } from "./timeline.js";
+import { STATUSES } from "./timeline_drawing.js";
 
 export class Transport {
   #store;
@@ -68,15 +69,33 @@ export class Transport {
   }
 
   #showLegend() {
-    const present = new Set([...this.#store.facts.timeline.values()].map(({ source }) => source));
+    const cells = [...this.#store.facts.timeline.values()];
+    const sources = new Set(cells.map(({ source }) => source));
+    const statuses = new Set(cells.map(({ status }) => status));
+    const rows = [
+      STATUSES.filter((status) => statuses.has(status)).map((status) => swatch(status, `--status-${status}`, status)),
+      SOURCES.filter((source) => sources.has(source)).map((source) => swatch(source, `--source-${source}`, "")),
+    ];
     this.#legend.replaceChildren(
-      ...SOURCES.filter((source) => present.has(source)).map((source) => {
-        const item = document.createElement("span");
-        const swatch = document.createElement("i");
-        swatch.style.background = `var(--source-${source})`;
-        item.append(swatch, source);
-        return item;
+      ...rows.map((swatches) => {
+        const row = document.createElement("div");
+        row.append(...swatches);
+        return row;
       }),
     );
   }
+}
+
+/**
+ * @param {string} text
+ * @param {string} color name of the style's colour
+ * @param {string} kind class of the mark, which gives it its shape
+ */
+function swatch(text, color, kind) {
+  const item = document.createElement("span");
+  const mark = document.createElement("i");
+  mark.style.background = `var(${color})`;
+  if (kind) mark.className = `is-${kind}`;
+  item.append(mark, text);
+  return item;
 }

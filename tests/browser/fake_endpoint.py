@@ -36,7 +36,31 @@ BONES = [
     ("l_hip", "l_knee"), ("r_hip", "r_knee"), ("torso", "head"), ("l_shoulder", "r_shoulder"), ("l_hip", "r_hip"),
 ]  # fmt: skip
 SCALE = 150.0
+NO_TRACK = {
+    "running": False, "first": None, "last": None, "at": None, "done": 0, "total": 0, "per_second": 0.0, "doubtful": 0,
+    "lost": 0, "message": "",
+}  # fmt: skip
 STAGES = ["torso_head", "arms", "legs"]
+PARTS = ["torso", "head", "left_arm", "right_arm"]
+ANGLES = ("abduction", "elevation", "twist", "extension")
+PLOTS = {
+    "arms": [("Left arm", "deg", ANGLES), ("Right arm", "deg", ANGLES)],
+    "legs": [("Left leg", "deg", ANGLES), ("Right leg", "deg", ANGLES)],
+    "torso": [("Angles", "deg", ANGLES[:3]), ("Position", "cm", ("x", "y", "z"))],
+    "cost": [("Cost", "px", ("mean", *CAMERA_NAMES))],
+}
+REMARK = "left arm searched anew"
+
+
+def status_of(frame):
+    """Frames 31 and 32 are doubtful, 50 is lost; there is no pose from 100 on."""
+    return "doubtful" if frame in (31, 32) else "lost" if frame == 50 else "good"
+
+
+def curve(index, frame):
+    """Value of a curve: twists wrap at half a turn, the gap from frame 60 to 64 has none."""
+    value = 90.0 + 60 * np.sin(frame / 9 + index) if index % 4 != 2 else (7.0 * frame + 180) % 360 - 180
+    return np.where((frame >= 100) | ((frame >= 60) & (frame < 65)), np.nan, value)
 
 
 def project(points, camera):
@@ -55,6 +79,7 @@ class FakeEndpoint:
     overlay_delay_s: float = 0.0
     """How long each overlay takes, to try what a slow program does."""
     image_delay_s: float = 0.0
+    n_frames: int = N_FRAMES
     received: list = field(default_factory=list)
     """Every message of every page, but for what each says when it connects."""
     greetings: list = field(default_factory=list)
@@ -68,11 +93,14 @@ class FakeEndpoint:
         self.epipolar_of = None
         self.jpegs = {}
         self.search_task = None
+        self.track_task = None
+        self.curves_group = None
         self.state = {
             "type": "state", "frame": 12, "person": 0, "point": None, "base": "image",
             "overlays": {"contours": True, "joints": True, "part_edges": False, "skeleton": True},
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
-            "source": "manual", "job": self.idle_job(""), "undo": "drag l_wrist", "redo": None,
+            "source": "manual", "status": "", "remark": "", "parts_px": [], "job": self.idle_job(""),
+            "track": dict(NO_TRACK), "follow": True, "undo": "drag l_wrist", "redo": None,
             "saved": True, "save_error": None,
         }  # fmt: skip
 
@@ -102,7 +130,9 @@ class FakeEndpoint:
     async def answer(self, message):
         match message["type"]:
             case "seek":
-                self.state["frame"] = message["frame"]
+                self.state |= self.judged(message["frame"])
+                if self.state["track"]["running"]:
+                    self.state["follow"] = False
                 await self.broadcast(self.state)
                 await self.send_frame()
             case "select":
@@ -118,6 +148,15 @@ class FakeEndpoint:
                 await self.drag(message)
             case "search":
                 await self.search(message["action"])
+            case "track":
+                await self.track(message["action"], message.get("until"))
+            case "follow":
+                self.state["follow"] = message["follow"]
+                await self.broadcast(self.state)
+            case "curves":
+                self.curves_group = message["group"]
+                if self.curves_group:
+                    await self.send_curves(np.arange(self.n_frames), replace=True)
             case "undo" | "redo":
                 await self.broadcast(self.state)
 
@@ -160,6 +199,59 @@ class FakeEndpoint:
         self.state["job"] = job
         await self.broadcast(self.state)
 
+    def judged(self, frame):
+        """What the state says of a frame."""
+        status = status_of(frame)
+        remark = REMARK if status == "doubtful" else ""
+        return {"frame": frame, "status": status, "remark": remark, "parts_px": [0.8, 1.2, 4.5, None]}
+
+    async def track(self, action, until):
+        if self.track_task:
+            self.track_task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self.track_task
+            self.track_task = None
+        track = self.state["track"]
+        if action in ("forward", "backward"):
+            step = 1 if action == "forward" else -1
+            first = self.state["frame"] + step
+            end = (self.n_frames - 1 if step > 0 else 0) if until is None else until
+            self.state |= {"follow": True}
+            track |= NO_TRACK | {"first": first, "last": end, "total": abs(end - first) + 1, "running": True}
+        elif action == "stop":
+            track |= NO_TRACK | {"message": f"stopped: {track['done']} frames"}
+        else:
+            track["running"] = action == "go_on"
+        if track["running"]:
+            self.track_task = asyncio.create_task(self.run_track())
+        await self.broadcast(self.state)
+
+    async def run_track(self):
+        """Some twenty frames a second."""
+        track = self.state["track"]
+        step = 1 if track["last"] >= track["first"] else -1
+        at = track["first"] if track["at"] is None else track["at"] + step
+        for frame in range(at, track["last"] + step, step):
+            track |= {"at": frame, "done": track["done"] + 1, "per_second": 20.0}
+            cell = {"source": "tracked", "cost_px": 1.0, "keyframe": False, "status": status_of(frame), "remark": ""}
+            await self.broadcast({"type": "timeline", "cells": {frame: cell}, "replace": False})
+            if self.state["follow"]:
+                self.state |= self.judged(frame)
+                await self.send_frame()
+            await self.broadcast(self.state)
+            await asyncio.sleep(0.05)
+        track |= NO_TRACK | {"message": f"done: {track['done']} frames"}
+        await self.broadcast(self.state)
+
+    async def send_curves(self, frames, replace):
+        plots = PLOTS[self.curves_group]
+        values = np.stack([curve(i, frames) for i in range(sum(len(p[2]) for p in plots))])
+        header = {
+            "type": "curves", "group": self.curves_group, "person": 0, "replace": replace, "count": len(frames),
+            "plots": [{"title": title, "unit": unit, "labels": labels} for title, unit, labels in plots],
+        }  # fmt: skip
+        await self.send_binary(header, frames.astype("<u4").tobytes() + values.astype("<f4").tobytes())
+
     async def run_search(self, n_steps=40):
         for step in range(n_steps):
             self.state["job"] = self.idle_job("") | {
@@ -179,11 +271,11 @@ class FakeEndpoint:
             for c in range(self.n_cameras)
         ]
         people = [
-            {"name": f"person {p}", "color": COLORS[p], "points": list(REST), "bones": BONES}
+            {"name": f"person {p}", "color": COLORS[p], "points": list(REST), "bones": BONES, "parts": PARTS}
             for p in range(self.n_people)
         ]
         await socket.send_str(json.dumps({
-            "type": "session", "name": "elbow_rotation", "fps": 30.0, "n_frames": N_FRAMES, "cameras": cameras,
+            "type": "session", "name": "elbow_rotation", "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
             "people": people,
         }))  # fmt: skip
         await socket.send_str(json.dumps(self.state))
@@ -193,8 +285,10 @@ class FakeEndpoint:
                 "source": sources[k // 10 % 8],
                 "cost_px": 1 + 0.5 * np.sin(k / 7) + (k == 50) * 9,
                 "keyframe": k % 20 == 0,
+                "status": "" if k < 10 else status_of(k),
+                "remark": REMARK if k in (31, 32) else "",
             }
-            for k in range(100)
+            for k in range(self.n_frames * 100 // N_FRAMES)
         }
         await socket.send_str(json.dumps({"type": "timeline", "cells": cells, "replace": True}))
         await self.send_frame([socket])

@@ -1,0 +1,235 @@
+/**
+ * The curves above the timeline: parameters of the pose, or costs, against the frame (GD96 Fig. 8). They share the timeline's
+ * axis; a click goes to the frame. The program sends them only while they are open.
+ */
+
+import { button, byId } from "./elements.js";
+import { colorName, drawCurves } from "./curve_drawing.js";
+import { prepare } from "./drawing.js";
+import { FrameAxis } from "./frame_axis.js";
+import { keyframesOf } from "./timeline_drawing.js";
+
+/**
+ * @typedef {import("./protocol.js").CurveGroup} CurveGroup
+ * @typedef {import("./series.js").Curves} Data
+ */
+
+const STORED_OPEN = "quadrille.curves-open";
+const STORED_GROUP = "quadrille.curves-group";
+const STORED_HIDDEN = "quadrille.curves-hidden";
+const SIGNS = { deg: "°", cm: " cm", px: " px" };
+
+export class Curves {
+  #store;
+  #navigation;
+  #actions;
+  #panel = byId("curves", HTMLElement);
+  #stage = byId("curves-stage", HTMLElement);
+  #legend = byId("curves-legend", HTMLElement);
+  #groups = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll("input[name=curves]")]);
+  #toggle;
+  #lines = document.createElement("canvas");
+  #cursor = document.createElement("canvas");
+  #isOpen = localStorage.getItem(STORED_OPEN) === "yes";
+  /** Names of the curves that are switched off. */
+  #hidden = new Set(/** @type {string[]} */ (JSON.parse(localStorage.getItem(STORED_HIDDEN) ?? "[]")));
+  #hovered = /** @type {number | null} */ (null);
+  /** What the legend was built for. */
+  #described = "";
+
+  /**
+   * @param {import("./store.js").Store} store
+   * @param {import("./navigation.js").Navigation} navigation
+   * @param {import("./actions.js").Actions} actions
+   */
+  constructor(store, navigation, actions) {
+    this.#store = store;
+    this.#navigation = navigation;
+    this.#actions = actions;
+    this.#toggle = button("show-curves", () => this.toggle());
+    this.#stage.append(this.#lines, this.#cursor);
+    const stored = localStorage.getItem(STORED_GROUP);
+    for (const input of this.#groups) {
+      input.checked = input.value === stored || (!stored && input.value === "arms");
+      input.addEventListener("change", () => this.#choose());
+    }
+    store.subscribe((changed) => this.#update(changed));
+    new ResizeObserver(() => this.#drawAll()).observe(this.#stage);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#drawAll());
+    this.#listen();
+    this.#show();
+  }
+
+  toggle() {
+    this.#isOpen = !this.#isOpen;
+    localStorage.setItem(STORED_OPEN, this.#isOpen ? "yes" : "no");
+    this.#show();
+    this.#ask();
+  }
+
+  get #group() {
+    return /** @type {CurveGroup} */ (this.#groups.find(({ checked }) => checked)?.value ?? "arms");
+  }
+
+  /** The curves to be drawn; null while those asked for are on their way. */
+  get #data() {
+    const { curves } = this.#store.facts;
+    return curves?.group === this.#group ? curves : null;
+  }
+
+  get #axis() {
+    return new FrameAxis(this.#stage.clientWidth, this.#store.facts.session?.n_frames ?? 1);
+  }
+
+  /** @param {Set<keyof import("./store.js").Facts>} changed */
+  #update(changed) {
+    if (changed.has("connected") && this.#store.facts.connected && this.#isOpen) this.#ask();
+    if (!this.#isOpen) return;
+    if (changed.has("curves")) this.#describe();
+    if (changed.has("curves") || changed.has("session") || changed.has("timeline")) this.#drawLines();
+    if (changed.has("curves") || changed.has("session") || changed.has("target")) this.#drawCursor();
+  }
+
+  #show() {
+    this.#panel.hidden = !this.#isOpen;
+    this.#toggle.setAttribute("aria-pressed", String(this.#isOpen));
+    this.#drawAll();
+  }
+
+  #choose() {
+    localStorage.setItem(STORED_GROUP, this.#group);
+    this.#ask();
+  }
+
+  #ask() {
+    this.#actions.openCurves(this.#isOpen ? this.#group : null);
+  }
+
+  #listen() {
+    const stage = this.#stage;
+    stage.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      stage.setPointerCapture(event.pointerId);
+      this.#navigation.pause();
+      this.#navigation.goTo(this.#axis.frameUnder(event, stage));
+    });
+    stage.addEventListener("pointermove", (event) => {
+      const frame = this.#axis.frameUnder(event, stage);
+      if (stage.hasPointerCapture(event.pointerId)) this.#navigation.goTo(frame);
+      if (frame !== this.#hovered) this.#hover(frame);
+    });
+    stage.addEventListener("pointerleave", () => this.#hover(null));
+  }
+
+  /** @param {number | null} frame */
+  #hover(frame) {
+    this.#hovered = frame;
+    requestAnimationFrame(() => this.#drawCursor());
+  }
+
+  /** Build the legend: one switch per name, which stands for the curves of that name in all plots. */
+  #describe() {
+    const data = this.#data;
+    const labels = labelsOf(data);
+    const described = JSON.stringify(labels);
+    if (!data || described === this.#described) return;
+    this.#described = described;
+    this.#legend.replaceChildren(
+      ...labels.map((label, index) => {
+        const one = document.createElement("button");
+        one.type = "button";
+        one.className = "legend-switch";
+        one.setAttribute("aria-pressed", String(!this.#hidden.has(label)));
+        one.title = `Show or hide ${label}`;
+        const swatch = document.createElement("i");
+        swatch.style.background = `var(${colorName(index)})`;
+        const value = document.createElement("output");
+        one.append(swatch, label, value);
+        one.addEventListener("click", () => this.#switch(one, label));
+        return one;
+      }),
+    );
+  }
+
+  /**
+   * @param {HTMLButtonElement} element
+   * @param {string} label
+   */
+  #switch(element, label) {
+    element.blur();
+    if (!this.#hidden.delete(label)) this.#hidden.add(label);
+    element.setAttribute("aria-pressed", String(!this.#hidden.has(label)));
+    localStorage.setItem(STORED_HIDDEN, JSON.stringify([...this.#hidden]));
+    this.#drawLines();
+  }
+
+  #drawAll() {
+    if (!this.#isOpen) return;
+    this.#drawLines();
+    this.#drawCursor();
+  }
+
+  #drawLines() {
+    const { clientWidth, clientHeight } = this.#stage;
+    if (clientWidth === 0) return;
+    const context = prepare(this.#lines, clientWidth, clientHeight, true);
+    const data = this.#data;
+    if (!data) return;
+    const keyframes = keyframesOf(this.#store.facts.timeline);
+    const style = getComputedStyle(this.#stage);
+    drawCurves(context, this.#axis, clientHeight, data, labelsOf(data), this.#hidden, keyframes, style);
+  }
+
+  /** Lines at the current frame and under the pointer, and in the legend the values at the latter, else the former. */
+  #drawCursor() {
+    const { clientWidth, clientHeight } = this.#stage;
+    if (clientWidth === 0 || !this.#isOpen) return;
+    const context = prepare(this.#cursor, clientWidth, clientHeight, true);
+    const style = getComputedStyle(this.#stage);
+    const axis = this.#axis;
+    const { target } = this.#store.facts;
+    context.fillStyle = style.getPropertyValue("--text");
+    context.fillRect(axis.middle(target) - 0.5, 0, 1, clientHeight);
+    if (this.#hovered !== null) {
+      context.globalAlpha = 0.5;
+      context.fillRect(axis.middle(this.#hovered) - 0.5, 0, 1, clientHeight);
+      context.globalAlpha = 1;
+    }
+    this.#readOut(this.#hovered ?? target);
+  }
+
+  /** @param {number} frame */
+  #readOut(frame) {
+    const data = this.#data;
+    labelsOf(data).forEach((label, index) => {
+      const value = this.#legend.children[index]?.querySelector("output");
+      if (!value || !data) return;
+      const found = data.series.filter((one) => one.label === label);
+      value.textContent = found
+        .map(({ plot, values }) => (found.length > 1 ? `${data.plots[plot].title[0]} ` : "") + write(data, plot, values[frame]))
+        .join("  ");
+      value.title = found
+        .map(({ plot, values }) => `${data.plots[plot].title} at frame ${frame}: ${write(data, plot, values[frame])}`)
+        .join("\n");
+    });
+  }
+}
+
+/**
+ * Names of curves, each once.
+ *
+ * @param {Data | null} data
+ */
+function labelsOf(data) {
+  return [...new Set(data?.series.map(({ label }) => label))];
+}
+
+/**
+ * @param {Data} data
+ * @param {number} plot
+ * @param {number} value
+ */
+function write(data, plot, value) {
+  const { unit } = data.plots[plot];
+  return Number.isFinite(value) ? `${value.toFixed(unit === "px" ? 2 : 1)}${SIGNS[unit]}` : "–";
+}

@@ -1,0 +1,56 @@
+/** What the tracker says of the shown frame: a line in the corner of the panes that opens to the cost of each part. */
+
+import { byId } from "./elements.js";
+import { px } from "./text.js";
+
+const STORED_OPEN = "quadrille.parts-open";
+/** A bar as long as this cost fills its row: what costs more looks no worse. */
+const FULL_PX = 6;
+
+export class FrameCard {
+  #store;
+  #card = byId("frame-card", HTMLDetailsElement);
+  #badge = byId("frame-status", HTMLElement);
+  #remark = byId("frame-remark", HTMLElement);
+  #parts = byId("frame-parts", HTMLElement);
+
+  /** @param {import("./store.js").Store} store */
+  constructor(store) {
+    this.#store = store;
+    this.#card.open = localStorage.getItem(STORED_OPEN) === "yes";
+    this.#card.addEventListener("toggle", () => {
+      localStorage.setItem(STORED_OPEN, this.#card.open ? "yes" : "no");
+      this.#show();
+    });
+    store.subscribe((changed) => {
+      if (changed.has("state")) this.#show();
+    });
+  }
+
+  #show() {
+    const { state, session } = this.#store.facts;
+    if (!state || !session) return;
+    const { status, remark, parts_px, person } = state;
+    this.#card.hidden = status === "" && parts_px.length === 0;
+    this.#badge.className = `status-badge is-${status}`;
+    this.#badge.textContent = status || "not judged";
+    this.#remark.textContent = remark;
+    if (this.#card.hidden || !this.#card.open) return;
+    const names = session.people[person].parts;
+    this.#parts.replaceChildren(...parts_px.flatMap((cost, part) => row(names[part] ?? "", cost)));
+  }
+}
+
+/**
+ * @param {string} name
+ * @param {number | null} cost px; null for a part that no view sees
+ */
+function row(name, cost) {
+  const label = document.createElement("span");
+  label.textContent = name.replaceAll("_", " ");
+  const bar = document.createElement("i");
+  bar.style.setProperty("--filled", `${Math.min(100, (100 * (cost ?? 0)) / FULL_PX)}%`);
+  const value = document.createElement("output");
+  value.textContent = cost === null ? "unseen" : px(cost);
+  return [label, bar, value];
+}
