@@ -29,6 +29,9 @@ class Axis:
     """Unit axis in the joint's frame, after the rotations listed before it."""
     limits: tuple[float, float]
     """Lowest and highest angle, rad; infinite where the angle may wind."""
+    spread: float = np.inf
+    """How far people usually bend it from 0 (one standard deviation), rad; infinite where nothing is known. What the
+    image hardly shows, such as the bending of a trunk, a fit keeps near 0 by this."""
 
 
 @dataclass(frozen=True)
@@ -200,6 +203,14 @@ class BodyModel:
             rows += [(-np.inf, np.inf)] * (len(j.dof_names) - len(j.axes))
             rows += [a.limits for a in j.axes]
         return np.array(rows, dtype=np.float64).reshape(-1, 2)
+
+    @cached_property
+    def spreads(self) -> Array:
+        """Usual distance of each degree of freedom from 0, (n_dofs,), rad; infinite where nothing is known."""
+        rows = []
+        for j in self.joints:
+            rows += [np.inf] * (len(j.dof_names) - len(j.axes)) + [a.spread for a in j.axes]
+        return np.array(rows, dtype=np.float64)
 
     @cached_property
     def moves(self) -> NDArray[np.bool_]:

@@ -1,7 +1,7 @@
 """The one Gauss-Newton of the project: poses from residual blocks.
 
-A block turns a pose into weighted residuals and their Jacobian. Whatever speaks for a pose is one: joints known in
-space, a prior. The solver is damped (Levenberg-Marquardt) and holds the joint limits.
+A block turns a pose into the normal equations of its weighted residuals. Whatever speaks for a pose is one: joints
+known in space, contours and edges (`refine`), a prior. The solver is damped (Levenberg-Marquardt) and holds the joint limits.
 """
 
 import itertools
@@ -18,12 +18,37 @@ from tracker.kinematics import IntArray, Kinematics
 from tracker.rigid import Array
 
 
-class Block(Protocol):
-    """One kind of evidence for the pose of one person."""
+_MOST_DAMPING = 1e8
+_UNKNOWN = 1.0
+"""Variance of a degree of freedom that nothing is known of, rad^2 or m^2."""
 
-    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> tuple[Array, Array]:
-        """Weighted residuals (N,) at a pose and their derivative by the degrees of freedom, (N, n_dofs)."""
+
+class Normal(NamedTuple):
+    """The normal equations of some residuals at a pose."""
+
+    cost: float
+    """Half the sum of the weighted squared residuals; of robust ones, what half the squares are bent to."""
+    gradient: Array
+    """Derivative of the cost by the degrees of freedom, (n_dofs,)."""
+    hessian: Array
+    """Gauss-Newton's second derivative, (n_dofs, n_dofs), positive semi-definite."""
+
+
+class Block(Protocol):
+    """One kind of evidence for the pose of one person.
+
+    A block hands over its normal equations and not its residuals, so that thousands of image residuals can be summed
+    where they arise.
+    """
+
+    def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
+        """Linearize the weighted residuals at a pose."""
         ...
+
+
+def normal_of(residuals: Array, jacobian: Array) -> Normal:
+    """Normal equations of weighted residuals (N,) with their derivative by the degrees of freedom, (N, n_dofs)."""
+    return Normal(0.5 * float(residuals @ residuals), jacobian.T @ residuals, jacobian.T @ jacobian)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,14 +62,14 @@ class PointTargets:
     weights: Array
     """Weight of each point's distance, (N,), per metre."""
 
-    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> tuple[Array, Array]:
+    def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `Block`."""
         parts = model.point_parts[self.points]
         T = kinematics.Ts_world_part[parts]
         points_world = np.einsum("nij,nj->ni", T[:, :3, :3], model.points_part[self.points]) + T[:, :3, 3]
         J = model.point_jacobian(kinematics, parts, points_world) * self.weights[:, None, None]
         r = (points_world - self.targets_world) * self.weights[:, None]
-        return r.ravel(), J.reshape(-1, model.n_dofs)
+        return normal_of(r.ravel(), J.reshape(-1, model.n_dofs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,10 +81,11 @@ class StayNear:
     weights: Array
     """Weight of each degree of freedom, (n_dofs,), per radian or metre."""
 
-    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> tuple[Array, Array]:
+    def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `Block`."""
         # d(difference)/d(step) is the identity to first order, for balls up to the curvature of the rotation.
-        return model.difference(values, self.values) * self.weights, np.diag(self.weights)
+        r = model.difference(values, self.values) * self.weights
+        return Normal(0.5 * float(r @ r), self.weights * r, np.diag(self.weights**2))
 
 
 class Fit(NamedTuple):
@@ -70,6 +96,8 @@ class Fit(NamedTuple):
     cost: float
     """Half the sum of squared residuals."""
     iterations: int
+    hessian: Array
+    """Second derivative of the cost at the pose, (n_dofs, n_dofs); `covariance` takes it from there."""
 
 
 def solve(
@@ -80,45 +108,52 @@ def solve(
     max_iterations: int = 50,
     tolerance: float = 1e-6,
 ) -> Fit:
-    """Minimize the sum of squared residuals of all blocks within the joint limits.
+    """Minimize the summed cost of all blocks within the joint limits (Levenberg-Marquardt with an active set).
 
     Args:
         model: the body.
         values: where to start, (n_values,).
         blocks: the evidence.
         free: which degrees of freedom may move, (n_dofs,); all by default.
-        max_iterations: how often to linearize at most.
+        max_iterations: how often to take a step at most.
         tolerance: smallest step that is worth another iteration, rad or metres.
     """
     may_move = np.ones(model.n_dofs, dtype=bool) if free is None else free
     values = model.clip(values)
-    r, J = _stack(model, values, blocks)
-    cost, damping = 0.5 * float(r @ r), 1e-3
+    here = _sum(model, values, blocks)
+    damping, iteration = 1e-3, 0
     for iteration in range(1, max_iterations + 1):
-        gradient, hessian = J.T @ r, J.T @ J
-        moving = may_move & ~_pressed_against_limit(model, values, gradient)
-        if not moving.any():
-            return Fit(values, cost, iteration)
-        g, H = gradient[moving], hessian[np.ix_(moving, moving)]
+        moving = np.flatnonzero(may_move & ~_pressed_against_limit(model, values, here.gradient))
+        if not len(moving):
+            break
+        g, H = here.gradient[moving], here.hessian[moving[:, None], moving]
         # Damping by the diagonal leaves metres and radians to themselves; the floor serves dofs nothing speaks of.
         scale = np.diag(H) + 1e-6 * max(1e-12, float(np.trace(H)) / len(H))
         while True:
             step = np.zeros(model.n_dofs)
             step[moving] = -np.linalg.solve(H + damping * np.diag(scale), g)
             trial = model.clip(model.retract(values, step))
-            trial_r, trial_J = _stack(model, trial, blocks)
-            trial_cost = 0.5 * float(trial_r @ trial_r)
-            if trial_cost < cost or damping > 1e8:
+            there = _sum(model, trial, blocks)
+            if there.cost < here.cost or damping > _MOST_DAMPING:
                 break
             damping *= 10
+        if there.cost >= here.cost:
+            break
         moved = float(np.abs(model.difference(trial, values)).max())
-        if trial_cost >= cost:
-            return Fit(values, cost, iteration)
-        values, r, J, cost = trial, trial_r, trial_J, trial_cost
+        values, here = trial, there
         damping = max(1e-9, damping / 10)
         if moved < tolerance:
             break
-    return Fit(values, cost, iteration)
+    return Fit(values, here.cost, iteration, here.hessian)
+
+
+def covariance(model: BodyModel, fit: Fit) -> Array:
+    """Covariance of a fitted pose, (n_dofs, n_dofs), rad and metres, from the normal matrix.
+
+    It is as true as the blocks' weights are inverse standard deviations. What nothing speaks of has a variance of
+    `_UNKNOWN`; joint limits are not counted as knowledge.
+    """
+    return np.linalg.inv(fit.hessian + np.eye(model.n_dofs) / _UNKNOWN)
 
 
 def fit_to_points(model: BodyModel, targets_world: dict[str, Array], near: Array | None = None) -> Fit:
@@ -183,10 +218,10 @@ def _by_other_angles(model: BodyModel, values: Array, joint: int) -> Array:
     return model.clip(out)
 
 
-def _stack(model: BodyModel, values: Array, blocks: Sequence[Block]) -> tuple[Array, Array]:
+def _sum(model: BodyModel, values: Array, blocks: Sequence[Block]) -> Normal:
     kinematics = model.kinematics(values)
-    parts = [b.linearize(model, values, kinematics) for b in blocks]
-    return np.concatenate([r for r, _ in parts]), np.concatenate([J for _, J in parts])
+    parts = [b.normal(model, values, kinematics) for b in blocks]
+    return Normal(sum(p.cost for p in parts), sum(p.gradient for p in parts), sum(p.hessian for p in parts))  # type: ignore[arg-type]
 
 
 def _pressed_against_limit(model: BodyModel, values: Array, gradient: Array) -> NDArray[np.bool_]:

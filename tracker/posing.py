@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tracker import rigid
 from tracker.body import BodyModel
 from tracker.cameras import Camera, viewed_point
-from tracker.fit import Block, StayNear, fit_to_points, solve
+from tracker.fit import Block, Normal, StayNear, fit_to_points, normal_of, solve
 from tracker.kinematics import Kinematics
 from tracker.rigid import Array
 
@@ -23,6 +23,8 @@ class _Solving(TypedDict):
 _REST_WEIGHT = 0.003
 """Pull of the rest of the chain to its pose at the grab, per rad, against 1 per metre for the dragged point: it
 decides what the pointer leaves open and holds the point back by some 0.1 mm."""
+_STIFF_WEIGHT = 0.015
+"""The same for joints that people bend little, as the waist: limbs move first, the trunk gives way where they end."""
 _DEPTH_WEIGHT = 0.1
 """Weight of keeping the point's depth, against 1 for being under the pointer: where the limb's lengths allow only one
 of the two, the point goes where the hand sees it go."""
@@ -109,7 +111,7 @@ class _UnderPointer:
     target_world: Array
     """Where the point should be, (3,), metres: under the pointer, at the depth."""
 
-    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> tuple[Array, Array]:
+    def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `Block`."""
         hand, T_camera_world = self.hand, self.hand.camera.T_camera_world
         parts = model.point_parts[[hand.point]]
@@ -122,7 +124,7 @@ class _UnderPointer:
         across = hand.depth_m * (x[:2] / z - target[:2] / target[2])
         J_across = hand.depth_m / z * (J[:2] - np.outer(x[:2] / z, J[2]))  # (2, n_dofs)
         r = np.append(across, _DEPTH_WEIGHT * (x[2] - hand.depth_m))
-        return r, np.concatenate([J_across, _DEPTH_WEIGHT * J[2:]])
+        return normal_of(r, np.concatenate([J_across, _DEPTH_WEIGHT * J[2:]]))
 
 
 def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
@@ -144,7 +146,7 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
         return model.retract(hand.values, step)
     blocks: list[Block] = [
         _UnderPointer(hand, target),
-        StayNear(hand.values, np.full(model.n_dofs, _REST_WEIGHT)),
+        StayNear(hand.values, np.where(np.isfinite(model.spreads), _STIFF_WEIGHT, _REST_WEIGHT)),
     ]
     fit = solve(model, values, blocks, free=hand.free, **_QUICK)
     joint, first = model.dof_joint[hand.free][[-1, 0]]

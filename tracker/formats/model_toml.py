@@ -111,6 +111,7 @@ def format_model(model: BodyModel) -> str:
                     "axis": list(a.direction),
                     "limits_deg": [float(np.degrees(x)) for x in a.limits],
                 }
+                | ({"spread_deg": float(np.degrees(a.spread))} if np.isfinite(a.spread) else {})
                 for a in j.axes
             ]
         joints.append(row)
@@ -150,14 +151,20 @@ def _numbers(value: Any, count: int, source: str, where: str) -> Any:
 def _axis(data: Any, source: str, joint: str) -> Axis:
     direction = np.array(_numbers(data["axis"], 3, source, f"{joint}.{data['name']}"))
     low, high = (float(np.radians(float(v))) for v in data.get("limits_deg", (-np.inf, np.inf)))
+    spread = float(np.radians(float(data.get("spread_deg", np.inf))))
     norm = float(np.linalg.norm(direction))
+    if not spread > 0.0:
+        raise ModelError(
+            f"body model {source}: axis '{joint}.{data['name']}' expected a spread_deg above 0, "
+            f"found {data['spread_deg']}"
+        )
     if norm < 1e-9 or not low <= 0.0 <= high:
         raise ModelError(
             f"body model {source}: axis '{joint}.{data['name']}' expected a direction and limits around 0, "
             f"found {data['axis']} and {data.get('limits_deg')}"
         )
     x, y, z = direction / norm
-    return Axis(str(data["name"]), (float(x), float(y), float(z)), (low, high))
+    return Axis(str(data["name"]), (float(x), float(y), float(z)), (low, high), spread)
 
 
 def _joint(data: Any, source: str) -> Joint:
