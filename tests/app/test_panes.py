@@ -1,0 +1,236 @@
+"""The pane socket of a real controller: what a page is told, and what it may ask for."""
+
+import asyncio
+import json
+import struct
+from contextlib import asynccontextmanager
+
+import aiohttp
+import numpy as np
+import pytest
+from aiohttp import web
+from fake_tracker import FakeTracker
+from hands import drag
+
+from app.panes import Panes
+
+
+@pytest.fixture
+def tracker(monkeypatch):
+    return FakeTracker(monkeypatch)
+
+
+@pytest.fixture
+def controller(opened, tracker):
+    controller = opened()
+    controller.seek(2)
+    drag(controller, "torso", (4.0, 0.0))
+    yield controller
+    tracker.let_go(1000)
+
+
+class Page:
+    """A page that keeps everything it is told."""
+
+    def __init__(self, socket):
+        self._socket = socket
+        self.told = []
+
+    async def send(self, kind, **fields):
+        await self._socket.send_str(json.dumps({"type": kind, **fields}))
+
+    async def hear(self, kind, condition=lambda _: True, timeout_s=10.0):
+        """The next message of a kind for which a condition holds; binary ones with their `payload`."""
+        async with asyncio.timeout(timeout_s):
+            while True:
+                message = self._read(await self._socket.receive())
+                self.told.append(message)
+                if message["type"] == kind and condition(message):
+                    return message
+
+    def _read(self, message):
+        if message.type is aiohttp.WSMsgType.TEXT:
+            return json.loads(message.data)
+        assert message.type is aiohttp.WSMsgType.BINARY, message
+        (length,) = struct.unpack_from("<I", message.data)
+        return json.loads(message.data[4 : 4 + length]) | {"payload": message.data[4 + length :]}
+
+
+@asynccontextmanager
+async def visiting(controller):
+    async def serve(request):
+        socket = web.WebSocketResponse()
+        await socket.prepare(request)
+        await Panes(controller).serve(socket)
+        return socket
+
+    app = web.Application()
+    app.router.add_get("/ws", serve)
+    runner = web.AppRunner(app, shutdown_timeout=0.1)
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", 0).start()
+    try:
+        async with (
+            aiohttp.ClientSession() as session,
+            session.ws_connect(f"http://127.0.0.1:{runner.addresses[0][1]}/ws") as socket,
+        ):
+            yield Page(socket)
+    finally:
+        await runner.cleanup()
+
+
+def curves_of(message):
+    """Frames and curves by name of the plot and the curve."""
+    frames = np.frombuffer(message["payload"], "<u4", message["count"])
+    values = np.frombuffer(message["payload"], "<f4", offset=4 * message["count"]).reshape(-1, message["count"])
+    names = [(plot["title"], label) for plot in message["plots"] for label in plot["labels"]]
+    assert len(names) == len(values)
+    return frames.tolist(), dict(zip(names, values, strict=True))
+
+
+async def test_a_page_is_told_all_when_it_connects(controller):
+    async with visiting(controller) as page:
+        session = await page.hear("session")
+        assert session["people"][0]["parts"][0] == "torso"
+        state = await page.hear("state")
+        assert (state["frame"], state["source"], state["status"], state["parts_px"]) == (2, "manual", "", [])
+        assert state["track"]["first"] is None
+        assert state["follow"]
+        timeline = await page.hear("timeline")
+        assert timeline["replace"]
+        assert timeline["cells"].keys() == {"2"}
+        assert not [m for m in page.told if m["type"] == "curves"]  # only for those who ask
+
+
+async def test_a_run_is_watched_frame_by_frame(controller, tracker):
+    async with visiting(controller) as page:
+        await page.hear("timeline")
+        await page.send("track", action="forward", until=6)
+        await page.hear("state", lambda m: m["track"]["running"] and m["track"]["total"] == 4)
+        tracker.let_go(2)
+        state = await page.hear("state", lambda m: m["frame"] == 4)
+        assert (state["status"], state["remark"]) == ("doubtful", "left arm searched anew")
+        assert state["parts_px"] == [0.5] * 9 + [None]
+        assert state["view_costs_px"] == [1.0, None, 2.0, 3.0]
+        await page.hear("overlay", lambda m: m["frame"] == 4)
+        for camera in range(4):
+            image = await page.hear("image", lambda m: m["frame"] == 4)
+            assert image["camera"] == camera
+        tracker.let_go(2)
+        await page.hear("state", lambda m: m["track"]["message"].startswith("done"))
+        cells = {k: c for m in page.told if m["type"] == "timeline" for k, c in m["cells"].items()}
+        cells |= (await page.hear("timeline", lambda m: "6" in m["cells"]))["cells"] if "6" not in cells else {}
+        assert cells["4"]["status"] == "doubtful"
+        assert cells["4"]["remark"] == "left arm searched anew"
+
+
+async def test_images_come_though_the_tracker_is_ahead_by_then(controller, tracker):
+    """A tracker that is faster than the pictures must not leave the panes without any."""
+    async with visiting(controller) as page:
+        await page.hear("timeline")
+        jpeg = controller.frames.jpeg
+
+        def overtaken(*args):
+            tracker.let_go(1)
+            return jpeg(*args)
+
+        controller.frames.jpeg = overtaken
+        await page.send("track", action="forward", until=None)
+        tracker.let_go(1)
+        frames = [(await page.hear("image"))["frame"] for _ in range(8)]
+        assert len(set(frames)) >= 2
+
+
+async def test_pause_go_on_follow_and_stop(controller, tracker):
+    async with visiting(controller) as page:
+        await page.hear("timeline")
+        await page.send("track", action="forward", until=None)
+        tracker.let_go(2)
+        await page.hear("state", lambda m: m["track"]["at"] == 4)
+        await page.send("seek", frame=3)
+        await page.hear("state", lambda m: m["frame"] == 3 and not m["follow"])
+        await page.send("follow", follow=True)
+        await page.hear("state", lambda m: m["frame"] == 4 and m["follow"])
+        going = asyncio.create_task(go_on_slowly(tracker))
+        await page.send("track", action="pause")
+        state = await page.hear("state", lambda m: not m["track"]["running"])
+        assert state["track"]["first"] == 3
+        await page.send("track", action="go_on")
+        await page.hear("state", lambda m: m["track"]["running"])
+        await page.send("track", action="stop")
+        await page.hear("state", lambda m: m["track"]["message"].startswith("stopped"))
+        going.cancel()
+
+
+async def go_on_slowly(tracker):
+    """Whoever pauses waits for the step at hand, which must come to its end."""
+    while True:
+        await asyncio.sleep(0.2)
+        tracker.let_go(1)
+
+
+async def test_what_cannot_be_tracked_is_a_notice(controller):
+    async with visiting(controller) as page:
+        await page.send("track", action="backward", until=40)
+        notice = await page.hear("notice")
+        assert notice["level"] == "error"
+        assert "frames to track before frame 2" in notice["text"]
+        await page.send("curves", group="ears")
+        assert "'ears' is no group of curves" in (await page.hear("notice"))["text"]
+
+
+async def test_curves_come_whole_and_then_as_they_change(controller, tracker):
+    async with visiting(controller) as page:
+        await page.hear("timeline")
+        await page.send("curves", group="torso")
+        message = await page.hear("curves")
+        assert (message["replace"], message["group"], message["person"]) == (True, "torso", 0)
+        frames, curves = curves_of(message)
+        assert frames == [2]
+        assert curves["Position", "x"][0] == pytest.approx(100 * controller.state.poses[0][0], abs=1e-3)
+        await page.send("track", action="forward", until=4)
+        tracker.let_go(2)
+        seen = {}
+        while 4 not in seen:
+            message = await page.hear("curves")
+            assert not message["replace"]
+            frames, curves = curves_of(message)
+            seen |= dict(zip(frames, curves["Position", "x"], strict=True))
+        assert 2 not in seen
+        assert seen[4] - seen[3] == pytest.approx(1.0, abs=1e-3)  # the fake walks a centimetre a frame
+        await page.send("undo")
+        message = await page.hear("curves")
+        frames, curves = curves_of(message)
+        assert frames == [3, 4]
+        assert np.all(np.isnan(curves["Position", "x"]))
+
+
+async def test_another_group_replaces_the_first_and_closed_ones_rest(controller):
+    async with visiting(controller) as page:
+        await page.send("curves", group="arms")
+        await page.hear("curves")
+        await page.send("curves", group="cost")
+        message = await page.hear("curves")
+        assert (message["group"], message["replace"]) == ("cost", True)
+        assert message["plots"][0]["labels"] == ["mean", "FRONT", "RIGHT", "BACK", "LEFT"]
+        await page.send("curves", group=None)
+        await page.send("select", person=0, point="head")  # carried out after it
+        await page.hear("state", lambda m: m["point"] == "head")
+        count = len(page.told)
+        drag(controller, "left_knee", (4.0, 0.0))
+        await page.hear("timeline")
+        await asyncio.sleep(0.2)
+        await page.send("select", person=0, point="head")
+        await page.hear("state", lambda m: m["point"] == "head")
+        assert not [m for m in page.told[count:] if m["type"] == "curves"]
+
+
+async def test_a_drag_means_the_frame_that_the_hand_saw(controller):
+    controller.seek(5)
+    async with visiting(controller) as page:
+        await page.hear("timeline")
+        hold = {"camera": 0, "person": 0, "point": "torso", "u": 320.0, "v": 240.0, "frame": 2}
+        await page.send("drag", phase="start", seq=1, **hold)
+        await page.hear("state", lambda m: m["frame"] == 2)
+        await page.send("drag", phase="end", seq=2, **(hold | {"u": 330.0}))
+        await page.hear("state", lambda m: m["undo"] == "drag torso, frame 2")
