@@ -7,7 +7,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import cv2
@@ -51,6 +51,10 @@ class ViewEvidence:
     """Where the region's first pixel lies in the whole image, matched px."""
     image_size: tuple[int, int] | None = None
     """Width and height of the whole image, matched px; None where the region is all of it."""
+    normals: FloatArray = field(default_factory=lambda: np.empty((0, 2), np.float32))
+    """Unit gradient at each of `points_px`, from dark to light, (N, 2); zero where the edge's direction is unknown."""
+    colors: Image | None = None
+    """The region of the frame itself, smoothed, (H, W, 3) RGB; None where it is damaged or was not kept."""
 
     @property
     def theta_px(self) -> float:
@@ -83,6 +87,8 @@ def view_evidence(
     edge_map: NDArray[np.bool_] | NDArray[np.uint8],
     corner_px: tuple[int, int] = (0, 0),
     image_size: tuple[int, int] | None = None,
+    gradients: NDArray[np.int16] | None = None,
+    colors: Image | None = None,
 ) -> ViewEvidence:
     """Make the evidence of a view from its edge map.
 
@@ -92,13 +98,24 @@ def view_evidence(
         edge_map: (H, W), edges are not 0.
         corner_px: see `ViewEvidence`.
         image_size: see `ViewEvidence`.
+        gradients: of the image along u and v, (2, H, W); None where the directions of the edges are unknown.
+        colors: see `ViewEvidence`.
     """
     assert edge_map.shape == (camera.height, camera.width), (edge_map.shape, camera.size)
     found = cv2.findNonZero(edge_map.view(np.uint8))
     points = np.empty((0, 2), np.float32) if found is None else _thinned(found, camera.width, camera.height)
     # Beyond twice theta nothing asks for the distance any more.
     limit_px = 2 * _theta_px(image_size or camera.size)
-    return ViewEvidence(camera, scale, points, distance_image(edge_map, limit_px), corner_px, image_size)
+    normals = np.zeros_like(points) if gradients is None else _directions(points, gradients)
+    distance = distance_image(edge_map, limit_px)
+    return ViewEvidence(camera, scale, points, distance, corner_px, image_size, normals, colors)
+
+
+def _directions(points: FloatArray, gradients: NDArray[np.int16]) -> FloatArray:
+    """Unit gradients (N, 2) at points (N, 2) of an image."""
+    u, v = points.T.astype(np.intp)
+    found = gradients[:, v, u].T.astype(np.float32)
+    return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), np.float32(1e-6))
 
 
 @njit(nogil=True, cache=True)
@@ -228,11 +245,11 @@ class Observer:
         box = view.whole if region is None else fit_region(region, view.camera.size)
         camera = view.camera.cropped(box)
         if prepared is None:
-            found = np.zeros((camera.height, camera.width), np.uint8)
-        else:
-            smooth = silhouettes.smoothed(view.image(prepared.frame, box))
-            found = detect_edges(smooth, prepared.bounds, self._foreground(i, prepared, smooth, box)).found
-        return view_evidence(camera, view.scale, found, box[:2], view.camera.size)
+            nothing = np.zeros((camera.height, camera.width), np.uint8)
+            return view_evidence(camera, view.scale, nothing, box[:2], view.camera.size)
+        smooth = silhouettes.smoothed(view.image(prepared.frame, box))
+        edges = detect_edges(smooth, prepared.bounds, self._foreground(i, prepared, smooth, box))
+        return view_evidence(camera, view.scale, edges.found, box[:2], view.camera.size, edges.gradients, smooth)
 
     def _foreground(self, i: int, prepared: _Prepared, smooth: Image, box: Region) -> Mask | None:
         """Where a person may be, (H, W), generously; None where nothing tells."""

@@ -1,7 +1,8 @@
 """The one Gauss-Newton of the project: poses from residual blocks.
 
 A block turns a pose into the normal equations of its weighted residuals. Whatever speaks for a pose is one: joints
-known in space, contours and edges (`refine`), a prior. The solver is damped (Levenberg-Marquardt) and holds the joint limits.
+known in space, contours and edges (`refine`), a prior. The solver is damped (Levenberg-Marquardt) and holds the joint
+limits.
 """
 
 import itertools
@@ -16,7 +17,6 @@ from tracker.body import BodyModel
 from tracker.errors import TrackerError
 from tracker.kinematics import IntArray, Kinematics
 from tracker.rigid import Array
-
 
 _MOST_DAMPING = 1e8
 _UNKNOWN = 1.0
@@ -121,8 +121,9 @@ def solve(
     may_move = np.ones(model.n_dofs, dtype=bool) if free is None else free
     values = model.clip(values)
     here = _sum(model, values, blocks)
-    damping, iteration = 1e-3, 0
-    for iteration in range(1, max_iterations + 1):
+    damping, iterations = 1e-3, 0
+    while iterations < max_iterations:
+        iterations += 1
         moving = np.flatnonzero(may_move & ~_pressed_against_limit(model, values, here.gradient))
         if not len(moving):
             break
@@ -144,7 +145,7 @@ def solve(
         damping = max(1e-9, damping / 10)
         if moved < tolerance:
             break
-    return Fit(values, here.cost, iteration, here.hessian)
+    return Fit(values, here.cost, iterations, here.hessian)
 
 
 def covariance(model: BodyModel, fit: Fit) -> Array:
