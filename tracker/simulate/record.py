@@ -21,6 +21,7 @@ from tracker.formats.pose_table import write_pose_table
 from tracker.formats.trc import write_trc
 from tracker.rigid import Array
 from tracker.session import PALETTE, CameraSource, Person, Session, load_session, save_session
+from tracker.simulate.acting import Role, perform
 from tracker.simulate.encode import VideoWriter
 from tracker.simulate.film import Image, exposed, film, freeze
 from tracker.simulate.outfit import Outfit
@@ -28,7 +29,7 @@ from tracker.simulate.parts import PartsFigure
 from tracker.simulate.render import Figure
 from tracker.simulate.rig import make_cameras
 from tracker.simulate.room import Backdrop, see_room
-from tracker.simulate.scenes import Role, cast_of, perform
+from tracker.simulate.scenes import cast_of
 from tracker.simulate.skeleton import altered_model
 from tracker.simulate.skin import make_skin
 
@@ -64,7 +65,7 @@ def simulate(
         scene: one of `scenes.SCENES`.
         n_cameras: 4 are FRONT, RIGHT, BACK and LEFT in the corners; others are spread around.
         n_frames: number of frames.
-        seed: of the room, the small differences of the cameras, and the noise.
+        seed: of the room, the small differences of the cameras, the noise, and the motion where the scene has it vary.
         size: image width and height, px, both even.
         fps: frame rate, 1/s.
         body: film a smooth-skinned person whose bones are not the preset's, or the preset's own parts.
@@ -77,7 +78,7 @@ def simulate(
     """
     out = Path(out).absolute()
     _check(out, n_frames, fps, body)
-    cast = cast_of(scene)
+    cast = cast_of(scene, seed)
     cameras = make_cameras(n_cameras, size, seed)
     presets = [load_model(PRESET, role.height_m) for role in cast]
     models = [altered_model(m) if body == "skinned" else m for m in presets]

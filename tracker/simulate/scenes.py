@@ -1,63 +1,15 @@
-"""What the simulated people do: poses over time, feet on the floor."""
+"""What the simulated people do."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from tracker import rigid
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
-from tracker.rigid import Array
-from tracker.simulate.anatomy import ANKLE_HEIGHT
-
-HEADING_RAD = np.radians(32.0)
-"""Where the person faces: towards FRONT, but not straight at it, where a forward motion would hardly show."""
-TOES_OUT_RAD = np.radians(9.0)
-
-
-@dataclass(frozen=True)
-class Role:
-    """One person of a scene."""
-
-    name: str
-    height_m: float
-    """Body height, metres."""
-    act: Callable[[BodyModel, float], "Posture"]
-    """Posture of a body of these sizes at a time in seconds."""
-
-
-@dataclass(frozen=True, eq=False)
-class Posture:
-    """A pose as an actor thinks of it; the hips and knees follow from where trunk and feet are."""
-
-    trunk_m: tuple[float, float, float]
-    """Torso centre, metres, in the frame of the actor's place: x ahead, y left, z from the floor."""
-    lean: Array
-    """Rotation of the trunk from upright facing ahead, (3, 3)."""
-    feet_m: Mapping[str, tuple[float, float, float]]
-    """`left` and `right` ankle in the frame of the actor's place, metres."""
-    angles: Mapping[str, float]
-    """Degrees of freedom of the arms, rad."""
-
-
-def perform(role: Role, model: BodyModel, n_frames: int, fps: float) -> Array:
-    """Poses of a role played by a body, (n_frames, n_values)."""
-    R_world_place = rigid.so3_exp(np.array([0.0, 0.0, HEADING_RAD]))
-    poses: list[Array] = []
-    for k in range(n_frames):
-        posture = role.act(model, k / fps)
-        values = poses[-1].copy() if poses else _upright(model)
-        values[:3] = R_world_place @ posture.trunk_m
-        for name, angle in (_torso_angles(R_world_place @ posture.lean) | dict(posture.angles)).items():
-            values[model.value_names.index(name)] = angle
-        for side, ankle in posture.feet_m.items():
-            _plant(model, values, side, R_world_place @ ankle, HEADING_RAD)
-        assert np.allclose(values, model.clip(values)), "the scene asks for a pose beyond the joint limits"
-        poses.append(values)
-    return np.array(poses)
+from tracker.simulate.acting import Posture, Role, ramp, stance, standing_height
+from tracker.simulate.moves import dance, exercise, leaving, reach_and_cross
 
 
 def elbow_rotation(model: BodyModel, t: float) -> Posture:
@@ -66,8 +18,8 @@ def elbow_rotation(model: BodyModel, t: float) -> Posture:
     The trunk leans back against the arms and turns a little, the knees give.
     """
     t = t % 4.4
-    up = _ramp(t, 0.05, 0.95) - _ramp(t, 3.25, 4.25)
-    forward = _ramp(t, 0.95, 1.85) - _ramp(t, 2.3, 3.2)
+    up = ramp(t, 0.05, 0.95) - ramp(t, 3.25, 4.25)
+    forward = ramp(t, 0.95, 1.85) - ramp(t, 2.3, 3.2)
     sway = np.sin(2 * np.pi * t / 2.2)
     angles = {}
     for side, delay in (("left", 0.0), ("right", 0.06)):
@@ -78,17 +30,17 @@ def elbow_rotation(model: BodyModel, t: float) -> Posture:
         angles[f"{side}_elbow.extension"] = np.radians(12.0 - 6.0 * up + 94.0 * late)
     lean = rigid.so3_exp(np.radians([1.2 * sway, -5.0 * forward + 1.5 * up, 3.5 * np.sin(2 * np.pi * t / 1.7)]))
     dip = 0.007 + 0.005 * up + 0.014 * forward
-    trunk = (0.01 - 0.035 * forward, 0.008 * sway, _standing_height(model) - dip)
-    return Posture(trunk, lean, _stance(model), angles)
+    trunk = (0.01 - 0.035 * forward, 0.008 * sway, standing_height(model) - dip)
+    return Posture(trunk, lean, stance(model), angles)
 
 
 def walk_in_place(model: BodyModel, t: float) -> Posture:
     """Walk on the spot: knees lifted in turn, bent arms swinging against them."""
     phase = 2 * np.pi * t / 1.3
-    start = _ramp(t, 0.0, 0.5)
+    start = ramp(t, 0.0, 0.5)
     swing = start * np.sin(phase)
     feet = {}
-    for side, (x, y, z) in _stance(model).items():
+    for side, (x, y, z) in stance(model).items():
         lift = start * max(0.0, swing if side == "left" else -swing) ** 1.5
         feet[side] = (x + 0.04 * lift, y, z + 0.11 * model.height_m * lift)
     angles = {}
@@ -100,20 +52,26 @@ def walk_in_place(model: BodyModel, t: float) -> Posture:
     lean = rigid.so3_exp(np.radians([1.5 * swing, 3.0 * start, 6.0 * swing]))
     bob = 0.014 * start * np.cos(2 * phase)
     # The weight goes over the standing foot, away from the lifted one.
-    trunk = (0.0, -0.028 * swing, _standing_height(model) - 0.022 + bob)
+    trunk = (0.0, -0.028 * swing, standing_height(model) - 0.022 + bob)
     return Posture(trunk, lean, feet, angles)
 
 
-SCENES: Mapping[str, tuple[Role, ...]] = MappingProxyType(
+Casting = Callable[[int], tuple[Role, ...]]
+
+SCENES: Mapping[str, Casting] = MappingProxyType(
     {
-        "elbow_rotation": (Role("person", 1.78, elbow_rotation),),
-        "walk_in_place": (Role("person", 1.78, walk_in_place),),
+        "elbow_rotation": lambda seed: (Role("person", 1.78, elbow_rotation),),
+        "walk_in_place": lambda seed: (Role("person", 1.78, walk_in_place),),
+        "exercise": lambda seed: (Role("person", 1.78, exercise(seed).act),),
+        "dance": lambda seed: (Role("person", 1.78, dance(seed).act),),
+        "reach_and_cross": lambda seed: (Role("person", 1.78, reach_and_cross(seed).act),),
+        "leaving": lambda seed: (Role("person", 1.78, leaving(seed).act),),
     }
 )
-"""Who does what, by the name of the scene."""
+"""Who does what, by the name of the scene, for a seed; the first two are the same for every seed."""
 
 
-def cast_of(scene: str) -> tuple[Role, ...]:
+def cast_of(scene: str, seed: int = 0) -> tuple[Role, ...]:
     """Roles of a scene.
 
     Raises:
@@ -121,60 +79,4 @@ def cast_of(scene: str) -> tuple[Role, ...]:
     """
     if scene not in SCENES:
         raise TrackerError(f"expected one of the scenes {', '.join(SCENES)}, found '{scene}'")
-    return SCENES[scene]
-
-
-def _ramp(t: float, start: float, end: float) -> float:
-    """Rise from 0 to 1 between two times, at rest at both ends."""
-    s = min(max((t - start) / (end - start), 0.0), 1.0)
-    return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
-
-
-def _upright(model: BodyModel) -> Array:
-    """Pose to start the first frame's leg search from: knees a little bent, so that they know which way to go."""
-    values = model.neutral()
-    for i, name in enumerate(model.value_names):
-        values[i] += 0.4 * name.endswith("_knee.extension") + 0.2 * name.endswith("_hip.elevation")
-    return values
-
-
-def _standing_height(model: BodyModel) -> float:
-    """Height of the torso centre over the floor with straight legs, metres."""
-    points = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
-    return float(ANKLE_HEIGHT * model.height_m - points["left_ankle"][2])
-
-
-def _stance(model: BodyModel) -> dict[str, tuple[float, float, float]]:
-    """Ankles of a relaxed stance, metres."""
-    y, z = 0.068 * model.height_m, ANKLE_HEIGHT * model.height_m
-    return {"left": (-0.02, y, z), "right": (0.0, -y, z)}
-
-
-def _torso_angles(R_world_torso: Array) -> dict[str, float]:
-    """Angles whose rotation `Rx(abduction) Ry(elevation) Rz(twist)` is the given one."""
-    return {
-        "torso.abduction": float(np.arctan2(-R_world_torso[1, 2], R_world_torso[2, 2])),
-        "torso.elevation": float(np.arcsin(R_world_torso[0, 2])),
-        "torso.twist": float(np.arctan2(-R_world_torso[0, 1], R_world_torso[0, 0])),
-    }
-
-
-def _plant(model: BodyModel, values: Array, side: str, ankle_world: Array, heading: float) -> None:
-    """Solve one leg's four angles, in place: the ankle where it should be, the toes pointing a little out."""
-    dofs = np.array([i for i, n in enumerate(model.dof_names) if n.startswith((f"{side}_hip.", f"{side}_knee."))])
-    at = model.dof_value[dofs]
-    ankle, calf = model.point_names.index(f"{side}_ankle"), model.part_index[f"{side}_calf"]
-    toes = heading + (TOES_OUT_RAD if side == "left" else -TOES_OUT_RAD)
-    aside = np.array([-np.sin(toes), np.cos(toes), 0.0])
-
-    def errors(angles: Array) -> Array:
-        trial = values.copy()
-        trial[at] = angles
-        R_calf = model.kinematics(trial).Ts_world_part[calf, :3, :3]
-        return np.append(model.points_world(trial)[ankle] - ankle_world, R_calf[:, 0] @ aside)
-
-    low, high = model.limits[dofs].T
-    start = np.clip(values[at], low + 1e-3, high - 1e-3)
-    solution = least_squares(errors, start, bounds=(low, high), xtol=1e-12, ftol=1e-12, gtol=1e-12)
-    assert solution.cost < 1e-8, f"the {side} leg cannot reach its place on the floor"
-    values[at] = solution.x
+    return SCENES[scene](seed)

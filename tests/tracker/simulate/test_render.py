@@ -5,9 +5,10 @@ import trimesh
 
 from tracker import rigid
 from tracker.cameras import Camera
+from tracker.simulate.acting import perform
 from tracker.simulate.render import SAMPLES, cast, pixel_means, vertex_normals
 from tracker.simulate.rig import make_cameras
-from tracker.simulate.scenes import cast_of, perform
+from tracker.simulate.scenes import cast_of
 
 
 def coverage(camera, vertices, faces):

@@ -12,10 +12,11 @@ from tracker.formats.model_toml import load_model
 from tracker.formats.pose_table import read_pose_table
 from tracker.formats.trc import read_trc
 from tracker.session import load_session
+from tracker.simulate.acting import perform
 from tracker.simulate.film import film, freeze
 from tracker.simulate.rig import make_cameras
 from tracker.simulate.room import see_room
-from tracker.simulate.scenes import cast_of, perform
+from tracker.simulate.scenes import cast_of
 
 SAMPLE = Path(__file__).parents[3] / "sample_sessions" / "elbow_rotation"
 

@@ -2,8 +2,9 @@ import numpy as np
 import trimesh
 
 from tracker import rigid
+from tracker.simulate.acting import perform
 from tracker.simulate.anatomy import ANKLE_HEIGHT, bone_names
-from tracker.simulate.scenes import cast_of, perform
+from tracker.simulate.scenes import cast_of
 from tracker.simulate.skin import rest_values
 
 
