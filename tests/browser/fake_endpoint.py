@@ -243,9 +243,11 @@ class FakeEndpoint:
         track |= NO_TRACK | {"message": f"done: {track['done']} frames"}
         await self.broadcast(self.state)
 
-    async def send_curves(self, frames, replace):
+    async def send_curves(self, frames, replace, shift=0.0):
         plots = PLOTS[self.curves_group]
-        values = np.stack([curve(i, frames) for i in range(sum(len(p[2]) for p in plots))])
+        values = shift + np.stack(
+            [curve(i, frames % 101 if shift else frames) for i in range(sum(len(p[2]) for p in plots))]
+        )
         header = {
             "type": "curves", "group": self.curves_group, "person": 0, "replace": replace, "count": len(frames),
             "plots": [{"title": title, "unit": unit, "labels": labels} for title, unit, labels in plots],

@@ -105,3 +105,15 @@ async def test_keys_work_while_the_scene_has_the_focus_except_those_of_its_camer
 async def test_a_page_without_a_graphics_card_asks_the_3d_view_to_wait(page, endpoint):
     """Headless Chromium draws WebGL in software (chromium.FLAGS)."""
     await until(lambda: endpoint.greetings == [{"type": "hold_3d", "hold": True}])
+
+
+async def test_vectors_wait_for_the_images_of_their_own_frame(page, endpoint):
+    """A tracker may be some frames ahead of the browser's decoder."""
+    for frame in (41, 42):
+        endpoint.state["frame"] = frame
+        await endpoint.send_overlay()
+    for camera in range(4):
+        header = {"type": "image", "base": "image", "camera": camera, "frame": 41}
+        await endpoint.send_binary(header, endpoint.jpeg(camera, 41, "image"))
+    await shows(page, "quadrille.state.shown.frame === 41")
+    await shows(page, "quadrille.state.overlay.frame === 41")
