@@ -15,6 +15,7 @@ ORDER = [
         "tracker.cameras",
         "tracker.shapes",
         "tracker.kinematics",
+        "tracker.nearest",
         "tracker.probes",
         "tracker.edges",
         "tracker.files",
@@ -23,6 +24,8 @@ ORDER = [
     ],
     ["tracker.session_lock", "tracker.annotations", "tracker.body", "tracker.matched"],
     ["tracker.formats.anipose", "tracker.formats.trc", "tracker.formats.model_toml", "tracker.formats.pose_table"],
+    ["tracker.surfaces"],
+    ["tracker.outlines", "tracker.hiding"],
     ["tracker.contours", "tracker.fit", "tracker.joint_maps"],
     ["tracker.occlusion", "tracker.posing", "tracker.sizes", "tracker.evaluate"],
     # The session keeps its cameras and models in files of these formats, so it reads and writes by them; a format

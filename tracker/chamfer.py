@@ -5,6 +5,7 @@ the image's edges to the model's contour is measured point by piece. Both are no
 averaged over the views. Costs are in undistorted pixels of the footage; images may be matched at a smaller scale.
 """
 
+import threading
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
@@ -17,11 +18,13 @@ from tracker.body import Body, BodyModel
 from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence, default_theta_px
 from tracker.kinematics import Tree, forward_kinematics
+from tracker.nearest import Segments, nearest_segment, segment_buffer, sort_by_row
 from tracker.rigid import Array
 
 Outliers = Literal["truncated", "paper"]
 
-_ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernel's arithmetic into float64
+_JOINED = 10
+"""Pieces in a row on one straight edge that are matched as one segment: longer ones would reach too many points."""
 
 
 class Cost(NamedTuple):
@@ -49,7 +52,9 @@ class _Scene(NamedTuple):
     distances: FloatArray
     """The distance images, one after the other, row by row."""
     points: FloatArray
-    """u and v of the edge points near the prediction, one view after the other, (2, N)."""
+    """u and v of the edge points near the prediction, one view after the other, each sorted by row, (2, N)."""
+    rows: NDArray[np.int64]
+    """Index of the first point of each row among those of its view, (V, largest height + 1)."""
     firsts: NDArray[np.int64]
     """Index of the first edge point of each view, and the number of all, (V + 1,)."""
     thetas: Array
@@ -59,15 +64,11 @@ class _Scene(NamedTuple):
 class _Scratch(NamedTuple):
     """Room that the kernels work in."""
 
-    contour: contours.Contour
-    starts: FloatArray
-    """x and y of the start of each visible piece, (2, room)."""
-    steps: FloatArray
-    """x and y from its start to its end, (2, room)."""
-    inverse: FloatArray
-    """Its inverse squared length, (room,)."""
+    pieces: contours.Pieces
+    segments: Segments
+    """Visible pieces, joined where they are straight."""
     lengths: FloatArray
-    """Its length, (room,)."""
+    """Length of each visible piece, (room,)."""
     distances: FloatArray
     """Distances, of pieces or of edge points, (room,)."""
     ones: FloatArray
@@ -103,7 +104,9 @@ class ChamferCost:
         self._surfaces = contours.surfaces_of(self.models)
         self._scales = np.array([v.scale for v in views])
         thetas = [default_theta_px(v.camera) if theta_px is None else theta_px * v.scale for v in views]
-        points = [_near(v, contours.trace(predicted, v.camera), theta) for v, theta in zip(views, thetas, strict=True)]
+        near = [_near(v, contours.trace(predicted, v.camera), theta) for v, theta in zip(views, thetas, strict=True)]
+        points = [n[0] for n in near]
+        tallest = max(v.camera.height for v in views)
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
         self._scene = _Scene(
             np.stack([contours.projection(v.camera) for v in views]),
@@ -111,10 +114,13 @@ class ChamferCost:
             np.array([v.camera.size for v in views], dtype=np.int64),
             np.concatenate([v.distance.ravel() for v in views]),
             np.ascontiguousarray(np.concatenate(points).T, dtype=np.float32),
+            np.stack([np.pad(rows, (0, tallest + 1 - len(rows)), mode="edge") for _, rows in near]),
             np.concatenate([[0], np.cumsum([len(p) for p in points])]).astype(np.int64),
             np.array(thetas),
         )
-        self._widest = max((v.camera for v in views), key=lambda camera: camera.width)
+        widest = max((v.camera for v in views), key=lambda camera: camera.width)
+        self._room = max(contours.contour_room(widest, len(self.models)), self._scene.points.shape[1])
+        self._own = threading.local()
 
     def __call__(self, poses: Sequence[Array]) -> Cost:
         """Cost of one pose of everybody; `poses` holds the values of each body."""
@@ -151,14 +157,14 @@ class ChamferCost:
         return contours.part_poses([Body(m, p) for m, p in zip(self.models, poses, strict=True)])
 
     def _scratch(self) -> _Scratch:
-        """Fresh for each call: several threads may score at a time."""
-        contour = contours.contour_buffer(self._widest, len(self.models))
-        room = len(contour.parts)
-        longest = max(room, self._scene.points.shape[1])
-        return _Scratch(
-            contour, np.empty((2, room), np.float32), np.empty((2, room), np.float32), np.empty(room, np.float32),
-            np.empty(room, np.float32), np.empty(longest, np.float32), np.ones(longest, np.float32),
-        )  # fmt: skip
+        """Room of the calling thread's own: several threads may score at a time."""
+        scratch: _Scratch | None = getattr(self._own, "scratch", None)
+        if scratch is None:
+            scratch = self._own.scratch = _Scratch(
+                contours.piece_buffer(self._surfaces, self._room), segment_buffer(self._room),
+                np.empty(self._room, np.float32), np.empty(self._room, np.float32), np.ones(self._room, np.float32),
+            )  # fmt: skip
+        return scratch
 
     def _blank_unseen(self, views_px: Array) -> Array:
         views_px[..., ~self._seen] = np.nan
@@ -171,44 +177,15 @@ class ChamferCost:
         return views_px[..., self._seen].mean(axis=-1)
 
 
-def _near(view: ViewEvidence, contour: contours.Contour, theta: float) -> FloatArray:
-    """Edge points within theta of the visible model contour, (N, 2)."""
+def _near(view: ViewEvidence, contour: contours.Contour, theta: float) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Edge points within theta of the visible model contour, (N, 2), sorted by row, and the index of their rows."""
+    points, rows = sort_by_row(view.points_px, view.camera.height)
     pieces = contour.pieces_px[~contour.hidden]
-    if not len(pieces) or not len(view.points_px):
-        return np.empty((0, 2), np.float32)
-    starts = np.ascontiguousarray(pieces[:, :2].T)
-    steps = np.ascontiguousarray((pieces[:, 2:] - pieces[:, :2]).T)
-    inverse = (1 / np.maximum(np.sum(steps**2, axis=0), 1e-12)).astype(np.float32)
-    distances = np.empty(len(view.points_px), np.float32)
-    u, v = np.ascontiguousarray(view.points_px.T)
-    nearest_piece(u, v, starts, steps, inverse, len(pieces), distances)
-    return view.points_px[distances <= theta]
-
-
-@njit(nogil=True, cache=True, fastmath=True)
-def nearest_piece(
-    u: FloatArray, v: FloatArray, starts: FloatArray, steps: FloatArray, inverse: FloatArray, n: int, out: FloatArray
-) -> None:
-    """Distance of each point (u, v), (N,) each, to the nearest of the first n straight pieces.
-
-    Brute force, and the pieces in the outer loop, because that runs on whole vectors of points: 30 times faster than
-    the other way round.
-    """
-    n_points = u.shape[0]
-    for i in range(n_points):
-        out[i] = np.float32(1e12)
-    for k in range(n):
-        x, y, dx, dy, inverse_k = starts[0, k], starts[1, k], steps[0, k], steps[1, k], inverse[k]
-        for i in range(n_points):
-            from_u, from_v = u[i] - x, v[i] - y
-            t = (from_u * dx + from_v * dy) * inverse_k
-            t = t if t > _ZERO else _ZERO
-            t = t if t < _ONE else _ONE
-            off_u, off_v = from_u - t * dx, from_v - t * dy
-            squared = off_u * off_u + off_v * off_v
-            out[i] = squared if squared < out[i] else out[i]
-    for i in range(n_points):
-        out[i] = np.sqrt(out[i])
+    segments = Segments(*np.ascontiguousarray(np.column_stack([pieces[:, :2], pieces[:, 2:] - pieces[:, :2]]).T))
+    distances = np.empty(len(points), np.float32)
+    u, v = np.ascontiguousarray(points.T)
+    nearest_segment(u, v, rows, segments, len(pieces), theta, distances)
+    return sort_by_row(points[distances <= theta], view.camera.height)
 
 
 @njit(nogil=True, cache=True)
@@ -239,18 +216,45 @@ def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool
     return total / weight if weight >= 0.5 * everything else theta
 
 
-@njit(nogil=True, cache=True)
-def sample_distance(distances: FloatArray, first: int, width: int, height: int, u: float, v: float) -> float:
+@njit(nogil=True, cache=True, error_model="numpy")
+def sample_distance(distances: FloatArray, first: int, width: int, height: int, u: np.float32, v: np.float32) -> float:
     """Bilinear distance at a pixel; outside the image, that of the nearest border pixel and the way to it."""
-    cu = min(max(u, 0.0), width - 1.0)
-    cv = min(max(v, 0.0), height - 1.0)
-    outside = np.sqrt((u - cu) ** 2 + (v - cv) ** 2)
+    cu = min(max(u, np.float32(0)), np.float32(width - 1))
+    cv = min(max(v, np.float32(0)), np.float32(height - 1))
     c, r = min(int(cu), width - 2), min(int(cv), height - 2)
-    a, b = cu - c, cv - r
+    a, b = cu - np.float32(c), cv - np.float32(r)
     i = first + r * width + c
-    top = distances[i] * (1 - a) + distances[i + 1] * a
-    bottom = distances[i + width] * (1 - a) + distances[i + width + 1] * a
-    return top * (1 - b) + bottom * b + outside
+    top = distances[i] + a * (distances[i + 1] - distances[i])
+    bottom = distances[i + width] + a * (distances[i + width + 1] - distances[i + width])
+    inside = top + b * (bottom - top)
+    if cu == u and cv == v:
+        return inside
+    return inside + np.sqrt((u - cu) * (u - cu) + (v - cv) * (v - cv))
+
+
+@njit(nogil=True, cache=True)
+def _collect(n: int, distances: FloatArray, first: int, width: int, height: int, scratch: _Scratch) -> tuple[int, int]:
+    """Sample the distance image at the visible pieces, and join them to segments; the numbers of both."""
+    ends, hidden, edges = scratch.pieces.ends, scratch.pieces.hidden, scratch.pieces.edges
+    lengths, d, segments = scratch.lengths, scratch.distances, scratch.segments
+    half = np.float32(0.5)
+    kept, joined, n_segments, edge = 0, 0, 0, -1
+    for i in range(n):
+        if hidden[i]:
+            edge = -1
+            continue
+        x0, y0, x1, y1 = ends[0, i], ends[1, i], ends[2, i], ends[3, i]
+        d[kept] = sample_distance(distances, first, width, height, half * (x0 + x1), half * (y0 + y1))
+        lengths[kept] = np.sqrt((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0))
+        kept += 1
+        if edges[i] != edge or joined == _JOINED:
+            edge, joined = edges[i], 0
+            segments.u[n_segments], segments.v[n_segments] = x0, y0
+            n_segments += 1
+        joined += 1
+        k = n_segments - 1
+        segments.du[k], segments.dv[k] = x1 - segments.u[k], y1 - segments.v[k]
+    return kept, n_segments
 
 
 @njit(nogil=True, cache=True)
@@ -258,27 +262,15 @@ def _score(
     Ts: Array, surfaces: contours.Surfaces, scene: _Scene, paper: bool, scratch: _Scratch, directed: Array
 ) -> None:
     """Fill the directed costs of one pose, (V, 2): model to image and image to model, matched px."""
-    pieces, hidden = scratch.contour.pieces_px, scratch.contour.hidden
-    starts, steps, d = scratch.starts, scratch.steps, scratch.distances
-    pixel = 0
+    d, pixel = scratch.distances, 0
     for view in range(scene.P.shape[0]):
         width, height, theta = scene.sizes[view, 0], scene.sizes[view, 1], scene.thetas[view]
-        n = contours.trace_view(scene.P[view], scene.eyes[view], Ts, surfaces, contours.PIECE_PX, scratch.contour)
-        kept = 0
-        for i in range(n):
-            if not hidden[i]:
-                x, y = pieces[i, 0], pieces[i, 1]
-                dx, dy = pieces[i, 2] - x, pieces[i, 3] - y
-                length2 = max(dx * dx + dy * dy, np.float32(1e-12))
-                starts[0, kept], starts[1, kept], steps[0, kept], steps[1, kept] = x, y, dx, dy
-                scratch.inverse[kept] = 1 / length2
-                scratch.lengths[kept] = np.sqrt(length2)
-                d[kept] = sample_distance(scene.distances, pixel, width, height, x + 0.5 * dx, y + 0.5 * dy)
-                kept += 1
+        n = contours.trace_pieces(scene.P[view], scene.eyes[view], Ts, surfaces, contours.PIECE_PX, scratch.pieces)
+        kept, n_segments = _collect(n, scene.distances, pixel, width, height, scratch)
         directed[view, 0] = _robust_mean(d, scratch.lengths, kept, theta, paper)
         first, last = scene.firsts[view], scene.firsts[view + 1]
         u, v = scene.points[0][first:last], scene.points[1][first:last]
-        nearest_piece(u, v, starts, steps, scratch.inverse, kept, d)
+        nearest_segment(u, v, scene.rows[view][: height + 1], scratch.segments, n_segments, theta, d)
         directed[view, 1] = _robust_mean(d, scratch.ones, last - first, theta, paper)
         pixel += width * height
 

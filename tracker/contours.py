@@ -1,35 +1,38 @@
 """Visible occluding contours of posed bodies in one camera (the synthesis of GD96 Sect. 4.2).
 
-Each part's shape is a fixed grid of points and normals. A surface point lies on the occluding contour where the
-line of sight grazes the surface, `n . (x - c) = 0` for the camera centre c; the zero line of that function is
-followed through the cells of the grid. Pieces of it that a part hides are marked. Parts that adjoin at a joint hide
-each other also where they lie less than `JOINT_MARGIN_M` behind the line, so that no contour runs across the body
-where its parts merely meet.
+The contour generator of each part is a closed curve on its surface (see `outlines`). It is projected and cut into
+short pieces, and pieces that a part hides are marked (see `hiding`). Parts that adjoin at a joint hide each other also
+where they lie less than `JOINT_MARGIN_M` behind the line, so that no contour runs across the body where its parts
+merely meet.
 
 All of it is one compiled kernel per view, because a search evaluates thousands of poses a second.
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body import Body, BodyModel
+from tracker.body import Body
 from tracker.cameras import Camera
+from tracker.hiding import JOINT_MARGIN_M, hide
+from tracker.outlines import MAX_POINTS, grid_outline, revolved_outline
 from tracker.rigid import Array
+from tracker.surfaces import FloatArray, Surfaces, surfaces_of
 
-FloatArray = NDArray[np.float32]
-
-JOINT_MARGIN_M = 0.03
-"""How far in front of an adjoining part a contour must lie to be seen as one, metres."""
 PIECE_PX = 4.0
 """Longest piece of contour that is scored or hidden as a whole, px."""
-N_RINGS, N_SECTORS = 14, 24
 MAX_PIECES = 6000
 """Room for the pieces of one view; a 22-DOF body that fills a 640x480 image has some 600."""
+_NEAREST_M = 0.05
+"""What comes nearer to the camera's plane is not drawn, metres."""
+_SAG_PX = 0.07
+"""How far the middle of a chord around a part may lie inside the arc, px."""
+_THIN2 = np.float32(0.07**2)
+"""A point of an outline less than this off the line between its neighbours is left out, px squared."""
+_FLAGS = {"contract", "reassoc", "nsz", "arcp"}
 
 
 class Contour(NamedTuple):
@@ -45,52 +48,39 @@ class Contour(NamedTuple):
     """Middle of each piece on the surface, (N, 3), metres."""
 
 
-class Surfaces(NamedTuple):
-    """The shapes of several bodies as arrays, for the kernels. Parts are counted through all bodies."""
+class Pieces(NamedTuple):
+    """The same as long arrays, with the room that tracing works in; for kernels that score many poses."""
 
-    points: FloatArray
-    """Grid of surface points in the part's frame, (P, rings, sectors, 3), metres."""
-    normals: FloatArray
-    """Outward unit normals, (P, rings, sectors, 3)."""
-    offsets: FloatArray
-    """Normal times point, (P, rings, sectors), metres."""
-    centers: Array
-    """Centre of each shape in the part's frame, (P, 3), metres."""
-    shapes: Array
-    """a1, a2, a3 (metres), e1, e2, k_x, k_y, bounding radius (metres) of each shape, (P, 8)."""
-    adjoining: NDArray[np.bool_]
-    """Whether two parts share a joint, (P, P)."""
-    people: NDArray[np.int64]
-    """Index of the body of each part, (P,)."""
-
-
-@lru_cache(maxsize=32)
-def surfaces_of(models: tuple[BodyModel, ...]) -> Surfaces:
-    """Arrays of the shapes of the given bodies; kept, because models are immutable."""
-    shapes = [s for m in models for s in m.shapes]
-    centers = np.concatenate([m.centers_part for m in models])
-    grids = [s.grid(N_RINGS, N_SECTORS) for s in shapes]
-    points = np.stack([g[0] + c for g, c in zip(grids, centers, strict=True)])
-    normals = np.stack([g[1] for g in grids])
-    adjoining = np.zeros((len(shapes), len(shapes)), dtype=bool)
-    first, people = 0, []
-    for i, m in enumerate(models):
-        for part, parent in enumerate(m.parents):
-            if parent >= 0:
-                adjoining[first + part, first + parent] = adjoining[first + parent, first + part] = True
-        people += [i] * len(m.parts)
-        first += len(m.parts)
-    radii = [np.linalg.norm(p - c, axis=-1).max() for p, c in zip(points, centers, strict=True)]
-    table = [(*s.half_axes, *s.exponents, *s.taper, r) for s, r in zip(shapes, radii, strict=True)]
-    return Surfaces(
-        points.astype(np.float32),
-        normals.astype(np.float32),
-        np.sum(points * normals, axis=-1).astype(np.float32),
-        centers,
-        np.array(table),
-        adjoining,
-        np.array(people, dtype=np.int64),
-    )
+    ends: FloatArray
+    """u0, v0, u1, v1, (4, room), undistorted px."""
+    middles: FloatArray
+    """Middle of each piece in the unit coordinates of its part, (3, room)."""
+    edges: NDArray[np.int32]
+    """Number of the straight edge that each piece is cut from, (room,)."""
+    hidden: NDArray[np.bool_]
+    """Whether another part hides the piece, (room,)."""
+    firsts: NDArray[np.int64]
+    """Index of the first piece of each part, and the number of all, (P + 1,)."""
+    Ts_world_unit: Array
+    """From the unit coordinates of each part to the world, (P, 3, 4), metres."""
+    Ts_unit_world: Array
+    """Back, and the eye in unit coordinates as last column, (P, 3, 5)."""
+    boxes: Array
+    """Bounds u0, v0, u1, v1 of each part in the image, (P, 4), px."""
+    distances: Array
+    """From the eye to the centre of each part, (P,), metres."""
+    outline: FloatArray
+    """Points of one outline, (3, MAX_POINTS + 1), unit coordinates."""
+    image: FloatArray
+    """Their u, v in px and depths, (3, MAX_POINTS + 1)."""
+    half: FloatArray
+    """One side of an outline, (3, MAX_POINTS)."""
+    f: FloatArray
+    """A function on the grid of a part, (rings * sectors,)."""
+    between: FloatArray
+    """From the unit coordinates of one part to those of another, and the eye there, (3, 5)."""
+    shared: FloatArray
+    """What lines of sight share with a part, (2, room)."""
 
 
 def part_poses(bodies: Sequence[Body]) -> Array:
@@ -112,9 +102,14 @@ def trace(bodies: Sequence[Body], camera: Camera, piece_px: float = PIECE_PX) ->
     return Contour(out.pieces_px[:n], out.parts[:n], out.hidden[:n], out.points_world[:n])
 
 
+def contour_room(camera: Camera, n_bodies: int, piece_px: float = PIECE_PX) -> int:
+    """Number of pieces that a view may have."""
+    return int(MAX_PIECES * max(1.0, PIECE_PX / piece_px) * max(1.0, camera.width / 640) * n_bodies)
+
+
 def contour_buffer(camera: Camera, n_bodies: int, piece_px: float = PIECE_PX) -> Contour:
     """Uninitialized room for the contours of a view, to be filled by `trace_view`."""
-    room = int(MAX_PIECES * max(1.0, PIECE_PX / piece_px) * max(1.0, camera.width / 640) * n_bodies)
+    room = contour_room(camera, n_bodies, piece_px)
     return Contour(
         np.empty((room, 4), np.float32), np.empty(room, np.int32), np.empty(room, np.bool_),
         np.empty((room, 3), np.float32),
@@ -126,194 +121,181 @@ def projection(camera: Camera) -> Array:
     return camera.K @ camera.T_camera_world[:3]
 
 
-class Blockers(NamedTuple):
-    """The parts that may hide one part in one view; room for all."""
+@njit(nogil=True, cache=True)
+def piece_buffer(surfaces: Surfaces, room: int) -> Pieces:
+    """Uninitialized room for the pieces of a view, to be filled by `trace_pieces`."""
+    n_parts, grid_size = surfaces.offsets.shape
+    return Pieces(
+        np.empty((4, room), np.float32), np.empty((3, room), np.float32), np.empty(room, np.int32),
+        np.empty(room, np.bool_), np.empty(n_parts + 1, np.int64), np.empty((n_parts, 3, 4)),
+        np.empty((n_parts, 3, 5)), np.empty((n_parts, 4)), np.empty(n_parts),
+        np.empty((3, MAX_POINTS + 1), np.float32), np.empty((3, MAX_POINTS + 1), np.float32),
+        np.empty((3, MAX_POINTS), np.float32), np.empty(grid_size, np.float32), np.empty((3, 5), np.float32),
+        np.empty((2, room), np.float32),
+    )  # fmt: skip
 
-    parts: NDArray[np.int64]
-    """Index of each blocking part, (P,)."""
-    transform: Array
-    """From the hidden part's frame to the frame of the blocker's shape, (P, 3, 4), metres."""
-    eye: Array
-    """Camera centre in the frame of the blocker's shape, (P, 3), metres."""
-    reach: Array
-    """Largest t on the line of sight (0 camera, 1 contour) at which the blocker still hides, (P,)."""
+
+# The kernels below take the arrays they need one by one: handing over a tuple of thirty costs more than the work is.
 
 
 @njit(nogil=True, cache=True)
-def _inside_outside(x: float, y: float, z: float, shape: Array) -> float:
-    """`TaperedSuperquadric.inside_outside` for one point relative to the shape's centre, and one row of shapes."""
-    zn = z / shape[2]
-    zc = min(1.0, max(-1.0, zn))
-    X = abs(x / (shape[0] * (1.0 + shape[5] * zc)))
-    Y = abs(y / (shape[1] * (1.0 + shape[6] * zc)))
-    e1, e2 = shape[3], shape[4]
-    if e2 == 1.0:
-        return (X * X + Y * Y) ** (1.0 / e1) + (zn * zn) ** (1.0 / e1)
-    return (X ** (2.0 / e2) + Y ** (2.0 / e2)) ** (e2 / e1) + (zn * zn) ** (1.0 / e1)
-
-
-@njit(nogil=True, cache=True)
-def hide(
-    first: int, last: int, blockers: Blockers, k: int, shapes: Array, points: FloatArray, hidden: NDArray[np.bool_]
-) -> None:
-    """Mark the pieces that the k-th blocker hides; their middles are in the frame of the part they belong to.
-
-    The line of sight runs from the eye (t = 0) to the piece (t = 1) in the frame of the blocker's shape. First it is
-    cut with the enclosing elliptic cylinder, in closed form, then the implicit function is evaluated at four points
-    of what they share: exact but for lines that graze the surface.
-    """
-    shape, Q = shapes[blockers.parts[k]], blockers.transform[k]
-    q00, q01, q02, q03 = Q[0, 0], Q[0, 1], Q[0, 2], Q[0, 3]
-    q10, q11, q12, q13 = Q[1, 0], Q[1, 1], Q[1, 2], Q[1, 3]
-    q20, q21, q22, q23 = Q[2, 0], Q[2, 1], Q[2, 2], Q[2, 3]
-    ex, ey, ez = blockers.eye[k, 0], blockers.eye[k, 1], blockers.eye[k, 2]
-    girth = 2.0 ** (0.5 * (1.0 - shape[4]))
-    a1 = 1.0 / (shape[0] * girth * (1.0 + abs(shape[5])))
-    a2 = 1.0 / (shape[1] * girth * (1.0 + abs(shape[6])))
-    a3 = 1.0 / shape[2]
-    ox, oy, oz, t_max = ex * a1, ey * a2, ez * a3, blockers.reach[k]
-    C = ox * ox + oy * oy - 1.0
-    for i in range(first, last):
-        if hidden[i]:
-            continue
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        lx = q00 * x + q01 * y + q02 * z + q03 - ex
-        ly = q10 * x + q11 * y + q12 * z + q13 - ey
-        lz = q20 * x + q21 * y + q22 * z + q23 - ez
-        dx, dy, dz = lx * a1, ly * a2, lz * a3
-        A = dx * dx + dy * dy + 1e-12
-        B = ox * dx + oy * dy
-        disc = B * B - A * C
-        if disc <= 0.0:
-            continue
-        root = np.sqrt(disc)
-        if abs(dz) < 1e-12:
-            dz = 1e-12
-        near, far = (-1.0 - oz) / dz, (1.0 - oz) / dz
-        t0 = max(max(0.0, (-B - root) / A), min(near, far))
-        t1 = min(min(t_max, (-B + root) / A), max(near, far))
-        if t1 <= t0:
-            continue
-        for step in range(1, 5):
-            t = t0 + (0.25 * step if step < 4 else 0.999) * (t1 - t0)
-            if _inside_outside(ex + t * lx, ey + t * ly, ez + t * lz, shape) < 1.0:
-                hidden[i] = True
-                break
-
-
-@njit(nogil=True, cache=True)
-def _find_blockers(a: int, eye: Array, Ts: Array, surfaces: Surfaces, out: Blockers) -> int:
-    """List the parts whose cone of sight meets that of part a and that are not all behind it; their count."""
-    centers, shapes = surfaces.centers, surfaces.shapes
-    ca, cb = np.empty(3), np.empty(3)
-    for i in range(3):
-        ca[i] = Ts[a, i, 3] - eye[i]
-        for k in range(3):
-            ca[i] += Ts[a, i, k] * centers[a, k]
-    da, ra = np.sqrt(ca[0] ** 2 + ca[1] ** 2 + ca[2] ** 2), shapes[a, 7]
-    count = 0
-    for b in range(Ts.shape[0]):
-        if b == a:
-            continue
+def _place(eye: Array, Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
+    """Fill the motions between the parts' unit coordinates and the world, and their distances from the eye."""
+    to_world, to_unit, distances = out.Ts_world_unit, out.Ts_unit_world, out.distances
+    centers, half_axes = surfaces.centers, surfaces.half_axes
+    for part in range(Ts.shape[0]):
+        squared = 0.0
         for i in range(3):
-            cb[i] = Ts[b, i, 3] - eye[i]
+            center = Ts[part, i, 3]
             for k in range(3):
-                cb[i] += Ts[b, i, k] * centers[b, k]
-        db, rb = np.sqrt(cb[0] ** 2 + cb[1] ** 2 + cb[2] ** 2), shapes[b, 7]
-        if db < rb + 0.05 or db - rb > da + ra + JOINT_MARGIN_M:
-            continue
-        cosine = (ca[0] * cb[0] + ca[1] * cb[1] + ca[2] * cb[2]) / (da * db)
-        angle = np.arccos(min(1.0, max(-1.0, cosine)))
-        if angle > np.arcsin(min(1.0, ra / da)) + np.arcsin(rb / db):
-            continue
-        transform, eye_b = out.transform[count], out.eye[count]
-        for i in range(3):  # inverse(T_b) T_a, then relative to the shape's centre
-            transform[i, 3] = eye_b[i] = -centers[b, i]
+                to_world[part, i, k] = Ts[part, i, k] * half_axes[part, k]
+                center += Ts[part, i, k] * centers[part, k]
+            to_world[part, i, 3] = center
+            squared += (center - eye[i]) ** 2
+        distances[part] = np.sqrt(squared)
+        for i in range(3):
+            inverse = 1.0 / half_axes[part, i]
+            to_unit[part, i, 3] = to_unit[part, i, 4] = 0.0
             for k in range(3):
-                transform[i, k] = Ts[b, 0, i] * Ts[a, 0, k] + Ts[b, 1, i] * Ts[a, 1, k] + Ts[b, 2, i] * Ts[a, 2, k]
-                transform[i, 3] += Ts[b, k, i] * (Ts[a, k, 3] - Ts[b, k, 3])
-                eye_b[i] += Ts[b, k, i] * (eye[k] - Ts[b, k, 3])
-        out.reach[count] = 1.0 + JOINT_MARGIN_M / da if surfaces.adjoining[a, b] else 1.0
-        out.parts[count] = b
-        count += 1
-    return count
+                to_unit[part, i, k] = Ts[part, k, i] * inverse
+                to_unit[part, i, 3] -= to_unit[part, i, k] * to_world[part, k, 3]
+                to_unit[part, i, 4] += to_unit[part, i, k] * (eye[k] - to_world[part, k, 3])
 
 
-@njit(nogil=True, cache=True)
-def _cap_line(f: FloatArray, g: FloatArray, segment: FloatArray) -> bool:
-    """Zero line across the cap beyond the first or last ring; the cap is nearly flat, so it is taken as straight."""
-    n_sectors, crossings = f.shape[0], 0
-    for s in range(n_sectors):
-        s1 = s + 1 if s + 1 < n_sectors else 0
-        if (f[s] > 0) != (f[s1] > 0):
-            if crossings < 2:
-                t = f[s] / (f[s] - f[s1])
-                for i in range(3):
-                    segment[crossings, i] = g[s, i] + t * (g[s1, i] - g[s, i])
-            crossings += 1
-    return crossings == 2
-
-
-@njit(nogil=True, cache=True)
-def zero_line(f: FloatArray, g: FloatArray, segments: FloatArray) -> int:
-    """Zero line of f over the surface grid g as segments (n, 2, 3), by marching squares; their number."""
-    n_rings, n_sectors = f.shape
-    n = 0
-    for ring in (0, n_rings - 1):
-        n += _cap_line(f[ring], g[ring], segments[n])
-    for r in range(n_rings - 1):
-        for s in range(n_sectors):
-            s1 = s + 1 if s + 1 < n_sectors else 0
-            a, b, c, d = f[r, s], f[r, s1], f[r + 1, s1], f[r + 1, s]
-            inside = int(a > 0) + int(b > 0) + int(c > 0) + int(d > 0)
-            if inside == 0 or inside == 4 or n + 2 > segments.shape[0]:
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FLAGS)
+def _project(
+    part: int, P: Array, n: int, Ts_world_unit: Array, outline: FloatArray, image: FloatArray, boxes: Array
+) -> int:
+    """Close an outline of n points by its first, project, bound and thin it; returns the number of its edges."""
+    W, x, y, z = Ts_world_unit, outline[0], outline[1], outline[2]
+    for i in range(3):
+        outline[i, n] = outline[i, 0]
+    for i in range(3):
+        a = np.float32(P[i, 0] * W[part, 0, 0] + P[i, 1] * W[part, 1, 0] + P[i, 2] * W[part, 2, 0])
+        b = np.float32(P[i, 0] * W[part, 0, 1] + P[i, 1] * W[part, 1, 1] + P[i, 2] * W[part, 2, 1])
+        c = np.float32(P[i, 0] * W[part, 0, 2] + P[i, 1] * W[part, 1, 2] + P[i, 2] * W[part, 2, 2])
+        d = np.float32(P[i, 0] * W[part, 0, 3] + P[i, 1] * W[part, 1, 3] + P[i, 2] * W[part, 2, 3] + P[i, 3])
+        row = image[i]
+        for k in range(n + 1):
+            row[k] = a * x[k] + b * y[k] + c * z[k] + d
+    u, v, w = image[0], image[1], image[2]
+    for k in range(n + 1):
+        inverse = np.float32(1) / w[k]
+        u[k] *= inverse
+        v[k] *= inverse
+    u0 = u1 = u[0]
+    v0 = v1 = v[0]
+    for k in range(n):
+        u0, u1, v0, v1 = min(u0, u[k]), max(u1, u[k]), min(v0, v[k]), max(v1, v[k])
+    boxes[part, 0], boxes[part, 1], boxes[part, 2], boxes[part, 3] = u0, v0, u1, v1
+    kept = 0
+    for k in range(1, n + 1):
+        if k < n:
+            au, av = u[k] - u[kept], v[k] - v[kept]
+            bu, bv = u[k + 1] - u[kept], v[k + 1] - v[kept]
+            off = au * bv - av * bu
+            if off * off <= _THIN2 * (bu * bu + bv * bv):
                 continue
-            crossings = 0
-            for side in range(4):
-                if side == 0:
-                    v0, v1, r0, s0, r1, s2 = a, b, r, s, r, s1
-                elif side == 1:
-                    v0, v1, r0, s0, r1, s2 = b, c, r, s1, r + 1, s1
-                elif side == 2:
-                    v0, v1, r0, s0, r1, s2 = c, d, r + 1, s1, r + 1, s
-                else:
-                    v0, v1, r0, s0, r1, s2 = d, a, r + 1, s, r, s
-                if (v0 > 0) != (v1 > 0):
-                    t = v0 / (v0 - v1)
-                    k, end = n + crossings // 2, crossings % 2
-                    for i in range(3):
-                        segments[k, end, i] = g[r0, s0, i] + t * (g[r1, s2, i] - g[r0, s0, i])
-                    crossings += 1
-            n += crossings // 2
+        kept += 1
+        x[kept], y[kept], z[kept], u[kept], v[kept], w[kept] = x[k], y[k], z[k], u[k], v[k], w[k]
+    return kept
+
+
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FLAGS)
+def _cut(
+    n_edges: int, edge: int, piece_px: float, n: int, outline: FloatArray, image: FloatArray, ends: FloatArray,
+    middles: FloatArray, edges: NDArray[np.int32],
+) -> int:  # fmt: skip
+    """Cut the edges of an outline into pieces and append those; returns the new count of pieces."""
+    u, v, w, x, y, z = image[0], image[1], image[2], outline[0], outline[1], outline[2]
+    u0, v0, u1, v1 = ends[0], ends[1], ends[2], ends[3]
+    mx, my, mz = middles[0], middles[1], middles[2]
+    per_px, half, one, room = np.float32(1.0 / piece_px), np.float32(0.5), np.float32(1), edges.shape[0]
+    for k in range(n_edges):
+        du, dv = u[k + 1] - u[k], v[k + 1] - v[k]
+        count = min(int(np.ceil(np.sqrt(du * du + dv * dv) * per_px)), room - n)
+        if count <= 0:
+            continue
+        share = one / np.float32(count)
+        du, dv = du * share, dv * share
+        dx, dy, dz = x[k + 1] - x[k], y[k + 1] - y[k], z[k + 1] - z[k]
+        w0, w1 = w[k], w[k + 1]
+        for j in range(count):
+            i, a = np.uint64(n + j), np.float32(j)  # unsigned: an index that may be negative is not vectorized
+            u0[i], v0[i] = u[k] + a * du, v[k] + a * dv
+            u1[i], v1[i] = u[k] + (a + one) * du, v[k] + (a + one) * dv
+            # The middle in the image is not the middle in space; 1/depth is linear along the projected edge.
+            m = (a + half) * share
+            m = m * w0 / (w1 + m * (w0 - w1))
+            mx[i], my[i], mz[i] = x[k] + m * dx, y[k] + m * dy, z[k] + m * dz
+            edges[i] = edge + k
+        n += count
     return n
 
 
 @njit(nogil=True, cache=True)
-def cut(segments: FloatArray, n_segments: int, M: Array, piece_px: float, n: int, out: Contour) -> int:
-    """Project segments (n, 2, 3) by M, cut them into pieces and append those; returns the new count of pieces.
+def _hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
+    """Mark what parts hide of one another: those whose boxes in the image meet, and that are not all behind."""
+    boxes, distances, radii, firsts, adjoining = (
+        out.boxes,
+        out.distances,
+        surfaces.radii,
+        out.firsts,
+        surfaces.adjoining,
+    )
+    to_unit, to_world, Q = out.Ts_unit_world, out.Ts_world_unit, out.between
+    for a in range(n_parts):
+        if firsts[a] == firsts[a + 1]:
+            continue
+        u0, v0, u1, v1 = boxes[a, 0], boxes[a, 1], boxes[a, 2], boxes[a, 3]
+        behind = distances[a] + radii[a] + JOINT_MARGIN_M
+        for b in range(n_parts):
+            if b == a or firsts[b] == firsts[b + 1] or distances[b] - radii[b] > behind:
+                continue
+            if boxes[b, 0] > u1 or boxes[b, 2] < u0 or boxes[b, 1] > v1 or boxes[b, 3] < v0:
+                continue
+            for i in range(3):
+                p, q, r = to_unit[b, i, 0], to_unit[b, i, 1], to_unit[b, i, 2]
+                for k in range(3):
+                    Q[i, k] = p * to_world[a, 0, k] + q * to_world[a, 1, k] + r * to_world[a, 2, k]
+                Q[i, 3] = p * to_world[a, 0, 3] + q * to_world[a, 1, 3] + r * to_world[a, 2, 3] + to_unit[b, i, 3]
+                Q[i, 4] = to_unit[b, i, 4]
+            margin = JOINT_MARGIN_M / distances[a] if adjoining[a, b] else 0.0
+            hide(b, surfaces.solids, Q, margin, out.middles, firsts[a], firsts[a + 1], out.shared, out.hidden)
 
-    The middles of the pieces are left in the frame of the segments.
-    """
-    pieces, points, room = out.pieces_px, out.points_world, out.parts.shape[0]
-    for k in range(n_segments):
-        x0, y0, z0 = segments[k, 0, 0], segments[k, 0, 1], segments[k, 0, 2]
-        x1, y1, z1 = segments[k, 1, 0], segments[k, 1, 1], segments[k, 1, 2]
-        w0 = M[2, 0] * x0 + M[2, 1] * y0 + M[2, 2] * z0 + M[2, 3]
-        w1 = M[2, 0] * x1 + M[2, 1] * y1 + M[2, 2] * z1 + M[2, 3]
-        u0 = (M[0, 0] * x0 + M[0, 1] * y0 + M[0, 2] * z0 + M[0, 3]) / w0
-        v0 = (M[1, 0] * x0 + M[1, 1] * y0 + M[1, 2] * z0 + M[1, 3]) / w0
-        u1 = (M[0, 0] * x1 + M[0, 1] * y1 + M[0, 2] * z1 + M[0, 3]) / w1
-        v1 = (M[1, 0] * x1 + M[1, 1] * y1 + M[1, 2] * z1 + M[1, 3]) / w1
-        count = int(np.ceil(np.sqrt((u1 - u0) ** 2 + (v1 - v0) ** 2) / piece_px))
-        for i in range(min(count, room - n)):
-            a, b = i / count, (i + 1) / count
-            # The middle in the image is not the middle in space; 1/depth is linear along the projected segment.
-            m = 0.5 * (a + b)
-            m = m * w0 / (w1 + m * (w0 - w1))
-            points[n, 0], points[n, 1], points[n, 2] = x0 + m * (x1 - x0), y0 + m * (y1 - y0), z0 + m * (z1 - z0)
-            pieces[n, 0], pieces[n, 1] = u0 + a * (u1 - u0), v0 + a * (v1 - v0)
-            pieces[n, 2], pieces[n, 3] = u0 + b * (u1 - u0), v0 + b * (v1 - v0)
-            n += 1
+
+@njit(nogil=True, cache=True)
+def trace_pieces(P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: float, out: Pieces) -> int:
+    """Fill the pieces of one view; returns their number. See `trace_view`."""
+    n_parts = Ts.shape[0]
+    unit_eye, radii, half_axes, firsts = np.empty(3), surfaces.radii, surfaces.half_axes, out.firsts
+    profiles, profile_sizes = surfaces.profiles, surfaces.profile_sizes
+    to_world, to_unit, outline, image = out.Ts_world_unit, out.Ts_unit_world, out.outline, out.image
+    focal = np.sqrt(P[0, 0] ** 2 + P[0, 1] ** 2 + P[0, 2] ** 2)
+    n = edge = 0
+    _place(eye, Ts, surfaces, out)
+    for part in range(n_parts):
+        firsts[part] = n
+        depth = P[2, 3]
+        for i in range(3):
+            depth += P[2, i] * to_world[part, i, 3]
+            unit_eye[i] = to_unit[part, i, 4]
+        # A part that reaches the plane of the camera has no contour that could be drawn.
+        if depth < radii[part] + _NEAREST_M:
+            continue
+        if profile_sizes[part] > 0:
+            radius_px = max(half_axes[part, 0], half_axes[part, 1]) * focal / depth
+            turn = np.float32(min(max(np.sqrt(8 * _SAG_PX / radius_px), 0.05), 0.6))
+            n_points = revolved_outline(part, profile_sizes[part], profiles, unit_eye, turn, out.half, outline)
+        else:
+            n_points = grid_outline(part, unit_eye, surfaces, out.f, outline)
+        if n_points > 0:
+            n_edges = _project(part, P, n_points, to_world, outline, image, out.boxes)
+            n = _cut(n_edges, edge, piece_px, n, outline, image, out.ends, out.middles, out.edges)
+            edge += n_edges
+    firsts[n_parts] = n
+    out.hidden[:n] = False
+    _hide_all(n_parts, surfaces, out)
     return n
 
 
@@ -322,44 +304,22 @@ def trace_view(P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: fl
     """Fill a contour buffer for one view; returns the number of pieces. See `trace`.
 
     Args:
-        P: projection matrix, (3, 4), px.
+        P: projection matrix, (3, 4), px; its third row gives depths in metres.
         eye: camera centre in the world, (3,), metres.
         Ts: part poses, (P, 4, 4).
         surfaces: the shapes of the parts.
         piece_px: longest piece, px.
         out: room for the pieces; what does not fit is left out.
     """
-    n_parts, n_rings, n_sectors = surfaces.offsets.shape
-    shapes, points = surfaces.shapes, out.points_world
-    f = np.empty((n_rings, n_sectors), np.float32)
-    segments = np.empty((6 * (n_rings + n_sectors), 2, 3), np.float32)
-    blockers = Blockers(
-        np.empty(n_parts, np.int64), np.empty((n_parts, 3, 4)), np.empty((n_parts, 3)), np.empty(n_parts)
-    )
-    M, e = np.empty((3, 4)), np.empty(3, np.float32)
-    n = 0
-    for part in range(n_parts):
-        T, c = Ts[part], surfaces.centers[part]
-        for i in range(3):
+    pieces = piece_buffer(surfaces, out.parts.shape[0])
+    n = trace_pieces(P, eye, Ts, surfaces, piece_px, pieces)
+    points, W = out.points_world, pieces.Ts_world_unit
+    for part in range(Ts.shape[0]):
+        for i in range(pieces.firsts[part], pieces.firsts[part + 1]):
+            out.parts[i], out.hidden[i] = part, pieces.hidden[i]
+            x, y, z = pieces.middles[0, i], pieces.middles[1, i], pieces.middles[2, i]
             for k in range(4):
-                M[i, k] = P[i, 0] * T[0, k] + P[i, 1] * T[1, k] + P[i, 2] * T[2, k]
-            M[i, 3] += P[i, 3]
-            e[i] = T[0, i] * (eye[0] - T[0, 3]) + T[1, i] * (eye[1] - T[1, 3]) + T[2, i] * (eye[2] - T[2, 3])
-        # A part that reaches the plane of the camera has no contour that could be drawn.
-        if M[2, 0] * c[0] + M[2, 1] * c[1] + M[2, 2] * c[2] + M[2, 3] < shapes[part, 7] + 0.05:
-            continue
-        normals, offsets = surfaces.normals[part], surfaces.offsets[part]
-        for r in range(n_rings):
-            for s in range(n_sectors):
-                f[r, s] = offsets[r, s] - (normals[r, s, 0] * e[0] + normals[r, s, 1] * e[1] + normals[r, s, 2] * e[2])
-        first = n
-        n = cut(segments, zero_line(f, surfaces.points[part], segments), M, piece_px, n, out)
-        out.parts[first:n] = part
-        out.hidden[first:n] = False
-        for k in range(_find_blockers(part, eye, Ts, surfaces, blockers)):
-            hide(first, n, blockers, k, shapes, points, out.hidden)
-        for i in range(first, n):
-            x, y, z = points[i, 0], points[i, 1], points[i, 2]
-            for row in range(3):
-                points[i, row] = T[row, 0] * x + T[row, 1] * y + T[row, 2] * z + T[row, 3]
+                out.pieces_px[i, k] = pieces.ends[k, i]
+            for k in range(3):
+                points[i, k] = W[part, k, 0] * x + W[part, k, 1] * y + W[part, k, 2] * z + W[part, k, 3]
     return n

@@ -3,13 +3,15 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from tracker import contours
 from tracker.body import Body
 from tracker.cameras import Camera
-from tracker.contours import FloatArray
+from tracker.hiding import hide
 from tracker.rigid import Array
+from tracker.surfaces import N_RINGS, N_SECTORS, FloatArray
 
 _LIFT_M = 0.012
 """How far a curve is lifted off the surfaces to see whether they hide it, metres."""
@@ -46,28 +48,77 @@ def part_edges(bodies: Sequence[Body], camera: Camera) -> FloatArray:
     surfaces = contours.surfaces_of(tuple(b.model for b in bodies))
     Ts = contours.part_poses(bodies)
     shapes = [s for b in bodies for s in b.model.shapes]
-    P = contours.projection(camera)
-    segments = np.empty((6 * (contours.N_RINGS + contours.N_SECTORS), 2, 3), np.float32)
+    grids = [s.grid(N_RINGS, N_SECTORS)[0] + c for s, c in zip(shapes, surfaces.centers, strict=True)]
+    segments = np.empty((6 * (N_RINGS + N_SECTORS), 2, 3), np.float32)
     shown = [np.empty((0, 4), np.float32)]
     for a in range(len(shapes)):
-        grid = surfaces.points[a] @ Ts[a, :3, :3].T + Ts[a, :3, 3]
+        grid = grids[a] @ Ts[a, :3, :3].T + Ts[a, :3, 3]
         for b in range(a):  # each pair once: the curve lies on both surfaces
             apart = Ts[a, :3] @ (*surfaces.centers[a], 1.0) - Ts[b, :3] @ (*surfaces.centers[b], 1.0)
-            if np.linalg.norm(apart) > surfaces.shapes[a, 7] + surfaces.shapes[b, 7]:
+            if np.linalg.norm(apart) > surfaces.radii[a] + surfaces.radii[b]:
                 continue
             local = (grid - Ts[b, :3, 3]) @ Ts[b, :3, :3] - surfaces.centers[b]
             # The root makes the implicit function nearly linear across the surface, as interpolation wants it.
-            depth = shapes[b].inside_outside(local) ** (shapes[b].exponents[0] / 2) - 1.0
-            n = contours.zero_line(depth.astype(np.float32), grid.astype(np.float32), segments)
-            out = contours.contour_buffer(camera, 1)
-            n = contours.cut(segments, n, P, contours.PIECE_PX, 0, out)
-            points = out.points_world[:n]
+            depth = shapes[b].inside_outside(local) ** (1 / shapes[b].degree) - 1.0
+            n = _zero_line(depth.astype(np.float32), grid.astype(np.float32), segments)
+            pieces, points = _cut(segments[:n].astype(np.float64), camera)
             # Where both surfaces face the camera, a small way towards it leads out of both parts.
             towards = camera.center_world - points
             lifted = points + _LIFT_M * towards / np.linalg.norm(towards, axis=-1, keepdims=True)
-            nothing = np.zeros((len(shapes), n), dtype=bool)
-            shown.append(out.pieces_px[:n][~_blocked(camera, Ts, surfaces, lifted.astype(np.float32), nothing)])
+            nothing = np.zeros((len(shapes), len(points)), dtype=bool)
+            shown.append(pieces[~_blocked(camera, Ts, surfaces, lifted.astype(np.float32), nothing)])
     return np.concatenate(shown)
+
+
+def _cut(segments: Array, camera: Camera) -> tuple[FloatArray, Array]:
+    """Cut segments (n, 2, 3) in the world into pieces of at most PIECE_PX.
+
+    Returns:
+        End points x0, y0, x1, y1, (N, 4), px, and the middles, (N, 3), metres.
+    """
+    if not len(segments):
+        return np.empty((0, 4), np.float32), np.empty((0, 3))
+    px = camera.project(segments.reshape(-1, 3)).reshape(-1, 2, 2)
+    lengths = np.linalg.norm(px[:, 1] - px[:, 0], axis=1)
+    counts = np.maximum(1, np.ceil(lengths / contours.PIECE_PX)).astype(int)
+    which = np.repeat(np.arange(len(segments)), counts)
+    starts = (np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[which]
+    along = starts[:, None] + [0.0, 0.5, 1.0] / counts[which, None]  # (N, 3)
+    ends = px[which, :1] + along[:, ::2, None] * (px[which, 1:] - px[which, :1])
+    middles = segments[which, 0] + along[:, 1:2] * (segments[which, 1] - segments[which, 0])
+    return ends.reshape(-1, 4).astype(np.float32), middles
+
+
+@njit(nogil=True, cache=True)
+def _zero_line(f: FloatArray, g: FloatArray, segments: FloatArray) -> int:
+    """Zero line of f over the surface grid g as segments (n, 2, 3), by marching squares; their number."""
+    n_rings, n_sectors = f.shape
+    n = 0
+    for r in range(n_rings - 1):
+        for s in range(n_sectors):
+            s1 = s + 1 if s + 1 < n_sectors else 0
+            a, b, c, d = f[r, s], f[r, s1], f[r + 1, s1], f[r + 1, s]
+            inside = int(a > 0) + int(b > 0) + int(c > 0) + int(d > 0)
+            if inside == 0 or inside == 4 or n + 2 > segments.shape[0]:
+                continue
+            crossings = 0
+            for side in range(4):
+                if side == 0:
+                    v0, v1, r0, s0, r1, s2 = a, b, r, s, r, s1
+                elif side == 1:
+                    v0, v1, r0, s0, r1, s2 = b, c, r, s1, r + 1, s1
+                elif side == 2:
+                    v0, v1, r0, s0, r1, s2 = c, d, r + 1, s1, r + 1, s
+                else:
+                    v0, v1, r0, s0, r1, s2 = d, a, r + 1, s, r, s
+                if (v0 > 0) != (v1 > 0):
+                    t = v0 / (v0 - v1)
+                    k, end = n + crossings // 2, crossings % 2
+                    for i in range(3):
+                        segments[k, end, i] = g[r0, s0, i] + t * (g[r1, s2, i] - g[r0, s0, i])
+                    crossings += 1
+            n += crossings // 2
+    return n
 
 
 def _blocked(
@@ -78,11 +129,11 @@ def _blocked(
     Ts_part_world = np.swapaxes(Ts[:, :3, :3], 1, 2)
     for part in range(len(Ts)):
         center = surfaces.centers[part]
-        transform = np.column_stack([Ts_part_world[part], -Ts_part_world[part] @ Ts[part, :3, 3] - center])
-        eye = transform @ (*camera.center_world, 1.0)
-        blocker = contours.Blockers(np.array([part]), transform[None], eye[None], np.ones(1))
+        T = np.column_stack([Ts_part_world[part], -Ts_part_world[part] @ Ts[part, :3, 3] - center])
+        Q = np.column_stack([T, T @ (*camera.center_world, 1.0)]) / surfaces.half_axes[part][:, None]
         seen = np.flatnonzero(~hidden & ~ignored[part])
-        by_part = np.zeros(len(seen), dtype=bool)
-        contours.hide(0, len(seen), blocker, 0, surfaces.shapes, points[seen], by_part)
+        by_part, shared = np.zeros(len(seen), dtype=bool), np.empty((2, len(seen)), np.float32)
+        mine = np.ascontiguousarray(points[seen].T)
+        hide(part, surfaces.solids, Q.astype(np.float32), 0.0, mine, 0, len(seen), shared, by_part)
         hidden[seen] |= by_part
     return hidden

@@ -1,24 +1,58 @@
-"""Part shapes: the tapered superquadrics of GD96 Sect. 3 (after Metaxas & Terzopoulos 1993).
+"""Part shapes: tapered superquadrics (GD96 Sect. 3), truncated elliptical cones (KRH08 Sect. 3) and ellipsoids.
 
-A shape lives in its own frame, z along its axis. Cylinders, cones, spheres, ellipsoids and boxes with rounded
-edges are all members of the family.
+A shape lives in its own frame, z along its axis, its half-axes along x, y, z. Divided by them it is a solid about as
+large as the unit ball; in these *unit coordinates* cones, ellipsoids and superquadrics with an elliptic cross-section
+are solids of revolution, told by their profile alone.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import trimesh
 
 from tracker.rigid import Array
 
+_FLAT = 1e-6
+"""How far the normal of a flat end points away from the axis: all but not at all, so that its slope is a number."""
+
+
+class Profile(NamedTuple):
+    """The outline of a solid of revolution in unit coordinates, from its -z to its +z end.
+
+    The first and last point are flat ends: a disc that meets the surface in a rim.
+    """
+
+    radii: Array
+    """Distance from the axis, (n,)."""
+    heights: Array
+    """Place along the axis, (n,)."""
+    outward: Array
+    """The normal's component away from the axis, (n,)."""
+    along: Array
+    """The normal's component along z, (n,)."""
+
+
+class Enclosure(NamedTuple):
+    """A quadric around a solid in unit coordinates: `(x/g_x)^2 + (y/g_y)^2 + b z^2 <= (1 + k z)^2` with |z| <= 1."""
+
+    girths: tuple[float, float]
+    """g_x, g_y."""
+    taper: float
+    """k."""
+    bulge: float
+    """b."""
+    exact: bool
+    """Whether it is the solid itself."""
+
 
 @dataclass(frozen=True)
 class TaperedSuperquadric:
     """The solid `(|x/(a1 s_x)|^(2/e2) + |y/(a2 s_y)|^(2/e2))^(e2/e1) + |z/a3|^(2/e1) <= 1`.
 
-    The taper is `s_x = 1 + k_x z/a3`, `s_y = 1 + k_y z/a3`. With exponents in (0, 1] the solid is convex for the
-    mild tapers of body parts.
+    The taper is `s_x = 1 + k_x z/a3`, `s_y = 1 + k_y z/a3` (after Metaxas & Terzopoulos 1993). With exponents in
+    (0, 1] the solid is convex for the mild tapers of body parts.
     """
 
     half_axes: tuple[float, float, float]
@@ -27,6 +61,11 @@ class TaperedSuperquadric:
     """e1 along the axis, e2 around it; 1 is an ellipse, towards 0 a rectangle."""
     taper: tuple[float, float] = (0.0, 0.0)
     """k_x, k_y: relative change of the x and y half-axis from z = 0 to z = a3; within (-1, 1)."""
+
+    @property
+    def degree(self) -> float:
+        """Power of the distance from the centre as which `inside_outside` grows."""
+        return 2 / self.exponents[0]
 
     def inside_outside(self, points: Array) -> Array:
         """Evaluate the solid's implicit function at points `(..., 3)` in its frame: below 1 inside."""
@@ -66,30 +105,170 @@ class TaperedSuperquadric:
 
     def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> trimesh.Trimesh:
         """Closed triangle mesh of the surface in the shape's frame."""
-        points, _ = self.grid(n_rings, n_sectors)
-        a3 = self.half_axes[2]
-        vertices = np.concatenate([points.reshape(-1, 3), [[0.0, 0.0, -a3], [0.0, 0.0, a3]]])
-        ring, sector = np.meshgrid(np.arange(n_rings - 1), np.arange(n_sectors), indexing="ij")
-        a, b = ring * n_sectors + sector, ring * n_sectors + (sector + 1) % n_sectors
-        quads = np.stack([a, b, b + n_sectors, a + n_sectors], axis=-1).reshape(-1, 4)
-        first = np.arange(n_sectors)
-        last = (n_rings - 1) * n_sectors + first
-        bottom, top = n_rings * n_sectors, n_rings * n_sectors + 1
-        faces = np.concatenate(
-            [
-                quads[:, [0, 1, 2]],
-                quads[:, [0, 2, 3]],
-                np.stack([np.full(n_sectors, bottom), np.roll(first, -1), first], axis=-1),
-                np.stack([np.full(n_sectors, top), last, np.roll(last, -1)], axis=-1),
-            ]
-        )
-        return trimesh.Trimesh(vertices, faces, process=False)
+        return _closed_mesh(self.grid(n_rings, n_sectors)[0], self.half_axes[2])
 
     @cached_property
     def girth_bound(self) -> float:
         """Factor by which an elliptic cross-section must grow to enclose the superelliptic one."""
         return float(2 ** ((1 - self.exponents[1]) / 2))
 
+    def profile(self, tolerance_m: float) -> Profile | None:
+        """The profile in unit coordinates, thinned to chords within a tolerance; None for no solid of revolution."""
+        (a1, a2, a3), e1, (k, ky) = self.half_axes, self.exponents[0], self.taper
+        if self.exponents[1] != 1.0 or k != ky:
+            return None
+        eta = np.linspace(-np.pi / 2, np.pi / 2, 401)[1:-1]
+        z, r = _signed_power(np.sin(eta), e1), np.cos(eta) ** e1
+        s = 1 + k * z
+        away = np.cos(eta) ** (2 - e1) / s
+        along = _signed_power(np.sin(eta), 2 - e1) - k * np.cos(eta) ** 2 / s
+        kept = _chords(np.stack([max(a1, a2) * r * s, a3 * z], axis=1), tolerance_m)
+        return _with_ends((r * s)[kept], z[kept], away[kept], along[kept])
+
+    @property
+    def enclosure(self) -> Enclosure:
+        """A cone around the solid, or a cylinder where the taper differs along x and y."""
+        (kx, ky), g = self.taper, self.girth_bound
+        if kx == ky:
+            return Enclosure((g, g), kx, 0.0, False)
+        return Enclosure((g * (1 + abs(kx)), g * (1 + abs(ky))), 0.0, 0.0, False)
+
+
+@dataclass(frozen=True)
+class EllipticalCone:
+    """A truncated elliptical cone, or cylinder, between flat ends (KRH08 Eq. 3).
+
+    The solid `(x/a1)^2 + (y/a2)^2 <= (1 + k z/a3)^2` with `|z| <= a3`.
+    """
+
+    half_axes: tuple[float, float, float]
+    """a1, a2, a3: half-axes of the ellipse midway, along x and y, and half the length along z, metres."""
+    taper: float = 0.0
+    """k: relative change of the ellipse from z = 0 to z = a3; within (-1, 1), 0 is a cylinder."""
+    degree: ClassVar[float] = 2.0
+
+    def inside_outside(self, points: Array) -> Array:
+        """Evaluate the solid's implicit function at points `(..., 3)` in its frame: below 1 inside."""
+        x, y, z = np.moveaxis(points / self.half_axes, -1, 0)
+        return np.maximum((x**2 + y**2) / (1 + self.taper * np.clip(z, -1.0, 1.0)) ** 2, z**2)
+
+    def grid(self, n_rings: int, n_sectors: int) -> tuple[Array, Array]:
+        """Points and normals `(n_rings, n_sectors, 3)` on closed rings from the -z to the +z end, ends included."""
+        k, n_end = self.taper, max(1, n_rings // 5)
+        inner = (np.arange(n_end) + 0.5) / n_end
+        side = np.linspace(-1.0, 1.0, n_rings - 2 * n_end)
+        radii = np.concatenate([inner * (1 - k), 1 + k * side, inner[::-1] * (1 + k)])
+        heights = np.concatenate([-np.ones(n_end), side, np.ones(n_end)])
+        away = np.concatenate([np.zeros(n_end), np.ones(len(side)), np.zeros(n_end)])
+        along = np.concatenate([-np.ones(n_end), np.full(len(side), -k), np.ones(n_end)])
+        omega = np.arange(n_sectors) * (2 * np.pi / n_sectors) + np.pi / n_sectors
+
+        def turned(radius: Array, height: Array) -> Array:
+            x, y = np.outer(radius, np.cos(omega)), np.outer(radius, np.sin(omega))
+            return np.stack([x, y, np.broadcast_to(height[:, None], x.shape)], axis=-1)
+
+        normals = turned(away, along) / self.half_axes
+        return turned(radii, heights) * self.half_axes, normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+
+    def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> trimesh.Trimesh:
+        """Closed triangle mesh of the surface in the shape's frame."""
+        return _closed_mesh(self.grid(n_rings, n_sectors)[0], self.half_axes[2])
+
+    def profile(self, tolerance_m: float) -> Profile:
+        """The profile in unit coordinates: two points of one slope, so that the contour has two straight rulings."""
+        k = self.taper
+        return _with_ends(np.array([1 - k, 1 + k]), np.array([-1.0, 1.0]), np.ones(2), np.full(2, -k))
+
+    @property
+    def enclosure(self) -> Enclosure:
+        """The cone itself."""
+        return Enclosure((1.0, 1.0), self.taper, 0.0, True)
+
+
+@dataclass(frozen=True)
+class Ellipsoid:
+    """The solid `(x/a1)^2 + (y/a2)^2 + (z/a3)^2 <= 1`."""
+
+    half_axes: tuple[float, float, float]
+    """a1, a2, a3: half-axes along x, y, z, metres."""
+    degree: ClassVar[float] = 2.0
+
+    def inside_outside(self, points: Array) -> Array:
+        """Evaluate the solid's implicit function at points `(..., 3)` in its frame: below 1 inside."""
+        return np.sum((points / self.half_axes) ** 2, axis=-1)
+
+    def grid(self, n_rings: int, n_sectors: int) -> tuple[Array, Array]:
+        """Points and normals `(n_rings, n_sectors, 3)` on closed rings from the -z to the +z end."""
+        return self._superquadric.grid(n_rings, n_sectors)
+
+    def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> trimesh.Trimesh:
+        """Closed triangle mesh of the surface in the shape's frame."""
+        return self._superquadric.mesh(n_rings, n_sectors)
+
+    def profile(self, tolerance_m: float) -> Profile | None:
+        """The profile in unit coordinates, thinned to chords within a tolerance."""
+        return self._superquadric.profile(tolerance_m)
+
+    @property
+    def enclosure(self) -> Enclosure:
+        """The ellipsoid itself."""
+        return Enclosure((1.0, 1.0), 0.0, 1.0, True)
+
+    @property
+    def _superquadric(self) -> TaperedSuperquadric:
+        return TaperedSuperquadric(self.half_axes, (1.0, 1.0))
+
+
+Shape = TaperedSuperquadric | EllipticalCone | Ellipsoid
+
 
 def _signed_power(base: Array, exponent: float) -> Array:
     return np.sign(base) * np.abs(base) ** exponent
+
+
+def _with_ends(radii: Array, heights: Array, outward: Array, along: Array) -> Profile:
+    """Close a profile by flat ends, and bring its normals to unit length."""
+    norms = np.hypot(outward, along)
+    return Profile(
+        np.concatenate([radii[:1], radii, radii[-1:]]),
+        np.concatenate([heights[:1], heights, heights[-1:]]),
+        np.concatenate([[_FLAT], outward / norms, [_FLAT]]),
+        np.concatenate([[-1.0], along / norms, [1.0]]),
+    )
+
+
+def _chords(curve: Array, tolerance: float) -> list[int]:
+    """Indices of points of a curve (n, 2) between which chords stray from it by at most the tolerance; few of them."""
+    kept, last = [0], 1
+    while kept[-1] < len(curve) - 1:
+        while last + 1 < len(curve):
+            chord = curve[last + 1] - curve[kept[-1]]
+            between = curve[kept[-1] + 1 : last + 1] - curve[kept[-1]]
+            off = np.abs(chord[0] * between[:, 1] - chord[1] * between[:, 0])
+            if off.max() > tolerance * np.hypot(*chord):
+                break
+            last += 1
+        kept.append(last)
+        last += 1
+    return kept
+
+
+def _closed_mesh(rings: Array, end: float) -> trimesh.Trimesh:
+    """Mesh of closed rings of points (n_rings, n_sectors, 3) with a pole at z = -end and z = end."""
+    n_rings, n_sectors, _ = rings.shape
+    vertices = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, -end], [0.0, 0.0, end]]])
+    ring, sector = np.meshgrid(np.arange(n_rings - 1), np.arange(n_sectors), indexing="ij")
+    a, b = ring * n_sectors + sector, ring * n_sectors + (sector + 1) % n_sectors
+    quads = np.stack([a, b, b + n_sectors, a + n_sectors], axis=-1).reshape(-1, 4)
+    first = np.arange(n_sectors)
+    last = (n_rings - 1) * n_sectors + first
+    bottom, top = n_rings * n_sectors, n_rings * n_sectors + 1
+    faces = np.concatenate(
+        [
+            quads[:, [0, 1, 2]],
+            quads[:, [0, 2, 3]],
+            np.stack([np.full(n_sectors, bottom), np.roll(first, -1), first], axis=-1),
+            np.stack([np.full(n_sectors, top), last, np.roll(last, -1)], axis=-1),
+        ]
+    )
+    return trimesh.Trimesh(vertices, faces, process=False)

@@ -6,8 +6,10 @@ from scipy.spatial import cKDTree
 from staging import at, camera_at, cameras_around, solid
 
 from tracker.body import Body
-from tracker.contours import JOINT_MARGIN_M, N_SECTORS, PIECE_PX, trace
+from tracker.contours import PIECE_PX, trace
 from tracker.formats.model_toml import parse_model
+from tracker.hiding import JOINT_MARGIN_M
+from tracker.surfaces import N_SECTORS
 
 FRONT = camera_at("front", (4.0, 0.0, 0.0))
 

@@ -30,21 +30,12 @@ def run(folder):
 
 
 def test_an_edit_of_one_kernel_reaches_the_kernels_that_call_it(tmp_path):
-    """`trace_view` compiles `hide` into itself; both are moved to files of their own for the test."""
+    """`trace_view` in contours.py compiles `hide` of hiding.py into itself."""
     copy = tmp_path / "tracker"
     shutil.copytree(Path(tracker.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__", "simulate"))
-    source = (copy / "contours.py").read_text()
-    first = source.index("@njit(nogil=True, cache=True)\ndef _inside_outside")
-    last = source.index("@njit(nogil=True, cache=True)\ndef hide(")
-    kernel = source[first:last]
-    (copy / "inside.py").write_text(f"import numpy as np\nfrom numba import njit\n\nArray = np.ndarray\n\n\n{kernel}")
-    moved = "from tracker.inside import _inside_outside\n"
-    (copy / "contours.py").write_text(
-        (source[:first] + source[last:]).replace("from tracker.rigid", moved + "from tracker.rigid", 1)
-    )
     before = run(tmp_path)
     assert before > 0
-    text = (copy / "inside.py").read_text()
-    assert text.count("    zn = z / shape[2]\n") == 1
-    (copy / "inside.py").write_text(text.replace("    zn = z / shape[2]\n", "    zn = z / shape[2] + 10.0\n"))
-    assert run(tmp_path) == 0  # nothing is inside anything, so nothing hides
+    text = (copy / "hiding.py").read_text()
+    assert text.count("        far, near = shared[0, i], shared[1, i]\n") == 1
+    (copy / "hiding.py").write_text(text.replace("far, near = shared[0, i], shared[1, i]", "far, near = 1.0, 0.0"))
+    assert run(tmp_path) == 0  # no line of sight is inside anything, so nothing hides

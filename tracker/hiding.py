@@ -1,0 +1,122 @@
+"""What of the contour of a part other parts hide.
+
+The line of sight is followed from a point (s = 0) to the eye (s = 1) in the unit coordinates of the part that may
+hide it. The quadric around that part is met in closed form, for many points at once and without branches; where the
+part does not fill its quadric, its own shape is asked on what line and quadric share.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tracker.surfaces import ALONG, N_ALONG, N_SECTION, SECTION, FloatArray
+
+JOINT_MARGIN_M = 0.03
+"""How far in front of an adjoining part a contour must lie to be seen as one, metres."""
+
+_FLAGS = {"contract", "reassoc", "nsz", "arcp"}  # infinite numbers are left their meaning
+_TINY, _FAR = np.float32(1e-9), np.float32(1e9)
+_ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernels' arithmetic into float64
+_TRIES = (0.5, 0.25, 0.75, 0.001)
+"""Where on what the line of sight shares with the quadric the shape is asked, from its far end (0) to the near."""
+
+
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FLAGS)
+def _meet_quadric(
+    part: int, solids: FloatArray, Q: FloatArray, margin: float, points: FloatArray, first: int, last: int,
+    shared: FloatArray,
+) -> None:  # fmt: skip
+    """Cut lines of sight with the quadric around a part, between its ends, the point and the eye; see `hide`."""
+    gx, gy, k, bulge = solids[part, 0], solids[part, 1], solids[part, 2], solids[part, 3]
+    q00, q01, q02, q03, ex = Q[0, 0] * gx, Q[0, 1] * gx, Q[0, 2] * gx, Q[0, 3] * gx, Q[0, 4] * gx
+    q10, q11, q12, q13, ey = Q[1, 0] * gy, Q[1, 1] * gy, Q[1, 2] * gy, Q[1, 3] * gy, Q[1, 4] * gy
+    q20, q21, q22, q23, ez = Q[2, 0], Q[2, 1], Q[2, 2], Q[2, 3], Q[2, 4]
+    behind = np.float32(-margin)
+    px, py, pz, far, near = points[0], points[1], points[2], shared[0], shared[1]
+    for i in range(np.uint64(first), np.uint64(last)):  # unsigned: an index that may be negative is not vectorized
+        a, b, c = px[i], py[i], pz[i]
+        x = q00 * a + q01 * b + q02 * c + q03
+        y = q10 * a + q11 * b + q12 * c + q13
+        z = q20 * a + q21 * b + q22 * c + q23
+        dx, dy, dz = ex - x, ey - y, ez - z
+        w, dw = _ONE + k * z, k * dz
+        A = dx * dx + dy * dy + bulge * dz * dz - dw * dw
+        A = A if abs(A) > _TINY else _TINY
+        B = x * dx + y * dy + bulge * z * dz - w * dw
+        C = x * x + y * y + bulge * z * z - w * w
+        disc = B * B - A * C
+        root = np.sqrt(max(disc, _ZERO))
+        inverse = _ONE / A
+        s0, s1 = (-B - root) * inverse, (-B + root) * inverse
+        # Steeper than the cone (A < 0), a line is inside beyond one of the roots, on the side of the cone's base.
+        low = s0 if A > _ZERO else (s0 if dw > _ZERO else -_FAR)
+        high = s1 if A > _ZERO else (_FAR if dw > _ZERO else s1)
+        dz = dz if abs(dz) > _TINY else _TINY
+        per_z = _ONE / dz
+        e0, e1 = (-_ONE - z) * per_z, (_ONE - z) * per_z
+        low = max(max(low, behind), min(e0, e1))
+        high = min(min(high, _ONE), max(e0, e1))
+        far[i] = low
+        near[i] = high if disc > _ZERO else -_FAR
+
+
+@njit(nogil=True, cache=True)
+def _fills(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: np.float32) -> bool:
+    """Whether a point in unit coordinates is within a superquadric, by the tables of its shape."""
+    at = abs(z) * np.float32(N_ALONG)
+    k = int(at)
+    if k >= N_ALONG:
+        return False
+    below = solids[part, ALONG + k]
+    size = below + (at - np.float32(k)) * (solids[part, ALONG + k + 1] - below)
+    if solids[part, 7] > 0:
+        size *= _ONE + solids[part, 5] * z
+        return x * x + y * y < size * size
+    x = abs(x / (_ONE + solids[part, 5] * z))
+    y = abs(y / (_ONE + solids[part, 6] * z))
+    larger, smaller = max(x, y), min(x, y)
+    if larger >= size:
+        return False
+    at = smaller / max(larger, _TINY) * np.float32(N_SECTION)
+    k = min(int(at), N_SECTION - 1)
+    below = solids[part, SECTION + k]
+    return larger * (below + (at - np.float32(k)) * (solids[part, SECTION + k + 1] - below)) < size
+
+
+@njit(nogil=True, cache=True)
+def hide(
+    part: int, solids: FloatArray, Q: FloatArray, margin: float, points: FloatArray, first: int, last: int,
+    shared: FloatArray, hidden: NDArray[np.bool_],
+) -> None:  # fmt: skip
+    """Mark the points that a part hides: exactly, but for lines that graze a superquadric.
+
+    Args:
+        part: index of the part that may hide them.
+        solids: the shapes, see `Surfaces`. (All of `Surfaces` would cost more to hand over than the work is.)
+        Q: from the frame of the points to the part's unit coordinates, and the eye in those as last column, (3, 5).
+        margin: how far behind the point, as a share of the way to the eye, the part still hides it.
+        points: (3, room).
+        first: index of the first point.
+        last: index after the last.
+        shared: room for where each line of sight is inside the quadric, from and to, (2, room).
+        hidden: what is marked, (room,).
+    """
+    _meet_quadric(part, solids, Q, margin, points, first, last, shared)
+    exact = solids[part, 4] > 0
+    for i in range(first, last):
+        far, near = shared[0, i], shared[1, i]
+        if hidden[i] or far >= near:
+            continue
+        if exact:
+            hidden[i] = True
+            continue
+        a, b, c = points[0, i], points[1, i], points[2, i]
+        x = Q[0, 0] * a + Q[0, 1] * b + Q[0, 2] * c + Q[0, 3]
+        y = Q[1, 0] * a + Q[1, 1] * b + Q[1, 2] * c + Q[1, 3]
+        z = Q[2, 0] * a + Q[2, 1] * b + Q[2, 2] * c + Q[2, 3]
+        dx, dy, dz = Q[0, 4] - x, Q[1, 4] - y, Q[2, 4] - z
+        for share in _TRIES:
+            s = far + np.float32(share) * (near - far)
+            if _fills(part, solids, x + s * dx, y + s * dy, z + s * dz):
+                hidden[i] = True
+                break
