@@ -17,6 +17,7 @@ ORDER = [
         "tracker.kinematics",
         "tracker.nearest",
         "tracker.probes",
+        "tracker.segments",
         "tracker.edges",
         "tracker.files",
         "tracker.footage",

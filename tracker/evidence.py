@@ -7,7 +7,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import cv2
@@ -21,6 +21,7 @@ from tracker.edges import Levels, detect_edges, levels
 from tracker.matched import MatchedView, fit_region
 from tracker.probes import Probes, Readings
 from tracker.recording import Recording, read_background, read_mask
+from tracker.segments import Segments, accept, link_edges, pixels_of
 from tracker.session import CameraSource
 from tracker.silhouettes import Image, Mask
 
@@ -29,6 +30,8 @@ FloatArray = NDArray[np.float32]
 SCENE_SPACING_PX = 3
 """Scene edges are thinned to one point per cell of this many pixels a side."""
 
+ACCEPTED_SHARE = 0.5
+"""Mean distance to the predicted contours up to which a segment of edges is accepted, as a share of theta."""
 FOREGROUND_MARGIN = 0.012
 """How far around the silhouette edges are kept, as a fraction of the longer side of the image."""
 _WORKERS = 2
@@ -55,6 +58,10 @@ class ViewEvidence:
     """Unit gradient at each of `points_px`, from dark to light, (N, 2); zero where the edge's direction is unknown."""
     colors: Image | None = None
     """The region of the frame itself, smoothed, (H, W, 3) RGB; None where it is damaged or was not kept."""
+    segments: Segments | None = None
+    """All edges found, linked, in px of the region; None where the directions of the edges are unknown."""
+    accepted: NDArray[np.bool_] | None = None
+    """Which segments the prediction accepts, (S,); `points_px` and `distance` hold only those. None: all of them."""
 
     @property
     def theta_px(self) -> float:
@@ -89,6 +96,7 @@ def view_evidence(
     image_size: tuple[int, int] | None = None,
     gradients: NDArray[np.int16] | None = None,
     colors: Image | None = None,
+    predicted_px: FloatArray | None = None,
 ) -> ViewEvidence:
     """Make the evidence of a view from its edge map.
 
@@ -100,39 +108,72 @@ def view_evidence(
         image_size: see `ViewEvidence`.
         gradients: of the image along u and v, (2, H, W); None where the directions of the edges are unknown.
         colors: see `ViewEvidence`.
+        predicted_px: see `accepted`; None keeps all edges. Without gradients no edges are refused.
     """
     assert edge_map.shape == (camera.height, camera.width), (edge_map.shape, camera.size)
-    found = cv2.findNonZero(edge_map.view(np.uint8))
-    points = np.empty((0, 2), np.float32) if found is None else _thinned(found, camera.width, camera.height)
+    found, theta = edge_map.view(np.uint8), _theta_px(image_size or camera.size)
+    segments = chosen = None
+    if gradients is not None:
+        segments = link_edges(found, gradients)
+        if predicted_px is not None:
+            chosen = accept(segments, predicted_px, ACCEPTED_SHARE * theta)
+    points, normals, found = _matched_edges(segments, chosen, found)
     # Beyond twice theta nothing asks for the distance any more.
-    limit_px = 2 * _theta_px(image_size or camera.size)
-    normals = np.zeros_like(points) if gradients is None else _directions(points, gradients)
-    distance = distance_image(edge_map, limit_px)
-    return ViewEvidence(camera, scale, points, distance, corner_px, image_size, normals, colors)
+    distance = distance_image(found, 2 * theta)
+    return ViewEvidence(
+        camera, scale, points, distance, corner_px, image_size, normals, colors, segments, chosen
+    )  # fmt: skip
 
 
-def _directions(points: FloatArray, gradients: NDArray[np.int16]) -> FloatArray:
-    """Unit gradients (N, 2) at points (N, 2) of an image."""
-    u, v = points.T.astype(np.intp)
-    found = gradients[:, v, u].T.astype(np.float32)
-    return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), np.float32(1e-6))
+def accepted(view: ViewEvidence, predicted_px: FloatArray, threshold_px: float | None = None) -> ViewEvidence:
+    """The same view with only the edges that the prediction explains, segment by segment (GD96 Sect. 4.2, Fig. 6).
+
+    Args:
+        view: with directions of edges.
+        predicted_px: visible pieces of the predicted contours, x0, y0, x1, y1, (M, 4), px of the view's camera.
+        threshold_px: mean distance of a segment to them up to which it is accepted, px; by default half of theta.
+    """
+    assert view.segments is not None
+    chosen = accept(view.segments, predicted_px, threshold_px or ACCEPTED_SHARE * view.theta_px)
+    nothing = np.zeros((view.camera.height, view.camera.width), np.uint8)
+    points, normals, found = _matched_edges(view.segments, chosen, nothing)
+    distance = distance_image(found, 2 * view.theta_px)
+    return replace(view, points_px=points, normals=normals, distance=distance, accepted=chosen)
+
+
+def _matched_edges(
+    segments: Segments | None, chosen: NDArray[np.bool_] | None, found: NDArray[np.uint8]
+) -> tuple[FloatArray, FloatArray, NDArray[np.uint8]]:
+    """Thinned points (N, 2) and normals (N, 2) of chosen segments, and the map of all their pixels."""
+    if segments is None:
+        pixels = cv2.findNonZero(found)
+        points = np.empty((0, 2), np.float32) if pixels is None else np.asarray(pixels, np.float32).reshape(-1, 2)
+        normals = np.zeros_like(points)
+    else:
+        points, normals = segments.points_px, segments.normals
+        if chosen is not None:
+            kept = pixels_of(segments, chosen)
+            points, normals, found = points[kept], normals[kept], np.zeros_like(found)
+            u, v = points.T.astype(np.intp)
+            found[v, u] = 1
+    first = _first_in_cells(points, *found.shape)
+    return points[first], normals[first], found
 
 
 @njit(nogil=True, cache=True)
-def _thinned(points: NDArray[np.int32], width: int, height: int) -> FloatArray:
-    """The first of the points (N, 2) in each cell of the scene spacing, (M, 2)."""
+def _first_in_cells(points: FloatArray, height: int, width: int) -> NDArray[np.int64]:
+    """Index of the first of the points (N, 2) in each cell of the scene spacing, (M,)."""
     columns = width // SCENE_SPACING_PX + 1
     taken = np.zeros((height // SCENE_SPACING_PX + 1) * columns, np.bool_)
-    kept = np.empty((points.shape[0], 2), np.float32)
+    first = np.empty(points.shape[0], np.int64)
     n = 0
     for i in range(points.shape[0]):
-        u, v = points[i, 0], points[i, 1]
-        cell = (v // SCENE_SPACING_PX) * columns + u // SCENE_SPACING_PX
+        cell = (int(points[i, 1]) // SCENE_SPACING_PX) * columns + int(points[i, 0]) // SCENE_SPACING_PX
         if not taken[cell]:
             taken[cell] = True
-            kept[n, 0], kept[n, 1] = u, v
+            first[n] = i
             n += 1
-    return kept[:n].copy()
+    return first[:n].copy()
 
 
 class _Prepared(NamedTuple):
@@ -204,7 +245,12 @@ class Observer:
             while len(self._ahead) > _FRAMES_AHEAD:
                 self._ahead.popitem(last=False)[1].cancel()
 
-    def evidence(self, k: int, regions: Sequence[Region | None] | None = None) -> tuple[ViewEvidence, ...]:
+    def evidence(
+        self,
+        k: int,
+        regions: Sequence[Region | None] | None = None,
+        predicted_px: Sequence[FloatArray | None] | None = None,
+    ) -> tuple[ViewEvidence, ...]:
         """The edges of frame k in each view, kept to the foreground where masks or a background tell it.
 
         A damaged frame has no edges: the view has no say in the cost.
@@ -212,12 +258,15 @@ class Observer:
         Args:
             k: the frame.
             regions: where to look in each view, matched px, see `matched.region_around`; None is the whole image.
+            predicted_px: visible pieces of the predicted contours in each view, (M, 4), px of `matched_cameras`, by
+                which segments of edges are accepted; None keeps all edges.
         """
         with self._lock:
             ahead = self._ahead.pop(k, None)
         prepared = self._prepare(k) if ahead is None else ahead.result()
-        boxes = [None] * len(self.cameras) if regions is None else regions
-        return tuple(self._pool.map(self._observe, range(len(self.cameras)), prepared, boxes))
+        everywhere = [None] * len(self.cameras)
+        boxes, predictions = regions or everywhere, predicted_px or everywhere
+        return tuple(self._pool.map(self._observe, range(len(self.cameras)), prepared, boxes, predictions))
 
     def _prepare(self, k: int) -> list[_Prepared | None]:
         return [
@@ -240,7 +289,9 @@ class Observer:
         view = self._views[i]
         return _Empty(silhouettes.smoothed(view.image(background, view.whole)), self._probes[i].read(background))
 
-    def _observe(self, i: int, prepared: _Prepared | None, region: Region | None) -> ViewEvidence:
+    def _observe(
+        self, i: int, prepared: _Prepared | None, region: Region | None, predicted_px: FloatArray | None
+    ) -> ViewEvidence:
         view = self._views[i]
         box = view.whole if region is None else fit_region(region, view.camera.size)
         camera = view.camera.cropped(box)
@@ -249,7 +300,11 @@ class Observer:
             return view_evidence(camera, view.scale, nothing, box[:2], view.camera.size)
         smooth = silhouettes.smoothed(view.image(prepared.frame, box))
         edges = detect_edges(smooth, prepared.bounds, self._foreground(i, prepared, smooth, box))
-        return view_evidence(camera, view.scale, edges.found, box[:2], view.camera.size, edges.gradients, smooth)
+        if predicted_px is not None:
+            predicted_px = predicted_px - np.array([*box[:2], *box[:2]], np.float32)
+        return view_evidence(
+            camera, view.scale, edges.found, box[:2], view.camera.size, edges.gradients, smooth, predicted_px
+        )
 
     def _foreground(self, i: int, prepared: _Prepared, smooth: Image, box: Region) -> Mask | None:
         """Where a person may be, (H, W), generously; None where nothing tells."""

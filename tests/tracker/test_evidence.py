@@ -5,18 +5,22 @@ import numpy as np
 import pytest
 from staging import camera_at
 
+from tracker import contours
+from tracker.body import Body
 from tracker.cameras import Camera
 from tracker.errors import RecordingError
 from tracker.evidence import (
     FOREGROUND_MARGIN,
     SCENE_SPACING_PX,
     Observer,
+    accepted,
     default_theta_px,
     distance_image,
     view_evidence,
 )
 from tracker.matched import MatchedView, match_scale, region_around
 from tracker.recording import Recording
+from tracker.segments import pixels_of
 from tracker.session import CameraSource, load_session
 
 
@@ -292,3 +296,43 @@ def test_what_is_wrong_with_a_frame_read_ahead_is_told_when_it_is_asked_for():
     observer.prefetch(5)
     with pytest.raises(RecordingError, match="found 5"):
         observer.evidence(5)
+
+
+def visible_contours(real_frame, camera):
+    seen = contours.trace([Body(real_frame.model, real_frame.values)], camera)
+    return seen.pieces_px[~seen.hidden]
+
+
+def test_only_edges_near_the_prediction_are_accepted(sample, real_frame):
+    session, recording = sample
+    observer = Observer([replace(c, background=None) for c in session.cameras], recording)
+    predicted = [visible_contours(real_frame, c) for c in observer.matched_cameras]
+    for view, pieces in zip(observer.evidence(25), predicted, strict=True):
+        assert view.accepted is None
+        kept = accepted(view, pieces)
+        assert len(kept.accepted) == len(view.segments.firsts) - 1
+        assert 0.02 < kept.accepted.mean() < 0.5  # racks and bars are refused
+        pixels = view.segments.points_px[pixels_of(view.segments, kept.accepted)]
+        u, v = pixels.astype(int).T
+        on_edge = np.zeros(view.distance.shape, dtype=bool)
+        on_edge[v, u] = True
+        np.testing.assert_array_equal(kept.distance == 0, on_edge)
+        here = {tuple(p) for p in pixels.tolist()}
+        assert all(tuple(p) in here for p in kept.points_px.tolist())
+        assert len(kept.points_px) == len(kept.normals) > 100
+        np.testing.assert_allclose(np.linalg.norm(kept.normals, axis=1), 1, rtol=1e-5)
+        assert not accepted(view, pieces, 0.1).accepted.all()
+
+
+def test_evidence_of_a_region_takes_the_prediction_in_pixels_of_the_whole_image(sample, real_frame):
+    session, recording = sample
+    observer = Observer([replace(c, background=None) for c in session.cameras], recording)
+    predicted = [visible_contours(real_frame, c) for c in observer.matched_cameras]
+    boxes = [region_around(p.reshape(-1, 2), 40, (640, 480)) for p in predicted]
+    at_once = observer.evidence(25, boxes, predicted)
+    for view, once, pieces in zip(observer.evidence(25, boxes), at_once, predicted, strict=True):
+        kept = accepted(view, pieces - np.array([*view.corner_px, *view.corner_px], np.float32))
+        np.testing.assert_array_equal(once.accepted, kept.accepted)
+        np.testing.assert_array_equal(once.distance, kept.distance)
+        np.testing.assert_array_equal(once.points_px, kept.points_px)
+        np.testing.assert_array_equal(once.normals, kept.normals)
