@@ -173,12 +173,12 @@ def track(
 
     Args:
         session: session folder.
-        method: chamfer: best-first search on edges, frame by frame from the previous pose.
+        method: chamfer: edges; predicted, refined by Gauss-Newton, and searched where that does not suffice.
         frames: A:B, half open; all by default.
         person: whom; everybody by default.
         backward: from the last frame of the range to the first.
         theta: outlier distance in pixels; 3% of the longer side of the image by default.
-        paper: search as Gavrila and Davis 1996 do: one pass, outliers rejected.
+        paper: as Gavrila and Davis 1996: best-first search alone, in one pass, outliers rejected.
         json: print one JSON object.
     """
     from tracker.search import SearchSettings
@@ -187,7 +187,12 @@ def track(
     at = commands.target(session, person, several=True)
     wanted: Sequence[int] = commands.frame_range(frames, at.session)
     passes = (1.0,) if paper else SearchSettings().passes
-    settings = TrackSettings(SearchSettings(passes=passes), theta, "paper" if paper else "truncated")
+    settings = TrackSettings(
+        estimate="search" if paper else "refine",
+        search=SearchSettings(passes=passes),
+        theta_px=theta,
+        outliers="paper" if paper else "truncated",
+    )
     found = commands.track(at, wanted[::-1] if backward else wanted, settings, Reporter(silent=json))
     summary = f"tracked {', '.join(found['people'])} over {found['frames']} frames"
     print(commands.as_json(found) if json else f"{summary}, mean cost {found['mean_cost_px']:.2f} px")

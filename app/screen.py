@@ -99,7 +99,7 @@ class Screen:
     @property
     def track_settings(self) -> TrackSettings:
         """What searches and trackers are told."""
-        return TrackSettings(self.state.settings, self.state.theta_px, self.state.outliers)
+        return TrackSettings(search=self.state.settings, theta_px=self.state.theta_px, outliers=self.state.outliers)
 
     def _load(self, frame: int) -> tuple[Shown, ...]:
         """What a frame shows: stored poses, else drafts from the nearest frame that has one."""

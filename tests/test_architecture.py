@@ -34,8 +34,9 @@ ORDER = [
     ["tracker.session"],
     ["tracker.recording", "tracker.references"],
     ["tracker.assemble", "tracker.evidence", "tracker.simulate"],
-    ["tracker.chamfer"],
-    ["tracker.search"],
+    ["tracker.chamfer", "tracker.predict", "tracker.appearance", "tracker.refine"],
+    ["tracker.search", "tracker.confidence"],
+    ["tracker.recover"],
     ["tracker.track"],
     # The program: what the screen shows, then who may change it, then who shows it.
     ["app", "app.access", "app.jobs", "app.viser_proxy", "app.state"],

@@ -154,7 +154,7 @@ def covariance(model: BodyModel, fit: Fit) -> Array:
     It is as true as the blocks' weights are inverse standard deviations. What nothing speaks of has a variance of
     `_UNKNOWN`; joint limits are not counted as knowledge.
     """
-    return np.linalg.inv(fit.hessian + np.eye(model.n_dofs) / _UNKNOWN)
+    return np.asarray(np.linalg.inv(fit.hessian + np.eye(model.n_dofs) / _UNKNOWN), dtype=np.float64)
 
 
 def fit_to_points(model: BodyModel, targets_world: dict[str, Array], near: Array | None = None) -> Fit:

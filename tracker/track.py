@@ -1,29 +1,60 @@
-"""The chamfer tracker of GD96: predict, observe, search, one frame at a time.
+"""The chamfer tracker of GD96: predict, observe, estimate, judge, one frame at a time.
 
-So far the prediction is the pose of the frame before.
+The prediction is first refined on the edges around it (`refine`). Only where the outcome is not credible
+(`confidence`) the best-first search of the paper is spent, on the whole body, and proposals on single limbs
+(`recover`); the cheapest refined pose wins.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
+import numpy as np
+
+from tracker import confidence
+from tracker.appearance import Colors, PartColors
 from tracker.body import Body, BodyModel
 from tracker.chamfer import ChamferCost, Outliers
+from tracker.confidence import Limb, Quality, Status
 from tracker.evidence import Observer, ViewEvidence
+from tracker.fit import Block, Fit, StayNear, covariance, solve
+from tracker.matched import region_around
+from tracker.predict import PredictSettings, predict
+from tracker.recover import Judge, RecoverSettings, search_limb
+from tracker.refine import ContourMatch, MatchSettings
 from tracker.rigid import Array
 from tracker.search import SearchSettings, SearchStep, search
+
+Estimation = Literal["refine", "search"]
+
+_ITERATIONS = 15
+_TOLERANCE = 1e-3  # rad or metres: a tenth of a pixel on a limb
+_REGION_MARGIN_M = 0.22
+"""What is added around the joints to the region that is looked at: the flesh, and what the prediction may be off."""
 
 
 @dataclass(frozen=True)
 class TrackSettings:
     """What the chamfer tracker is told."""
 
+    estimate: Estimation = "refine"
+    """`refine` searches only where refinement does not suffice; `search` is best-first search alone, as in GD96."""
+    predict: PredictSettings = field(default_factory=PredictSettings)
+    """Motion model."""
+    match: MatchSettings = field(default_factory=MatchSettings)
+    """How contours and edges pull in the refinement."""
     search: SearchSettings = field(default_factory=SearchSettings)
-    """Bounds, steps and stopping rule of the search."""
+    """Bounds, steps and stopping rule of the best-first search."""
+    recover: RecoverSettings | None = field(default_factory=RecoverSettings)
+    """How lost limbs are searched for; None leaves them."""
     theta_px: float | None = None
     """Outlier distance, px of the footage; None for 3% of the longer side of each image."""
     outliers: Outliers = "truncated"
-    """How outliers are treated, see `ChamferCost`."""
+    """How the search treats outliers, see `ChamferCost`."""
+    trust_rad: float = 0.15
+    """Standard deviation of the prediction of an angle, rad."""
+    trust_m: float = 0.05
+    """Standard deviation of the prediction of a position, metres."""
 
 
 class PoseEstimate(NamedTuple):
@@ -37,7 +68,17 @@ class PoseEstimate(NamedTuple):
     views_px: Array
     """The same for each view, (V,); NaN for a view without edges."""
     evaluations: int
-    """Poses scored to find them."""
+    """Poses that the best-first search scored to find them."""
+    statuses: tuple[Status, ...]
+    """How sure the tracker is of each person."""
+    remarks: tuple[str, ...]
+    """What was out of the ordinary with each person; empty where nothing was."""
+    parts_px: tuple[Array, ...]
+    """Mean distance of the contour of each person's parts to the edges, (n_parts,) each, px; NaN where hidden."""
+    covariances: tuple[Array, ...]
+    """Covariance of each pose, (n_dofs, n_dofs) each, rad and metres; of a pose that was given, zero."""
+    qualities: tuple[Quality | None, ...]
+    """What the statuses were judged by; None for a pose that was given."""
 
 
 def pose_cost(
@@ -66,7 +107,7 @@ def track_chamfer(
     start: Sequence[Array],
     frames: Sequence[int],
     settings: TrackSettings,
-    fixed: dict[int, dict[int, Array]] | None = None,
+    fixed: Mapping[int, Mapping[int, Array]] | None = None,
     people: Sequence[int] | None = None,
 ) -> Iterator[PoseEstimate]:
     """Track all people frame by frame.
@@ -76,22 +117,195 @@ def track_chamfer(
         models: the body of each person.
         start: pose of each person from which the first frame is searched, (n_values,) each.
         frames: the frames in the order of tracking.
-        settings: of the search.
+        settings: of the tracker.
         fixed: poses that stay as they are (keyframes), by frame and person; tracking goes on from them.
         people: whom to track; everybody by default. The others stand as they are in `start` or `fixed`.
 
     Yields:
         The poses of each frame.
     """
-    everybody = range(len(models)) if people is None else people
-    poses = list(start)
-    for frame in frames:
+    everybody = tuple(range(len(models))) if people is None else tuple(people)
+    tracks = [_Track(m, s) for m, s in zip(models, start, strict=True)]
+    for i, frame in enumerate(frames):
+        for ahead in frames[i : i + 2]:
+            observer.prefetch(ahead)
         held = (fixed or {}).get(frame, {})
-        poses = [held.get(i, p) for i, p in enumerate(poses)]
-        searched = [i for i in everybody if i not in held]
-        views = observer.evidence(frame)
+        poses = [held.get(p, t.expected(settings) if p in everybody else t.past[-1]) for p, t in enumerate(tracks)]
+        views = observer.evidence(frame, _regions(observer, models, poses))
+        scene = _Scene(views, list(models), poses, settings)
+        found = [
+            scene.held(p, tracks[p]) if p in held or p not in everybody else scene.estimate(p, tracks[p])
+            for p in range(len(models))
+        ]
+        for p, (track, pose) in enumerate(zip(tracks, found, strict=True)):
+            track.update(scene, p, pose, given=p in held)
+        cost = pose_cost(views, models, scene.poses, settings)(scene.poses)
+        yield PoseEstimate(
+            frame, tuple(scene.poses), cost.total_px, cost.views_px, sum(f.evaluations for f in found),
+            tuple(f.status for f in found), tuple(f.remark for f in found), tuple(f.parts_px for f in found),
+            tuple(f.covariance for f in found), tuple(f.quality for f in found),
+        )  # fmt: skip
+
+
+class _Found(NamedTuple):
+    """One person on one frame."""
+
+    status: Status
+    remark: str
+    parts_px: Array
+    covariance: Array
+    evaluations: int
+    quality: Quality | None
+
+
+class _Track:
+    """What is remembered of one person from frame to frame."""
+
+    def __init__(self, model: BodyModel, start: Array) -> None:
+        self.model = model
+        self.limbs = confidence.limbs(model)
+        self.past = [np.array(start)]
+        self.last_good = self.past[0]
+        self.known: PartColors | None = None
+
+    def expected(self, settings: TrackSettings) -> Array:
+        """The predicted pose of the next frame."""
+        return predict(self.model, self.past, settings.predict)
+
+    def update(self, scene: "_Scene", person: int, found: _Found, given: bool) -> None:
+        """Take in what a frame brought; a given pose begins the motion anew where it is far from the track."""
+        pose = scene.poses[person]
+        if self.known is None or given:
+            self.known = scene.colors(person).learn()
+        self.past = [*self.past[-7:], pose]
+        if found.status == "good":
+            self.last_good = pose
+
+
+class _Scene:
+    """One frame: its evidence, and where everybody stands so far."""
+
+    def __init__(
+        self, views: Sequence[ViewEvidence], models: list[BodyModel], poses: list[Array], settings: TrackSettings
+    ) -> None:
+        self.views, self.models, self.poses, self.settings = views, models, poses, settings
+        self._thetas = np.array(
+            [v.theta_px if settings.theta_px is None else settings.theta_px * v.scale for v in views]
+        )
+
+    def colors(self, person: int) -> Colors:
+        """The colours of this frame under a person."""
+        return Colors(self.views, self._bodies(), person)
+
+    def held(self, person: int, track: _Track) -> _Found:
+        """Judge nobody: a pose that was given is taken as it is."""
+        match = ContourMatch(self.views, self._bodies(), person, self.settings.match, self.settings.theta_px)
+        n = track.model.n_dofs
+        return _Found("good", "", self._parts_px(match, self.poses[person]), np.zeros((n, n)), 0, None)
+
+    def estimate(self, person: int, track: _Track) -> _Found:
+        """Find the pose of one person, the others as they stand; it takes its place in `poses`."""
+        model, settings, predicted = track.model, self.settings, self.poses[person]
+        match = ContourMatch(self.views, self._bodies(), person, settings.match, settings.theta_px)
+        priors: list[Block] = [
+            StayNear(predicted, np.where(model.dof_is_length, 1 / settings.trust_m, 1 / settings.trust_rad)),
+            StayNear(model.neutral(), 1 / model.spreads),
+        ]
+        judge = Judge(match, priors, self.colors(person), track.known, settings.recover or RecoverSettings())
+        evaluations, remarks = 0, []
+        if settings.estimate == "search":
+            evaluations = self._search(person)
+            fit = solve(model, self.poses[person], [match, *priors], max_iterations=0)
+        else:
+            fit = solve(model, predicted, [match, *priors], max_iterations=_ITERATIONS, tolerance=_TOLERANCE)
+        found = self._quality(track, match, fit, predicted, judge)
+        if settings.estimate == "refine" and confidence.judge(found) == "lost":
+            evaluations, fit = self._search_body(person, track, fit, judge)
+            remarks.append("body searched anew")
+            found = self._quality(track, match, fit, predicted, judge)
+        if settings.estimate == "refine" and settings.recover is not None:
+            for limb in [x for x in track.limbs if x.name in found.suspects]:
+                better = search_limb(model, limb, fit, (track.past[-1], predicted), judge, _ITERATIONS)
+                if better is not fit:
+                    remarks.append(f"{_chain(limb)} searched anew")
+                    fit = better
+            found = self._quality(track, match, fit, predicted, judge)
+        self.poses[person] = fit.values
+        return _Found(
+            confidence.judge(found), ", ".join(remarks), self._parts_px(match, fit.values), covariance(model, fit),
+            evaluations, found,
+        )  # fmt: skip
+
+    def _search_body(self, person: int, track: _Track, fit: Fit, judge: Judge) -> tuple[int, Fit]:
+        """Best-first search from the prediction and from the last good pose; the best of what refines from there."""
+        predicted, best, evaluations = self.poses[person], fit, 0
+        for start in (predicted, track.last_good):
+            self.poses[person] = start
+            evaluations += self._search(person)
+            refined = solve(
+                track.model, self.poses[person], [judge.match, *judge.priors], None, _ITERATIONS, _TOLERANCE
+            )
+            if judge.cost(track.model, refined) < judge.cost(track.model, best):
+                best = refined
+        self.poses[person] = best.values
+        return evaluations, best
+
+    def _search(self, person: int) -> int:
+        """Best-first search of one person from where it stands; returns how many poses were scored."""
         evaluations = 0
-        for step in search_frame(views, models, poses, settings, searched):
-            poses, evaluations = list(step.best), step.evaluations
-        cost = pose_cost(views, models, poses, settings)(poses)
-        yield PoseEstimate(frame, tuple(poses), cost.total_px, cost.views_px, evaluations)
+        for step in search_frame(self.views, self.models, self.poses, self.settings, [person]):
+            self.poses, evaluations = list(step.best), step.evaluations
+        return evaluations
+
+    def _quality(self, track: _Track, match: ContourMatch, fit: Fit, predicted: Array, judge: Judge) -> Quality:
+        known = track.known
+        colors = None if known is None else (judge.colors.score(fit.values, known), known)
+        costs, open_px = match.part_costs(fit.values), _open_px(self.views, track.model, fit.values)
+        return confidence.quality(track.model, fit, predicted, costs, self._thetas, open_px, colors)
+
+    def _parts_px(self, match: ContourMatch, values: Array) -> Array:
+        """Mean distance of each part's contour to the edges, (n_parts,), px of the footage."""
+        costs = match.part_costs(values)
+        scales = np.array([v.scale for v in self.views])
+        length = (costs.length_px / scales[:, None]).sum(axis=0)
+        far = np.nansum(costs.forward_px * costs.length_px / scales[:, None] ** 2, axis=0)
+        return np.divide(far, length, out=np.full_like(length, np.nan), where=length > 0)
+
+    def _bodies(self) -> list[Body]:
+        return [Body(m, p) for m, p in zip(self.models, self.poses, strict=True)]
+
+
+def _chain(limb: Limb) -> str:
+    """A limb as people say it."""
+    words = limb.name.replace("forearm", "arm").replace("calf", "leg")
+    return words.replace("_", " ")
+
+
+def _open_px(views: Sequence[ViewEvidence], model: BodyModel, values: Array) -> Array:
+    """Length of outline that each part would show within each image with nothing before it, (V, n_parts), px."""
+    T = model.kinematics(values).Ts_world_part
+    half = np.array([s.half_axes[2] for s in model.shapes])
+    middles = np.einsum("nij,nj->ni", T[:, :3, :3], model.centers_part) + T[:, :3, 3]
+    ends = np.stack([middles - half[:, None] * T[:, :3, 2], middles + half[:, None] * T[:, :3, 2]])
+    rows = []
+    for view in views:
+        size = np.array(view.camera.size)
+        seen = np.clip(view.camera.project(ends), 0, size - 1)
+        rows.append(2.0 * np.linalg.norm(seen[0] - seen[1], axis=-1))
+    return np.array(rows)
+
+
+def _regions(
+    observer: Observer, models: Sequence[BodyModel], poses: Sequence[Array]
+) -> list[tuple[int, int, int, int] | None]:
+    """Where to look in each view: around everybody, as predicted."""
+    points = np.concatenate([m.points_world(p) for m, p in zip(models, poses, strict=True)])
+    out: list[tuple[int, int, int, int] | None] = []
+    for camera in observer.matched_cameras:
+        depths = camera.depths(points)
+        if depths.min() < 2 * _REGION_MARGIN_M:  # too near for its outline to lie around the joints' images
+            out.append(None)
+            continue
+        margin = _REGION_MARGIN_M * camera.K[0, 0] / float(np.median(depths))
+        out.append(region_around(camera.project(points), margin, camera.size))
+    return out

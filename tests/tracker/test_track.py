@@ -8,12 +8,15 @@ from tracker.evaluate import evaluate_joints, joints_of_poses
 from tracker.evidence import Observer
 from tracker.fit import fit_to_points
 from tracker.joint_maps import LIMB_JOINTS
+from tracker.predict import PredictSettings
 from tracker.recording import Recording
 from tracker.references import read_joints
 from tracker.search import SearchSettings
 from tracker.track import TrackSettings, pose_cost, search_frame, track_chamfer
 
-COARSE = TrackSettings(SearchSettings(passes=(1.0,)))
+COARSE = TrackSettings(
+    estimate="search", search=SearchSettings(passes=(1.0,)), predict=PredictSettings(order=0), recover=None
+)
 STEP = 0.05
 """What a ball moves from frame to frame: a step of the lattice, so that tracking it is exact, metres."""
 
@@ -23,8 +26,13 @@ class Shown:
 
     def __init__(self, views):
         self.views, self.asked = views, []
+        self.matched_cameras = [v.camera for v in views[0]]
 
-    def evidence(self, k):
+    def prefetch(self, k):
+        pass
+
+    def evidence(self, k, regions):
+        assert len(regions) == len(self.matched_cameras)
         self.asked.append(k)
         return self.views[k]
 
@@ -112,7 +120,8 @@ def test_settings_reach_the_cost(balls):
         assert cost(far).total_px == pytest.approx(theta)
     paper = pose_cost(views[0], [model, model], values[0], TrackSettings(outliers="paper"))
     assert (paper.outliers, paper.models) == ("paper", tuple(b.model for b in bodies))
-    steps = list(search_frame(views[0], [model, model], values[0], TrackSettings(SearchSettings(passes=(1.0, 0.5)))))
+    twice = TrackSettings(search=SearchSettings(passes=(1.0, 0.5)))
+    steps = list(search_frame(views[0], [model, model], values[0], twice))
     assert [s.stage.factor for s in steps if s.stage_done] == [1.0, 1.0, 0.5, 0.5]
 
 

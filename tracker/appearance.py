@@ -1,0 +1,205 @@
+"""The colours of the parts: what edges cannot tell, which of two limbs an outline belongs to.
+
+Where a pose is known the colours under each part are remembered as a histogram; of another pose they tell how well
+the pixels under each part go with that part rather than with anything else in sight. Where all is of one colour the
+ratio is one, and nothing is said.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from tracker.body import Body, BodyModel
+from tracker.evidence import ViewEvidence
+from tracker.rigid import Array
+from tracker.silhouettes import Image
+
+BINS = 12
+"""Bins of the histograms along each colour channel."""
+_SMOOTHING_BINS = 0.7
+_ALONG, _ACROSS = 7, 3
+"""Samples along each part and across it."""
+_MOST_NATS = 3.0
+"""One pixel says at most this much."""
+_DOUBT = 0.02
+"""Share of pixels under a part that may show anything: what has never been seen there is not impossible."""
+
+
+class PartColors(NamedTuple):
+    """What is remembered of the colours of one person's parts."""
+
+    log_ratios: Array
+    """Logarithm of how much likelier each colour is on the part than elsewhere, (n_parts, BINS^3), nats."""
+    usual: Array
+    """Mean of that under each part where it was learnt, (n_parts,), nats."""
+
+
+class ColorScore(NamedTuple):
+    """How well the colours under a posed body go with its parts."""
+
+    nats: float
+    """Sum of the log ratios of all visible samples."""
+    parts: Array
+    """Their mean under each part, (n_parts,), nats; 0 where nothing of it is visible."""
+    samples: Array
+    """Visible samples of each part, (n_parts,)."""
+
+
+class Colors:
+    """The colours of the parts of one person in the views of one frame."""
+
+    def __init__(self, views: Sequence[ViewEvidence], bodies: Sequence[Body], person: int = 0) -> None:
+        """Take the colours of the views.
+
+        Args:
+            views: the evidence of the frame; views without colours are passed over.
+            bodies: everybody, for they hide each other.
+            person: index of the body that is looked at.
+        """
+        seen = [v for v in views if v.colors is not None]
+        self._P = [v.camera.K @ v.camera.T_camera_world[:3] for v in seen]
+        self._eyes = [v.camera.center_world for v in seen]
+        self._images = [v.colors for v in seen if v.colors is not None]
+        self._bodies, self._person = list(bodies), person
+        self._shapes = [_ellipsoids(b.model) for b in bodies]
+
+    def learn(self) -> PartColors:
+        """Remember the colours under the parts where the bodies stand; left and right parts share theirs."""
+        model = self._bodies[self._person].model
+        parts, colors = self._samples(self._bodies[self._person].values)
+        twins = _twins(model)
+        counts = np.zeros((len(model.parts), BINS**3))
+        np.add.at(counts, (twins[parts], colors), 1.0)
+        around = sum(
+            (np.bincount(_binned(i), minlength=BINS**3) for i in self._images), start=np.zeros(BINS**3, dtype=np.int64)
+        )
+        # Half of what a part is told from is the rest of the body, however small it is in the picture.
+        other = 0.5 * _share(_smoothed(around.astype(np.float64))) + 0.5 * _share(_smoothed(counts.sum(axis=0)))
+        own = np.array([_share(_smoothed(c)) for c in counts])
+        ratios = np.log(((1 - _DOUBT) * own + _DOUBT * other + 1e-7) / (other + 1e-7))
+        ratios[counts.sum(axis=1) == 0] = 0.0
+        ratios = np.clip(ratios, -_MOST_NATS, _MOST_NATS)[twins]
+        return PartColors(ratios, _mean_by_part(ratios[parts, colors], parts, len(model.parts))[0])
+
+    def score(self, values: Array, known: PartColors) -> ColorScore:
+        """How well the colours under the person in a pose, (n_values,), go with what is known of its parts."""
+        parts, colors = self._samples(values)
+        nats = known.log_ratios[parts, colors]
+        return ColorScore(float(nats.sum()), *_mean_by_part(nats, parts, known.log_ratios.shape[0]))
+
+    def _samples(self, values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Part and colour of each visible sample, (n,) each."""
+        bodies = list(self._bodies)
+        bodies[self._person] = Body(bodies[self._person].model, values)
+        Ts = [b.model.kinematics(b.values).Ts_world_part for b in bodies]
+        first = sum(len(T) for T in Ts[: self._person])
+        last = first + len(Ts[self._person])
+        room = (last - first) * _ALONG * _ACROSS
+        parts, colors = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+        for P, eye, image in zip(self._P, self._eyes, self._images, strict=True):
+            out = np.empty((room, 2), np.int64)
+            n = _look(P, eye, np.concatenate(Ts), np.concatenate(self._shapes), first, last, image, out)
+            parts.append(out[:n, 0])
+            colors.append(out[:n, 1])
+        return np.concatenate(parts), np.concatenate(colors)
+
+
+def _binned(image: Image) -> NDArray[np.int64]:
+    """Index of each pixel's colour bin, (H, W, 3) to (H * W,)."""
+    steps = image.reshape(-1, 3).astype(np.int64) * BINS // 256
+    return (steps[:, 0] * BINS + steps[:, 1]) * BINS + steps[:, 2]
+
+
+def _smoothed(counts: Array) -> Array:
+    cube = np.asarray(counts, dtype=np.float64).reshape(BINS, BINS, BINS)
+    return np.asarray(gaussian_filter(cube, _SMOOTHING_BINS, mode="nearest")).ravel()
+
+
+def _share(counts: Array) -> Array:
+    return counts / max(1e-12, float(counts.sum()))
+
+
+def _mean_by_part(nats: Array, parts: NDArray[np.int64], n_parts: int) -> tuple[Array, Array]:
+    samples = np.bincount(parts, minlength=n_parts)
+    return np.bincount(parts, weights=nats, minlength=n_parts) / np.maximum(samples, 1), samples.astype(np.float64)
+
+
+def _twins(model: BodyModel) -> NDArray[np.int64]:
+    """Index of the part that each shares its colours with: its left twin, or itself."""
+    names = [p.name for p in model.parts]
+    lefts = [n.replace("right", "left") for n in names]
+    return np.array([names.index(left) if left in names else i for i, left in enumerate(lefts)])
+
+
+def _ellipsoids(model: BodyModel) -> Array:
+    """Centre and half-axes of the ellipsoids that stand for the parts, (n_parts, 6), metres."""
+    return np.array([(*c, *s.half_axes) for c, s in zip(model.centers_part, model.shapes, strict=True)])
+
+
+@njit(nogil=True, cache=True)
+def _hidden(eye: Array, X: Array, own: int, Ts: Array, shapes: Array) -> bool:
+    """Whether the ellipsoid of another part lies before a point X on the axis of a part."""
+    for p in range(Ts.shape[0]):
+        if p == own:
+            continue
+        A, B, C = 0.0, 0.0, -1.0
+        for i in range(3):
+            o, d = -shapes[p, i], 0.0
+            for k in range(3):
+                o += Ts[p, k, i] * (eye[k] - Ts[p, k, 3])
+                d += Ts[p, k, i] * (X[k] - eye[k])
+            o /= shapes[p, 3 + i]
+            d /= shapes[p, 3 + i]
+            A += d * d
+            B += o * d
+            C += o * o
+        discriminant = B * B - A * C
+        # Where the middle of the chord lies beyond the point, the point is before or just within the other part.
+        if discriminant > 0.0 and 0.0 < -B < A:
+            return True
+    return False
+
+
+@njit(nogil=True, cache=True)
+def _look(
+    P: Array,
+    eye: Array,
+    Ts: Array,
+    shapes: Array,
+    first: int,
+    last: int,
+    image: Image,
+    out: NDArray[np.int64],
+) -> int:
+    """List part and colour of the visible samples of the parts from first to last in one view; their number."""
+    height, width = image.shape[0], image.shape[1]
+    X, side = np.empty(3), np.empty(3)
+    n = 0
+    for part in range(first, last):
+        radius = 0.45 * min(shapes[part, 3], shapes[part, 4])
+        for a in range(_ALONG):
+            z = shapes[part, 2] + shapes[part, 5] * 0.8 * (2.0 * a / (_ALONG - 1) - 1.0)
+            for i in range(3):
+                X[i] = Ts[part, i, 0] * shapes[part, 0] + Ts[part, i, 1] * shapes[part, 1] + Ts[part, i, 2] * z
+                X[i] += Ts[part, i, 3]
+            if P[2, 0] * X[0] + P[2, 1] * X[1] + P[2, 2] * X[2] + P[2, 3] < 0.05 or _hidden(eye, X, part, Ts, shapes):
+                continue
+            ax, ay, az = Ts[part, 0, 2], Ts[part, 1, 2], Ts[part, 2, 2]
+            vx, vy, vz = X[0] - eye[0], X[1] - eye[1], X[2] - eye[2]
+            side[0], side[1], side[2] = ay * vz - az * vy, az * vx - ax * vz, ax * vy - ay * vx
+            norm = np.sqrt(side[0] ** 2 + side[1] ** 2 + side[2] ** 2) + 1e-9
+            for s in range(_ACROSS):
+                f = radius * (s - (_ACROSS - 1) / 2) / norm
+                x, y, w = X[0] + f * side[0], X[1] + f * side[1], X[2] + f * side[2]
+                depth = P[2, 0] * x + P[2, 1] * y + P[2, 2] * w + P[2, 3]
+                u = int(np.floor((P[0, 0] * x + P[0, 1] * y + P[0, 2] * w + P[0, 3]) / depth + 0.5))
+                v = int(np.floor((P[1, 0] * x + P[1, 1] * y + P[1, 2] * w + P[1, 3]) / depth + 0.5))
+                if 0 <= u < width and 0 <= v < height:
+                    r, g, b = image[v, u, 0] * BINS // 256, image[v, u, 1] * BINS // 256, image[v, u, 2] * BINS // 256
+                    out[n, 0], out[n, 1] = part - first, (r * BINS + g) * BINS + b
+                    n += 1
+    return n

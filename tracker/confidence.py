@@ -1,0 +1,145 @@
+"""How sure a tracker is of a pose: what the evidence says of it, and a status by rules.
+
+The rules were set on simulated footage, where the error is known (`tests/benchmarks/calibrate_status.py`), and are
+checked on other scenes.
+"""
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.appearance import ColorScore, PartColors
+from tracker.body import BodyModel
+from tracker.fit import Fit, covariance
+from tracker.refine import PartCosts
+from tracker.rigid import Array
+
+Status = Literal["good", "doubtful", "lost"]
+
+_LEAST_SAMPLES = 12
+"""Colours of fewer samples say nothing about a part."""
+_LEAST_LENGTH = 0.15
+"""A part of whose outline less than this is visible in all views together hides somewhere."""
+
+
+class Limb(NamedTuple):
+    """A chain of parts that can be lost by itself."""
+
+    name: str
+    """Name of its last part."""
+    parts: NDArray[np.int64]
+    """Indices of its parts."""
+    dofs: NDArray[np.bool_]
+    """The degrees of freedom of its joints, (n_dofs,)."""
+
+
+class Quality(NamedTuple):
+    """What the evidence says of a pose. Distances are in outlier distances, shares from 0 to about 1."""
+
+    forward: float
+    """Mean cut-off distance of the visible contour to the edges."""
+    worst_part: float
+    """The same of the part that is worst off."""
+    explained: float
+    """Edge points explained, per visible contour of the same length."""
+    hidden_limb: float
+    """Visible outline of the limb that is best hidden, as a share of what it would show in the open."""
+    color_drop: float
+    """How much worse than usual the colours go with the part that is worst off, nats per sample."""
+    spread_m: float
+    """Largest standard deviation of the end of a limb, metres."""
+    step: float
+    """Largest way of a limb's end from where it was predicted, metres."""
+    views: int
+    """Views that see the body."""
+    suspects: tuple[str, ...]
+    """Limbs that the figures of their parts speak against."""
+
+
+def limbs(model: BodyModel) -> tuple[Limb, ...]:
+    """The chains from the leaves of the joint tree up to where it branches."""
+    children = np.bincount(np.array(model.parents)[1:], minlength=len(model.parts))
+    out = []
+    for leaf in np.flatnonzero(children == 0):
+        chain, part = [int(leaf)], model.parents[leaf]
+        while part > 0 and children[part] == 1:
+            chain.append(part)
+            part = model.parents[part]
+        dofs = np.isin(model.dof_joint, chain)
+        if dofs.any():
+            out.append(Limb(model.parts[leaf].name, np.array(chain[::-1]), dofs))
+    return tuple(out)
+
+
+def quality(
+    model: BodyModel,
+    fit: Fit,
+    predicted: Array,
+    costs: PartCosts,
+    thetas_px: Array,
+    open_px: Array,
+    colors: tuple[ColorScore, PartColors] | None,
+) -> Quality:
+    """Sum up what speaks for and against a pose.
+
+    Args:
+        model: the body.
+        fit: the pose, and the normal matrix there.
+        predicted: where it was expected, (n_values,).
+        costs: of its parts.
+        thetas_px: outlier distance of each view, (V,), matched px.
+        open_px: length of outline that each part would show in each view in the open, (V, n_parts), matched px.
+        colors: of its parts; None where there are none.
+    """
+    length = costs.length_px.sum(axis=0)
+    far = np.nansum(costs.forward_px / thetas_px[:, None] * costs.length_px, axis=0)
+    forward = far / np.maximum(length, 1e-9)
+    enough = length >= _LEAST_LENGTH * open_px.sum(axis=0)
+    shown = length / np.maximum(open_px.sum(axis=0), 1e-9)
+    drops = np.zeros(len(model.parts))
+    if colors is not None:
+        score, known = colors
+        drops = np.where(score.samples >= _LEAST_SAMPLES, known.usual - score.parts, 0.0)
+    chains = limbs(model)
+    ends = np.array([np.flatnonzero(model.point_parts == c.parts[-1])[-1] for c in chains])
+    J = _jacobian(model, fit.values, ends)
+    cov = J @ covariance(model, fit) @ np.swapaxes(J, 1, 2)
+    spread = float(np.sqrt(np.trace(cov, axis1=1, axis2=2).max()))
+    step = np.linalg.norm((model.points_world(fit.values) - model.points_world(predicted))[ends], axis=-1)
+    suspects = [c.name for c in chains if suspicious(forward[c.parts], shown[c.parts], drops[c.parts])]
+    return Quality(
+        float(far.sum() / max(1e-9, length.sum())),
+        float(forward[enough].max(initial=0.0)),
+        float(3.0 * costs.points.sum() / max(1e-9, length.sum())),
+        float(min((shown[c.parts].max() for c in chains), default=1.0)),
+        float(drops.max(initial=0.0)),
+        spread,
+        float(step.max()),
+        int(np.count_nonzero(costs.length_px.sum(axis=1) > 0)),
+        tuple(suspects),
+    )
+
+
+def suspicious(forward: Array, shown: Array, drops: Array) -> bool:
+    """Whether the figures of a limb's parts speak against it: see `Quality` for what they are, (n,) each."""
+    return bool(forward.max() > 0.45 or shown.max() < _LEAST_LENGTH or drops.max() > 0.6)
+
+
+def judge(found: Quality) -> Status:
+    """Good, doubtful or lost."""
+    if found.views == 0 or found.forward > 0.6:
+        return "lost"
+    return "doubtful" if found.suspects else "good"
+
+
+def worst(statuses: Sequence[Status]) -> Status:
+    """The worst of several."""
+    return max(statuses, key=("good", "doubtful", "lost").index, default="good")
+
+
+def _jacobian(model: BodyModel, values: Array, points: NDArray[np.int64]) -> Array:
+    """Derivative of some of the body's points, (n, 3, n_dofs)."""
+    kinematics = model.kinematics(values)
+    return model.point_jacobian(kinematics, model.point_parts[points], model.points_world(values)[points])

@@ -1,0 +1,67 @@
+"""Where a body will be: a polynomial over its last poses (GD96 Sect. 4.2)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracker.body import BodyModel
+from tracker.errors import TrackerError
+from tracker.rigid import Array
+
+MOST_ORDER = 2
+
+
+@dataclass(frozen=True)
+class PredictSettings:
+    """How motion goes on."""
+
+    order: int = 1
+    """Degree of the polynomial: 0 stays, 1 is constant velocity, 2 is constant acceleration, as in the paper.
+    A parabola through noisy poses overshoots: on every recording tried, constant velocity tracks better."""
+    window: int = 3
+    """Number of past poses it is fitted to."""
+    bound_rad: float = float(np.radians(25))
+    """Largest predicted change of an angle from one frame to the next, rad."""
+    bound_m: float = 0.10
+    """Largest predicted change of a position from one frame to the next, metres."""
+
+    def __post_init__(self) -> None:
+        """Raise a TrackerError for settings that predict nothing."""
+        if not 0 <= self.order <= MOST_ORDER or self.window < 1:
+            raise TrackerError(
+                f"expected a prediction of order 0 to {MOST_ORDER} over at least 1 past pose, found order "
+                f"{self.order} over {self.window}"
+            )
+
+
+def predict(model: BodyModel, past: Sequence[Array], settings: PredictSettings) -> Array:
+    """Extrapolate the past poses by one frame.
+
+    The polynomial runs through steps from the last pose, in the degrees of freedom; angles that may wind are first
+    unwrapped, so that a turn through half a circle goes on. With fewer poses than the order needs, the order is lower.
+
+    Args:
+        model: the body.
+        past: its poses, one frame apart, the last one last, (n_values,) each; at least one.
+        settings: degree, window and bounds.
+
+    Returns:
+        The predicted pose within the joint limits, (n_values,).
+    """
+    last, recent = past[-1], past[-settings.window :]
+    order = min(settings.order, len(recent) - 1)
+    if order == 0:
+        return model.clip(last)
+    steps = np.array([unwrapped(model, model.difference(p, last)) for p in recent])
+    times = np.arange(1.0 - len(recent), 1.0)
+    coefficients = np.linalg.lstsq(np.vander(times, order + 1), steps, rcond=None)[0]
+    step = coefficients.sum(axis=0)  # the polynomial at time 1
+    bound = np.where(model.dof_is_length, settings.bound_m, settings.bound_rad)
+    return model.clip(model.retract(last, np.clip(step, -bound, bound)))
+
+
+def unwrapped(model: BodyModel, step: Array) -> Array:
+    """The shorter way round for angles that may wind: a step (n_dofs,) with those brought within half a turn."""
+    winds = ~model.dof_is_length & np.isinf(model.limits).all(axis=1)
+    return np.where(winds, np.remainder(step + np.pi, 2 * np.pi) - np.pi, step)
