@@ -184,6 +184,8 @@ class _Page:
                 if sent is None or sent.timeline_version != state.timeline_version:
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
                 await self._send_curves(state)
+                if state.track.failed and (sent is None or sent.track is not state.track):
+                    await self._notice(state.track.message)
             except TrackerError as error:
                 await self._notice(str(error))
 

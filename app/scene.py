@@ -1,5 +1,7 @@
 """State to viser's 3-D scene: bodies, cameras, floor."""
 
+import time
+
 import numpy as np
 import viser
 
@@ -16,6 +18,8 @@ from tracker.session import Session
 _FRUSTUM_M = 0.25
 _REST_S = 0.08
 """Time between updates: drawing the scene costs the browser more than drawing the panes, which go first."""
+_SLOW_REST_S = 1.0
+"""The same while a tracker runs and a page draws the scene without a graphics card."""
 
 
 class Scene:
@@ -25,6 +29,7 @@ class Scene:
         """Build the scene and follow the controller's state."""
         self._server, self._session = server, controller.session
         self._shown: tuple[object, ...] = ()
+        self._shown_at = 0.0
         _add_surroundings(server, self._session)
         self._parts = [
             server.scene.add_mesh_simple(
@@ -45,9 +50,10 @@ class Scene:
 
     def _show(self, state: State) -> None:
         poses = tuple(id(p) for p in state.poses)
-        if poses == self._shown or state.rests_3d:
+        is_slow = state.track.running and bool(state.holding_3d)
+        if poses == self._shown or state.rests_3d or (is_slow and time.monotonic() < self._shown_at + _SLOW_REST_S):
             return
-        self._shown = poses
+        self._shown, self._shown_at = poses, time.monotonic()
         bodies = [Body(p.model, v) for p, v in zip(self._session.people, state.poses, strict=True)]
         Ts = part_poses(bodies)
         turns = rigid.quaternion_from_matrix(Ts[:, :3, :3])

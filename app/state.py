@@ -75,6 +75,8 @@ class TrackState:
     """Number of frames called lost."""
     message: str = ""
     """How the last run ended."""
+    failed: bool = False
+    """Whether it ended by an error."""
 
 
 @dataclass(frozen=True)

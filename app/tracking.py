@@ -200,15 +200,16 @@ class Tracking:
             if error is None:
                 how = "done"
             else:
-                how = str(error) if isinstance(error, TrackerError) else f"the tracker failed: {error}"
-            self._end(run, how)
+                why = str(error) if isinstance(error, TrackerError) else f"the tracker failed: {error}"
+                how = f"stopped, because {why}"
+            self._end(run, how, error is not None)
             self._screen.request_costs()
 
-    def _end(self, run: _Run, how: str) -> None:
+    def _end(self, run: _Run, how: str, failed: bool = False) -> None:
         self._save(run)
         track = self._screen.state.track
         self._run = None
-        self._screen.set(track=TrackState(message=f"{how}: {_summary(track)}"))
+        self._screen.set(track=TrackState(message=f"{how}: {_summary(track)}", failed=failed))
 
 
 def _worst(found: PoseEstimate, people: Sequence[int]) -> str:

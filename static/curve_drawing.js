@@ -35,7 +35,6 @@ export function drawCurves(context, axis, height, curves, labels, hidden, keyfra
     const top = index * (each + PLOT_GAP);
     const scale = scaleOf(plot.unit, series.map(({ values }) => values), top, top + each);
     drawFrame(context, axis, scale, style);
-    drawTitle(context, axis, top, `${plot.title}, ${UNITS[plot.unit]}`, style);
     drawKeyframes(context, keys, scale, style);
     context.save();
     context.beginPath();
@@ -50,6 +49,7 @@ export function drawCurves(context, axis, height, curves, labels, hidden, keyfra
       context.stroke(path);
     }
     context.restore();
+    drawTitle(context, axis, top, `${plot.title}, ${UNITS[plot.unit]}`, style);
   });
   drawFrameNumbers(context, axis, height, style);
 }

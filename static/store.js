@@ -23,6 +23,8 @@
  * @property {number | null} filled the camera whose pane fills the grid
  */
 
+const MOST_ROUNDS = 3;
+
 export class Store {
   /** @type {Facts} */
   facts = {
@@ -44,6 +46,7 @@ export class Store {
   #views = [];
   /** @type {Set<keyof Facts>} */
   #changed = new Set();
+  #isScheduled = false;
 
   /**
    * Change facts; views hear of it on the next animation frame.
@@ -51,7 +54,10 @@ export class Store {
    * @param {Partial<Facts>} facts
    */
   set(facts) {
-    if (this.#changed.size === 0) requestAnimationFrame(() => this.#flush());
+    if (!this.#isScheduled) {
+      this.#isScheduled = true;
+      requestAnimationFrame(() => this.#flush());
+    }
     Object.assign(this.facts, facts);
     for (const key of Object.keys(facts)) this.#changed.add(/** @type {keyof Facts} */ (key));
   }
@@ -62,9 +68,14 @@ export class Store {
   }
 
   #flush() {
-    const changed = this.#changed;
-    this.#changed = new Set();
-    for (const view of this.#views) view(changed);
+    // What views change meanwhile is shown at once too, not an animation frame later.
+    for (let round = 0; round < MOST_ROUNDS && this.#changed.size > 0; round += 1) {
+      const changed = this.#changed;
+      this.#changed = new Set();
+      for (const view of this.#views) view(changed);
+    }
+    this.#isScheduled = false;
+    if (this.#changed.size > 0) this.set({});
   }
 
   /**

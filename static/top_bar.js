@@ -102,17 +102,17 @@ export class TopBar {
 
   /** @param {import("./protocol.js").Track} track */
   #showTrack({ running, first, last, at, done, total, per_second, doubtful, lost, message }) {
-    const what = running ? "tracking" : "paused";
-    const where = at === null ? `from frame ${first}` : `frame ${at}`;
-    this.#stage.textContent = first === null ? message : `${what}: ${where}, ${done} of ${total} to ${last}`;
-    this.#stage.title = this.#stage.textContent;
+    const stands = first !== null;
+    const [how, ...rest] = message.split(", ");
+    this.#stage.textContent = stands ? `${running ? "tracked" : "paused"} ${done} of ${total}` : how;
+    this.#stage.title = stands ? `Frame ${at ?? first}, on the way to frame ${last}` : message;
     const counts = [doubtful && `${doubtful} doubtful`, lost && `${lost} lost`].filter(Boolean);
-    const figures = [`${per_second.toFixed(1)} frames/s`, ...counts].join(" · ");
-    this.#figures.textContent = first === null ? "" : figures;
+    const figures = [`${per_second.toFixed(1)}/s`, ...counts].join(" · ");
+    this.#figures.textContent = stands ? figures : rest.join(" · ");
     const bar = document.createElement("i");
     bar.style.setProperty("--done", `${(100 * done) / Math.max(1, total)}%`);
     bar.className = "is-share";
-    this.#stages.replaceChildren(...(first === null ? [] : [bar]));
+    this.#stages.replaceChildren(...(stands ? [bar] : []));
   }
 
   /** @param {import("./protocol.js").StateMessage} state */

@@ -179,6 +179,18 @@ async def test_what_cannot_be_tracked_is_a_notice(controller):
         assert "'ears' is no group of curves" in (await page.hear("notice"))["text"]
 
 
+async def test_a_tracker_that_fails_is_a_notice_once(controller, tracker):
+    tracker.fails_at = 4
+    async with visiting(controller) as page:
+        await page.hear("timeline")
+        await page.send("track", action="forward", until=None)
+        tracker.let_go(2)
+        assert "no light" in (await page.hear("notice"))["text"]
+        await page.send("select", person=0, point="head")
+        await page.hear("state", lambda m: m["point"] == "head")
+        assert len([m for m in page.told if m["type"] == "notice"]) == 1
+
+
 async def test_curves_come_whole_and_then_as_they_change(controller, tracker):
     async with visiting(controller) as page:
         await page.hear("timeline")

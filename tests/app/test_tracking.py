@@ -262,7 +262,8 @@ def test_a_tracker_that_fails_says_so_and_loses_nothing(placed, tracker):
     placed.track(backward=False, until=None)
     tracker.let_go(4)
     wait_for(lambda: placed.state.track.message)
-    assert placed.state.track.message == "the tracker failed: no light: 3 frames, 1 doubtful"
+    assert placed.state.track.message == "stopped, because the tracker failed: no light: 3 frames, 1 doubtful"
+    assert placed.state.track.failed
     assert set(placed.timeline()) == {2, 3, 4, 5}
 
 
