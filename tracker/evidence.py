@@ -141,6 +141,17 @@ def accepted(view: ViewEvidence, predicted_px: FloatArray, threshold_px: float |
     return replace(view, points_px=points, normals=normals, distance=distance, accepted=chosen)
 
 
+def unfiltered(view: ViewEvidence) -> ViewEvidence:
+    """The same view with all its edges: where the prediction is wrong, what it refused may be what it missed."""
+    if view.segments is None or view.accepted is None or view.accepted.all():
+        return view
+    everything = np.ones(len(view.accepted), np.bool_)
+    nothing = np.zeros((view.camera.height, view.camera.width), np.uint8)
+    points, normals, found = _matched_edges(view.segments, everything, nothing)
+    distance = distance_image(found, 2 * view.theta_px)
+    return replace(view, points_px=points, normals=normals, distance=distance, accepted=None)
+
+
 def _matched_edges(
     segments: Segments | None, chosen: NDArray[np.bool_] | None, found: NDArray[np.uint8]
 ) -> tuple[FloatArray, FloatArray, NDArray[np.uint8]]:

@@ -11,12 +11,14 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from tracker import confidence
+from tracker import confidence, contours
 from tracker.appearance import Colors, PartColors
 from tracker.body import Body, BodyModel
+from tracker.cameras import Camera
 from tracker.chamfer import ChamferCost, Outliers
 from tracker.confidence import Limb, Quality, Status
-from tracker.evidence import Observer, ViewEvidence
+from tracker.contours import FloatArray
+from tracker.evidence import Observer, ViewEvidence, unfiltered
 from tracker.fit import Block, Fit, StayNear, covariance, solve
 from tracker.matched import region_around
 from tracker.predict import PredictSettings, predict
@@ -51,6 +53,8 @@ class TrackSettings:
     """Outlier distance, px of the footage; None for 3% of the longer side of each image."""
     outliers: Outliers = "truncated"
     """How the search treats outliers, see `ChamferCost`."""
+    segments: bool = True
+    """Whether edges count only in segments that the prediction accepts as wholes (GD96 Sect. 4.2)."""
     trust_rad: float = 0.15
     """Standard deviation of the prediction of an angle, rad."""
     trust_m: float = 0.05
@@ -131,7 +135,9 @@ def track_chamfer(
             observer.prefetch(ahead)
         held = (fixed or {}).get(frame, {})
         poses = [held.get(p, t.expected(settings) if p in everybody else t.past[-1]) for p, t in enumerate(tracks)]
-        views = observer.evidence(frame, _regions(observer, models, poses))
+        regions, bodies = _regions(observer, models, poses), [Body(m, p) for m, p in zip(models, poses, strict=True)]
+        outlines = [_outline(bodies, c) for c in observer.matched_cameras] if settings.segments else None
+        views = observer.evidence(frame, regions, outlines)
         scene = _Scene(views, list(models), poses, settings)
         found = [
             scene.held(p, tracks[p]) if p in held or p not in everybody else scene.estimate(p, tracks[p])
@@ -188,7 +194,7 @@ class _Scene:
     def __init__(
         self, views: Sequence[ViewEvidence], models: list[BodyModel], poses: list[Array], settings: TrackSettings
     ) -> None:
-        self.views, self.models, self.poses, self.settings = views, models, poses, settings
+        self.views, self.models, self.poses, self.settings = list(views), models, poses, settings
         self._thetas = np.array(
             [v.theta_px if settings.theta_px is None else settings.theta_px * v.scale for v in views]
         )
@@ -211,29 +217,49 @@ class _Scene:
             StayNear(predicted, np.where(model.dof_is_length, 1 / settings.trust_m, 1 / settings.trust_rad)),
             StayNear(model.neutral(), 1 / model.spreads),
         ]
-        judge = Judge(match, priors, self.colors(person), track.known, settings.recover or RecoverSettings())
-        evaluations, remarks = 0, []
+        blocks: list[Block] = [match, *priors]
         if settings.estimate == "search":
             evaluations = self._search(person)
-            fit = solve(model, self.poses[person], [match, *priors], max_iterations=0)
-        else:
-            fit = solve(model, predicted, [match, *priors], max_iterations=_ITERATIONS, tolerance=_TOLERANCE)
-        found = self._quality(track, match, fit, predicted, judge)
-        if settings.estimate == "refine" and confidence.judge(found) == "lost":
+            fit = solve(model, self.poses[person], blocks, max_iterations=0)
+            return self._take(person, track, match, fit, predicted, evaluations, [])
+        fit = solve(model, predicted, blocks, max_iterations=_ITERATIONS, tolerance=_TOLERANCE)
+        found = self._quality(person, track, match, fit, predicted)
+        if settings.recover is None or confidence.judge(found) == "good":
+            return self._take(person, track, match, fit, predicted, 0, [])
+        return self._recover(person, track, fit, found, predicted, priors)
+
+    def _recover(
+        self, person: int, track: _Track, fit: Fit, found: Quality, predicted: Array, priors: list[Block]
+    ) -> _Found:
+        """Search what the refinement alone did not find, among all edges: the prediction may refuse the right ones."""
+        model, settings = track.model, self.settings
+        assert settings.recover is not None
+        self.views = [unfiltered(v) for v in self.views]
+        match = ContourMatch(self.views, self._bodies(), person, settings.match, settings.theta_px)
+        judge = Judge(match, priors, self.colors(person), track.known, settings.recover)
+        fit = solve(model, fit.values, [match, *priors], max_iterations=_ITERATIONS, tolerance=_TOLERANCE)
+        remarks, evaluations = [], 0
+        if confidence.judge(found) == "lost":
             evaluations, fit = self._search_body(person, track, fit, judge)
             remarks.append("body searched anew")
-            found = self._quality(track, match, fit, predicted, judge)
-        if settings.estimate == "refine" and settings.recover is not None:
-            for limb in [x for x in track.limbs if x.name in found.suspects]:
-                better = search_limb(model, limb, fit, (track.past[-1], predicted), judge, _ITERATIONS)
-                if better is not fit:
-                    remarks.append(f"{_chain(limb)} searched anew")
-                    fit = better
-            found = self._quality(track, match, fit, predicted, judge)
+            found = self._quality(person, track, match, fit, predicted)
+        for limb in [x for x in track.limbs if x.name in found.suspects]:
+            better = search_limb(model, limb, fit, (track.past[-1], predicted), judge, _ITERATIONS)
+            if better is not fit:
+                remarks.append(f"{_chain(limb)} searched anew")
+                fit = better
+        return self._take(person, track, match, fit, predicted, evaluations, remarks)
+
+    def _take(
+        self, person: int, track: _Track, match: ContourMatch, fit: Fit, predicted: Array, evaluations: int,
+        remarks: list[str],
+    ) -> _Found:  # fmt: skip
+        """Put a person in the pose that was found, and judge it."""
         self.poses[person] = fit.values
+        found = self._quality(person, track, match, fit, predicted)
         return _Found(
-            confidence.judge(found), ", ".join(remarks), self._parts_px(match, fit.values), covariance(model, fit),
-            evaluations, found,
+            confidence.judge(found), ", ".join(remarks), self._parts_px(match, fit.values),
+            covariance(track.model, fit), evaluations, found,
         )  # fmt: skip
 
     def _search_body(self, person: int, track: _Track, fit: Fit, judge: Judge) -> tuple[int, Fit]:
@@ -257,9 +283,10 @@ class _Scene:
             self.poses, evaluations = list(step.best), step.evaluations
         return evaluations
 
-    def _quality(self, track: _Track, match: ContourMatch, fit: Fit, predicted: Array, judge: Judge) -> Quality:
-        known = track.known
-        colors = None if known is None else (judge.colors.score(fit.values, known), known)
+    def _quality(self, person: int, track: _Track, match: ContourMatch, fit: Fit, predicted: Array) -> Quality:
+        known, colors = track.known, None
+        if known is not None:
+            colors = self.colors(person).score(fit.values, known), known
         costs, open_px = match.part_costs(fit.values), _open_px(self.views, track.model, fit.values)
         return confidence.quality(track.model, fit, predicted, costs, self._thetas, open_px, colors)
 
@@ -293,6 +320,12 @@ def _open_px(views: Sequence[ViewEvidence], model: BodyModel, values: Array) -> 
         seen = np.clip(view.camera.project(ends), 0, size - 1)
         rows.append(2.0 * np.linalg.norm(seen[0] - seen[1], axis=-1))
     return np.array(rows)
+
+
+def _outline(bodies: Sequence[Body], camera: Camera) -> FloatArray:
+    """Visible pieces of the predicted contours, x0, y0, x1, y1, (M, 4), px."""
+    contour = contours.trace(bodies, camera)
+    return contour.pieces_px[~contour.hidden]
 
 
 def _regions(

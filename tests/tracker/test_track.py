@@ -31,7 +31,7 @@ class Shown:
     def prefetch(self, k):
         pass
 
-    def evidence(self, k, regions):
+    def evidence(self, k, regions, outlines):
         assert len(regions) == len(self.matched_cameras)
         self.asked.append(k)
         return self.views[k]
