@@ -20,8 +20,8 @@ from app.tracking import Tracking
 from tracker import posing
 from tracker.records import FrameNumbers
 from tracker.rigid import Array
-from tracker.search import SearchSettings
 from tracker.session import Session
+from tracker.track import TrackSettings
 
 _CHECKPOINT_S = 1.0
 """A long drag is on disk at least this often."""
@@ -169,13 +169,12 @@ class Controller:
 
     # --- searching and tracking --------------------------------------------------------------------------------
 
-    def set_search(self, settings: SearchSettings, theta_px: float | None, outliers: str) -> None:
+    def set_settings(self, settings: TrackSettings) -> None:
         """Change what the next search or tracking run is told; a search that stands is forgotten."""
         self._searching.halt()
         with self._lock:
             self._searching.forget()
-            kind = "paper" if outliers == "paper" else "truncated"
-            self._screen.set(settings=settings, theta_px=theta_px, outliers=kind)
+            self._screen.set(settings=settings)
             self._screen.set(**self._screen.costs(self.state.poses))
 
     def search_step(self) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from app import overlays
 from app.curves import plots_of, samples
 from app.state import OVERLAYS, JobState, State, TrackState
+from tracker.evidence import ViewEvidence
 from tracker.records import FrameNumbers
 from tracker.session import Session
 
@@ -63,16 +64,17 @@ def state(state: State) -> dict[str, Any]:
     }
 
 
-def overlay(session: Session, state: State, page: int) -> bytes:
+def overlay(session: Session, state: State, page: int, views: Sequence[ViewEvidence] | None) -> bytes:
     """The vectors over all views.
 
     Args:
         session: with its cameras and people.
         state: what to draw.
         page: number of the page, whose drags the message answers.
+        views: the evidence of the shown frame, where it is at hand.
     """
     segments, rows, first = [], [], 0
-    for path in overlays.paths(session, state):
+    for path in overlays.paths(session, state, views):
         count = len(path.segments_px)
         rows.append(
             {

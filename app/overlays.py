@@ -1,4 +1,4 @@
-"""What is drawn over the views: contours, candidates, part edges, joints, epipolar lines."""
+"""What is drawn over the views: contours, candidates, part edges, joints, epipolar lines, segments of edges."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,12 +10,18 @@ from tracker import contours, occlusion
 from tracker.body import Body, BodyModel
 from tracker.cameras import Camera, epipolar_segment
 from tracker.contours import FloatArray
+from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.rigid import Array
+from tracker.segments import accept
 from tracker.session import Session
 
 CANDIDATE_COLOR = "#ffffff"
 PART_EDGE_COLOR = "#9aa3ad"
 EPIPOLAR_COLOR = "#ffd54a"
+ACCEPTED_COLOR = "#35e0c8"
+REJECTED_COLOR = "#ff4fa3"
+_EDGE_STRIDE = 3
+"""Every so many pixels of an edge are drawn: more would be seen only far in, and cost the browser much."""
 
 
 class Path(NamedTuple):
@@ -24,7 +30,7 @@ class Path(NamedTuple):
     camera: int
     person: int
     kind: str
-    """`model`, `candidate`, `part_edge` or `epipolar`."""
+    """`model`, `candidate`, `part_edge`, `epipolar`, `accepted` or `rejected`."""
     color: str
     segments_px: FloatArray
     """x0, y0, x1, y1, (N, 4), undistorted px."""
@@ -55,8 +61,14 @@ def bones(model: BodyModel) -> list[tuple[str, str]]:
     return pairs
 
 
-def paths(session: Session, state: State) -> list[Path]:
-    """Everything that the state's overlays call for, in all views."""
+def paths(session: Session, state: State, views: Sequence[ViewEvidence] | None) -> list[Path]:
+    """Everything that the state's overlays call for, in all views.
+
+    Args:
+        session: with its cameras and people.
+        state: what to draw.
+        views: the evidence of the shown frame; without it there are no segments of edges to draw.
+    """
     bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
     for index, source in enumerate(session.cameras):
@@ -68,6 +80,8 @@ def paths(session: Session, state: State) -> list[Path]:
                 out += _contours(session, tested, camera, index, "candidate", [CANDIDATE_COLOR] * len(tested))
         if "part_edges" in state.overlays:
             out.append(Path(index, 0, "part_edge", PART_EDGE_COLOR, occlusion.part_edges(bodies, camera)))
+        if "segments" in state.overlays and views is not None:
+            out += _segments(bodies, views[index], index)
     if state.drag is not None:
         out += _epipolar_lines(session, state)
     return out
@@ -101,6 +115,28 @@ def _contours(
     return [
         Path(index, person, kind, colors[person], contour.pieces_px[~contour.hidden & (people == person)])
         for person in range(len(bodies))
+    ]
+
+
+def _segments(bodies: Sequence[Body], view: ViewEvidence, index: int) -> list[Path]:
+    """The segments of edges that the poses shown explain, and those that they do not (GD96 Fig. 6)."""
+    segments = view.segments
+    if segments is None or len(segments.points_px) == 0:
+        return []
+    contour = contours.trace(bodies, view.camera)
+    chosen = accept(segments, contour.pieces_px[~contour.hidden], ACCEPTED_SHARE * view.theta_px)
+    lengths = np.diff(segments.firsts)
+    owners = np.repeat(np.arange(len(lengths)), lengths)
+    places = np.arange(len(owners)) - segments.firsts[owners]
+    drawn = np.flatnonzero((places % _EDGE_STRIDE == 0) | (places == lengths[owners] - 1))
+    goes_on = owners[drawn[1:]] == owners[drawn[:-1]]
+    # As resized pictures keep the borders of their pixels, not the centres.
+    points_px = (segments.points_px[drawn] + np.array(view.corner_px, np.float32) + 0.5) / view.scale - 0.5
+    lines = np.hstack([points_px[:-1], points_px[1:]])[goes_on].astype(np.float32)
+    of_accepted = chosen[owners[drawn[:-1][goes_on]]]
+    return [
+        Path(index, 0, "rejected", REJECTED_COLOR, lines[~of_accepted]),
+        Path(index, 0, "accepted", ACCEPTED_COLOR, lines[of_accepted]),
     ]
 
 

@@ -1,6 +1,6 @@
-"""State to viser's panels and back: pose sliders and the settings of the search."""
+"""State to viser's panels and back: pose sliders."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,9 +8,9 @@ import viser
 
 from app.controller import Controller
 from app.jobs import Latest
+from app.settings_panel import SettingsPanel
 from app.state import State
 from tracker.body import BodyModel
-from tracker.errors import TrackerError
 
 _REACH_M = 6.0
 """How far from the scene's middle the position sliders go, metres."""
@@ -43,7 +43,7 @@ class Panels:
             with folder:
                 self._sliders.append(self._add_sliders(index, person.model, middle))
             self._folders.append(folder)
-        self._search = self._add_search_settings()
+        SettingsPanel(server, controller)
         latest = Latest(self._show, "panels", _REST_S)
         controller.subscribe(latest.offer)
         latest.offer(controller.state)
@@ -80,78 +80,6 @@ class Panels:
 
     def _apply(self, change: _Change) -> None:
         self._controller.set_dof(change.person, change.dof, change.value)
-
-    def _add_search_settings(self) -> dict[str, Any]:
-        gui, state = self._server.gui, self._controller.state
-        s = state.settings
-        with gui.add_folder("Search", expand_by_default=False):
-            controls: dict[str, Any] = {
-                "bound_deg": gui.add_number(
-                    "bound, deg", float(np.degrees(s.bound_rad)), min=0.5, max=90.0, step=0.5,
-                    hint="Largest change of an angle from where the search begins",
-                ),
-                "bound_cm": gui.add_number(
-                    "bound, cm", 100 * s.bound_m, min=0.5, max=100.0, step=0.5,
-                    hint="Largest change of the position from where the search begins",
-                ),
-                "step_deg": gui.add_number(
-                    "step, deg", float(np.degrees(s.step_rad)), min=0.5, max=30.0, step=0.5,
-                    hint="Spacing of the poses tried, along an angle",
-                ),
-                "step_cm": gui.add_number(
-                    "step, cm", 100 * s.step_m, min=0.5, max=30.0, step=0.5,
-                    hint="Spacing of the poses tried, along the position",
-                ),
-                "passes": gui.add_text(
-                    "passes", ", ".join(f"{p:g}" for p in s.passes),
-                    hint="Factors on the steps: all stages are searched once per factor. The paper's mode is 1",
-                ),
-                "patience": gui.add_number(
-                    "patience", s.patience, min=1, max=100, step=1,
-                    hint="A stage ends after so many expansions that found nothing better",
-                ),
-                "theta_px": gui.add_number(
-                    "theta, px", 0.0, min=0.0, max=500.0, step=1.0,
-                    hint="Edges farther away than this say nothing; 0 takes 3% of the longer side of the image",
-                ),
-                "outliers": gui.add_dropdown(
-                    "outliers", ("truncated", "paper"), initial_value=state.outliers,
-                    hint="truncated: min(d, theta) over all points; paper: points beyond theta are left out",
-                ),
-            }  # fmt: skip
-
-        async def changed(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None:
-                try:
-                    self._read_search_settings()
-                except TrackerError as error:
-                    event.client.add_notification("Search", str(error), color="red", auto_close_seconds=8.0)
-
-        for control in controls.values():
-            control.on_update(changed)
-        self._search = controls
-        return controls
-
-    def _read_search_settings(self) -> None:
-        value = {name: control.value for name, control in self._search.items()}
-        try:
-            passes = tuple(float(p) for p in str(value["passes"]).split(",") if p.strip())
-        except ValueError:
-            passes = ()
-        if not passes or not all(0 < p <= 1 for p in passes):
-            raise TrackerError(
-                f"expected passes as factors above 0 and up to 1, such as '1, 0.5, 0.25', found '{value['passes']}'"
-            )
-        settings = replace(
-            self._controller.state.settings,
-            bound_rad=float(np.radians(value["bound_deg"])),
-            bound_m=value["bound_cm"] / 100,
-            step_rad=float(np.radians(value["step_deg"])),
-            step_m=value["step_cm"] / 100,
-            passes=passes,
-            patience=int(value["patience"]),
-        )
-        self._controller.set_search(settings, value["theta_px"] or None, value["outliers"])
 
     def _show(self, state: State) -> None:
         if state.rests_3d:

@@ -49,6 +49,7 @@ class _Page:
         self._sent: State | None = None
         self._sent_text: dict[str, Any] | None = None
         self._sent_text_at = 0.0
+        self._sent_overlay: tuple[object, ...] = ()  # what it was drawn from
         self._sent_images: tuple[int, str] | None = None
         self._curves: str | None = None
         self._sent_curves: tuple[str, int, int] | None = None  # group, person, version of the timeline
@@ -216,9 +217,12 @@ class _Page:
             await self._socket.send_bytes(messages.binary(header, data))
 
     async def _send_overlay(self, state: State, sent: State | None) -> None:
-        if sent is not None and _drawn(state) == _drawn(sent):
+        views = self._controller.frames.evidence_at_hand(state.frame) if "segments" in state.overlays else None
+        drawn = (*_drawn(state), views is None)
+        if sent is not None and drawn == self._sent_overlay:
             return
-        message = await asyncio.to_thread(messages.overlay, self._controller.session, state, self._number)
+        self._sent_overlay = drawn
+        message = await asyncio.to_thread(messages.overlay, self._controller.session, state, self._number, views)
         await self._socket.send_bytes(message)
 
     async def _send_timeline(self, since: int) -> None:

@@ -99,7 +99,7 @@ class Saver:
                 for i, value in enumerate(shown.values)
             )
             keyframe = source == "manual" or (stored is not None and stored.keyframe)
-            told = {"theta_px": state.theta_px, "outliers": state.outliers} if source == "searched" else {}
+            told = asdict(state.settings) if source == "searched" else {}
             record = PoseRecord(
                 shown.values, sources, revision, keyframe, "", state.cost_px, told, views_px=state.view_costs_px
             )

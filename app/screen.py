@@ -11,7 +11,7 @@ from app.state import Shown, State, finite_or_none
 from tracker import posing
 from tracker.rigid import Array
 from tracker.session import Session
-from tracker.track import TrackSettings, pose_cost
+from tracker.track import pose_cost
 
 
 class Screen:
@@ -66,10 +66,10 @@ class Screen:
         people = self._load(frame)
         costs = self.costs(tuple(p.values for p in people), frame)
         self.set(frame=frame, people=people, drag=None, **costs, **changes)
-        self.request_costs()
+        self.request_evidence()
 
-    def request_costs(self) -> None:
-        """See to it that the costs of the poses shown follow when the frame's evidence is there."""
+    def request_evidence(self) -> None:
+        """See to it that the frame's evidence comes, and the costs of the poses shown with it."""
         if self.frames.evidence_at_hand(self.state.frame) is None:
             self.frames.request(self.state.frame, self._evidence_ready)
 
@@ -78,7 +78,7 @@ class Screen:
         views = self.frames.evidence_at_hand(self.state.frame if frame is None else frame)
         if views is None:
             return {"cost_px": None, "view_costs_px": ()}
-        cost = pose_cost(views, self.models, poses, self.track_settings)(poses)
+        cost = pose_cost(views, self.models, poses, self.state.settings)(poses)
         return {
             "cost_px": finite_or_none(cost.total_px),
             "view_costs_px": tuple(finite_or_none(c) for c in cost.views_px),
@@ -95,11 +95,6 @@ class Screen:
         """Bring what the state says of the history and the disk up to date."""
         undo, redo = self.saver.undo_label(), self.saver.redo_label()
         self.set(undo=undo, redo=redo, save_error=self.saver.error, timeline_version=self.saver.timeline_version)
-
-    @property
-    def track_settings(self) -> TrackSettings:
-        """What searches and trackers are told."""
-        return TrackSettings(search=self.state.settings, theta_px=self.state.theta_px, outliers=self.state.outliers)
 
     def _load(self, frame: int) -> tuple[Shown, ...]:
         """What a frame shows: stored poses, else drafts from the nearest frame that has one."""

@@ -58,7 +58,7 @@ class Searching:
         """The search that stands, or a new one from the poses shown."""
         screen, state = self._screen, self._screen.state
         if self._job is None or self._job.ended:
-            frame, poses, settings = state.frame, state.poses, screen.track_settings
+            frame, poses, settings = state.frame, state.poses, state.settings
             job: Job[SearchStep] = Job(
                 lambda: search_frame(screen.frames.evidence(frame), screen.models, poses, settings),
                 lambda step, seconds: self._stepped(job, step, seconds),

@@ -6,11 +6,11 @@ from typing import Literal
 import numpy as np
 
 from tracker.rigid import Array
-from tracker.search import SearchSettings
+from tracker.track import TrackSettings
 
 Base = Literal["image", "edges", "distance"]
 BASES: tuple[Base, ...] = ("image", "edges", "distance")
-OVERLAYS = ("contours", "joints", "part_edges", "skeleton")
+OVERLAYS = ("contours", "joints", "part_edges", "skeleton", "segments")
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,10 +115,8 @@ class State:
     """For each page that drags: its number, and the last of its drag messages that this state takes in."""
     holding_3d: frozenset[int] = frozenset()
     """Numbers of the pages that want the 3-D view to rest during a drag."""
-    settings: SearchSettings = field(default_factory=SearchSettings)
-    theta_px: float | None = None
-    """Outlier distance, px; None for the default."""
-    outliers: Literal["truncated", "paper"] = "truncated"
+    settings: TrackSettings = field(default_factory=TrackSettings)
+    """What searches and trackers are told."""
     undo: str | None = None
     """What undo would take back."""
     redo: str | None = None

@@ -63,7 +63,7 @@ class Tracking:
             if not people:
                 raise TrackerError("expected a person who has been placed, found none; pose the body here first")
             frames = self._frames(backward, until, people)
-            way, settings, poses = "backward" if backward else "forward", screen.track_settings, state.poses
+            way, settings, poses = "backward" if backward else "forward", state.settings, state.poses
             run = _Run(f"track {way} from frame {frames[0]}", people, settings, saver.keyframes(frames))
             fixed = {frame: dict(held) for frame, held in run.fixed.items()}
             run.job = Job(
@@ -149,6 +149,8 @@ class Tracking:
             )  # fmt: skip
             if screen.state.follow or screen.state.frame == found.frame:
                 screen.set(track=track, **self._found(run, found))
+                if "segments" in screen.state.overlays:  # else nobody needs it until the run is over
+                    screen.request_evidence()
             else:
                 screen.set(track=track)
             if time.monotonic() - screen.last_save > _SAVE_S:
@@ -191,7 +193,7 @@ class Tracking:
             if run is self._run:
                 self._save(run)
                 self._screen.set(track=replace(self._screen.state.track, running=False))
-                self._screen.request_costs()
+                self._screen.request_evidence()
 
     def _ended(self, run: _Run, error: Exception | None) -> None:
         with self._screen.lock:
@@ -203,7 +205,7 @@ class Tracking:
                 why = str(error) if isinstance(error, TrackerError) else f"the tracker failed: {error}"
                 how = f"stopped, because {why}"
             self._end(run, how, error is not None)
-            self._screen.request_costs()
+            self._screen.request_evidence()
 
     def _end(self, run: _Run, how: str, failed: bool = False) -> None:
         self._save(run)

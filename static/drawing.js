@@ -15,12 +15,21 @@ const JOINT_RADIUS = 3.5;
 const TORSO_HALF_SIDE = 5.5;
 export const TORSO = "torso";
 
-/** @type {Record<import("./protocol.js").Path["kind"], {width: number, alpha: number, dash: number[]}>} */
+/**
+ * How each kind of line is drawn, and the layer that shows it; null: always.
+ *
+ * @typedef {{width: number, alpha: number, dash: number[], layer: keyof import("./protocol.js").Overlays | null,
+ *   hasHalo: boolean}} LineStyle
+ * @type {Record<import("./protocol.js").Path["kind"], LineStyle>}
+ */
 const LINE_STYLES = {
-  model: { width: 1.75, alpha: 1, dash: [] },
-  candidate: { width: 1.25, alpha: 0.8, dash: [] },
-  part_edge: { width: 1, alpha: 0.75, dash: [] },
-  epipolar: { width: 1.25, alpha: 0.9, dash: [6, 4] },
+  model: { width: 1.75, alpha: 1, dash: [], layer: "contours", hasHalo: true },
+  candidate: { width: 1.25, alpha: 0.8, dash: [], layer: "contours", hasHalo: true },
+  part_edge: { width: 1, alpha: 0.75, dash: [], layer: "part_edges", hasHalo: true },
+  epipolar: { width: 1.25, alpha: 0.9, dash: [6, 4], layer: null, hasHalo: true },
+  // Thousands of short lines, which their halos would merge into one.
+  accepted: { width: 1.5, alpha: 1, dash: [], layer: "segments", hasHalo: false },
+  rejected: { width: 1, alpha: 0.8, dash: [], layer: "segments", hasHalo: false },
 };
 
 /**
@@ -68,12 +77,12 @@ export function drawImage(context, view, bitmap) {
 export function drawPaths(context, view, overlay, camera, layers) {
   for (const path of overlay.paths) {
     if (path.camera !== camera || path.count === 0) continue;
-    if (path.kind === "part_edge" ? !layers.part_edges : path.kind !== "epipolar" && !layers.contours) continue;
     const style = LINE_STYLES[path.kind];
+    if (style.layer && !layers[style.layer]) continue;
     const line = tracePath(view, overlay.segments, path.first, path.count);
     context.globalAlpha = style.alpha;
     context.setLineDash(style.dash);
-    stroke(context, line, path.color, style.width);
+    stroke(context, line, path.color, style.width, style.hasHalo);
   }
   context.setLineDash([]);
   context.globalAlpha = 1;
@@ -105,12 +114,15 @@ function tracePath(view, segments, first, count) {
  * @param {Path2D} line
  * @param {string} color
  * @param {number} width
+ * @param {boolean} hasHalo
  */
-function stroke(context, line, color, width) {
+function stroke(context, line, color, width, hasHalo = true) {
   context.lineJoin = context.lineCap = "round";
-  context.strokeStyle = HALO;
-  context.lineWidth = width + 2;
-  context.stroke(line);
+  if (hasHalo) {
+    context.strokeStyle = HALO;
+    context.lineWidth = width + 2;
+    context.stroke(line);
+  }
   context.strokeStyle = color;
   context.lineWidth = width;
   context.stroke(line);

@@ -2,7 +2,8 @@
  * The messages of the pane socket (docs/protocol.md). Positions are undistorted pixels, pixel centres at integers.
  *
  * @typedef {"image" | "edges" | "distance"} Base
- * @typedef {{contours: boolean, joints: boolean, part_edges: boolean, skeleton: boolean}} Overlays
+ * @typedef {{contours: boolean, joints: boolean, part_edges: boolean, skeleton: boolean,
+ *   segments: boolean}} Overlays
  * @typedef {{name: string, width: number, height: number}} CameraInfo
  * @typedef {{name: string, color: string, points: string[], bones: [string, string][],
  *   parts: string[]}} PersonInfo
@@ -23,8 +24,8 @@
  * @typedef {SessionMessage | StateMessage | NoticeMessage | TimelineMessage} TextMessage
  *
  * @typedef {{type: "image", camera: number, frame: number, base: Base}} ImageHeader
- * @typedef {{camera: number, person: number, kind: "model" | "candidate" | "part_edge" | "epipolar", color: string,
- *   first: number, count: number}} Path
+ * @typedef {{camera: number, person: number, color: string, first: number, count: number,
+ *   kind: "model" | "candidate" | "part_edge" | "epipolar" | "accepted" | "rejected"}} Path
  * @typedef {{camera: number, person: number, point: string, u: number, v: number, visible: boolean}} Handle
  * @typedef {{type: "overlay", frame: number, seq: number, job: boolean, paths: Path[], handles: Handle[]}} OverlayHeader
  * @typedef {OverlayHeader & {segments: Float32Array}} Overlay

@@ -44,7 +44,8 @@ ORDER = [
     ["app.screen"],
     ["app.searching", "app.tracking"],
     ["app.controller", "app.messages"],
-    ["app.panes", "app.scene", "app.panels"],
+    ["app.panes", "app.scene", "app.settings_panel"],
+    ["app.panels"],
     ["app.workbench"],
     ["app.__main__"],
 ]

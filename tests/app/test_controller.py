@@ -10,6 +10,7 @@ from hands import FRONT, PAGE, drag, pixel_of, wait_for
 from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
 from tracker.search import SearchSettings
+from tracker.track import TrackSettings
 
 
 def test_a_fresh_session_shows_a_draft_that_is_not_stored(opened):
@@ -147,7 +148,7 @@ def test_stepping_a_search(opened):
 def test_a_search_to_its_end_lowers_the_cost_and_is_one_entry(opened):
     controller = opened()
     before = controller.state.cost_px
-    controller.set_search(SearchSettings(passes=(1.0,), max_expansions=4), None, "truncated")
+    controller.set_settings(TrackSettings(search=SearchSettings(passes=(1.0,), max_expansions=4)))
     controller.search_frame()
     wait_for(lambda: controller.state.job.message)
     assert controller.state.job.message.startswith("done")

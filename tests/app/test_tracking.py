@@ -31,6 +31,11 @@ def at(controller, frame):
     return lambda: controller.state.track.at == frame
 
 
+def end_the_step_soon(tracker):
+    """Whoever stops a run waits for the step at hand."""
+    threading.Timer(0.2, tracker.let_go, (1,)).start()
+
+
 def x_of(controller):
     return controller.state.poses[0][0]
 
@@ -129,7 +134,7 @@ def test_pause_and_go_on_are_one_entry(placed, tracker, session):
     placed.track(backward=False, until=8)
     tracker.let_go(2)
     wait_for(at(placed, 4))
-    threading.Timer(0.1, tracker.let_go, (1,)).start()  # the step at hand ends first
+    end_the_step_soon(tracker)
     placed.pause_tracking()
     assert not placed.state.track.running
     assert placed.state.track.at == 5
@@ -150,7 +155,7 @@ def test_stop_ends_a_run_and_keeps_what_it_found(placed, tracker):
     placed.track(backward=False, until=None)
     tracker.let_go(3)
     wait_for(at(placed, 5))
-    tracker.let_go(1)
+    end_the_step_soon(tracker)
     placed.stop()
     assert placed.state.track.first is None
     assert placed.state.track.message.startswith("stopped: ")
@@ -192,7 +197,7 @@ def test_edits_stop_a_run(placed, tracker, edit):
     placed.track(backward=False, until=None)
     tracker.let_go(3)
     wait_for(at(placed, 5))
-    tracker.let_go(1)
+    end_the_step_soon(tracker)
     {
         "drag": lambda: drag(placed, "left_knee", (3.0, 3.0)),
         "set": lambda: placed.set_dof(0, 8, 0.3),
@@ -226,7 +231,7 @@ def test_a_hand_takes_hold_of_the_frame_that_it_saw(placed, tracker):
     placed.track(backward=False, until=None)
     tracker.let_go(4)
     wait_for(at(placed, 6))
-    tracker.let_go(1)
+    end_the_step_soon(tracker)
     placed.begin_drag(PAGE, FRONT, 0, "torso", (320.0, 240.0), frame=4)
     assert placed.state.frame == 4
     assert placed.state.people[0].status == "doubtful"

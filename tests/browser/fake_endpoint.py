@@ -97,7 +97,7 @@ class FakeEndpoint:
         self.curves_group = None
         self.state = {
             "type": "state", "frame": 12, "person": 0, "point": None, "base": "image",
-            "overlays": {"contours": True, "joints": True, "part_edges": False, "skeleton": True},
+            "overlays": {"contours": True, "joints": True, "part_edges": False, "skeleton": True, "segments": False},
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
             "source": "manual", "status": "", "remark": "", "parts_px": [], "job": self.idle_job(""),
             "track": dict(NO_TRACK), "follow": True, "undo": "drag l_wrist", "redo": None,

@@ -161,7 +161,9 @@ async def test_layers_are_asked_for_and_shown_at_once(page, endpoint):
     await until(lambda: len(endpoint.heard("view")) == 2)
     first, second = endpoint.heard("view")
     assert first["base"] == second["base"] == "distance"
-    assert second["overlays"] == {"contours": False, "joints": True, "part_edges": False, "skeleton": True}
+    assert second["overlays"] == {
+        "contours": False, "joints": True, "part_edges": False, "skeleton": True, "segments": False,
+    }  # fmt: skip
     await page.get_by_text("Joints", exact=True).click()
     await page.get_by_text("Skeleton", exact=True).click()
     await shows(page, f"({DRAWN}) === 0")

@@ -1,0 +1,145 @@
+"""The settings of searches and trackers in viser's panel."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import viser
+
+from app.controller import Controller
+from tracker.errors import TrackerError
+from tracker.predict import MOST_ORDER, PredictSettings
+from tracker.recover import RecoverSettings
+from tracker.search import SearchSettings
+from tracker.track import Estimation, TrackSettings
+
+_METHODS: dict[Estimation, str] = {"refine": "refinement, search where needed", "search": "search alone (paper)"}
+_ORDERS = ("stays", "constant velocity", "constant acceleration")
+assert len(_ORDERS) == MOST_ORDER + 1
+
+
+class SettingsPanel:
+    """Two folders of the panel: what the tracker is told, and what a search is told."""
+
+    def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
+        """Build the folders; what is entered goes to the controller at once."""
+        self._server, self._controller = server, controller
+        settings = controller.state.settings
+        self._controls = {**self._add_tracking(settings), **self._add_search(settings)}
+
+        async def changed(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:  # else the program set it
+                try:
+                    self._controller.set_settings(self.read())
+                except TrackerError as error:
+                    event.client.add_notification("Settings", str(error), color="red", auto_close_seconds=8.0)
+
+        for control in self._controls.values():
+            control.on_update(changed)
+
+    def _add_tracking(self, settings: TrackSettings) -> dict[str, Any]:
+        gui, predict = self._server.gui, settings.predict
+        with gui.add_folder("Track", expand_by_default=False):
+            return {
+                "method": gui.add_dropdown(
+                    "method", tuple(_METHODS.values()), initial_value=_METHODS[settings.estimate],
+                    hint="How the pose of a frame is found from its prediction",
+                ),
+                "order": gui.add_dropdown(
+                    "prediction", _ORDERS, initial_value=_ORDERS[predict.order],
+                    hint="How motion is expected to go on; the paper has constant acceleration",
+                ),
+                "window": gui.add_number(
+                    "past poses", predict.window, min=1, max=8, step=1,
+                    hint="Number of poses from which the motion is taken",
+                ),
+                "recover": gui.add_checkbox(
+                    "search lost limbs", settings.recover is not None,
+                    hint="Search anew for a limb that is not where the edges and colours are",
+                ),
+            }  # fmt: skip
+
+    def _add_search(self, settings: TrackSettings) -> dict[str, Any]:
+        gui, s = self._server.gui, settings.search
+        with gui.add_folder("Search", expand_by_default=False):
+            return {
+                "bound_deg": gui.add_number(
+                    "bound, deg", float(np.degrees(s.bound_rad)), min=0.5, max=90.0, step=0.5,
+                    hint="Largest change of an angle from where the search begins",
+                ),
+                "bound_cm": gui.add_number(
+                    "bound, cm", 100 * s.bound_m, min=0.5, max=100.0, step=0.5,
+                    hint="Largest change of the position from where the search begins",
+                ),
+                "step_deg": gui.add_number(
+                    "step, deg", float(np.degrees(s.step_rad)), min=0.5, max=30.0, step=0.5,
+                    hint="Spacing of the poses tried, along an angle",
+                ),
+                "step_cm": gui.add_number(
+                    "step, cm", 100 * s.step_m, min=0.5, max=30.0, step=0.5,
+                    hint="Spacing of the poses tried, along the position",
+                ),
+                "passes": gui.add_text(
+                    "passes", ", ".join(f"{p:g}" for p in s.passes),
+                    hint="Factors on the steps: all stages are searched once per factor. The paper's mode is 1",
+                ),
+                "patience": gui.add_number(
+                    "patience", s.patience, min=1, max=100, step=1,
+                    hint="A stage ends after so many expansions that found nothing better",
+                ),
+                "theta_px": gui.add_number(
+                    "theta, px", settings.theta_px or 0.0, min=0.0, max=500.0, step=1.0,
+                    hint="Edges farther away than this say nothing; 0 takes 3% of the longer side of the image",
+                ),
+                "outliers": gui.add_dropdown(
+                    "outliers", ("truncated", "paper"), initial_value=settings.outliers,
+                    hint="truncated: min(d, theta) over all points; paper: points beyond theta are left out",
+                ),
+            }  # fmt: skip
+
+    def read(self) -> TrackSettings:
+        """The settings that the panel shows."""
+        return settings_of(
+            {name: control.value for name, control in self._controls.items()}, self._controller.state.settings
+        )
+
+
+def settings_of(value: dict[str, Any], before: TrackSettings) -> TrackSettings:
+    """Turn what the panel shows into settings; what it does not show stays as it is.
+
+    Args:
+        value: by name of the control; degrees and centimetres.
+        before: the settings until now.
+
+    Raises:
+        TrackerError: the passes are no factors.
+    """
+    search: SearchSettings = replace(
+        before.search,
+        bound_rad=float(np.radians(value["bound_deg"])),
+        bound_m=value["bound_cm"] / 100,
+        step_rad=float(np.radians(value["step_deg"])),
+        step_m=value["step_cm"] / 100,
+        passes=_passes(str(value["passes"])),
+        patience=int(value["patience"]),
+    )
+    predict: PredictSettings = replace(before.predict, order=_ORDERS.index(value["order"]), window=int(value["window"]))
+    return replace(
+        before,
+        estimate=next(key for key, label in _METHODS.items() if label == value["method"]),
+        predict=predict,
+        recover=(before.recover or RecoverSettings()) if value["recover"] else None,
+        search=search,
+        theta_px=value["theta_px"] or None,
+        outliers=value["outliers"],
+    )
+
+
+def _passes(text: str) -> tuple[float, ...]:
+    try:
+        passes = tuple(float(p) for p in text.split(",") if p.strip())
+    except ValueError:
+        passes = ()
+    if not passes or not all(0 < p <= 1 for p in passes):
+        raise TrackerError(f"expected passes as factors above 0 and up to 1, such as '1, 0.5, 0.25', found '{text}'")
+    return passes
