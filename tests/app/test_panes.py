@@ -246,3 +246,18 @@ async def test_a_drag_means_the_frame_that_the_hand_saw(controller):
         await page.hear("state", lambda m: m["frame"] == 2)
         await page.send("drag", phase="end", seq=2, **(hold | {"u": 330.0}))
         await page.hear("state", lambda m: m["undo"] == "drag torso, frame 2")
+
+
+async def test_segments_are_sent_when_the_evidence_has_come(controller):
+    async with visiting(controller) as page:
+        await page.hear("timeline")
+        shown = {"contours": True, "joints": True, "part_edges": False, "skeleton": False, "segments": True}
+        await page.send("view", base="image", overlays=shown)
+        await page.hear("overlay", lambda m: "rejected" in kinds(m))
+        await page.send("seek", frame=30)
+        message = await page.hear("overlay", lambda m: m["frame"] == 30 and "rejected" in kinds(m))
+        assert {p["camera"] for p in message["paths"] if p["kind"] == "accepted"} == {0, 1, 2, 3}
+
+
+def kinds(message):
+    return {p["kind"] for p in message["paths"]}
