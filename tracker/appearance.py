@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from tracker.body import Body, BodyModel
+from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence
+from tracker.kinematics import Tree, forward_kinematics
 from tracker.rigid import Array
 from tracker.silhouettes import Image
 
@@ -63,6 +65,7 @@ class Colors:
         seen = [v for v in views if v.colors is not None]
         self._P = [v.camera.K @ v.camera.T_camera_world[:3] for v in seen]
         self._eyes = [v.camera.center_world for v in seen]
+        self._distances = [v.distance / np.float32(v.theta_px) for v in seen]
         self._images = [v.colors for v in seen if v.colors is not None]
         self._bodies, self._person = list(bodies), person
         self._shapes = [_ellipsoids(b.model) for b in bodies]
@@ -90,6 +93,23 @@ class Colors:
         parts, colors = self._samples(values)
         nats = known.log_ratios[parts, colors]
         return ColorScore(float(nats.sum()), *_mean_by_part(nats, parts, known.log_ratios.shape[0]))
+
+    def along_limb(self, candidates: Array, limb: NDArray[np.int64], known: PartColors | None) -> Array:
+        """A quick look at one limb in many poses, (C, n_values): how good it seems, (C,), more is better.
+
+        At samples along the axes of its parts, where no other part hides them, the colours speak, and the edges at
+        both sides: near ones for it, none against it. Where the limb is hidden nothing is said.
+        """
+        model = self._bodies[self._person].model
+        Ts = np.concatenate([b.model.kinematics(b.values).Ts_world_part for b in self._bodies])
+        first = sum(len(b.model.parts) for b in self._bodies[: self._person])
+        ratios = np.zeros((len(model.parts), BINS**3)) if known is None else known.log_ratios
+        total, shapes = np.zeros(len(candidates)), np.concatenate(self._shapes)
+        for P, eye, image, distance in zip(self._P, self._eyes, self._images, self._distances, strict=True):
+            _look_along(
+                P, eye, candidates, model.tree, model.n_dofs, Ts, shapes, first, limb, image, distance, ratios, total
+            )
+        return total
 
     def _samples(self, values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Part and colour of each visible sample, (n,) each."""
@@ -165,6 +185,53 @@ def _hidden(eye: Array, X: Array, own: int, Ts: Array, shapes: Array) -> bool:
 
 
 @njit(nogil=True, cache=True)
+def _look_along(
+    P: Array, eye: Array, candidates: Array, tree: Tree, n_dofs: int, Ts: Array, shapes: Array, first: int,
+    limb: NDArray[np.int64], image: Image, distance: FloatArray, ratios: Array, total: Array,
+) -> None:  # fmt: skip
+    """Add to the totals (C,) what one view says of each candidate's limb."""
+    height, width = distance.shape
+    all_Ts, axes, origins = Ts.copy(), np.empty((n_dofs, 3)), np.empty((n_dofs, 3))
+    n_parts = tree.parents.shape[0]
+    X, side = np.empty(3), np.empty(3)
+    for c in range(candidates.shape[0]):
+        forward_kinematics(candidates[c], tree, all_Ts[first : first + n_parts], axes, origins)
+        for part in limb:
+            p = first + part
+            for a in range(_ALONG):
+                z = shapes[p, 2] + shapes[p, 5] * 0.8 * (2.0 * a / (_ALONG - 1) - 1.0)
+                for i in range(3):
+                    X[i] = all_Ts[p, i, 0] * shapes[p, 0] + all_Ts[p, i, 1] * shapes[p, 1] + all_Ts[p, i, 2] * z
+                    X[i] += all_Ts[p, i, 3]
+                depth = P[2, 0] * X[0] + P[2, 1] * X[1] + P[2, 2] * X[2] + P[2, 3]
+                if depth < 0.05 or _hidden(eye, X, p, all_Ts, shapes):
+                    continue
+                ax, ay, az = all_Ts[p, 0, 2], all_Ts[p, 1, 2], all_Ts[p, 2, 2]
+                vx, vy, vz = X[0] - eye[0], X[1] - eye[1], X[2] - eye[2]
+                side[0], side[1], side[2] = ay * vz - az * vy, az * vx - ax * vz, ax * vy - ay * vx
+                norm = np.sqrt(side[0] ** 2 + side[1] ** 2 + side[2] ** 2) + 1e-9
+                for s in range(5):
+                    f = 0.5 * (s - 2) * shapes[p, 3] / norm
+                    x, y, w = X[0] + f * side[0], X[1] + f * side[1], X[2] + f * side[2]
+                    d = P[2, 0] * x + P[2, 1] * y + P[2, 2] * w + P[2, 3]
+                    u = int(np.floor((P[0, 0] * x + P[0, 1] * y + P[0, 2] * w + P[0, 3]) / d + 0.5))
+                    v = int(np.floor((P[1, 0] * x + P[1, 1] * y + P[1, 2] * w + P[1, 3]) / d + 0.5))
+                    if u < 0 or v < 0 or u >= width or v >= height:
+                        total[c] -= 0.25
+                    elif s == 0 or s == 4:
+                        total[c] += 1.5 * (0.3 - min(distance[v, u], np.float32(1.0)))
+                    else:
+                        total[c] += ratios[part, _bin_of(image, v, u)]
+
+
+@njit(nogil=True, cache=True)
+def _bin_of(image: Image, v: int, u: int) -> int:
+    """Index of a pixel's colour."""
+    r, g, b = image[v, u, 0] * BINS // 256, image[v, u, 1] * BINS // 256, image[v, u, 2] * BINS // 256
+    return (r * BINS + g) * BINS + b
+
+
+@njit(nogil=True, cache=True)
 def _look(
     P: Array,
     eye: Array,
@@ -199,7 +266,6 @@ def _look(
                 u = int(np.floor((P[0, 0] * x + P[0, 1] * y + P[0, 2] * w + P[0, 3]) / depth + 0.5))
                 v = int(np.floor((P[1, 0] * x + P[1, 1] * y + P[1, 2] * w + P[1, 3]) / depth + 0.5))
                 if 0 <= u < width and 0 <= v < height:
-                    r, g, b = image[v, u, 0] * BINS // 256, image[v, u, 1] * BINS // 256, image[v, u, 2] * BINS // 256
-                    out[n, 0], out[n, 1] = part - first, (r * BINS + g) * BINS + b
+                    out[n, 0], out[n, 1] = part - first, _bin_of(image, v, u)
                     n += 1
     return n

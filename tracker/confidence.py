@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tracker.appearance import ColorScore, PartColors
 from tracker.body import BodyModel
+from tracker.evidence import SCENE_SPACING_PX
 from tracker.fit import Fit, covariance
 from tracker.refine import PartCosts
 from tracker.rigid import Array
@@ -20,8 +21,8 @@ Status = Literal["good", "doubtful", "lost"]
 
 _LEAST_SAMPLES = 12
 """Colours of fewer samples say nothing about a part."""
-_LEAST_LENGTH = 0.15
-"""A part of whose outline less than this is visible in all views together hides somewhere."""
+_LEAST_SHOWN = 0.15
+"""A limb of whose outline less than this is visible in all views together hides somewhere."""
 
 
 class Limb(NamedTuple):
@@ -30,32 +31,50 @@ class Limb(NamedTuple):
     name: str
     """Name of its last part."""
     parts: NDArray[np.int64]
-    """Indices of its parts."""
+    """Indices of its parts, from the trunk outwards."""
     dofs: NDArray[np.bool_]
     """The degrees of freedom of its joints, (n_dofs,)."""
 
 
+class LimbFigures(NamedTuple):
+    """What the evidence says of one limb."""
+
+    name: str
+    forward: float
+    """Mean cut-off distance to the edges of the part that is worst off, in outlier distances."""
+    shown: float
+    """Visible outline of the part that shows most, as a share of what it would show in the open."""
+    color: float
+    """Colours under the part that is worst off: how much likelier on this part than elsewhere, nats per sample."""
+    drop: float
+    """How much less that is than where the colours were learnt, nats per sample."""
+
+    @property
+    def suspicious(self) -> bool:
+        """Whether they speak against the limb's pose."""
+        return self.forward > 0.45 or self.shown < _LEAST_SHOWN or (self.drop > 0.6 and self.color < 0.2)
+
+
 class Quality(NamedTuple):
-    """What the evidence says of a pose. Distances are in outlier distances, shares from 0 to about 1."""
+    """What the evidence says of a pose. Distances are in outlier distances."""
 
     forward: float
     """Mean cut-off distance of the visible contour to the edges."""
-    worst_part: float
-    """The same of the part that is worst off."""
     explained: float
     """Edge points explained, per visible contour of the same length."""
-    hidden_limb: float
-    """Visible outline of the limb that is best hidden, as a share of what it would show in the open."""
-    color_drop: float
-    """How much worse than usual the colours go with the part that is worst off, nats per sample."""
     spread_m: float
     """Largest standard deviation of the end of a limb, metres."""
-    step: float
+    step_m: float
     """Largest way of a limb's end from where it was predicted, metres."""
     views: int
     """Views that see the body."""
-    suspects: tuple[str, ...]
-    """Limbs that the figures of their parts speak against."""
+    limbs: tuple[LimbFigures, ...]
+    """The same limb by limb."""
+
+    @property
+    def suspects(self) -> tuple[str, ...]:
+        """Names of the limbs that their figures speak against."""
+        return tuple(x.name for x in self.limbs if x.suspicious)
 
 
 def limbs(model: BodyModel) -> tuple[Limb, ...]:
@@ -93,38 +112,33 @@ def quality(
         open_px: length of outline that each part would show in each view in the open, (V, n_parts), matched px.
         colors: of its parts; None where there are none.
     """
-    length = costs.length_px.sum(axis=0)
+    length, chains = costs.length_px.sum(axis=0), limbs(model)
     far = np.nansum(costs.forward_px / thetas_px[:, None] * costs.length_px, axis=0)
-    forward = far / np.maximum(length, 1e-9)
-    enough = length >= _LEAST_LENGTH * open_px.sum(axis=0)
     shown = length / np.maximum(open_px.sum(axis=0), 1e-9)
-    drops = np.zeros(len(model.parts))
+    forward = np.where(shown >= _LEAST_SHOWN, far / np.maximum(length, 1e-9), 0.0)
+    color, drop = np.full(len(model.parts), np.inf), np.zeros(len(model.parts))
     if colors is not None:
         score, known = colors
-        drops = np.where(score.samples >= _LEAST_SAMPLES, known.usual - score.parts, 0.0)
-    chains = limbs(model)
+        seen = score.samples >= _LEAST_SAMPLES
+        color, drop = np.where(seen, score.parts, np.inf), np.where(seen, known.usual - score.parts, 0.0)
     ends = np.array([np.flatnonzero(model.point_parts == c.parts[-1])[-1] for c in chains])
     J = _jacobian(model, fit.values, ends)
     cov = J @ covariance(model, fit) @ np.swapaxes(J, 1, 2)
-    spread = float(np.sqrt(np.trace(cov, axis1=1, axis2=2).max()))
     step = np.linalg.norm((model.points_world(fit.values) - model.points_world(predicted))[ends], axis=-1)
-    suspects = [c.name for c in chains if suspicious(forward[c.parts], shown[c.parts], drops[c.parts])]
     return Quality(
         float(far.sum() / max(1e-9, length.sum())),
-        float(forward[enough].max(initial=0.0)),
-        float(3.0 * costs.points.sum() / max(1e-9, length.sum())),
-        float(min((shown[c.parts].max() for c in chains), default=1.0)),
-        float(drops.max(initial=0.0)),
-        spread,
-        float(step.max()),
+        float(SCENE_SPACING_PX * costs.points.sum() / max(1e-9, length.sum())),
+        float(np.sqrt(np.trace(cov, axis1=1, axis2=2).max(initial=0.0))),
+        float(step.max(initial=0.0)),
         int(np.count_nonzero(costs.length_px.sum(axis=1) > 0)),
-        tuple(suspects),
-    )
-
-
-def suspicious(forward: Array, shown: Array, drops: Array) -> bool:
-    """Whether the figures of a limb's parts speak against it: see `Quality` for what they are, (n,) each."""
-    return bool(forward.max() > 0.45 or shown.max() < _LEAST_LENGTH or drops.max() > 0.6)
+        tuple(
+            LimbFigures(
+                c.name, float(forward[c.parts].max()), float(shown[c.parts].max()), float(color[c.parts].min()),
+                float(drop[c.parts].max()),
+            )
+            for c in chains
+        ),
+    )  # fmt: skip
 
 
 def judge(found: Quality) -> Status:

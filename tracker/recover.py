@@ -1,4 +1,8 @@
-"""Lost limbs found again: proposals beside the pose, the best of them refined (DESIGN section 10)."""
+"""Lost limbs found again: a limb is tried everywhere it can be, the best places refined (DESIGN section 10).
+
+A thousand poses of the limb are ranked by a quick look along its axis: the colours under it, and edges at both its
+sides. The first few go through the costs that all poses go through, then through refinement, and the cheapest stays.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,16 +23,20 @@ from tracker.rigid import Array
 class RecoverSettings:
     """How lost limbs are searched for."""
 
-    proposals: int = 64
-    """Poses of a limb that are scored; a power of two, so that they fill the space evenly."""
+    proposals: int = 1024
+    """Poses of a limb that are looked at; a power of two, so that they fill the space evenly."""
     reach_rad: float = float(np.radians(35))
-    """Spread of the proposals around the pose, rad."""
+    """Spread of those proposals that lie around the pose, rad; half of them lie anywhere within the joint limits."""
+    scored: int = 24
+    """Proposals whose contours are scored."""
     refined: int = 6
     """Proposals whose limb is refined alone."""
     finished: int = 2
     """Of these, how many go through a refinement of the whole body."""
     colors: float = 0.1
     """Weight of the colours against edges; neighbouring pixels say the same, so it is far below 1."""
+    trust_rad: float = 1.0
+    """Standard deviation of the prediction of a limb that seems lost, rad: nearly none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +50,13 @@ class Judge:
     """Colours of the parts; None where nobody has shown them."""
     settings: RecoverSettings
 
-    def cost(self, model: BodyModel, fit: Fit) -> float:
+    def cost(self, fit: Fit) -> float:
         """Cost of a refined pose with its colours."""
         return fit.cost + self._of_colors(fit.values)
 
-    def costs(self, model: BodyModel, candidates: Sequence[Array]) -> Array:
+    def costs(self, candidates: Sequence[Array]) -> Array:
         """Costs of poses without refinement, (n,); priors are left to the refinement."""
-        found = self.match.costs(np.array(candidates))
-        return found + np.array([self._of_colors(values) for values in candidates])
+        return self.match.costs(np.array(candidates)) + np.array([self._of_colors(v) for v in candidates])
 
     def _of_colors(self, values: Array) -> float:
         if self.known is None:
@@ -58,7 +65,7 @@ class Judge:
 
 
 def search_limb(model: BodyModel, limb: Limb, here: Fit, others: Sequence[Array], judge: Judge, iterations: int) -> Fit:
-    """Search one limb around a pose and in other poses; returns what is cheapest, `here` where nothing is better.
+    """Search one limb; returns what is cheapest, `here` itself where nothing is better.
 
     Args:
         model: the body.
@@ -69,18 +76,17 @@ def search_limb(model: BodyModel, limb: Limb, here: Fit, others: Sequence[Array]
         iterations: most steps of a refinement of the whole body.
     """
     settings, blocks = judge.settings, [judge.match, *judge.priors]
+    proposals = _proposals(model, limb, here.values, settings)
+    quick = judge.colors.along_limb(proposals, limb.parts, judge.known)
     candidates = [_with_limb(model, here.values, other, limb) for other in others]
-    for step in _steps(settings.proposals, int(limb.dofs.sum())):
-        change = np.zeros(model.n_dofs)
-        change[limb.dofs] = step * settings.reach_rad
-        candidates.append(model.clip(model.retract(here.values, change)))
-    order = np.argsort(judge.costs(model, candidates))[: settings.refined]
+    candidates += list(proposals[np.argsort(-quick)[: settings.scored]])
+    order = np.argsort(judge.costs(candidates))[: settings.refined]
     alone = [solve(model, candidates[i], blocks, limb.dofs, max_iterations=4, tolerance=1e-2) for i in order]
-    alone.sort(key=lambda fit: judge.cost(model, fit))
-    best, best_cost = here, judge.cost(model, here)
+    alone.sort(key=judge.cost)
+    best, best_cost = here, judge.cost(here)
     for start in alone[: settings.finished]:
         fit = solve(model, start.values, blocks, max_iterations=iterations, tolerance=1e-3)
-        cost = judge.cost(model, fit)
+        cost = judge.cost(fit)
         if cost < best_cost:
             best, best_cost = fit, cost
     return best
@@ -92,9 +98,26 @@ def _with_limb(model: BodyModel, values: Array, other: Array, limb: Limb) -> Arr
     return model.clip(model.retract(values, change))
 
 
+def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSettings) -> Array:
+    """Poses with the limb elsewhere, (n, n_values): every other one nearby, the others anywhere."""
+    dofs = np.flatnonzero(limb.dofs)
+    even = _even(settings.proposals, len(dofs))
+    low, high = model.limits[dofs].T
+    low, high = np.maximum(low, -np.pi), np.minimum(high, np.pi)
+    now = model.difference(values, model.neutral())[dofs]
+    near = norm.ppf(0.002 + 0.996 * even) * settings.reach_rad
+    anywhere = low + even * (high - low) - now
+    # Joints that people bend little stay near: a collarbone needs no search of its own.
+    anywhere = np.where(np.isfinite(model.spreads[dofs]), near, anywhere)
+    out = []
+    for k, steps in enumerate(np.where(np.arange(len(even))[:, None] % 2, near, anywhere)):
+        change = np.zeros(model.n_dofs)
+        change[dofs] = steps * (0.5 if k % 4 == 1 else 1.0)
+        out.append(model.clip(model.retract(values, change)))
+    return np.array(out)
+
+
 @lru_cache(maxsize=16)
-def _steps(n: int, dims: int) -> Array:
-    """Normally distributed steps that fill the space evenly, the same ones each time, (n, dims); half of them short."""
-    even = norm.ppf(qmc.Sobol(dims, seed=7).random(n) * 0.998 + 0.001)
-    even[::2] *= 0.5
-    return np.asarray(even)
+def _even(n: int, dims: int) -> Array:
+    """Points that fill the unit cube evenly, the same ones each time, (n, dims)."""
+    return np.asarray(qmc.Sobol(dims, seed=7).random(n))

@@ -213,11 +213,7 @@ class _Scene:
         """Find the pose of one person, the others as they stand; it takes its place in `poses`."""
         model, settings, predicted = track.model, self.settings, self.poses[person]
         match = ContourMatch(self.views, self._bodies(), person, settings.match, settings.theta_px)
-        priors: list[Block] = [
-            StayNear(predicted, np.where(model.dof_is_length, 1 / settings.trust_m, 1 / settings.trust_rad)),
-            StayNear(model.neutral(), 1 / model.spreads),
-        ]
-        blocks: list[Block] = [match, *priors]
+        blocks: list[Block] = [match, *self._priors(model, predicted, [])]
         if settings.estimate == "search":
             evaluations = self._search(person)
             fit = solve(model, self.poses[person], blocks, max_iterations=0)
@@ -226,24 +222,24 @@ class _Scene:
         found = self._quality(person, track, match, fit, predicted)
         if settings.recover is None or confidence.judge(found) == "good":
             return self._take(person, track, match, fit, predicted, 0, [])
-        return self._recover(person, track, fit, found, predicted, priors)
+        return self._recover(person, track, fit, found, predicted)
 
-    def _recover(
-        self, person: int, track: _Track, fit: Fit, found: Quality, predicted: Array, priors: list[Block]
-    ) -> _Found:
+    def _recover(self, person: int, track: _Track, fit: Fit, found: Quality, predicted: Array) -> _Found:
         """Search what the refinement alone did not find, among all edges: the prediction may refuse the right ones."""
         model, settings = track.model, self.settings
         assert settings.recover is not None
+        suspects = [x for x in track.limbs if x.name in found.suspects]
+        priors = self._priors(model, predicted, suspects)
         self.views = [unfiltered(v) for v in self.views]
         match = ContourMatch(self.views, self._bodies(), person, settings.match, settings.theta_px)
         judge = Judge(match, priors, self.colors(person), track.known, settings.recover)
         fit = solve(model, fit.values, [match, *priors], max_iterations=_ITERATIONS, tolerance=_TOLERANCE)
-        remarks, evaluations = [], 0
+        remarks: list[str] = []
+        evaluations = 0
         if confidence.judge(found) == "lost":
             evaluations, fit = self._search_body(person, track, fit, judge)
             remarks.append("body searched anew")
-            found = self._quality(person, track, match, fit, predicted)
-        for limb in [x for x in track.limbs if x.name in found.suspects]:
+        for limb in suspects:
             better = search_limb(model, limb, fit, (track.past[-1], predicted), judge, _ITERATIONS)
             if better is not fit:
                 remarks.append(f"{_chain(limb)} searched anew")
@@ -262,6 +258,15 @@ class _Scene:
             covariance(track.model, fit), evaluations, found,
         )  # fmt: skip
 
+    def _priors(self, model: BodyModel, predicted: Array, suspects: Sequence[Limb]) -> list[Block]:
+        """What holds a pose besides the image: its prediction, but for limbs that seem lost, and how people bend."""
+        settings = self.settings
+        sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
+        for limb in suspects:
+            assert settings.recover is not None
+            sigma[limb.dofs] = settings.recover.trust_rad
+        return [StayNear(predicted, 1 / sigma), StayNear(model.neutral(), 1 / model.spreads)]
+
     def _search_body(self, person: int, track: _Track, fit: Fit, judge: Judge) -> tuple[int, Fit]:
         """Best-first search from the prediction and from the last good pose; the best of what refines from there."""
         predicted, best, evaluations = self.poses[person], fit, 0
@@ -271,7 +276,7 @@ class _Scene:
             refined = solve(
                 track.model, self.poses[person], [judge.match, *judge.priors], None, _ITERATIONS, _TOLERANCE
             )
-            if judge.cost(track.model, refined) < judge.cost(track.model, best):
+            if judge.cost(refined) < judge.cost(best):
                 best = refined
         self.poses[person] = best.values
         return evaluations, best
