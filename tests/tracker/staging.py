@@ -1,7 +1,10 @@
 """Staged scenes of which the answer is known: cameras around a place, simple bodies, edges drawn from contours."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
+from scipy.spatial import cKDTree
 
 from tracker import contours
 from tracker.body import Body
@@ -69,11 +72,40 @@ def edge_map(bodies, camera):
 
 
 def own_evidence(bodies, cameras):
-    """Evidence that shows the visible contours of bodies and nothing else."""
-    return tuple(view_evidence(c, 1.0, edge_map(bodies, c)) for c in cameras)
+    """Evidence that shows the visible contours of bodies and nothing else; edges run as the contours do."""
+    return tuple(_across(view_evidence(c, 1.0, edge_map(bodies, c)), bodies) for c in cameras)
+
+
+def _across(view, bodies):
+    """The same view, the normal of each edge point across the piece of contour that it was drawn from."""
+    seen = contours.trace(bodies, view.camera)
+    pieces = seen.pieces_px[~seen.hidden]
+    if not len(pieces) or not len(view.points_px):
+        return view
+    steps = pieces[:, 2:] - pieces[:, :2]
+    normals = np.stack([-steps[:, 1], steps[:, 0]], axis=1) / np.maximum(np.linalg.norm(steps, axis=1), 1e-6)[:, None]
+    nearest = cKDTree((pieces[:, :2] + pieces[:, 2:]) / 2).query(view.points_px)[1]
+    return replace(view, normals=normals[nearest].astype(np.float32))
 
 
 def shaken(model, values, rng, sigma_rad, sigma_m):
     """A pose displaced at random in all degrees of freedom, within the joint limits."""
     sigma = np.where(model.dof_is_length, sigma_m, sigma_rad)
     return model.clip(model.retract(values, sigma * rng.normal(size=model.n_dofs)))
+
+
+POSTURE_DEG = {
+    "left_shoulder.abduction": 50, "left_elbow.extension": 50, "right_shoulder.elevation": 60,
+    "right_elbow.extension": 70, "left_hip.elevation": 40, "left_knee.extension": 60, "right_hip.abduction": 15,
+    "right_knee.extension": 20,
+}  # fmt: skip
+"""Limbs away from the trunk and bent, so that each view shows most of them."""
+
+
+def posed(model, seed):
+    """A body with its limbs away from the trunk, a little otherwise for each seed; other models are just shaken."""
+    values = model.neutral()
+    for name, degrees in POSTURE_DEG.items():
+        if name in model.dof_names:
+            values[model.dof_value[model.dof_names.index(name)]] = np.radians(degrees)
+    return shaken(model, values, np.random.default_rng(seed), 0.1, 0.05)
