@@ -88,6 +88,43 @@ def _across(view, bodies):
     return replace(view, normals=normals[nearest].astype(np.float32))
 
 
+def painted(bodies, camera, colors, background=(40, 90, 60)):
+    """A picture of bodies in flat colours, (H, W, 3) RGB: far parts first, each the hull of its mesh.
+
+    Args:
+        bodies: everybody.
+        camera: the view.
+        colors: RGB of each part by its name, `left_` and `right_` left out.
+        background: RGB of the rest.
+    """
+    image = np.full((camera.height, camera.width, 3), background, np.uint8)
+    parts = []
+    for body in bodies:
+        Ts = body.model.kinematics(body.values).Ts_world_part
+        for part, shape, center, T in zip(
+            body.model.parts, body.model.shapes, body.model.centers_part, Ts, strict=True
+        ):
+            world = (shape.grid(20, 30)[0].reshape(-1, 3) + center) @ T[:3, :3].T + T[:3, 3]
+            color = colors[part.name.removeprefix("left_").removeprefix("right_")]
+            parts.append((camera.depths(world).mean(), camera.project(world), color))
+    for _, px, color in sorted(parts, key=lambda p: -p[0]):
+        cv2.fillConvexPoly(image, cv2.convexHull(np.round(px).astype(np.int32)), color)
+    return image
+
+
+def dressed(bodies, cameras, colors):
+    """Evidence of the bodies' own contours and colours."""
+    views = own_evidence(bodies, cameras)
+    return tuple(replace(v, colors=painted(bodies, v.camera, colors)) for v in views)
+
+
+SUIT = {
+    "torso": (200, 40, 40), "pelvis": (200, 40, 40), "head": (230, 190, 160), "collar": (200, 40, 40),
+    "upper_arm": (250, 250, 240), "forearm": (220, 160, 130), "thigh": (30, 40, 140), "calf": (20, 20, 25),
+}  # fmt: skip
+"""Colours by which all kinds of parts can be told."""
+
+
 def shaken(model, values, rng, sigma_rad, sigma_m):
     """A pose displaced at random in all degrees of freedom, within the joint limits."""
     sigma = np.where(model.dof_is_length, sigma_m, sigma_rad)

@@ -1,0 +1,150 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from staging import SUIT, at, camera_at, cameras_around, dressed, posed, shaken, solid
+
+from tracker.appearance import Colors
+from tracker.body import Body
+
+GRAY = dict.fromkeys(SUIT, (120, 120, 120))
+CAMERAS = cameras_around()
+
+
+def colors_of(model, values, suit=SUIT, cameras=CAMERAS):
+    bodies = [Body(model, values)]
+    return Colors(dressed(bodies, cameras, suit), bodies)
+
+
+def parts(model, *names):
+    return [model.part_index[n] for n in names]
+
+
+@pytest.fixture(scope="module")
+def stand(gavrila):
+    return posed(gavrila, 1)
+
+
+@pytest.fixture(scope="module")
+def seen(gavrila, stand):
+    """The colours of a figure that stands, and what is learnt from them."""
+    found = colors_of(gavrila, stand)
+    return found, found.learn()
+
+
+def test_the_pose_it_was_learnt_in_scores_best(gavrila, stand, seen):
+    colors, known = seen
+    rng = np.random.default_rng(0)
+    best = colors.score(stand, known)
+    others = [colors.score(shaken(gavrila, stand, rng, 0.25, 0.08), known).nats for _ in range(30)]
+    assert best.nats > max(others)
+    assert best.nats / best.samples.sum() > 1  # each sample is three times as likely on its part as elsewhere
+
+
+def test_arms_for_legs_score_worse(gavrila, stand, seen):
+    """Head over heels about its middle, the arms where the legs were: the outline is much the same."""
+    colors, known = seen
+    turned = np.array(stand)
+    turned[gavrila.dof_names.index("torso.abduction")] += np.pi
+    right, wrong = (colors.score(v, known) for v in (stand, turned))
+    assert wrong.nats < 0 < right.nats
+    limbs = parts(gavrila, "left_upper_arm", "right_upper_arm", "left_thigh", "right_thigh", "left_calf", "right_calf")
+    assert (wrong.parts[limbs] < right.parts[limbs] - 0.5).all()
+
+
+def test_other_clothes_score_worse(gavrila, stand, seen):
+    """Sleeves and trousers of each other's colours: each of these parts notices, and no other."""
+    _, known = seen
+    swapped = SUIT | {"upper_arm": SUIT["thigh"], "thigh": SUIT["upper_arm"]}
+    changed = colors_of(gavrila, stand, swapped).score(stand, known).parts - known.usual
+    swapped_parts = parts(gavrila, "left_upper_arm", "right_upper_arm", "left_thigh", "right_thigh")
+    assert (changed[swapped_parts] < -1).all()
+    np.testing.assert_allclose(np.delete(changed, swapped_parts), 0, atol=0.2)
+
+
+def test_where_all_is_of_one_colour_nothing_is_said(gavrila, stand):
+    bodies = [Body(gavrila, stand)]
+    views = [replace(v, colors=np.full((480, 640, 3), 120, np.uint8)) for v in dressed(bodies, CAMERAS, GRAY)]
+    colors = Colors(views, bodies)
+    known = colors.learn()
+    rng = np.random.default_rng(1)
+    for values in (stand, shaken(gavrila, stand, rng, 0.3, 0.1)):
+        found = colors.score(values, known)
+        assert found.nats == pytest.approx(0, abs=1e-3)
+        np.testing.assert_allclose(found.parts, 0, atol=1e-5)
+        assert found.samples.sum() > 300
+
+
+def test_a_body_of_one_colour_tells_itself_from_the_rest_alone(gavrila, stand):
+    colors = colors_of(gavrila, stand, GRAY)
+    known = colors.learn()
+    beside = gavrila.retract(stand, np.pad([0.0, 0.0, 5.0], (0, gavrila.n_dofs - 3)))
+    assert colors.score(stand, known).nats > 0
+    off = gavrila.retract(stand, np.pad([0.3, -0.3], (0, gavrila.n_dofs - 2)))
+    assert colors.score(off, known).nats < 0
+    assert colors.score(beside, known).samples.sum() == 0  # above all images
+    # One part is like another.
+    np.testing.assert_allclose(known.log_ratios.max(axis=1), known.log_ratios.max(), rtol=0.01)
+
+
+def test_samples_in_the_open_and_behind_others():
+    ball, wall = solid((0.2, 0.2, 0.3)), solid((0.1, 1.0, 1.0))
+    front, back = camera_at("front", (4.0, 0.0, 0.0)), camera_at("back", (-4.0, 0.0, 0.0))
+    alone, behind = [at(ball, 0, 0, 0)], [at(ball, 0, 0, 0), at(wall, 1.5, 0, 0)]
+
+    def samples(bodies, cameras):
+        colors = Colors(dressed(bodies, cameras, {"solid": (200, 0, 0)}), bodies)
+        return int(colors.score(bodies[0].values, colors.learn()).samples.sum())
+
+    assert samples(alone, [front]) == samples(alone, [back]) > 10
+    assert samples(alone, [front, back]) == 2 * samples(alone, [front])
+    assert samples(behind, [front]) == 0
+    assert samples(behind, [back]) == samples(alone, [back])
+    # The one that is looked at may be any in the list.
+    colors = Colors(dressed(behind, [front], {"solid": (200, 0, 0)}), behind, person=1)
+    assert colors.score(behind[1].values, colors.learn()).samples.sum() > 10
+
+
+def test_parts_hidden_by_the_body_give_no_samples(gavrila):
+    """From the left the hanging right arm is behind the trunk."""
+    stand = gavrila.neutral()
+    left, right = (camera_at(n, (0.0, y, 0.2)) for n, y in (("left", 4.0), ("right", -4.0)))
+    arms = parts(gavrila, "left_upper_arm", "right_upper_arm")
+    for camera, expected in ((left, [True, False]), (right, [False, True])):
+        colors = colors_of(gavrila, stand, cameras=[camera])
+        assert (colors.score(stand, colors.learn()).samples[arms] > 0).tolist() == expected
+
+
+def test_left_and_right_share(gavrila):
+    """What the left arm showed is known of the right one, which nobody has seen."""
+    stand, left = gavrila.neutral(), camera_at("left", (0.0, 4.0, 0.2))
+    known = colors_of(gavrila, stand, cameras=[left]).learn()
+    names = gavrila.part_index
+    for name in (n for n in names if n.startswith("left_")):
+        twin = names[name.replace("left_", "right_")]
+        np.testing.assert_array_equal(known.log_ratios[names[name]], known.log_ratios[twin])
+    arms = parts(gavrila, "left_upper_arm", "right_upper_arm")
+    later = colors_of(gavrila, stand, cameras=[camera_at("right", (0.0, -4.0, 0.2))]).score(stand, known)
+    assert later.samples[arms[1]] > 10
+    assert later.parts[arms[1]] > 1
+    assert later.parts[arms[0]] == 0  # hidden
+    # Different kinds of parts do not share.
+    assert np.abs(known.log_ratios[names["left_thigh"]] - known.log_ratios[names["left_calf"]]).max() > 1
+
+
+def test_usual_is_what_the_learnt_frame_scores(gavrila, stand, seen):
+    colors, known = seen
+    np.testing.assert_allclose(colors.score(stand, known).parts, known.usual)
+
+
+def test_views_without_colours_are_passed_over(gavrila, stand):
+    bodies = [Body(gavrila, stand)]
+    views = dressed(bodies, CAMERAS, SUIT)
+    blind = replace(views[0], colors=None)
+    two, three = Colors(views[1:], bodies), Colors([blind, *views[1:]], bodies)
+    known = two.learn()
+    np.testing.assert_array_equal(three.learn().log_ratios, known.log_ratios)
+    assert two.score(stand, known).nats == three.score(stand, known).nats
+    none = Colors([blind], bodies)
+    assert none.score(stand, none.learn()).nats == 0
+    assert not none.score(stand, known).samples.any()
