@@ -31,13 +31,21 @@ _DOUBT = 0.02
 """Share of pixels under a part that may show anything: what has never been seen there is not impossible."""
 
 
+_SAME = 0.4
+"""Colours have changed much where their mean log ratio is below this share of the usual."""
+
+
 class PartColors(NamedTuple):
     """What is remembered of the colours of one person's parts."""
 
     log_ratios: Array
     """Logarithm of how much likelier each colour is on the part than elsewhere, (n_parts, BINS^3), nats."""
     usual: Array
-    """Mean of that under each part where it was learnt, (n_parts,), nats."""
+    """Mean of that under each part where it was first learnt, (n_parts,), nats."""
+    shares: Array
+    """Share of each colour under each part, its twin's with it, (n_parts, BINS^3)."""
+    around: Array
+    """Share of each colour in the regions looked at, (BINS^3,)."""
 
 
 class ColorScore(NamedTuple):
@@ -70,23 +78,39 @@ class Colors:
         self._bodies, self._person = list(bodies), person
         self._shapes = [_ellipsoids(b.model) for b in bodies]
 
-    def learn(self) -> PartColors:
-        """Remember the colours under the parts where the bodies stand; left and right parts share theirs."""
+    def learn(self, before: PartColors | None = None, share: float = 1.0) -> PartColors:
+        """Remember the colours under the parts where the bodies stand; left and right parts share theirs.
+
+        Args:
+            before: what was known; None where nothing was.
+            share: what this frame counts against it, 0 to 1. Parts under which the colours have changed much keep
+                what was known: the part may not be there.
+        """
         model = self._bodies[self._person].model
         parts, colors = self._samples(self._bodies[self._person].values)
         twins = _twins(model)
-        counts = np.zeros((len(model.parts), BINS**3))
-        np.add.at(counts, (twins[parts], colors), 1.0)
-        around = sum(
-            (np.bincount(_binned(i), minlength=BINS**3) for i in self._images), start=np.zeros(BINS**3, dtype=np.int64)
-        )
+        seen = np.zeros((len(model.parts), BINS**3))
+        np.add.at(seen, (twins[parts], colors), 1.0)
+        seen = np.array([_share(s) for s in seen])
+        shown = [np.bincount(_binned(i), minlength=BINS**3) for i in self._images]
+        around = _share(np.sum(shown, axis=0, initial=0.0, dtype=np.float64) + np.zeros(BINS**3))
+        usual = None
+        if before is not None:
+            now, samples = _mean_by_part(before.log_ratios[parts, colors], parts, len(model.parts))
+            trusted = (samples > 0) & (now > _SAME * before.usual)
+            weights = share * _twin_min(trusted, twins)
+            seen = before.shares + weights[:, None] * (seen - before.shares)
+            around = before.around + share * (around - before.around)
+            usual = before.usual
         # Half of what a part is told from is the rest of the body, however small it is in the picture.
-        other = 0.5 * _share(_smoothed(around.astype(np.float64))) + 0.5 * _share(_smoothed(counts.sum(axis=0)))
-        own = np.array([_share(_smoothed(c)) for c in counts])
+        other = 0.5 * _smoothed(around) + 0.5 * _share(_smoothed(seen.sum(axis=0)))
+        own = np.array([_smoothed(s) for s in seen])
         ratios = np.log(((1 - _DOUBT) * own + _DOUBT * other + 1e-7) / (other + 1e-7))
-        ratios[counts.sum(axis=1) == 0] = 0.0
+        ratios[seen.sum(axis=1) == 0] = 0.0
         ratios = np.clip(ratios, -_MOST_NATS, _MOST_NATS)[twins]
-        return PartColors(ratios, _mean_by_part(ratios[parts, colors], parts, len(model.parts))[0])
+        if usual is None:
+            usual = _mean_by_part(ratios[parts, colors], parts, len(model.parts))[0]
+        return PartColors(ratios, usual, seen, around)
 
     def score(self, values: Array, known: PartColors) -> ColorScore:
         """How well the colours under the person in a pose, (n_values,), go with what is known of its parts."""
@@ -146,6 +170,13 @@ def _share(counts: Array) -> Array:
 def _mean_by_part(nats: Array, parts: NDArray[np.int64], n_parts: int) -> tuple[Array, Array]:
     samples = np.bincount(parts, minlength=n_parts)
     return np.bincount(parts, weights=nats, minlength=n_parts) / np.maximum(samples, 1), samples.astype(np.float64)
+
+
+def _twin_min(trusted: NDArray[np.bool_], twins: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether all parts that share their colours with each are trusted, (n_parts,)."""
+    out = np.ones_like(trusted)
+    np.logical_and.at(out, twins, trusted)
+    return out
 
 
 def _twins(model: BodyModel) -> NDArray[np.int64]:

@@ -31,6 +31,9 @@ Estimation = Literal["refine", "search"]
 
 _ITERATIONS = 15
 _TOLERANCE = 1e-3  # rad or metres: a tenth of a pixel on a limb
+_LEARN_FRAMES, _TRACKED_SHARE, _GIVEN_SHARE = 3, 0.15, 0.5
+"""Every so many frames the colours of the parts are brought up to date, and what such a frame counts; what a keyframe
+counts against the frames before it."""
 _REGION_MARGIN_M = 0.22
 """What is added around the joints to the region that is looked at: the flesh, and what the prediction may be off."""
 
@@ -173,6 +176,7 @@ class _Track:
         self.past = [np.array(start)]
         self.last_good = self.past[0]
         self.known: PartColors | None = None
+        self._frames = 0
 
     def expected(self, settings: TrackSettings) -> Array:
         """The predicted pose of the next frame."""
@@ -181,8 +185,11 @@ class _Track:
     def update(self, scene: "_Scene", person: int, found: _Found, given: bool) -> None:
         """Take in what a frame brought; a given pose begins the motion anew where it is far from the track."""
         pose = scene.poses[person]
+        self._frames += 1
         if self.known is None or given:
-            self.known = scene.colors(person).learn()
+            self.known = scene.colors(person).learn(self.known, _GIVEN_SHARE)
+        elif self._frames % _LEARN_FRAMES == 0 and found.status != "lost":
+            self.known = scene.colors(person).learn(self.known, _TRACKED_SHARE)
         self.past = [*self.past[-7:], pose]
         if found.status == "good":
             self.last_good = pose
