@@ -23,7 +23,7 @@ ORDER = [
         "tracker.footage",
         "tracker.records",
     ],
-    ["tracker.session_lock", "tracker.annotations", "tracker.body", "tracker.matched"],
+    ["tracker.session_lock", "tracker.annotations", "tracker.body", "tracker.matched", "tracker.silhouette_contour"],
     ["tracker.formats.anipose", "tracker.formats.trc", "tracker.formats.model_toml", "tracker.formats.pose_table"],
     ["tracker.surfaces"],
     ["tracker.outlines", "tracker.hiding"],

@@ -8,6 +8,7 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import cv2
@@ -17,13 +18,14 @@ from numpy.typing import NDArray
 
 from tracker import silhouettes
 from tracker.cameras import Camera, Region
-from tracker.edges import Levels, detect_edges, levels
+from tracker.edges import Edges, Levels, detect_edges, levels
 from tracker.matched import MatchedView, fit_region
 from tracker.probes import Probes, Readings
 from tracker.recording import Recording, read_background, read_mask
 from tracker.segments import Segments, accept, link_edges, pixels_of
 from tracker.session import CameraSource
-from tracker.silhouettes import Image, Mask
+from tracker.silhouette_contour import Outline, trace_outline, trust_outline
+from tracker.silhouettes import Changes, Image, Mask
 
 FloatArray = NDArray[np.float32]
 
@@ -36,6 +38,32 @@ FOREGROUND_MARGIN = 0.012
 """How far around the silhouette edges are kept, as a fraction of the longer side of the image."""
 _WORKERS = 2
 _FRAMES_AHEAD = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Silhouette:
+    """Everybody's silhouette in a region of a view, as far as masks or a background tell it."""
+
+    inside: Mask
+    """The silhouette, shadows left out, (H, W)."""
+    points_px: FloatArray
+    """Points of its contour, thinned, (N, 2), matched px of the region."""
+    normals: FloatArray
+    """Unit normals at these, out of the silhouette, (N, 2)."""
+    trust: float
+    """How far it can be trusted, 0 to 1; see `silhouette_contour.trust_outline`."""
+    outline: Outline
+    """All pixels of its contour."""
+    limit_px: float
+    """Where `distance` is cut off, matched px."""
+
+    @cached_property
+    def distance(self) -> FloatArray:
+        """Distance to the contour, (H, W), matched px."""
+        on_contour = np.zeros(self.inside.shape, np.uint8)
+        u, v = self.outline.points_px.T.astype(np.intp)
+        on_contour[v, u] = 1
+        return distance_image(on_contour, self.limit_px)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +90,9 @@ class ViewEvidence:
     """All edges found, linked, in px of the region; None where the directions of the edges are unknown."""
     accepted: NDArray[np.bool_] | None = None
     """Which segments the prediction accepts, (S,); `points_px` and `distance` hold only those. None: all of them."""
+
+    silhouette: Silhouette | None = None
+    """The silhouette in the region; None where neither a mask nor a background tells it."""
 
     @property
     def theta_px(self) -> float:
@@ -198,6 +229,8 @@ class _Prepared(NamedTuple):
     """Thresholds of edges."""
     threshold: float
     """Difference from the background that is a change, gray levels."""
+    gain: FloatArray
+    """How much brighter than the background the camera shows each channel, (3,)."""
 
 
 class _Empty(NamedTuple):
@@ -290,9 +323,10 @@ class Observer:
         readings = self._probes[i].read(frame)
         bounds = levels(readings.strengths, restricted=empty is not None or mask is not None)
         if empty is None:
-            return _Prepared(frame, mask, bounds, 0.0)
-        differences = np.abs(readings.colors - empty.readings.colors).max(axis=-1)
-        return _Prepared(frame, mask, bounds, silhouettes.change_threshold(differences))
+            return _Prepared(frame, mask, bounds, 0.0, np.ones(3, np.float32))
+        gain = silhouettes.exposure_gain(readings.colors, empty.readings.colors)
+        differences = np.abs(readings.colors - gain * empty.readings.colors).max(axis=-1)
+        return _Prepared(frame, mask, bounds, silhouettes.change_threshold(differences), gain)
 
     def _empty_scene(self, i: int, background: Image | None) -> _Empty | None:
         if background is None:
@@ -310,21 +344,34 @@ class Observer:
             nothing = np.zeros((camera.height, camera.width), np.uint8)
             return view_evidence(camera, view.scale, nothing, box[:2], view.camera.size)
         smooth = silhouettes.smoothed(view.image(prepared.frame, box))
-        edges = detect_edges(smooth, prepared.bounds, self._foreground(i, prepared, smooth, box))
+        changes = self._changes(i, prepared, smooth, box)
+        margin_px = FOREGROUND_MARGIN * max(view.camera.size)
+        foreground = None if changes is None else silhouettes.grow(changes.anything, margin_px)
+        edges = detect_edges(smooth, prepared.bounds, foreground)
         if predicted_px is not None:
             predicted_px = predicted_px - np.array([*box[:2], *box[:2]], np.float32)
-        return view_evidence(
+        seen = view_evidence(
             camera, view.scale, edges.found, box[:2], view.camera.size, edges.gradients, smooth, predicted_px
         )
+        if changes is None:
+            return seen
+        return replace(seen, silhouette=_silhouette(changes.inside, edges, 2 * seen.theta_px))
 
-    def _foreground(self, i: int, prepared: _Prepared, smooth: Image, box: Region) -> Mask | None:
-        """Where a person may be, (H, W), generously; None where nothing tells."""
+    def _changes(self, i: int, prepared: _Prepared, smooth: Image, box: Region) -> Changes | None:
+        """What is new in the region, by its mask or before its background; None where nothing tells it."""
         u0, v0, u1, v1 = box
-        view, empty = self._views[i], self._empty[i]
+        empty = self._empty[i]
         if prepared.mask is not None:
-            inside = view.mask(prepared.mask, box)
-        elif empty is not None:
-            inside = silhouettes.subtract_background(smooth, empty.smooth[v0:v1, u0:u1], prepared.threshold)
-        else:
+            inside = self._views[i].mask(prepared.mask, box)
+            return Changes(inside, inside)
+        if empty is None:
             return None
-        return silhouettes.grow(inside, FOREGROUND_MARGIN * max(view.camera.size))
+        background = silhouettes.brightened(empty.smooth[v0:v1, u0:u1], prepared.gain)
+        return silhouettes.subtract_background(smooth, background, prepared.threshold)
+
+
+def _silhouette(inside: Mask, edges: Edges, limit_px: float) -> Silhouette:
+    outline = trace_outline(inside)
+    first = _first_in_cells(outline.points_px, *inside.shape)
+    trust = trust_outline(outline, inside, edges)
+    return Silhouette(inside, outline.points_px[first], outline.normals[first], trust, outline, limit_px)

@@ -1,7 +1,10 @@
 """Frame and background to silhouette: where the image shows something that the empty scene does not."""
 
+from typing import NamedTuple
+
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 Image = NDArray[np.uint8]
@@ -11,6 +14,14 @@ SMOOTHING_PX = 1.0
 """Standard deviation of the Gaussian that images are smoothed with before they are compared or derived, px."""
 MIN_DIFFERENCE = 12.0
 """Least difference of any colour channel (of 255) that counts as a change; video noise stays below."""
+MIN_SHADE = 0.5
+"""What is left of the light in the deepest shadow that is taken for one."""
+MAX_HUE_SHIFT = 7.0
+"""How far a channel may be from the darkened background in a shadow, gray levels."""
+_DARK, _BRIGHT = 20.0, 235.0  # beyond, a ratio of colours says little
+_LEAST_PLACES = 50
+_LEAST_GAIN = 0.01
+_SAME, _SHADOW, _NEW = 0, 1, 2  # what becomes of a pixel
 
 
 def smoothed(image: Image) -> Image:
@@ -31,21 +42,76 @@ def change_threshold(differences: NDArray[np.float32]) -> float:
     return max(MIN_DIFFERENCE, 5.0 * float(np.median(differences)))
 
 
-def subtract_background(smooth: Image, background: Image, threshold: float) -> Mask:
-    """Find the pixels that differ from the background: the silhouette, with holes where colours agree.
+def exposure_gain(colors: NDArray[np.float32], empty_colors: NDArray[np.float32]) -> NDArray[np.float32]:
+    """How much brighter each channel of a frame is than the empty scene, (3,), as automatic exposure makes it.
+
+    Args:
+        colors: smoothed colours at places spread over the whole frame, (n, 3), of which most show the scene.
+        empty_colors: those of the empty scene at the same places, (n, 3).
+    """
+    usable = np.all((empty_colors > _DARK) & (empty_colors < _BRIGHT), axis=-1)
+    if usable.sum() < _LEAST_PLACES:
+        return np.ones(3, np.float32)
+    return np.median(colors[usable] / empty_colors[usable], axis=0).astype(np.float32)
+
+
+def brightened(image: Image, gain: NDArray[np.float32]) -> Image:
+    """Multiply the channels of an image, (H, W, 3), by a gain, (3,)."""
+    if np.abs(gain - 1.0).max() < _LEAST_GAIN:
+        return image
+    table = np.clip(np.round(np.arange(256)[:, None] * gain), 0, 255).astype(np.uint8)
+    return np.asarray(cv2.LUT(np.ascontiguousarray(image), table[None]), dtype=np.uint8)
+
+
+class Changes(NamedTuple):
+    """Where a frame differs from the empty scene."""
+
+    inside: Mask
+    """The silhouette, with holes where colours agree; shadows are left out, (H, W)."""
+    anything: Mask
+    """The silhouette and the shadows, and so also clothes that look like a shadow of what is behind them, (H, W)."""
+
+
+def subtract_background(smooth: Image, background: Image, threshold: float) -> Changes:
+    """Find the pixels that differ from the background.
+
+    A pixel that is merely darker, with the hue of the background, is taken to lie in a shadow (the brightness and
+    chromaticity distortion of Horprasert, Harwood & Davis 1999).
 
     Args:
         smooth: smoothed frame, (H, W, 3) RGB.
         background: the smoothed empty scene, (H, W, 3) RGB, same size and pixels.
         threshold: see `change_threshold`.
-
-    Returns:
-        (H, W) bool.
     """
-    red, green, blue = cv2.split(cv2.absdiff(smooth, background))
-    changed = np.asarray(cv2.max(cv2.max(red, green), blue)) > np.uint8(min(threshold, 255))
+    changed = np.empty(smooth.shape[:2], np.uint8)
+    planes = (np.stack([np.asarray(c).ravel() for c in cv2.split(image)]) for image in (smooth, background))
+    _find_changes(*planes, np.float32(threshold), np.float32(MIN_SHADE), np.float32(MAX_HUE_SHIFT), changed.ravel())
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
-    return np.asarray(cv2.morphologyEx(changed.view(np.uint8), cv2.MORPH_OPEN, cross)) > 0
+    inside, anything = (
+        np.asarray(cv2.morphologyEx((changed > least).view(np.uint8), cv2.MORPH_OPEN, cross)) > 0
+        for least in (_SHADOW, _SAME)
+    )
+    return Changes(inside, anything)
+
+
+@njit(nogil=True, cache=True)
+def _find_changes(
+    image: NDArray[np.uint8], empty: NDArray[np.uint8], threshold: float, least: float, hue: float,
+    changed: NDArray[np.uint8],
+) -> None:  # fmt: skip
+    """Fill in what became of each pixel, (n,): the same, in a shadow, or new; colours are (3, n) each.
+
+    In float32 and without branches, so that it runs on whole vectors.
+    """
+    one, tiny = np.float32(1.0), np.float32(1.0)
+    for i in range(changed.shape[0]):
+        r, g, b = np.float32(image[0, i]), np.float32(image[1, i]), np.float32(image[2, i])
+        r0, g0, b0 = np.float32(empty[0, i]), np.float32(empty[1, i]), np.float32(empty[2, i])
+        difference = max(abs(r - r0), max(abs(g - g0), abs(b - b0)))
+        shade = (r * r0 + g * g0 + b * b0) / (r0 * r0 + g0 * g0 + b0 * b0 + tiny)
+        shift = max(abs(r - shade * r0), max(abs(g - shade * g0), abs(b - shade * b0)))
+        in_shadow = (shade > least) & (shade < one) & (shift < hue)
+        changed[i] = (difference > threshold) * (_NEW - in_shadow)
 
 
 def grow(mask: Mask, radius_px: float) -> Mask:

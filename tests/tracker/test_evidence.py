@@ -336,3 +336,43 @@ def test_evidence_of_a_region_takes_the_prediction_in_pixels_of_the_whole_image(
         np.testing.assert_array_equal(once.distance, kept.distance)
         np.testing.assert_array_equal(once.points_px, kept.points_px)
         np.testing.assert_array_equal(once.normals, kept.normals)
+
+
+def test_the_silhouette_and_its_contour_are_evidence(sample, real_frame):
+    session, recording = sample
+    for view in Observer(session.cameras, recording).evidence(25):
+        seen = view.silhouette
+        assert seen.inside.shape == view.distance.shape
+        joints = np.round(view.camera.project(real_frame.model.points_world(real_frame.values))).astype(int)
+        assert np.mean([seen.inside[v, u] for u, v in joints]) > 0.5  # the trousers look like a shadow of the floor
+        assert len(seen.points_px) == len(seen.normals) > 100
+        u, v = seen.points_px.astype(int).T
+        assert (seen.distance[v, u] == 0).all()
+        assert seen.distance.max() <= 2 * view.theta_px
+        assert seen.trust > 0.5
+    bare = Observer([replace(c, background=None) for c in session.cameras], recording).evidence(25)
+    assert all(view.silhouette is None for view in bare)
+
+
+def test_a_broken_background_is_not_trusted(sample, tmp_path):
+    session, recording = sample
+    first = session.cameras[0]
+    moved = np.roll(cv2.imread(str(first.background)), 12, axis=1)
+    moved[150:400, 350:450] = 255
+    cv2.imwrite(str(tmp_path / "moved.png"), moved)
+    cameras = [replace(first, background=tmp_path / "moved.png"), *session.cameras[1:]]
+    region = (200, 60, 460, 440)
+    good = Observer(session.cameras, recording).evidence(25, [region, None, None, None])[0].silhouette
+    broken = Observer(cameras, recording).evidence(25, [region, None, None, None])[0].silhouette
+    assert broken.trust < good.trust - 0.3
+
+
+def test_exposure_that_changed_is_made_up_for(sample, tmp_path):
+    session, recording = sample
+    first = session.cameras[0]
+    darker = (0.8 * cv2.imread(str(first.background))).astype(np.uint8)
+    cv2.imwrite(str(tmp_path / "darker.png"), darker)
+    cameras = [replace(first, background=tmp_path / "darker.png"), *session.cameras[1:]]
+    expected = Observer(session.cameras, recording).evidence(25)[0].silhouette.inside
+    found = Observer(cameras, recording).evidence(25)[0].silhouette.inside
+    assert (found & expected).sum() > 0.93 * (found | expected).sum()

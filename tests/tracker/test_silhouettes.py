@@ -1,7 +1,15 @@
 import numpy as np
 import pytest
 
-from tracker.silhouettes import MIN_DIFFERENCE, change_threshold, grow, smoothed, subtract_background
+from tracker.silhouettes import (
+    MIN_DIFFERENCE,
+    brightened,
+    change_threshold,
+    exposure_gain,
+    grow,
+    smoothed,
+    subtract_background,
+)
 
 
 def room(seed=0, noise=0.0):
@@ -14,7 +22,7 @@ def changed(image, background):
     """Silhouette of an image before a background, both as filmed, with the threshold that they call for."""
     pair = smoothed(image), smoothed(background)
     differences = np.abs(np.subtract(*pair, dtype=np.float32)).max(axis=-1)
-    return subtract_background(*pair, change_threshold(differences.ravel()))
+    return subtract_background(*pair, change_threshold(differences.ravel())).inside
 
 
 def test_finds_what_is_new():
@@ -71,3 +79,39 @@ def test_nothing_to_grow():
     assert not grow(mask, 5).any()
     mask[5, 5] = True
     assert grow(mask, 0.5).sum() == 1
+
+
+def test_a_shadow_is_no_silhouette_and_dark_clothes_are():
+    background = np.full((60, 80, 3), (150, 120, 90), np.uint8)
+    image = background.copy()
+    image[10:50, 10:30] = (105, 84, 63)  # 0.7 of the light
+    image[10:50, 50:70] = (40, 45, 60)
+    found = changed(image, background)
+    assert not found[:, :40].any()
+    assert found[12:48, 52:68].all()
+    # Deep black is no shadow of a lit room, and what is brighter is none either.
+    for color in ((30, 24, 18), (195, 156, 117)):
+        image[10:50, 50:70] = color
+        assert changed(image, background)[12:48, 52:68].all()
+    # Both are where edges may lie.
+    anything = subtract_background(smoothed(image), smoothed(background), MIN_DIFFERENCE).anything
+    assert anything[12:48, 12:28].all()
+    assert anything[12:48, 52:68].all()
+    assert not anything[:, 34:46].any()
+
+
+def test_exposure_is_found_although_a_person_stands_there():
+    rng = np.random.default_rng(0)
+    empty = rng.uniform(30, 180, (1000, 3)).astype(np.float32)
+    seen = empty * (1.2, 1.1, 0.9)
+    seen[:300] = rng.uniform(0, 255, (300, 3))
+    np.testing.assert_allclose(exposure_gain(seen.astype(np.float32), empty), (1.2, 1.1, 0.9), atol=0.03)
+    # Where everything is black nothing can be told.
+    np.testing.assert_array_equal(exposure_gain(seen.astype(np.float32), 0 * empty), 1)
+
+
+def test_a_background_follows_the_exposure():
+    image = np.array([[[100, 100, 100], [250, 0, 20]]], np.uint8)
+    gain = np.array([1.1, 1.0, 0.5], np.float32)
+    assert brightened(image, gain).tolist() == [[[110, 100, 50], [255, 0, 10]]]
+    assert brightened(image, np.ones(3, np.float32)) is image
