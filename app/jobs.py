@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Generic, TypeVar
 
+from tracker.errors import TrackerError
+
 _LOG = logging.getLogger(__name__)
 _POOL = ThreadPoolExecutor(2, thread_name_prefix="job")
 
@@ -54,10 +56,20 @@ class Job(Generic[T]):
         self._launch(None)
 
     def stop(self, timeout: float = 30.0) -> None:
-        """Stop after the step at hand, and wait for that. Never call it holding a lock that `on_step` takes."""
+        """Stop after the step at hand, and wait for that. Never call it holding a lock that `on_step` takes.
+
+        Raises:
+            TrackerError: the step takes longer than `timeout`, s.
+        """
         self._stop.set()
-        if self._future is not None:
-            self._future.exception(timeout)
+        try:
+            if self._future is not None:
+                self._future.exception(timeout)
+        except TimeoutError as error:
+            raise TrackerError(
+                f"expected the step at hand to end within {timeout:g} s, found it still at work, as it may be the "
+                "first time; it stops as soon as it can, so wait and try again"
+            ) from error
 
     def _launch(self, limit: int | None) -> None:
         if not self.running and not self.ended:

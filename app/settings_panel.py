@@ -13,7 +13,7 @@ from tracker.recover import RecoverSettings
 from tracker.search import SearchSettings
 from tracker.track import Estimation, TrackSettings
 
-_METHODS: dict[Estimation, str] = {"refine": "refinement, search where needed", "search": "search alone (paper)"}
+_METHODS: dict[Estimation, str] = {"refine": "refine, else search", "search": "search alone (paper)"}
 _ORDERS = ("stays", "constant velocity", "constant acceleration")
 assert len(_ORDERS) == MOST_ORDER + 1
 
