@@ -15,8 +15,9 @@ from tracker.silhouettes import SMOOTHING_PX, Image
 
 FloatArray = NDArray[np.float32]
 
-SPACING_PX = 16
+SPACING_PX = 20
 """Distance between neighbouring probes, matched px."""
+_LEAST_PLACES = 8  # along each axis, in small images
 _TAPS = 9
 """Matched pixels a side that smoothing (7) and a derivative (3) draw on."""
 
@@ -55,7 +56,7 @@ class Probes:
 
 def _taps(length: int, scale: float) -> NDArray[np.int64]:
     """Positions along one axis, (places, taps), px of the footage, within the image."""
-    places = max(2, round(length * scale / SPACING_PX))
+    places = max(_LEAST_PLACES, round(length * scale / SPACING_PX))
     middles = (np.arange(places) + 0.5) * length / places
     taps = middles[:, None] + (np.arange(_TAPS) - _TAPS // 2) / scale
     return np.clip(np.round(taps), 0, length - 1).astype(np.int64)

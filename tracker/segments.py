@@ -82,7 +82,7 @@ def pixels_of(segments: Segments, chosen: NDArray[np.bool_]) -> NDArray[np.bool_
     return np.repeat(chosen, np.diff(segments.firsts))
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _chain(
     found: NDArray[np.uint8], pixels: NDArray[np.int32], gradients: NDArray[np.int16],
     points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_],
@@ -134,7 +134,7 @@ def _neighbours(left: NDArray[np.uint8], u: int, v: int) -> int:
     return count
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _cut(points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_], firsts: IntArray) -> int:
     """Cut chains where they stop turning evenly; fills the first pixels of segments and returns their number.
 
@@ -172,7 +172,7 @@ def _cut(points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_], fir
     return count
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _accept(
     segments: Segments, pieces: FloatArray, threshold: float, max_angle: float, accepted: NDArray[np.bool_]
 ) -> None:

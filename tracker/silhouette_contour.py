@@ -13,7 +13,7 @@ FloatArray = NDArray[np.float32]
 
 LEAST_LENGTH = 24
 """Contours of fewer pixels go around specks and pinholes, and are left out."""
-_NORMAL_SMOOTHING_PX = 2.0
+_NORMAL_WINDOW = (7, 7)
 _NEAR = np.ones((5, 5), np.uint8)  # an edge this near to the contour is the same
 _ALIGNED = 0.7  # cosine of the angle between the contour's normal and the image's gradient
 _NO_TRUST, _FULL_TRUST = 0.5, 0.9
@@ -39,7 +39,7 @@ def trace_outline(silhouette: Mask) -> Outline:
     points = np.concatenate(long) if long else np.empty((0, 2), np.int32)
     u, v = points.T
     points = points[(u > 0) & (v > 0) & (u < width - 1) & (v < height - 1)]
-    soft = cv2.GaussianBlur(np.where(silhouette, np.uint8(255), np.uint8(0)), (0, 0), _NORMAL_SMOOTHING_PX)
+    soft = cv2.blur(np.where(silhouette, np.uint8(255), np.uint8(0)), _NORMAL_WINDOW)
     u, v = points.T
     inward = np.stack([np.asarray(g)[v, u] for g in cv2.spatialGradient(soft)], axis=-1).astype(np.float32)
     lengths = np.linalg.norm(inward, axis=-1, keepdims=True)

@@ -13,7 +13,7 @@ def picture(size, blur=1.5, seed=0):
 
 
 def test_probes_read_what_the_whole_image_holds_there():
-    size = (320, 240)
+    size = (320, 240)  # multiples of the spacing
     image = picture(size)
     readings = Probes(size, 1.0).read(image)
     smooth = smoothed(image)
