@@ -10,7 +10,15 @@ ROOT = Path(__file__).resolve().parents[1]
 # From the bottom up. A module may import from the rows above its own in this list, never from its own row or further
 # down. A new module takes its place here; one that finds none is two concepts, or in the wrong file.
 ORDER = [
-    ["tracker", "tracker.formats", "tracker.errors", "tracker.rigid", "tracker.silhouettes", "tracker.store_schema"],
+    [
+        "tracker",
+        "tracker.formats",
+        "tracker.errors",
+        "tracker.kernels",
+        "tracker.rigid",
+        "tracker.silhouettes",
+        "tracker.store_schema",
+    ],
     [
         "tracker.cameras",
         "tracker.shapes",
@@ -39,11 +47,11 @@ ORDER = [
     ["tracker.recover"],
     ["tracker.track"],
     # The program: what the screen shows, then who may change it, then who shows it.
-    ["app", "app.access", "app.jobs", "app.viser_proxy", "app.state"],
+    ["app", "app.access", "app.jobs", "app.viser_proxy", "app.state", "app.tracked"],
     ["app.commands", "app.curves", "app.frames", "app.overlays", "app.saving", "app.server"],
     ["app.screen"],
     ["app.searching", "app.tracking"],
-    ["app.controller", "app.messages"],
+    ["app.controller", "app.messages", "app.headless"],
     ["app.panes", "app.scene", "app.settings_panel"],
     ["app.panels"],
     ["app.workbench"],

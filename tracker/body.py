@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tracker import rigid
 from tracker.kinematics import BALL, REVOLVE, TRANSLATE, IntArray, Kinematics, Tree, forward_kinematics
 from tracker.rigid import Array
-from tracker.shapes import TaperedSuperquadric
+from tracker.shapes import Ellipsoid, EllipticalCone, Shape, TaperedSuperquadric
 
 
 @dataclass(frozen=True)
@@ -70,13 +70,25 @@ class Part:
     half_axes: tuple[float, float, float]
     """Half-axes of the shape along its x, y, z, fraction of body height."""
     exponents: tuple[float, float]
-    """e1, e2 of the tapered superquadric."""
+    """e1, e2 of a tapered superquadric; 1, 1 for other kinds."""
     taper: tuple[float, float]
-    """k_x, k_y of the tapered superquadric."""
+    """k_x, k_y of a tapered superquadric; k, k of a cone; 0, 0 of an ellipsoid."""
     center: tuple[float, float, float]
     """Centre of the shape in the part's frame, fraction of body height."""
     color: str
     """Colour in which the part is drawn, `#rrggbb`."""
+    kind: Literal["superquadric", "cone", "ellipsoid"] = "superquadric"
+    """What family the shape is of."""
+
+    def shape(self, height_m: float) -> Shape:
+        """The shape at a body height, metres."""
+        a1, a2, a3 = self.half_axes
+        half_axes = (a1 * height_m, a2 * height_m, a3 * height_m)
+        if self.kind == "cone":
+            return EllipticalCone(half_axes, self.taper[0])
+        if self.kind == "ellipsoid":
+            return Ellipsoid(half_axes)
+        return TaperedSuperquadric(half_axes, self.exponents, self.taper)
 
 
 @dataclass(frozen=True)
@@ -136,13 +148,9 @@ class BodyModel:
         return tuple(self.part_index[j.parent] if j.parent else -1 for j in self.joints)
 
     @cached_property
-    def shapes(self) -> tuple[TaperedSuperquadric, ...]:
+    def shapes(self) -> tuple[Shape, ...]:
         """Shape of each part at this body's size, metres."""
-        H = self.height_m
-        return tuple(
-            TaperedSuperquadric((p.half_axes[0] * H, p.half_axes[1] * H, p.half_axes[2] * H), p.exponents, p.taper)
-            for p in self.parts
-        )
+        return tuple(p.shape(self.height_m) for p in self.parts)
 
     @cached_property
     def centers_part(self) -> Array:

@@ -17,8 +17,9 @@ from tracker import contours
 from tracker.body import Body, BodyModel
 from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence, default_theta_px
+from tracker.kernels import BORROW, FAST
 from tracker.kinematics import Tree, forward_kinematics
-from tracker.nearest import Segments, nearest_segment, segment_buffer, sort_by_row
+from tracker.nearest import RowSorted, Segments, nearest_segment, segment_buffer, sort_by_row
 from tracker.rigid import Array
 
 Outliers = Literal["truncated", "paper"]
@@ -52,11 +53,13 @@ class _Scene(NamedTuple):
     distances: FloatArray
     """The distance images, one after the other, row by row."""
     points: FloatArray
-    """u and v of the edge points near the prediction, one view after the other, each sorted by row, (2, N)."""
+    """u and v of the edge points near the prediction, one `RowSorted` view after the other, (2, N)."""
     rows: NDArray[np.int64]
     """Index of the first point of each row among those of its view, (V, largest height + 1)."""
     firsts: NDArray[np.int64]
     """Index of the first edge point of each view, and the number of all, (V + 1,)."""
+    counts: NDArray[np.int64]
+    """Number of edge points of each view, (V,)."""
     thetas: Array
     """Outlier distances, (V,)."""
 
@@ -105,7 +108,6 @@ class ChamferCost:
         self._scales = np.array([v.scale for v in views])
         thetas = [default_theta_px(v.camera) if theta_px is None else theta_px * v.scale for v in views]
         near = [_near(v, contours.trace(predicted, v.camera), theta) for v, theta in zip(views, thetas, strict=True)]
-        points = [n[0] for n in near]
         tallest = max(v.camera.height for v in views)
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
         self._scene = _Scene(
@@ -113,9 +115,10 @@ class ChamferCost:
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
             np.concatenate([v.distance.ravel() for v in views]),
-            np.ascontiguousarray(np.concatenate(points).T, dtype=np.float32),
-            np.stack([np.pad(rows, (0, tallest + 1 - len(rows)), mode="edge") for _, rows in near]),
-            np.concatenate([[0], np.cumsum([len(p) for p in points])]).astype(np.int64),
+            np.concatenate([n.points for n in near], axis=1),
+            np.stack([np.pad(n.rows, (0, tallest + 1 - len(n.rows)), mode="edge") for n in near]),
+            np.concatenate([[0], np.cumsum([n.points.shape[1] for n in near])]).astype(np.int64),
+            np.array([n.n_points for n in near], dtype=np.int64),
             np.array(thetas),
         )
         widest = max((v.camera for v in views), key=lambda camera: camera.width)
@@ -177,24 +180,24 @@ class ChamferCost:
         return views_px[..., self._seen].mean(axis=-1)
 
 
-def _near(view: ViewEvidence, contour: contours.Contour, theta: float) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Edge points within theta of the visible model contour, (N, 2), sorted by row, and the index of their rows."""
-    points, rows = sort_by_row(view.points_px, view.camera.height)
+def _near(view: ViewEvidence, contour: contours.Contour, theta: float) -> RowSorted:
+    """Edge points within theta of the visible model contour."""
+    everything = sort_by_row(view.points_px, view.camera.height)
     pieces = contour.pieces_px[~contour.hidden]
     segments = Segments(*np.ascontiguousarray(np.column_stack([pieces[:, :2], pieces[:, 2:] - pieces[:, :2]]).T))
-    distances = np.empty(len(points), np.float32)
-    u, v = np.ascontiguousarray(points.T)
-    nearest_segment(u, v, rows, segments, len(pieces), theta, distances)
-    return sort_by_row(points[distances <= theta], view.camera.height)
+    u, v = everything.points
+    distances = np.empty(len(u), np.float32)
+    nearest_segment(u, v, everything.rows, segments, len(pieces), theta, distances)
+    return sort_by_row(everything.points[:, distances <= theta].T, view.camera.height)
 
 
-@njit(nogil=True, cache=True)
+@njit(**FAST)
 def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool) -> float:
     """Mean of n distances with weights w, outliers treated as `ChamferCost` says; theta where there are none."""
     total, weight = 0.0, 0.0
     if not paper:
         for i in range(n):
-            total += w[i] * min(d[i], theta)
+            total += w[i] * (d[i] if d[i] < theta else theta)
             weight += w[i]
         return total / weight if weight > 0 else theta
     everything, squares = 0.0, 0.0
@@ -216,7 +219,7 @@ def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool
     return total / weight if weight >= 0.5 * everything else theta
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(**BORROW)
 def sample_distance(distances: FloatArray, first: int, width: int, height: int, u: np.float32, v: np.float32) -> float:
     """Bilinear distance at a pixel; outside the image, that of the nearest border pixel and the way to it."""
     cu = min(max(u, np.float32(0)), np.float32(width - 1))
@@ -232,7 +235,7 @@ def sample_distance(distances: FloatArray, first: int, width: int, height: int, 
     return inside + np.sqrt((u - cu) * (u - cu) + (v - cv) * (v - cv))
 
 
-@njit(nogil=True, cache=True)
+@njit(**BORROW)
 def _collect(n: int, distances: FloatArray, first: int, width: int, height: int, scratch: _Scratch) -> tuple[int, int]:
     """Sample the distance image at the visible pieces, and join them to segments; the numbers of both."""
     ends, hidden, edges = scratch.pieces.ends, scratch.pieces.hidden, scratch.pieces.edges
@@ -257,7 +260,7 @@ def _collect(n: int, distances: FloatArray, first: int, width: int, height: int,
     return kept, n_segments
 
 
-@njit(nogil=True, cache=True)
+@njit(**BORROW)
 def _score(
     Ts: Array, surfaces: contours.Surfaces, scene: _Scene, paper: bool, scratch: _Scratch, directed: Array
 ) -> None:
@@ -271,7 +274,7 @@ def _score(
         first, last = scene.firsts[view], scene.firsts[view + 1]
         u, v = scene.points[0][first:last], scene.points[1][first:last]
         nearest_segment(u, v, scene.rows[view][: height + 1], scratch.segments, n_segments, theta, d)
-        directed[view, 1] = _robust_mean(d, scratch.ones, last - first, theta, paper)
+        directed[view, 1] = _robust_mean(d, scratch.ones, scene.counts[view], theta, paper)
         pixel += width * height
 
 

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from tracker.body import Body
 from tracker.cameras import Camera
-from tracker.hiding import JOINT_MARGIN_M, hide
+from tracker.hiding import JOINT_MARGIN_M, LANES, hide
+from tracker.kernels import BORROW, FAST
 from tracker.outlines import MAX_POINTS, grid_outline, revolved_outline
 from tracker.rigid import Array
 from tracker.surfaces import FloatArray, Surfaces, surfaces_of
@@ -28,11 +29,10 @@ MAX_PIECES = 6000
 """Room for the pieces of one view; a 22-DOF body that fills a 640x480 image has some 600."""
 _NEAREST_M = 0.05
 """What comes nearer to the camera's plane is not drawn, metres."""
-_SAG_PX = 0.07
+_SAG_PX = 0.08
 """How far the middle of a chord around a part may lie inside the arc, px."""
 _THIN2 = np.float32(0.07**2)
 """A point of an outline less than this off the line between its neighbours is left out, px squared."""
-_FLAGS = {"contract", "reassoc", "nsz", "arcp"}
 
 
 class Contour(NamedTuple):
@@ -54,7 +54,7 @@ class Pieces(NamedTuple):
     ends: FloatArray
     """u0, v0, u1, v1, (4, room), undistorted px."""
     middles: FloatArray
-    """Middle of each piece in the unit coordinates of its part, (3, room)."""
+    """Middle of each piece in the unit coordinates of its part, (3, room + LANES)."""
     edges: NDArray[np.int32]
     """Number of the straight edge that each piece is cut from, (room,)."""
     hidden: NDArray[np.bool_]
@@ -70,17 +70,19 @@ class Pieces(NamedTuple):
     distances: Array
     """From the eye to the centre of each part, (P,), metres."""
     outline: FloatArray
-    """Points of one outline, (3, MAX_POINTS + 1), unit coordinates."""
+    """Points of one outline, (3, MAX_POINTS + LANES), unit coordinates."""
     image: FloatArray
-    """Their u, v in px and depths, (3, MAX_POINTS + 1)."""
+    """Their u, v in px and depths, (3, MAX_POINTS + LANES)."""
     half: FloatArray
     """One side of an outline, (3, MAX_POINTS)."""
     f: FloatArray
     """A function on the grid of a part, (rings * sectors,)."""
     between: FloatArray
     """From the unit coordinates of one part to those of another, and the eye there, (3, 5)."""
+    unit_eye: Array
+    """The eye in unit coordinates of one part, (3,)."""
     shared: FloatArray
-    """What lines of sight share with a part, (2, room)."""
+    """What lines of sight share with a part, (2, room + LANES)."""
 
 
 def part_poses(bodies: Sequence[Body]) -> Array:
@@ -126,19 +128,19 @@ def piece_buffer(surfaces: Surfaces, room: int) -> Pieces:
     """Uninitialized room for the pieces of a view, to be filled by `trace_pieces`."""
     n_parts, grid_size = surfaces.offsets.shape
     return Pieces(
-        np.empty((4, room), np.float32), np.empty((3, room), np.float32), np.empty(room, np.int32),
+        np.empty((4, room), np.float32), np.zeros((3, room + LANES), np.float32), np.empty(room, np.int32),
         np.empty(room, np.bool_), np.empty(n_parts + 1, np.int64), np.empty((n_parts, 3, 4)),
         np.empty((n_parts, 3, 5)), np.empty((n_parts, 4)), np.empty(n_parts),
-        np.empty((3, MAX_POINTS + 1), np.float32), np.empty((3, MAX_POINTS + 1), np.float32),
+        np.zeros((3, MAX_POINTS + LANES), np.float32), np.empty((3, MAX_POINTS + LANES), np.float32),
         np.empty((3, MAX_POINTS), np.float32), np.empty(grid_size, np.float32), np.empty((3, 5), np.float32),
-        np.empty((2, room), np.float32),
+        np.empty(3), np.empty((2, room + LANES), np.float32),
     )  # fmt: skip
 
 
 # The kernels below take the arrays they need one by one: handing over a tuple of thirty costs more than the work is.
 
 
-@njit(nogil=True, cache=True)
+@njit(**BORROW)
 def _place(eye: Array, Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
     """Fill the motions between the parts' unit coordinates and the world, and their distances from the eye."""
     to_world, to_unit, distances = out.Ts_world_unit, out.Ts_unit_world, out.distances
@@ -162,78 +164,97 @@ def _place(eye: Array, Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
                 to_unit[part, i, 4] += to_unit[part, i, k] * (eye[k] - to_world[part, k, 3])
 
 
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FLAGS)
+@njit(**FAST)
 def _project(
     part: int, P: Array, n: int, Ts_world_unit: Array, outline: FloatArray, image: FloatArray, boxes: Array
 ) -> int:
-    """Close an outline of n points by its first, project, bound and thin it; returns the number of its edges."""
-    W, x, y, z = Ts_world_unit, outline[0], outline[1], outline[2]
+    """Close an outline of n points by its first, project, thin and bound it; returns the number of its edges."""
+    W = Ts_world_unit
     for i in range(3):
         outline[i, n] = outline[i, 0]
-    for i in range(3):
-        a = np.float32(P[i, 0] * W[part, 0, 0] + P[i, 1] * W[part, 1, 0] + P[i, 2] * W[part, 2, 0])
-        b = np.float32(P[i, 0] * W[part, 0, 1] + P[i, 1] * W[part, 1, 1] + P[i, 2] * W[part, 2, 1])
-        c = np.float32(P[i, 0] * W[part, 0, 2] + P[i, 1] * W[part, 1, 2] + P[i, 2] * W[part, 2, 2])
-        d = np.float32(P[i, 0] * W[part, 0, 3] + P[i, 1] * W[part, 1, 3] + P[i, 2] * W[part, 2, 3] + P[i, 3])
-        row = image[i]
-        for k in range(n + 1):
-            row[k] = a * x[k] + b * y[k] + c * z[k] + d
-    u, v, w = image[0], image[1], image[2]
-    for k in range(n + 1):
-        inverse = np.float32(1) / w[k]
-        u[k] *= inverse
-        v[k] *= inverse
-    u0 = u1 = u[0]
-    v0 = v1 = v[0]
-    for k in range(n):
-        u0, u1, v0, v1 = min(u0, u[k]), max(u1, u[k]), min(v0, v[k]), max(v1, v[k])
-    boxes[part, 0], boxes[part, 1], boxes[part, 2], boxes[part, 3] = u0, v0, u1, v1
-    kept = 0
+    a0, b0, c0, d0 = _image_row(0, part, P, W)
+    a1, b1, c1, d1 = _image_row(1, part, P, W)
+    a2, b2, c2, d2 = _image_row(2, part, P, W)
+    for k in range(np.uint64(n // LANES * LANES + LANES)):  # whole vectors, whatever is beyond the outline
+        x, y, z = outline[0, k], outline[1, k], outline[2, k]
+        w = a2 * x + b2 * y + c2 * z + d2
+        inverse = np.float32(1) / w
+        image[0, k] = (a0 * x + b0 * y + c0 * z + d0) * inverse
+        image[1, k] = (a1 * x + b1 * y + c1 * z + d1) * inverse
+        image[2, k] = w
+    kept = last = 0
+    u0 = u1 = u = image[0, 0]
+    v0 = v1 = v = image[1, 0]
     for k in range(1, n + 1):
-        if k < n:
-            au, av = u[k] - u[kept], v[k] - v[kept]
-            bu, bv = u[k + 1] - u[kept], v[k + 1] - v[kept]
-            off = au * bv - av * bu
+        uk, vk = image[0, k], image[1, k]
+        if k < n and k == last + 1:  # of two in a row one is kept: else the error would add up
+            bu, bv = image[0, k + 1] - u, image[1, k + 1] - v
+            off = (uk - u) * bv - (vk - v) * bu
             if off * off <= _THIN2 * (bu * bu + bv * bv):
                 continue
-        kept += 1
-        x[kept], y[kept], z[kept], u[kept], v[kept], w[kept] = x[k], y[k], z[k], u[k], v[k], w[k]
+        kept, last = kept + 1, k
+        u, v = uk, vk
+        u0, u1, v0, v1 = min(u0, u), max(u1, u), min(v0, v), max(v1, v)
+        image[0, kept], image[1, kept], image[2, kept] = u, v, image[2, k]
+        for i in range(3):
+            outline[i, kept] = outline[i, k]
+    boxes[part, 0], boxes[part, 1], boxes[part, 2], boxes[part, 3] = u0, v0, u1, v1
     return kept
 
 
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FLAGS)
+@njit(**BORROW)
+def _image_row(i: int, part: int, P: Array, W: Array) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+    """Row i of the projection from the unit coordinates of a part."""
+    p, q, r = P[i, 0], P[i, 1], P[i, 2]
+    return (
+        np.float32(p * W[part, 0, 0] + q * W[part, 1, 0] + r * W[part, 2, 0]),
+        np.float32(p * W[part, 0, 1] + q * W[part, 1, 1] + r * W[part, 2, 1]),
+        np.float32(p * W[part, 0, 2] + q * W[part, 1, 2] + r * W[part, 2, 2]),
+        np.float32(p * W[part, 0, 3] + q * W[part, 1, 3] + r * W[part, 2, 3] + P[i, 3]),
+    )
+
+
+@njit(**FAST)
 def _cut(
     n_edges: int, edge: int, piece_px: float, n: int, outline: FloatArray, image: FloatArray, ends: FloatArray,
     middles: FloatArray, edges: NDArray[np.int32],
 ) -> int:  # fmt: skip
     """Cut the edges of an outline into pieces and append those; returns the new count of pieces."""
-    u, v, w, x, y, z = image[0], image[1], image[2], outline[0], outline[1], outline[2]
-    u0, v0, u1, v1 = ends[0], ends[1], ends[2], ends[3]
-    mx, my, mz = middles[0], middles[1], middles[2]
     per_px, half, one, room = np.float32(1.0 / piece_px), np.float32(0.5), np.float32(1), edges.shape[0]
     for k in range(n_edges):
-        du, dv = u[k + 1] - u[k], v[k + 1] - v[k]
+        u, v, w0, w1 = image[0, k], image[1, k], image[2, k], image[2, k + 1]
+        x, y, z = outline[0, k], outline[1, k], outline[2, k]
+        du, dv = image[0, k + 1] - u, image[1, k + 1] - v
+        dx, dy, dz = outline[0, k + 1] - x, outline[1, k + 1] - y, outline[2, k + 1] - z
         count = min(int(np.ceil(np.sqrt(du * du + dv * dv) * per_px)), room - n)
-        if count <= 0:
-            continue
-        share = one / np.float32(count)
-        du, dv = du * share, dv * share
-        dx, dy, dz = x[k + 1] - x[k], y[k + 1] - y[k], z[k + 1] - z[k]
-        w0, w1 = w[k], w[k + 1]
-        for j in range(count):
-            i, a = np.uint64(n + j), np.float32(j)  # unsigned: an index that may be negative is not vectorized
-            u0[i], v0[i] = u[k] + a * du, v[k] + a * dv
-            u1[i], v1[i] = u[k] + (a + one) * du, v[k] + (a + one) * dv
+        if count == 1:
+            i = np.uint64(n)
             # The middle in the image is not the middle in space; 1/depth is linear along the projected edge.
-            m = (a + half) * share
-            m = m * w0 / (w1 + m * (w0 - w1))
-            mx[i], my[i], mz[i] = x[k] + m * dx, y[k] + m * dy, z[k] + m * dz
+            m = w0 / (w0 + w1)
+            ends[0, i], ends[1, i], ends[2, i], ends[3, i] = u, v, u + du, v + dv
+            middles[0, i], middles[1, i], middles[2, i] = x + m * dx, y + m * dy, z + m * dz
             edges[i] = edge + k
-        n += count
+            n += 1
+        elif count > 1:
+            share = one / np.float32(count)
+            du, dv = du * share, dv * share
+            for j in range(count):
+                i, a = np.uint64(n + j), np.float32(j)
+                m = (a + half) * share
+                m = m * w0 / (w1 + m * (w0 - w1))
+                ends[0, i], ends[1, i], ends[2, i], ends[3, i] = (
+                    u + a * du,
+                    v + a * dv,
+                    u + (a + one) * du,
+                    v + (a + one) * dv,
+                )
+                middles[0, i], middles[1, i], middles[2, i] = x + m * dx, y + m * dy, z + m * dz
+                edges[i] = edge + k
+            n += count
     return n
 
 
-@njit(nogil=True, cache=True)
+@njit(**BORROW)
 def _hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
     """Mark what parts hide of one another: those whose boxes in the image meet, and that are not all behind."""
     boxes, distances, radii, firsts, adjoining = (
@@ -243,7 +264,10 @@ def _hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
         out.firsts,
         surfaces.adjoining,
     )
-    to_unit, to_world, Q = out.Ts_unit_world, out.Ts_world_unit, out.between
+    to_unit, to_world, Q, middles, shared, hidden = (
+        out.Ts_unit_world, out.Ts_world_unit, out.between, out.middles, out.shared, out.hidden
+    )  # fmt: skip
+    solids = surfaces.solids
     for a in range(n_parts):
         if firsts[a] == firsts[a + 1]:
             continue
@@ -261,14 +285,14 @@ def _hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
                 Q[i, 3] = p * to_world[a, 0, 3] + q * to_world[a, 1, 3] + r * to_world[a, 2, 3] + to_unit[b, i, 3]
                 Q[i, 4] = to_unit[b, i, 4]
             margin = JOINT_MARGIN_M / distances[a] if adjoining[a, b] else 0.0
-            hide(b, surfaces.solids, Q, margin, out.middles, firsts[a], firsts[a + 1], out.shared, out.hidden)
+            hide(b, solids, Q, margin, middles, firsts[a], firsts[a + 1], shared, hidden)
 
 
-@njit(nogil=True, cache=True)
+@njit(**BORROW)
 def trace_pieces(P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: float, out: Pieces) -> int:
     """Fill the pieces of one view; returns their number. See `trace_view`."""
     n_parts = Ts.shape[0]
-    unit_eye, radii, half_axes, firsts = np.empty(3), surfaces.radii, surfaces.half_axes, out.firsts
+    unit_eye, radii, half_axes, firsts = out.unit_eye, surfaces.radii, surfaces.half_axes, out.firsts
     profiles, profile_sizes = surfaces.profiles, surfaces.profile_sizes
     to_world, to_unit, outline, image = out.Ts_world_unit, out.Ts_unit_world, out.outline, out.image
     focal = np.sqrt(P[0, 0] ** 2 + P[0, 1] ** 2 + P[0, 2] ** 2)
@@ -294,7 +318,8 @@ def trace_pieces(P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: 
             n = _cut(n_edges, edge, piece_px, n, outline, image, out.ends, out.middles, out.edges)
             edge += n_edges
     firsts[n_parts] = n
-    out.hidden[:n] = False
+    for i in range(n):
+        out.hidden[i] = False
     _hide_all(n_parts, surfaces, out)
     return n
 

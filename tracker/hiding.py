@@ -9,19 +9,21 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.kernels import BORROW, FAST
 from tracker.surfaces import ALONG, N_ALONG, N_SECTION, SECTION, FloatArray
 
 JOINT_MARGIN_M = 0.03
 """How far in front of an adjoining part a contour must lie to be seen as one, metres."""
 
-_FLAGS = {"contract", "reassoc", "nsz", "arcp"}  # infinite numbers are left their meaning
+LANES = 16
+"""Numbers that are worked on together; rooms for points have as many to spare."""
 _TINY, _FAR = np.float32(1e-9), np.float32(1e9)
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernels' arithmetic into float64
 _TRIES = (0.5, 0.25, 0.75, 0.001)
 """Where on what the line of sight shares with the quadric the shape is asked, from its far end (0) to the near."""
 
 
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FLAGS)
+@njit(**FAST)
 def _meet_quadric(
     part: int, solids: FloatArray, Q: FloatArray, margin: float, points: FloatArray, first: int, last: int,
     shared: FloatArray,
@@ -32,9 +34,11 @@ def _meet_quadric(
     q10, q11, q12, q13, ey = Q[1, 0] * gy, Q[1, 1] * gy, Q[1, 2] * gy, Q[1, 3] * gy, Q[1, 4] * gy
     q20, q21, q22, q23, ez = Q[2, 0], Q[2, 1], Q[2, 2], Q[2, 3], Q[2, 4]
     behind = np.float32(-margin)
-    px, py, pz, far, near = points[0], points[1], points[2], shared[0], shared[1]
-    for i in range(np.uint64(first), np.uint64(last)):  # unsigned: an index that may be negative is not vectorized
-        a, b, c = px[i], py[i], pz[i]
+    # Whole vectors: their last numbers may be of no point and are not read again. The index is unsigned because one
+    # that may be negative is not vectorized.
+    for j in range(np.uint64((last - first + LANES - 1) // LANES * LANES)):
+        i = np.uint64(first) + j
+        a, b, c = points[0, i], points[1, i], points[2, i]
         x = q00 * a + q01 * b + q02 * c + q03
         y = q10 * a + q11 * b + q12 * c + q13
         z = q20 * a + q21 * b + q22 * c + q23
@@ -56,11 +60,11 @@ def _meet_quadric(
         e0, e1 = (-_ONE - z) * per_z, (_ONE - z) * per_z
         low = max(max(low, behind), min(e0, e1))
         high = min(min(high, _ONE), max(e0, e1))
-        far[i] = low
-        near[i] = high if disc > _ZERO else -_FAR
+        shared[0, i] = low
+        shared[1, i] = high if disc > _ZERO else -_FAR
 
 
-@njit(nogil=True, cache=True)
+@njit(**BORROW)
 def _fills(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: np.float32) -> bool:
     """Whether a point in unit coordinates is within a superquadric, by the tables of its shape."""
     at = abs(z) * np.float32(N_ALONG)
@@ -83,7 +87,7 @@ def _fills(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: np.fl
     return larger * (below + (at - np.float32(k)) * (solids[part, SECTION + k + 1] - below)) < size
 
 
-@njit(nogil=True, cache=True)
+@njit(**BORROW)
 def hide(
     part: int, solids: FloatArray, Q: FloatArray, margin: float, points: FloatArray, first: int, last: int,
     shared: FloatArray, hidden: NDArray[np.bool_],
@@ -95,20 +99,22 @@ def hide(
         solids: the shapes, see `Surfaces`. (All of `Surfaces` would cost more to hand over than the work is.)
         Q: from the frame of the points to the part's unit coordinates, and the eye in those as last column, (3, 5).
         margin: how far behind the point, as a share of the way to the eye, the part still hides it.
-        points: (3, room).
+        points: (3, room), with room for `LANES` more.
         first: index of the first point.
         last: index after the last.
-        shared: room for where each line of sight is inside the quadric, from and to, (2, room).
+        shared: room for where each line of sight is inside the quadric, from and to, (2, room) too.
         hidden: what is marked, (room,).
     """
     _meet_quadric(part, solids, Q, margin, points, first, last, shared)
-    exact = solids[part, 4] > 0
-    for i in range(first, last):
+    if solids[part, 4] > 0:  # the quadric is the part
+        for j in range(np.uint64(last - first)):
+            i = np.uint64(first) + j
+            hidden[i] |= shared[0, i] < shared[1, i]
+        return
+    for j in range(np.uint64(last - first)):
+        i = np.uint64(first) + j
         far, near = shared[0, i], shared[1, i]
         if hidden[i] or far >= near:
-            continue
-        if exact:
-            hidden[i] = True
             continue
         a, b, c = points[0, i], points[1, i], points[2, i]
         x = Q[0, 0] * a + Q[0, 1] * b + Q[0, 2] * c + Q[0, 3]

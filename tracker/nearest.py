@@ -10,11 +10,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.kernels import FAST
+
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernel's arithmetic into float64
-_FAR2 = np.float32(1e12)
+_FAR, _FAR2 = np.float32(1e6), np.float32(1e12)
+LANES = 16
+"""Points that are worked on together."""
 
 
 class Segments(NamedTuple):
@@ -35,26 +39,37 @@ def segment_buffer(room: int) -> Segments:
     return Segments(*(np.empty(room, np.float32) for _ in range(4)))
 
 
-def sort_by_row(points: FloatArray, height: int) -> tuple[FloatArray, IntArray]:
-    """Sort points (N, 2) by row, and index them.
+class RowSorted(NamedTuple):
+    """Points sorted by the row of the image they lie in."""
 
-    Returns:
-        The points, (N, 2), and the index of the first point in each row or below, (height + 1,). Points above or below
-        the image count to its first or last row.
-    """
+    points: FloatArray
+    """u and v, (2, N) with N filled up to whole `LANES` by points far away, px."""
+    rows: IntArray
+    """Index of the first point in each row or below, (height + 1,); the last is the number of points."""
+
+    @property
+    def n_points(self) -> int:
+        """Number of points."""
+        return int(self.rows[-1])
+
+
+def sort_by_row(points: FloatArray, height: int) -> RowSorted:
+    """Sort points (N, 2) by row; those above or below the image count to its first or last."""
     rows = np.clip(np.floor(points[:, 1]), 0, height - 1).astype(np.int64)
     order = np.argsort(rows, kind="stable")
-    return points[order], np.searchsorted(rows[order], np.arange(height + 1)).astype(np.int64)
+    filled = np.full((2, -(-len(points) // LANES) * LANES), _FAR, np.float32)
+    filled[:, : len(points)] = points[order].T
+    return RowSorted(filled, np.searchsorted(rows[order], np.arange(height + 1)).astype(np.int64))
 
 
-@njit(nogil=True, cache=True, fastmath=True)
+@njit(**FAST)
 def nearest_segment(
     u: FloatArray, v: FloatArray, rows: IntArray, segments: Segments, n: int, reach: float, out: FloatArray
 ) -> None:
     """Distance of each point to the nearest of n segments; exact up to the reach, beyond it at least the reach.
 
     Args:
-        u: of the points, sorted by row, (N,), px.
+        u: of the points (see `RowSorted`), (N,), px.
         v: (N,), px.
         rows: index of the first point of each row, (height + 1,).
         segments: the segments.
@@ -63,15 +78,16 @@ def nearest_segment(
         out: the distances, (N,), px.
     """
     last_row = rows.shape[0] - 1
-    for i in range(u.shape[0]):
-        out[i] = _FAR2
+    out[: u.shape[0]] = _FAR2
     far = np.float32(reach)
     for k in range(n):
         x, y, dx, dy = segments.u[k], segments.v[k], segments.du[k], segments.dv[k]
         inverse = _ONE / max(dx * dx + dy * dy, np.float32(1e-12))
-        top, bottom = int(min(y, y + dy) - far), int(max(y, y + dy) + far) + 1
-        first, last = rows[min(max(top - 1, 0), last_row - 1)], rows[min(max(bottom, 1), last_row)]
-        for i in range(np.uint64(first), np.uint64(last)):  # unsigned: an index that may be negative is not vectorized
+        top, bottom = int(min(y, y + dy) - far) - 1, int(max(y, y + dy) + far) + 1
+        first = rows[min(max(top, 0), last_row - 1)] // LANES * LANES  # whole vectors, of points nearby at worst
+        count = (rows[min(max(bottom, 1), last_row)] - first + LANES - 1) // LANES * LANES
+        for j in range(np.uint64(count)):  # unsigned: an index that may be negative is not vectorized
+            i = np.uint64(first) + j
             from_u, from_v = u[i] - x, v[i] - y
             t = (from_u * dx + from_v * dy) * inverse
             t = t if t > _ZERO else _ZERO
@@ -79,5 +95,5 @@ def nearest_segment(
             off_u, off_v = from_u - t * dx, from_v - t * dy
             squared = off_u * off_u + off_v * off_v
             out[i] = squared if squared < out[i] else out[i]
-    for i in range(u.shape[0]):
-        out[i] = np.sqrt(out[i])
+    for k in range(u.shape[0]):
+        out[k] = np.sqrt(out[k])

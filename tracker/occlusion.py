@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tracker import contours
 from tracker.body import Body
 from tracker.cameras import Camera
-from tracker.hiding import hide
+from tracker.hiding import LANES, hide
 from tracker.rigid import Array
 from tracker.surfaces import N_RINGS, N_SECTORS, FloatArray
 
@@ -132,8 +132,8 @@ def _blocked(
         T = np.column_stack([Ts_part_world[part], -Ts_part_world[part] @ Ts[part, :3, 3] - center])
         Q = np.column_stack([T, T @ (*camera.center_world, 1.0)]) / surfaces.half_axes[part][:, None]
         seen = np.flatnonzero(~hidden & ~ignored[part])
-        by_part, shared = np.zeros(len(seen), dtype=bool), np.empty((2, len(seen)), np.float32)
-        mine = np.ascontiguousarray(points[seen].T)
+        by_part, shared = np.zeros(len(seen), dtype=bool), np.empty((2, len(seen) + LANES), np.float32)
+        mine = np.pad(points[seen].T, ((0, 0), (0, LANES)))
         hide(part, surfaces.solids, Q.astype(np.float32), 0.0, mine, 0, len(seen), shared, by_part)
         hidden[seen] |= by_part
     return hidden

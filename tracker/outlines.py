@@ -8,15 +8,18 @@ point of the profile; on other parts the zero line of the function is followed a
 import numpy as np
 from numba import njit
 
+from tracker.kernels import BORROW
 from tracker.rigid import Array
 from tracker.surfaces import N_RINGS, N_SECTORS, FloatArray, Surfaces
 
 MAX_POINTS = 512
 """Room for the points of one curve."""
+_ON_AXIS = 1e-9
+"""An eye nearer to the axis has no direction from it, unit coordinates."""
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(**BORROW)
 def revolved_outline(
     part: int, n_profile: int, profile: FloatArray, eye: Array, turn: np.float32, half: FloatArray, out: FloatArray
 ) -> int:
@@ -39,7 +42,8 @@ def revolved_outline(
     Returns:
         Their number.
     """
-    inverse = np.float32(1.0 / max(np.sqrt(eye[0] * eye[0] + eye[1] * eye[1]), 1e-9))
+    distance = np.sqrt(eye[0] * eye[0] + eye[1] * eye[1])
+    inverse = np.float32(1.0 / max(distance, _ON_AXIS))
     eye_z = np.float32(eye[2])
     n = 0
     c0 = r0 = z0 = n0 = _ZERO
@@ -54,6 +58,8 @@ def revolved_outline(
     if n < 3:
         return 0
     cos_eye, sin_eye = np.float32(eye[0]) * inverse, np.float32(eye[1]) * inverse
+    if distance < _ON_AXIS:  # any direction will do
+        cos_eye, sin_eye = _ONE, _ZERO
     for k in range(n):
         mirrored = 2 * n - 2 - k
         x, y = cos_eye * half[0, k], sin_eye * half[1, k]
@@ -64,7 +70,7 @@ def revolved_outline(
     return 2 * n - 2  # the mirrored first point is the first itself
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(**BORROW)
 def _strip(
     c0: np.float32, c1: np.float32, n0: np.float32, n1: np.float32, first: np.float32, last: np.float32,
     r0: np.float32, z0: np.float32, r1: np.float32, z1: np.float32, turn: np.float32, n: int, half: FloatArray,
@@ -83,7 +89,7 @@ def _strip(
         n = 1
     if (last - first) * (last - first) + (s1 - s0) * (s1 - s0) > turn * turn:
         angle = np.arccos(min(max(first * last + s0 * s1, -_ONE), _ONE))
-        count = min(int(np.ceil(angle / turn)), MAX_POINTS // 2 - n)
+        count = min(int(angle / turn) + 1, MAX_POINTS // 2 - n)
         step = angle / np.float32(count) if last < first else -angle / np.float32(count)
         cos_step, sin_step = np.cos(step), np.sin(step)
         c, s = first, s0
@@ -101,7 +107,7 @@ def _strip(
     return n
 
 
-@njit(nogil=True, cache=True)
+@njit(**BORROW)
 def grid_outline(part: int, eye: Array, surfaces: Surfaces, f: FloatArray, out: FloatArray) -> int:
     """Follow the contour generator around the grid of a part, from cell to cell.
 
@@ -154,7 +160,7 @@ def grid_outline(part: int, eye: Array, surfaces: Surfaces, f: FloatArray, out: 
     return 0
 
 
-@njit(nogil=True, cache=True)
+@njit(**BORROW)
 def _start(f: FloatArray) -> tuple[int, int, int]:
     """Where the zero line enters a cell, as ring, sector and side; ring -1 where there is none."""
     for ring in range(N_RINGS + 1):

@@ -14,7 +14,7 @@ FloatArray = NDArray[np.float32]
 
 N_RINGS, N_SECTORS = 14, 24
 """Of the grid on a part that is no solid of revolution."""
-PROFILE_TOLERANCE_M = 6e-4
+PROFILE_TOLERANCE_M = 8e-4
 """How far the chords of a profile may stray from it, metres: a tenth of a pixel where a person fills 640x480."""
 N_SECTION, N_ALONG = 32, 128
 """Cells of the tables of a shape's cross-section and of its size along the axis."""

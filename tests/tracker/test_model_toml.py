@@ -4,6 +4,7 @@ from test_body import BALLS
 
 from tracker.errors import ModelError
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M, PRESETS, format_model, load_model, parse_model
+from tracker.shapes import Ellipsoid, EllipticalCone
 
 SMALL = """
 version = 1
@@ -154,3 +155,41 @@ def test_two_joints_for_one_part():
 def test_impossible_heights(height):
     with pytest.raises(ModelError, match=r"height of 0\.3 to 3 metres"):
         parse_model(SMALL, "x", height)
+
+
+KINDS = SMALL.replace('name = "arm"\nhalf_axes', 'name = "arm"\nshape = "cone"\ntaper = 0.3\nhalf_axes').replace(
+    'name = "trunk"\nhalf_axes', 'name = "trunk"\nshape = "ellipsoid"\nhalf_axes'
+)
+
+
+def test_shapes_of_parts():
+    model = parse_model(KINDS, "x", 2.0)
+    assert model.shapes == (Ellipsoid((0.4, 0.4, 0.4)), EllipticalCone((0.2, 0.2, 0.2), 0.3))
+    again = parse_model(format_model(model), "again")
+    assert again.parts == model.parts
+    assert again.shapes == model.shapes
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (KINDS.replace('"cone"', '"cube"'), "part 'arm' expected shape superquadric, cone or ellipsoid, found 'cube'"),
+        (KINDS.replace("taper", "exponents = [1, 1]\ntaper"), "of shape cone, which has no exponents; leave it out"),
+        (KINDS.replace('"cone"', '"ellipsoid"'), "of shape ellipsoid, which has no taper; leave it out"),
+        (KINDS.replace("taper = 0.3", "taper = 0.95"), "tapers within 0.9"),
+        (KINDS.replace("taper = 0.3", "taper = [0.3, 0.3]"), "malformed"),
+    ],
+)
+def test_malformed_shapes(text, expected):
+    with pytest.raises(ModelError, match=expected):
+        parse_model(text, "mine.toml")
+
+
+def test_the_cones_stand_where_gavrilas_parts_do():
+    model, cones = load_model("gavrila22"), load_model("gavrila22_cones")
+    assert cones.joints == model.joints
+    assert cones.landmarks == model.landmarks
+    assert cones.search_groups == model.search_groups
+    for part, other in zip(cones.parts, model.parts, strict=True):
+        assert (part.name, part.half_axes, part.center) == (other.name, other.half_axes, other.center)
+        assert part.kind == ("ellipsoid" if part.name == "head" else "cone")

@@ -115,17 +115,7 @@ def format_model(model: BodyModel) -> str:
                 for a in j.axes
             ]
         joints.append(row)
-    parts = [
-        {
-            "name": p.name,
-            "half_axes": list(p.half_axes),
-            "exponents": list(p.exponents),
-            "taper": list(p.taper),
-            "center": list(p.center),
-            "color": p.color,
-        }
-        for p in model.parts
-    ]
+    parts = [_part_row(p) for p in model.parts]
     landmarks = [{"name": m.name, "part": m.part, "position": list(m.position)} for m in model.landmarks]
     search = [{"name": g.name, "dofs": list(g.dofs)} for g in model.search_groups]
     return tomli_w.dumps(
@@ -139,6 +129,15 @@ def format_model(model: BodyModel) -> str:
             "parts": parts,
         }
     )
+
+
+def _part_row(p: Part) -> dict[str, Any]:
+    row: dict[str, Any] = {"name": p.name, "half_axes": list(p.half_axes)}
+    if p.kind == "superquadric":
+        row |= {"exponents": list(p.exponents), "taper": list(p.taper)}
+    else:
+        row |= {"shape": p.kind} | ({"taper": p.taper[0]} if p.kind == "cone" else {})
+    return row | {"center": list(p.center), "color": p.color}
 
 
 def _numbers(value: Any, count: int, source: str, where: str) -> Any:
@@ -185,17 +184,28 @@ def _joint(data: Any, source: str) -> Joint:
 
 
 def _part(data: Any, source: str) -> Part:
-    name = str(data["name"])
+    name, kind = str(data["name"]), data.get("shape", "superquadric")
+    if kind not in ("superquadric", "cone", "ellipsoid"):
+        raise ModelError(
+            f"body model {source}: part '{name}' expected shape superquadric, cone or ellipsoid, found '{kind}'"
+        )
+    unknown = {"superquadric": set(), "cone": {"exponents"}, "ellipsoid": {"exponents", "taper"}}[kind] & set(data)
+    if unknown:
+        raise ModelError(
+            f"body model {source}: part '{name}' is of shape {kind}, which has no {' and no '.join(sorted(unknown))}; "
+            "leave it out"
+        )
     half_axes = _numbers(data["half_axes"], 3, source, name)
     exponents = _numbers(data.get("exponents", (1, 1)), 2, source, name)
-    taper = _numbers(data.get("taper", (0, 0)), 2, source, name)
+    taper = [data.get("taper", 0)] * 2 if kind == "cone" else data.get("taper", (0, 0))
+    taper = _numbers(taper, 2, source, name)
     if min(half_axes) <= 0 or not all(0.05 <= e <= 1 for e in exponents) or not all(abs(k) < 0.9 for k in taper):
         raise ModelError(
             f"body model {source}: part '{name}' expected half-axes above 0, exponents of 0.05 to 1 and tapers within "
             f"0.9, found {half_axes}, {exponents}, {taper}"
         )
     center = _numbers(data.get("center", (0, 0, 0)), 3, source, name)
-    return Part(name, half_axes, exponents, taper, center, str(data.get("color", "#b0b0b0")))
+    return Part(name, half_axes, exponents, taper, center, str(data.get("color", "#b0b0b0")), kind)
 
 
 def _order(joints: tuple[Joint, ...], source: str) -> tuple[Joint, ...]:

@@ -1,0 +1,48 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tracker.nearest import LANES, Segments, nearest_segment, sort_by_row
+
+HEIGHT = 200
+
+
+def distances(points, segments):
+    """Distance of each point to the nearest segment the obvious way, (n,)."""
+    starts, steps = segments[:, None, :2], segments[:, None, 2:]
+    t = np.clip(np.sum((points - starts) * steps, -1) / np.maximum(np.sum(steps**2, -1), 1e-12), 0, 1)
+    return np.linalg.norm(points - starts - t[..., None] * steps, axis=-1).min(axis=0)
+
+
+def run(points, segments, reach):
+    found = sort_by_row(points.astype(np.float32), HEIGHT)
+    out = np.empty(found.points.shape[1], np.float32)
+    nearest_segment(
+        *found.points, found.rows, Segments(*segments.T.astype(np.float32).copy()), len(segments), reach, out
+    )
+    return found, out
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10_000), st.integers(0, 70), st.integers(0, 12), st.sampled_from([1.0, 8.0, 500.0]))
+def test_as_by_brute_force_within_reach(seed, n_points, n_segments, reach):
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-20, HEIGHT + 20, (n_points, 2))  # some above and below the image
+    segments = np.column_stack([rng.uniform(-60, HEIGHT + 60, (n_segments, 2)), rng.normal(0, 30, (n_segments, 2))])
+    segments[: n_segments // 3, 2:] = 0  # points are segments too
+    found, out = run(points, segments, reach)
+    sorted_points = found.points[:, : found.n_points].T
+    assert sorted(map(tuple, sorted_points)) == sorted(map(tuple, points.astype(np.float32)))
+    expected = distances(sorted_points, segments) if n_segments else np.full(n_points, np.inf)
+    near = expected <= reach
+    np.testing.assert_allclose(out[: found.n_points][near], expected[near], atol=2e-3)
+    assert np.all(out[: found.n_points][~near] >= reach - 2e-3)
+
+
+def test_filled_up_by_points_that_are_nowhere():
+    found, out = run(np.array([[10.0, 10.0], [10.0, 9.5]]), np.array([[10.0, 12.0, 5.0, 0.0]]), 20.0)
+    assert found.points.shape == (2, LANES)
+    assert out[:2] == pytest.approx([2.5, 2.0])
+    assert out[2:].min() > 1e5
+    assert found.rows[[9, 10, 11, HEIGHT]].tolist() == [0, 1, 2, 2]
