@@ -18,6 +18,9 @@ from tracker.fit import Block, Fit, solve
 from tracker.refine import ContourMatch
 from tracker.rigid import Array
 
+_LEAST_GAIN = 0.1
+"""What a pose must cost less to count as another one: to refine the same pose once more gains a little too."""
+
 
 @dataclass(frozen=True)
 class RecoverSettings:
@@ -83,7 +86,7 @@ def search_limb(model: BodyModel, limb: Limb, here: Fit, others: Sequence[Array]
     order = np.argsort(judge.costs(candidates))[: settings.refined]
     alone = [solve(model, candidates[i], blocks, limb.dofs, max_iterations=4, tolerance=1e-2) for i in order]
     alone.sort(key=judge.cost)
-    best, best_cost = here, judge.cost(here)
+    best, best_cost = here, judge.cost(here) - _LEAST_GAIN
     for start in alone[: settings.finished]:
         fit = solve(model, start.values, blocks, max_iterations=iterations, tolerance=1e-3)
         cost = judge.cost(fit)
