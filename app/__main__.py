@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import tyro
 from rich.console import Console
@@ -166,10 +166,14 @@ def track(
     person: str | None = None,
     backward: bool = False,
     theta: float | None = None,
+    order: int = 1,
+    window: int = 3,
     paper: bool = False,
     json: bool = False,
 ) -> None:
     """Track people through a range of frames and store the poses.
+
+    Stopped with Ctrl+C it keeps what is done; the same command again goes on from there.
 
     Args:
         session: session folder.
@@ -178,9 +182,13 @@ def track(
         person: whom; everybody by default.
         backward: from the last frame of the range to the first.
         theta: outlier distance in pixels; 3% of the longer side of the image by default.
+        order: degree of the motion model: 0 stays, 1 constant velocity, 2 constant acceleration.
+        window: past frames that the motion is taken from.
         paper: as Gavrila and Davis 1996: best-first search alone, in one pass, outliers rejected.
         json: print one JSON object.
     """
+    from app import headless
+    from tracker.predict import PredictSettings
     from tracker.search import SearchSettings
     from tracker.track import TrackSettings
 
@@ -189,13 +197,15 @@ def track(
     passes = (1.0,) if paper else SearchSettings().passes
     settings = TrackSettings(
         estimate="search" if paper else "refine",
+        predict=PredictSettings(order, window),
         search=SearchSettings(passes=passes),
         theta_px=theta,
         outliers="paper" if paper else "truncated",
     )
-    found = commands.track(at, wanted[::-1] if backward else wanted, settings, Reporter(silent=json))
-    summary = f"tracked {', '.join(found['people'])} over {found['frames']} frames"
-    print(commands.as_json(found) if json else f"{summary}, mean cost {found['mean_cost_px']:.2f} px")
+    found = headless.track(at, wanted[::-1] if backward else wanted, settings, Reporter(silent=json))
+    print(commands.as_json(found) if json else _track_summary(found))
+    if found["stopped_at"] is not None:
+        sys.exit(130)
 
 
 @_app.command
@@ -294,6 +304,19 @@ def _common_or_pairs(words: Sequence[str], option: str, kind: Callable[[str], T]
         except ValueError:
             raise TrackerError(f"expected {option} as a value or NAME=VALUE, found '{words[0]}'") from None
     return _pairs(words, option, kind) or None
+
+
+def _track_summary(found: Mapping[str, Any]) -> str:
+    again = "" if found["resumed_at"] is None else f", going on from frame {found['resumed_at']}"
+    lines = [f"tracked {', '.join(found['people'])} over {found['frames']} frames{again}"]
+    if found["mean_cost_px"] is not None:
+        lines[0] += f", mean cost {found['mean_cost_px']:.2f} px"
+    for name, statuses in found["statuses"].items():
+        odd = [f"{statuses[s]} {s}" for s in ("good", "doubtful", "lost") if statuses.get(s)]
+        lines.append(f"{name}: {', '.join(odd)}")
+    if found["stopped_at"] is not None:
+        lines.append(f"stopped before frame {found['stopped_at']}; the same command again goes on from there")
+    return "\n".join(lines)
 
 
 def main() -> None:

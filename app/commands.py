@@ -1,7 +1,8 @@
 """What each command of the command line does; `__main__` reads the words and calls these."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -9,27 +10,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
 from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError, TrackerError
 from tracker.evaluate import Alignment, evaluate_joints, evaluate_poses
-from tracker.evidence import Observer
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import format_model
 from tracker.formats.trc import MarkerTable
 from tracker.joint_maps import LIMB_JOINTS
-from tracker.recording import Recording
 from tracker.records import FrameRow, PoseChange, PoseRecord
 from tracker.references import Reference, stored_motion
-from tracker.rigid import Array
-from tracker.session import Person, Session, load_session, save_session
+from tracker.session import Session, load_session, save_session
 from tracker.session_lock import SessionLock
 from tracker.sizes import fit_sizes
-from tracker.track import PoseEstimate, TrackSettings, track_chamfer
-
-_SAVE_FRAMES = 10
-"""A tracking run is on disk at least every so many frames."""
 
 
 class Target(NamedTuple):
@@ -173,54 +168,6 @@ def evaluate(at: Target, reference: Reference, frames: str | None, align: Alignm
     return {"person": person.name, **asdict(result)}
 
 
-def track(at: Target, frames: Sequence[int], settings: TrackSettings, progress: "Reporter") -> dict[str, Any]:
-    """Track people with the chamfer tracker, frame by frame from the previous pose, and store what is found.
-
-    Keyframes stay as they are and tracking goes on from them. Interrupted, it keeps what is done.
-
-    Raises:
-        SessionError: nobody has placed a person at or before the first frame.
-    """
-    session = at.session
-    with (
-        SessionLock(session.folder),
-        closing(AnnotationStore(session.annotations_path)) as store,
-        Recording(session.cameras) as recording,
-    ):
-        models = [p.model for p in session.people]
-        revisions = [store.add_model_revision(p.name, format_model(p.model)) for p in session.people]
-        start = [_start(store, p, frames[0], i in at.people) for i, p in enumerate(session.people)]
-        fixed = _keyframes(store, session.people, frames)
-        observer = Observer(session.cameras, recording)
-        waiting: list[PoseChange] = []
-        edit: int | None = None
-        costs: dict[int, float] = {}
-
-        def save() -> None:
-            nonlocal edit
-            if waiting and edit is None:
-                edit = store.commit(f"track frames {frames[0]}:{frames[-1] + 1}", waiting, by_program=True).edit
-            elif waiting and edit is not None:
-                store.amend(edit, waiting, by_program=True)
-            waiting.clear()
-
-        try:
-            with progress.over(len(frames), "tracking") as tick:
-                for found in track_chamfer(observer, models, start, frames, settings, fixed, at.people):
-                    costs[found.frame] = found.cost_px
-                    waiting += _changes(found, at, revisions, settings)
-                    if len(waiting) >= _SAVE_FRAMES:
-                        save()
-                    tick()
-        finally:
-            save()
-    return {
-        "frames": len(costs),
-        "people": [session.people[i].name for i in at.people],
-        "mean_cost_px": float(np.mean(list(costs.values()))),
-    }
-
-
 class Reporter:
     """Progress on a terminal as a bar, elsewhere as plain lines; nothing with `--json`."""
 
@@ -234,20 +181,30 @@ class Reporter:
         if self._silent:
             yield lambda: None
         elif self._console.is_terminal:
-            columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+            columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), _RateColumn(), TimeRemainingColumn())
             with Progress(*columns, console=self._console) as bar:
                 task = bar.add_task(what, total=total)
                 yield lambda: bar.advance(task)
         else:
-            done = 0
+            done, began = 0, time.monotonic()
 
             def tick() -> None:
                 nonlocal done
                 done += 1
                 if done % max(1, total // 10) == 0 or done == total:
-                    self._console.print(f"{what}: {done} of {total}", highlight=False)
+                    rate = done / max(1e-6, time.monotonic() - began)
+                    left = "" if done == total else f", {(total - done) / rate:.0f} s left"
+                    self._console.print(f"{what}: {done} of {total}, {rate:.1f}/s{left}", highlight=False)
 
             yield tick
+
+
+class _RateColumn(ProgressColumn):
+    """Pieces of work a second."""
+
+    def render(self, task: Task) -> Text:
+        """Text of the column."""
+        return Text("" if task.speed is None else f"{task.speed:.1f}/s")
 
 
 def as_json(result: Any) -> str:
@@ -269,42 +226,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return float(value) if np.isfinite(value) else None
     return value.item() if isinstance(value, np.generic) else value
-
-
-def _start(store: AnnotationStore, person: Person, frame: int, needed: bool) -> Array:
-    """Pose to begin from: that of the frame itself, else of the last frame before it."""
-    rows = [row.frame for row in store.frames(person.name) if row.frame <= frame]
-    record = store.pose(person.name, rows[-1]) if rows else None
-    if record is not None:
-        return record.values
-    if not needed:
-        return person.model.neutral()
-    raise SessionError(
-        f"expected a pose of '{person.name}' at frame {frame} or before, found none; place the body in the "
-        "page, or use quadrille init"
-    )
-
-
-def _keyframes(store: AnnotationStore, people: Sequence[Person], frames: Sequence[int]) -> dict[int, dict[int, Array]]:
-    fixed: dict[int, dict[int, Array]] = {}
-    wanted = set(frames)
-    for index, person in enumerate(people):
-        for row in store.frames(person.name):
-            record = store.pose(person.name, row.frame) if row.keyframe and row.frame in wanted else None
-            if record is not None:
-                fixed.setdefault(row.frame, {})[index] = record.values
-    return fixed
-
-
-def _changes(found: PoseEstimate, at: Target, revisions: Sequence[int], settings: TrackSettings) -> list[PoseChange]:
-    told = {"method": "chamfer", **asdict(settings)}
-    return [
-        PoseChange(
-            at.session.people[i].name,
-            found.frame,
-            PoseRecord(
-                found.poses[i], ("tracked",) * len(found.poses[i]), revisions[i], cost_px=found.cost_px, settings=told
-            ),
-        )
-        for i in at.people
-    ]

@@ -6,7 +6,8 @@ from dataclasses import asdict
 
 import numpy as np
 
-from app.state import Shown, State, finite_or_none
+from app.state import Shown, State
+from app.tracked import tracked_changes
 from tracker.annotations import AnnotationStore
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model
@@ -128,27 +129,8 @@ class Saver:
         Returns:
             Id of the entry; None where nothing was written. Where writing fails, `error` says why.
         """
-        told = {"method": "chamfer", **asdict(settings)}
-        changes = [
-            PoseChange(
-                self._session.people[i].name,
-                found.frame,
-                PoseRecord(
-                    found.poses[i],
-                    ("tracked",) * len(found.poses[i]),
-                    self._revisions[i],
-                    status=found.statuses[i],
-                    cost_px=finite_or_none(found.cost_px),
-                    settings=told,
-                    views_px=tuple(finite_or_none(c) for c in found.views_px),
-                    parts_px=tuple(finite_or_none(c) for c in found.parts_px[i]),
-                    remark=found.remarks[i],
-                ),
-            )
-            for found in estimates
-            for i in people
-            if i not in fixed.get(found.frame, {})
-        ]
+        names = [p.name for p in self._session.people]
+        changes = tracked_changes(estimates, names, people, self._revisions, fixed, settings)
         return self._write(label, changes, amend, by_program=True)
 
     def undo(self) -> list[int]:

@@ -111,7 +111,7 @@ def search_frame(
 def track_chamfer(
     observer: Observer,
     models: Sequence[BodyModel],
-    start: Sequence[Array],
+    start: Sequence[Array | Sequence[Array]],
     frames: Sequence[int],
     settings: TrackSettings,
     fixed: Mapping[int, Mapping[int, Array]] | None = None,
@@ -122,7 +122,8 @@ def track_chamfer(
     Args:
         observer: gives the evidence of a frame.
         models: the body of each person.
-        start: pose of each person from which the first frame is searched, (n_values,) each.
+        start: of each person the pose from which the first frame is predicted, (n_values,), or the poses of the frames
+            before it, the last one last, (n, n_values).
         frames: the frames in the order of tracking.
         settings: of the tracker.
         fixed: poses that stay as they are (keyframes), by frame and person; tracking goes on from them.
@@ -170,11 +171,11 @@ class _Found(NamedTuple):
 class _Track:
     """What is remembered of one person from frame to frame."""
 
-    def __init__(self, model: BodyModel, start: Array) -> None:
+    def __init__(self, model: BodyModel, start: Array | Sequence[Array]) -> None:
         self.model = model
         self.limbs = confidence.limbs(model)
-        self.past = [np.array(start)]
-        self.last_good = self.past[0]
+        self.past = list(np.atleast_2d(np.array(start)))
+        self.last_good = self.past[-1]
         self.known: PartColors | None = None
         self._frames = 0
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from command_line import SAMPLE, assert_refused, stored
 
-from app import commands
+from app import headless
 from tracker.annotations import AnnotationStore
 from tracker.records import PoseChange
 from tracker.session import load_session
@@ -89,7 +89,7 @@ def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
 
 def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
-    original = commands.track_chamfer
+    original = headless.track_chamfer
 
     def interrupted(*arguments):
         for k, estimate in enumerate(original(*arguments)):
@@ -97,11 +97,33 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
                 raise KeyboardInterrupt
             yield estimate
 
-    monkeypatch.setattr(commands, "track_chamfer", interrupted)
-    assert run("track", session, "--json")[0] == 130
+    monkeypatch.setattr(headless, "track_chamfer", interrupted)
+    status, out, _ = run("track", session, "--frames", "0:6", "--json")
+    assert status == 130
+    assert (json.loads(out)["frames"], json.loads(out)["stopped_at"]) == (3, 3)
     assert sorted(stored(session)) == [0, 1, 2]
     assert not (session / "lock.json").exists()
     monkeypatch.undo()
+    done = {k: stored(session)[k].time for k in (1, 2)}
+    status, out, _ = run("track", session, "--frames", "0:6")  # the same call goes on
+    assert status == 0
+    assert "tracked person over 3 frames, going on from frame 3" in out
+    found = stored(session)
+    assert sorted(found) == [0, 1, 2, 3, 4, 5]
+    assert {k: found[k].time for k in (1, 2)} == done
+    assert {found[k].status for k in range(1, 6)} <= {"good", "doubtful"}
+    assert len(found[3].views_px) == 4
+    status, out, _ = run("track", session, "--frames", "0:6", "--json")  # and once done, it begins anew
+    assert (json.loads(out)["frames"], json.loads(out)["resumed_at"]) == (6, None)
+
+
+def test_going_on_is_as_if_never_stopped(run, session, monkeypatch):
+    run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
+    run("track", session, "--frames", "0:4")
+    run("track", session, "--frames", "4:5")  # the motion before is known
+    stepwise = stored(session)[4].values
+    run("track", session, "--frames", "0:5")
+    np.testing.assert_allclose(stored(session)[4].values, stepwise, atol=2e-3)
 
 
 def test_backward_and_paper(run, session):
@@ -136,7 +158,7 @@ def test_simulate(run, tmp_path):
         "simulate", tmp_path / "sim", "--frames", "2", "--cameras", "2", "--body", "model", "--masks"
     )
     assert (status, out) == (0, f"made {tmp_path / 'sim'}\n")
-    assert err.splitlines()[-1] == "rendering: 4 of 4"  # an image of each camera for each frame
+    assert err.splitlines()[-1].startswith("rendering: 4 of 4, ")  # an image of each camera for each frame
     made = load_session(tmp_path / "sim")
     assert (made.n_frames, [c.camera.name for c in made.cameras]) == (2, ["cam1", "cam2"])
     for name in ("truth.trc", "truth.csv", "truth_model.toml", "masks/cam2/000001.png", "background/cam1.png"):

@@ -1,0 +1,65 @@
+"""What a tracker has found, as rows of the store."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from tracker.records import PoseChange, PoseRecord
+from tracker.rigid import Array
+from tracker.track import PoseEstimate, TrackSettings
+
+Keyframes = Mapping[int, Mapping[int, Array]]
+"""Poses that a tracker takes as they are, by frame and index of the person."""
+
+
+def tracked_changes(
+    estimates: Sequence[PoseEstimate],
+    names: Sequence[str],
+    people: Sequence[int],
+    revisions: Sequence[int],
+    fixed: Keyframes,
+    settings: TrackSettings,
+) -> list[PoseChange]:
+    """Poses to store, but for the keyframes that the tracker was given.
+
+    Args:
+        estimates: what it found.
+        names: of all people.
+        people: indices of those it tracked.
+        revisions: body model of each person.
+        fixed: keyframes on its way.
+        settings: what it was told.
+    """
+    told = told_of(settings)
+    return [
+        PoseChange(
+            names[i],
+            found.frame,
+            PoseRecord(
+                found.poses[i],
+                ("tracked",) * len(found.poses[i]),
+                revisions[i],
+                status=found.statuses[i],
+                cost_px=_number(found.cost_px),
+                settings=told,
+                views_px=tuple(_number(c) for c in found.views_px),
+                parts_px=tuple(_number(c) for c in found.parts_px[i]),
+                remark=found.remarks[i],
+            ),
+        )
+        for found in estimates
+        for i in people
+        if i not in fixed.get(found.frame, {})
+    ]
+
+
+def told_of(settings: TrackSettings) -> dict[str, Any]:
+    """A tracker's settings as the store keeps them."""
+    return {"method": "chamfer", **asdict(settings)}
+
+
+def _number(value: float) -> float | None:
+    """None where a number is NaN or infinite, as JSON wants it."""
+    return float(value) if np.isfinite(value) else None
