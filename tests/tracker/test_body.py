@@ -202,3 +202,53 @@ def test_gavrila_joints_turn_the_way_their_names_say(side, sign):
         if expected is None:  # 80 degrees is as far as the hip goes
             expected = np.add(hip, (0, sign * leg * np.sin(np.radians(80)), -leg * np.cos(np.radians(80))))
         np.testing.assert_allclose(found, expected, atol=1e-12, err_msg=str(degrees))
+
+
+def test_gavrila31_has_a_trunk_that_bends():
+    model, plain = MODELS["gavrila31"], MODELS["gavrila22"]
+    assert model.n_dofs == len(model.value_names) == 31
+    assert sorted(d for g in model.search_groups for d in g.dofs) == sorted(model.dof_names)
+    # Standing straight it is the same person: the points that both have are in the same places.
+    places = dict(zip(plain.point_names, plain.points_world(plain.neutral()), strict=True))
+    shared = [n for n in model.point_names if n in places]
+    assert len(shared) >= 14
+    for name in shared:
+        np.testing.assert_allclose(at(model, model.neutral(), name), places[name], atol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("joint", "degrees", "moving", "way"),
+    [
+        # x is forward, y to the left, z up; the legs hang on the pelvis below the waist.
+        ("waist__elevation", 20, "left_ankle", (-1, 0, 0)),
+        ("waist__abduction", 20, "left_ankle", (0, 1, 0)),
+        ("waist__twist", 20, "left_hip", (-1, 0, 0)),
+        ("neck__elevation", 20, "head", (1, 0, 0)),
+        ("neck__abduction", 20, "head", (0, -1, 0)),
+        ("left_collarbone__elevation", 20, "left_shoulder", (0, 0, 1)),
+        ("right_collarbone__elevation", 20, "right_shoulder", (0, 0, 1)),
+        ("left_collarbone__protraction", 20, "left_shoulder", (1, 0, 0)),
+        ("right_collarbone__protraction", 20, "right_shoulder", (1, 0, 0)),
+    ],
+)
+def test_gavrila31_joints_turn_the_way_their_names_say(joint, degrees, moving, way):
+    model = MODELS["gavrila31"]
+    moved = at(model, set_deg(model, **{joint: degrees}), moving) - at(model, model.neutral(), moving)
+    assert moved @ way > 0.8 * np.linalg.norm(moved) > 0.01
+    # Arms and head are above the waist, and stay where they are when it bends.
+    if joint.startswith("waist"):
+        np.testing.assert_array_equal(
+            at(model, set_deg(model, **{joint: degrees}), "left_wrist"), at(model, model.neutral(), "left_wrist")
+        )
+
+
+def test_spreads_are_known_of_what_bends_little():
+    model = MODELS["gavrila31"]
+    known = {n.split(".")[0] for n, s in zip(model.dof_names, model.spreads, strict=True) if np.isfinite(s)}
+    assert known == {"waist", "neck", "left_collarbone", "right_collarbone"}
+    assert (model.spreads > 0).all()
+    assert model.spreads[model.dof_names.index("waist.twist")] == pytest.approx(np.radians(25))
+    assert np.isinf(MODELS["gavrila22"].spreads).all()
+    balls = MODELS["balls"]
+    assert balls.spreads.shape == (balls.n_dofs,)
+    assert np.isinf(balls.spreads).all()

@@ -46,6 +46,13 @@ def test_joints_come_parent_first_and_parts_in_their_order():
     assert model.search_groups[0].dofs == ("root.x", "root.y", "root.z", "root.turn", "hinge.bend")
 
 
+def test_spread():
+    model = parse_model(SMALL.replace("limits_deg = [0, 90]", "limits_deg = [0, 90], spread_deg = 30"), "x")
+    np.testing.assert_allclose(model.spreads, [*[np.inf] * 4, np.pi / 6])
+    assert np.isinf(parse_model(SMALL, "x").spreads).all()
+    assert "spread_deg" not in format_model(parse_model(SMALL, "x"))
+
+
 def test_without_groups_one_holds_everything():
     model = parse_model(BALLS, "x")
     assert [g.dofs for g in model.search_groups] == [model.dof_names]
@@ -69,6 +76,7 @@ def test_round_trip(model):
     assert (again.parts, again.landmarks, again.search_groups) == (model.parts, model.landmarks, model.search_groups)
     assert again.value_names == model.value_names
     np.testing.assert_allclose(again.limits, model.limits, atol=1e-15)
+    np.testing.assert_allclose(again.spreads, model.spreads, atol=1e-15)
     for a, b in zip(again.joints, model.joints, strict=True):
         assert (a.name, a.parent, a.child, a.position, a.kind, a.free) == (
             b.name,
@@ -129,6 +137,8 @@ half_axes = [1, 1, 1]
         (SMALL.replace('part = "arm"', 'part = "leg"'), "landmark 'tip' is on a missing part 'leg'"),
         (SMALL.replace("[0, 2, 0]", "[0, 0, 0]"), "axis 'hinge.bend' expected a direction"),
         (SMALL.replace("[0, 90]", "[10, 90]"), "limits around 0"),
+        (SMALL.replace("[0, 90]", "[0, 90], spread_deg = 0"), "'hinge.bend' expected a spread_deg above 0, found 0"),
+        (SMALL.replace("[0, 90]", "[0, 90], spread_deg = nan"), "expected a spread_deg above 0, found nan"),
         (SMALL.replace("[0, 0, -0.1]", "[0, 0]"), "'tip' expected 3 finite numbers"),
         (SMALL.replace("[0, 0, -0.1]", "[0, 0, nan]"), "'tip' expected 3 finite numbers"),
         (SMALL.replace("[0.1, 0.1, 0.1]", "[0.1, 0.1, -0.1]"), "part 'arm' expected half-axes above 0"),
