@@ -74,6 +74,18 @@ def test_a_circle_is_cut_only_where_segments_become_too_long():
     assert lengths[lengths < 8].sum() < 0.2 * around
 
 
+@pytest.mark.parametrize("flip", [2, 13])
+def test_a_segment_ends_where_the_other_side_becomes_the_darker_one(flip):
+    rows = np.arange(32)
+    points = np.stack([np.full(32, 20), rows], axis=1)
+    normals = np.where(rows[:, None] < flip, (1.0, 0.0), (-1.0, 0.0))
+    gradients = np.zeros((2, 60, 60), np.int16)
+    found = np.zeros((60, 60), np.uint8)
+    for (u, v), normal in zip(points, normals, strict=True):
+        found[v, u], gradients[:, v, u] = 255, 100 * normal
+    assert link_edges(found, gradients).firsts.tolist() == [0, flip, 32]
+
+
 def test_normals_point_from_dark_to_light():
     _, segments = linked(disc_picture())
     from_middle = segments.points_px - np.array([80, 60], np.float32)
