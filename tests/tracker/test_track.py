@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
-from staging import at, cameras_around, own_evidence, shaken, solid
+from staging import SUIT, at, cameras_around, dressed, own_evidence, posed, shaken, solid
 
 from tracker.assemble import assemble
 from tracker.body import Body
 from tracker.evaluate import evaluate_joints, joints_of_poses
-from tracker.evidence import Observer
+from tracker.evidence import Observer, view_evidence
 from tracker.fit import fit_to_points
 from tracker.joint_maps import LIMB_JOINTS
 from tracker.predict import PredictSettings
@@ -123,6 +123,85 @@ def test_settings_reach_the_cost(balls):
     twice = TrackSettings(search=SearchSettings(passes=(1.0, 0.5)))
     steps = list(search_frame(views[0], [model, model], values[0], twice))
     assert [s.stage.factor for s in steps if s.stage_done] == [1.0, 1.0, 0.5, 0.5]
+
+
+def dancing(model, n, angle_deg=4.0, jump_at=None, jump_deg=70.0):
+    """Poses in which all limbs move evenly, (n, n_values); at one frame an arm is suddenly elsewhere, and stays."""
+    poses, step = [posed(model, 1)], np.zeros(model.n_dofs)
+    step[:2] = 0.02, -0.015
+    for i, name in enumerate(model.dof_names):
+        if name.endswith((".elevation", ".extension")) and not name.startswith("torso"):
+            step[i] = np.radians(angle_deg)
+    arm = np.where(np.array(model.dof_names) == "left_shoulder.abduction", np.radians(jump_deg), 0.0)
+    for k in range(1, n):
+        poses.append(model.clip(model.retract(poses[-1], step + (arm if k == jump_at else 0))))
+    return np.array(poses)
+
+
+def off_m(model, values, truth):
+    return np.linalg.norm(model.points_world(values) - model.points_world(truth), axis=1)
+
+
+def test_refinement_follows_by_itself(gavrila):
+    """Nobody is lost, so nothing is searched; the estimates say all there is to know."""
+    truth = dancing(gavrila, 5)
+    views = [dressed([Body(gavrila, v)], cameras_around(), SUIT) for v in truth]
+    found = list(track_chamfer(Shown(views), [gavrila], truth[:1], range(5), TrackSettings()))
+    for estimate, values in zip(found, truth, strict=True):
+        assert off_m(gavrila, estimate.poses[0], values).max() < 0.01
+        assert (estimate.statuses, estimate.remarks, estimate.evaluations) == (("good",), ("",), 0)
+        (parts_px,), (covariance,), (quality,) = estimate.parts_px, estimate.covariances, estimate.qualities
+        assert parts_px.shape == (10,)
+        assert np.nanmax(parts_px) < 1
+        assert quality.views == 3
+        # The pose is known to a degree or three and to a centimetre, less where an arm spins about itself.
+        sigma = np.sqrt(np.diag(covariance))
+        assert np.linalg.eigvalsh(covariance).min() > 0
+        assert sigma[gavrila.dof_is_length].max() < 0.01
+        assert np.median(sigma[~gavrila.dof_is_length]) < np.radians(3)
+
+
+def test_an_arm_that_jumps_is_searched_and_the_frame_says_so(gavrila):
+    truth = dancing(gavrila, 5, jump_at=3)
+    views = [dressed([Body(gavrila, v)], cameras_around(4), SUIT) for v in truth]
+    found = list(track_chamfer(Shown(views), [gavrila], truth[:1], range(5), TrackSettings()))
+    assert [f.remarks[0] for f in found[:3]] == ["", "", ""]
+    assert "left arm searched anew" in found[3].remarks[0]
+    for estimate, values in zip(found, truth, strict=True):
+        assert off_m(gavrila, estimate.poses[0], values).max() < 0.03
+    # Left alone it is not found, and not called good.
+    alone = list(track_chamfer(Shown(views), [gavrila], truth[:1], range(5), TrackSettings(recover=None)))
+    assert off_m(gavrila, alone[3].poses[0], truth[3]).max() > 0.1
+    assert alone[3].statuses[0] != "good"
+    assert alone[3].remarks == ("",)
+
+
+def test_a_pose_that_is_given_is_certain(gavrila):
+    truth = dancing(gavrila, 4)
+    views = [dressed([Body(gavrila, v)], cameras_around(), SUIT) for v in truth]
+    keyframe = gavrila.retract(truth[2], np.full(gavrila.n_dofs, 0.02))
+    found = list(track_chamfer(Shown(views), [gavrila], truth[:1], range(4), TrackSettings(), {2: {0: keyframe}}))
+    given = found[2]
+    np.testing.assert_array_equal(given.poses[0], keyframe)
+    assert (given.statuses, given.remarks, given.qualities, given.evaluations) == (("good",), ("",), (None,), 0)
+    assert not given.covariances[0].any()
+    assert np.nanmax(given.parts_px[0]) > np.nanmax(found[1].parts_px[0])  # judged by its contours all the same
+    assert off_m(gavrila, found[3].poses[0], truth[3]).max() < 0.01
+
+
+def test_the_prediction_stands_while_nothing_is_seen(gavrila):
+    """Without edges in any view the prediction stands, and the covariance says how far it is trusted."""
+    truth = dancing(gavrila, 4)
+    cameras = cameras_around()
+    views = [dressed([Body(gavrila, v)], cameras, SUIT) for v in truth]
+    views[3] = tuple(view_evidence(c, 1.0, np.zeros((480, 640), dtype=bool)) for c in cameras)
+    settings = TrackSettings(trust_rad=0.1, trust_m=0.03)
+    *_, last = track_chamfer(Shown(views), [gavrila], truth[:1], range(4), settings)
+    assert last.statuses == ("lost",)
+    assert np.isnan(last.views_px).all()
+    assert off_m(gavrila, last.poses[0], truth[3]).max() < 0.02
+    sigma = np.where(gavrila.dof_is_length, 0.03, 0.1)
+    assert (np.sqrt(np.diag(last.covariances[0])) > 0.9 * sigma).all()
 
 
 def test_a_sample_frame_is_drawn_to_its_truth(real_frame, sample_folder):
