@@ -45,6 +45,8 @@ class MatchSettings:
     """Weight of the model-to-image residuals; 0 leaves them out."""
     image_to_model: float = 0.5
     """Weight of the image-to-model residuals; 0 leaves them out."""
+    silhouette: float = 0.5
+    """Weight of the silhouette's contour against edges, where its view is fully trusted; 0 leaves it out."""
     information_per_px: float = 0.0125
     """What one pixel of contour tells: 1 / (variance in px^2 times the length over which errors are alike, px)."""
 
@@ -72,7 +74,7 @@ class _Scene(NamedTuple):
     distances: FloatArray
     """The distance images, one after the other, row by row."""
     points: FloatArray
-    """u, v of the edge points and their normals' u, v, one view after the other, (4, N)."""
+    """u, v of the edge points, their normals' u, v, and their weights, one view after the other, (5, N)."""
     firsts: NDArray[np.int64]
     """Index of the first edge point of each view, and the number of all, (V + 1,)."""
     thetas: Array
@@ -136,7 +138,9 @@ class ContourMatch:
         self._surfaces = contours.surfaces_of(tuple(b.model for b in bodies))
         self._Ts = contours.part_poses(bodies)
         thetas = [v.theta_px if theta_px is None else theta_px * v.scale for v in views]
-        points = [_within(v, bodies, _CAPTURE * theta) for v, theta in zip(views, thetas, strict=True)]
+        points = [
+            _within(v, bodies, _CAPTURE * theta, settings.silhouette) for v, theta in zip(views, thetas, strict=True)
+        ]
         weights = settings.information_per_px * np.array([settings.model_to_image, settings.image_to_model])
         self._scene = _Scene(
             np.stack([contours.projection(v.camera) for v in views]),
@@ -191,11 +195,15 @@ class ContourMatch:
         )  # fmt: skip
 
 
-def _within(view: ViewEvidence, bodies: Sequence[Body], reach_px: float) -> FloatArray:
-    """Edge points within reach of the visible contours, with their normals, (4, N)."""
+def _within(view: ViewEvidence, bodies: Sequence[Body], reach_px: float, silhouette: float) -> FloatArray:
+    """Points of edges and silhouette within reach of the visible contours, with normals and weights, (5, N)."""
     contour = contours.trace(bodies, view.camera)
     pieces = contour.pieces_px[~contour.hidden]
-    points = np.ascontiguousarray(np.concatenate([view.points_px, view.normals], axis=1).T, dtype=np.float32)
+    rows = [_rows(view.points_px, view.normals, 1.0)]
+    if view.silhouette is not None and silhouette * view.silhouette.trust > 0:
+        outline = view.silhouette
+        rows.append(_rows(outline.points_px, outline.normals, silhouette * outline.trust))
+    points = np.concatenate(rows, axis=1)
     if not len(pieces) or not points.shape[1]:
         return points[:, :0]
     # A coarse raster of the contours' surroundings is enough: this only spares work.
@@ -203,6 +211,11 @@ def _within(view: ViewEvidence, bodies: Sequence[Body], reach_px: float) -> Floa
     near = np.zeros(size, np.bool_)
     _mark(pieces, int(np.ceil(reach_px / 8)), near)
     return points[:, near[points[1].astype(np.intp) // 8, points[0].astype(np.intp) // 8]]
+
+
+def _rows(points_px: FloatArray, normals: FloatArray, weight: float) -> FloatArray:
+    """Points (N, 2) with normals (N, 2) as rows, (5, N)."""
+    return np.stack([*points_px.T, *normals.T, np.full(len(points_px), weight)]).astype(np.float32)
 
 
 @njit(nogil=True, cache=True)
@@ -337,11 +350,11 @@ def _image_to_model(
     s2, limit, cost = (scale * theta) ** 2, theta * theta, 0.0
     start, stop = scene.firsts[view], scene.firsts[view + 1]
     us, vs, q = scene.points[0][start:stop], scene.points[1][start:stop], scratch.pieces
-    nu, nv = scene.points[2][start:stop], scene.points[3][start:stop]
+    nu, nv, weights = scene.points[2][start:stop], scene.points[3][start:stop], scene.points[4][start:stop]
     _nearest_alike(us, vs, nu, nv, q, kept, turn * limit, scratch.best, scratch.nearest)
     for j in range(stop - start):
         squared = min(scratch.best[j], limit)
-        cost += 0.5 * weight * s2 * squared / (s2 + squared)
+        cost += 0.5 * weight * weights[j] * s2 * squared / (s2 + squared)
         if scratch.best[j] >= limit:
             continue
         k = scratch.nearest[j]
@@ -362,7 +375,9 @@ def _image_to_model(
         else:
             gu, gv = gu / d, gv / d
         f = s2 / (s2 + squared)
-        _add(sums.M[part], sums.b[part], P, x, y, scratch.contour.points_world[i], gu, gv, weight * f * f, d)
+        _add(
+            sums.M[part], sums.b[part], P, x, y, scratch.contour.points_world[i], gu, gv, weight * weights[j] * f * f, d
+        )
     return cost
 
 
