@@ -125,7 +125,7 @@ def test_quality_of_a_pose_and_of_a_lost_arm(gavrila):
     assert wrong.step_m == pytest.approx(moved[end])
     arm = [x.name for x in wrong.limbs].index("left_forearm")
     forward = [x.forward for x in wrong.limbs]
-    assert forward[arm] == max(forward) > 0.45
+    assert forward[arm] == max(forward) > 0.45 > 2 * sorted(forward)[-2]
     assert "left_forearm" in wrong.suspects
     assert all(x.drop == 0 and x.color == np.inf for x in right.limbs)  # without colours they say nothing
     assert 0 < right.spread_m < wrong.spread_m
