@@ -6,7 +6,7 @@ from match_oracle import MatchOracle
 from staging import at, camera_at, cameras_around, edge_map, own_evidence, posed, shaken, solid
 
 from tracker.body import Body
-from tracker.evidence import SCENE_SPACING_PX, ViewEvidence, view_evidence
+from tracker.evidence import SCENE_SPACING_PX, Silhouette, ViewEvidence, view_evidence
 from tracker.fit import StayNear, solve
 from tracker.formats.model_toml import PRESETS, load_model
 from tracker.refine import ContourMatch, MatchSettings
@@ -204,6 +204,26 @@ def test_an_edge_goes_to_the_contour_that_runs_its_way():
             view = seen((u + 8 + shift, v - 8 + shift), across, 30.0)
             counts = [ContourMatch([view], bodies, i, None, THETA).part_costs(b.values) for i, b in enumerate(bodies)]
             assert [int(c.points.sum()) for c in counts] == expected, (shift, across)
+
+
+@pytest.mark.parametrize("trust", [0.0, 0.3, 1.0])
+def test_a_silhouette_pulls_as_far_as_it_is_trusted(trust):
+    """Points of its contour are like edge points, of less weight."""
+    body, a = at(BALL.model, 0, 0.03, 0.02), np.linspace(0, 2 * np.pi, 40)
+    out = np.stack([np.cos(a), np.sin(a)], axis=1)
+    edges, contour = CENTER + RADIUS_PX * out[:15], CENTER + (RADIUS_PX + 4) * out[15:]
+    told = Silhouette(None, contour.astype(np.float32), out[15:].astype(np.float32), trust, None, THETA)
+
+    def found(view, weight=0.5):
+        match = replace(BACKWARD, silhouette=weight)
+        return normal(ContourMatch([view], [body], 0, match, THETA), body)
+
+    alone = found(seen(edges, out[:15], 30.0))
+    both = found(seen(np.concatenate([edges, contour]), out, 30.0))
+    for weight in (0.5, 0.2):
+        mixed = found(replace(seen(edges, out[:15], 30.0), silhouette=told), weight)
+        for m, e, b in zip(mixed, alone, both, strict=True):
+            np.testing.assert_allclose(m - e, weight * trust * (b - e), atol=1e-5 * np.abs(b).max())
 
 
 def test_views_without_edges_have_no_say(gavrila):
