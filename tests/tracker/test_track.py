@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from staging import SUIT, at, cameras_around, dressed, own_evidence, posed, shaken, solid
+from staging import SUIT, at, cameras_around, dressed, own_evidence, painted, posed, shaken, solid
 
 from tracker.assemble import assemble
 from tracker.body import Body
@@ -12,6 +12,7 @@ from tracker.predict import PredictSettings
 from tracker.recording import Recording
 from tracker.references import read_joints
 from tracker.search import SearchSettings
+from tracker.session import CameraSource
 from tracker.track import TrackSettings, pose_cost, search_frame, track_chamfer
 
 COARSE = TrackSettings(
@@ -174,6 +175,40 @@ def test_an_arm_that_jumps_is_searched_and_the_frame_says_so(gavrila):
     assert off_m(gavrila, alone[3].poses[0], truth[3]).max() > 0.1
     assert alone[3].statuses[0] != "good"
     assert alone[3].remarks == ("",)
+
+
+class Film:
+    """Stands for a recording: pictures of a figure in its clothes before a plain wall."""
+
+    def __init__(self, model, truth, cameras):
+        self.frames = [[painted([Body(model, v)], c, SUIT) for c in cameras] for v in truth]
+
+    def read(self, k):
+        return self.frames[k]
+
+
+def filmed(model, truth):
+    cameras = cameras_around(4)
+    return Observer([CameraSource(c, footage=None) for c in cameras], Film(model, truth, cameras))
+
+
+def test_what_the_prediction_refused_is_looked_at_again(gavrila):
+    """The prediction accepts no edge of an arm that jumps: it is found among all edges."""
+    truth = dancing(gavrila, 5, jump_at=3)
+    found = list(track_chamfer(filmed(gavrila, truth), [gavrila], truth[:1], range(5), TrackSettings()))
+    assert found[3].remarks == ("left arm searched anew",)
+    for estimate, values in zip(found, truth, strict=True):
+        assert off_m(gavrila, estimate.poses[0], values).max() < 0.02
+
+
+def test_a_body_that_is_elsewhere_is_searched(gavrila):
+    truth = dancing(gavrila, 3)
+    truth[2, 1] += 0.6
+    *_, last = track_chamfer(filmed(gavrila, truth), [gavrila], truth[:1], range(3), TrackSettings())
+    assert "body searched anew" in last.remarks[0]
+    assert last.evaluations > 100
+    if off_m(gavrila, last.poses[0], truth[2]).max() > 0.1:  # so far it is beyond the reach of the search
+        assert last.statuses[0] != "good"
 
 
 def test_a_pose_that_is_given_is_certain(gavrila):
