@@ -100,9 +100,14 @@ def test_samples_in_the_open_and_behind_others():
     assert samples(alone, [front, back]) == 2 * samples(alone, [front])
     assert samples(behind, [front]) == 0
     assert samples(behind, [back]) == samples(alone, [back])
-    # The one that is looked at may be any in the list.
+    # The one that is looked at may be any in the list, and elsewhere.
     colors = Colors(dressed(behind, [front], {"solid": (200, 0, 0)}), behind, person=1)
-    assert colors.score(behind[1].values, colors.learn()).samples.sum() > 10
+    known = colors.learn()
+    assert colors.score(behind[1].values, known).samples.sum() > 10
+    # Beside the images nothing is seen: 320 px of 520 px at 4 m are 2.46 m.
+    for way in (-2.8, 2.8):
+        assert colors.score(at(wall, 0, 1.5 * way, 0).values, known).samples.sum() == 0
+        assert samples([at(ball, 0, way, 0)], [front]) == 0
 
 
 def test_parts_hidden_by_the_body_give_no_samples(gavrila):
@@ -116,18 +121,19 @@ def test_parts_hidden_by_the_body_give_no_samples(gavrila):
 
 
 def test_left_and_right_share(gavrila):
-    """What the left arm showed is known of the right one, which nobody has seen."""
-    stand, left = gavrila.neutral(), camera_at("left", (0.0, 4.0, 0.2))
-    known = colors_of(gavrila, stand, cameras=[left]).learn()
-    names = gavrila.part_index
-    for name in (n for n in names if n.startswith("left_")):
-        twin = names[name.replace("left_", "right_")]
-        np.testing.assert_array_equal(known.log_ratios[names[name]], known.log_ratios[twin])
+    """What one arm showed is known of the other one, which nobody has seen."""
+    stand, names = gavrila.neutral(), gavrila.part_index
+    cameras = [camera_at("left", (0.0, 4.0, 0.2)), camera_at("right", (0.0, -4.0, 0.2))]
     arms = parts(gavrila, "left_upper_arm", "right_upper_arm")
-    later = colors_of(gavrila, stand, cameras=[camera_at("right", (0.0, -4.0, 0.2))]).score(stand, known)
-    assert later.samples[arms[1]] > 10
-    assert later.parts[arms[1]] > 1
-    assert later.parts[arms[0]] == 0  # hidden
+    for seen_from, later_from in ((0, 1), (1, 0)):
+        known = colors_of(gavrila, stand, cameras=[cameras[seen_from]]).learn()
+        for name in (n for n in names if n.startswith("left_")):
+            twin = names[name.replace("left_", "right_")]
+            np.testing.assert_array_equal(known.log_ratios[names[name]], known.log_ratios[twin])
+        later = colors_of(gavrila, stand, cameras=[cameras[later_from]]).score(stand, known)
+        assert later.samples[arms[later_from]] > 10
+        assert later.parts[arms[later_from]] > 1
+        assert later.parts[arms[seen_from]] == 0  # hidden
     # Different kinds of parts do not share.
     assert np.abs(known.log_ratios[names["left_thigh"]] - known.log_ratios[names["left_calf"]]).max() > 1
 
@@ -148,3 +154,33 @@ def test_views_without_colours_are_passed_over(gavrila, stand):
     none = Colors([blind], bodies)
     assert none.score(stand, none.learn()).nats == 0
     assert not none.score(stand, known).samples.any()
+
+
+def darker(views, share=0.6):
+    return [replace(v, colors=(v.colors * share).astype(np.uint8)) for v in views]
+
+
+def test_colours_follow_the_light(gavrila, stand, seen):
+    """The light goes down step by step: learnt along the way, the clothes stay known; learnt once, they do not."""
+    colors, first = seen
+    bodies = [Body(gavrila, stand)]
+    views, known = dressed(bodies, CAMERAS, SUIT), first
+    for share in np.linspace(1.0, 0.6, 25):
+        known = Colors(darker(views, share), bodies).learn(known, 0.3)
+    late = Colors(darker(views), bodies)
+    assert late.score(stand, known).nats > 0.7 * colors.score(stand, first).nats
+    assert late.score(stand, first).nats < 0.5 * colors.score(stand, first).nats
+    np.testing.assert_array_equal(known.usual, first.usual)
+
+
+def test_a_part_that_is_not_there_is_not_learnt(gavrila, stand, seen):
+    """An arm beside the picture's arm lies on the wall: what was known of arms stays known."""
+    _, first = seen
+    wrong = np.array(stand)
+    wrong[gavrila.dof_names.index("left_shoulder.abduction")] += 1.0
+    views, known = dressed([Body(gavrila, stand)], CAMERAS, SUIT), first
+    for _ in range(20):
+        known = Colors(views, [Body(gavrila, wrong)]).learn(known, 0.3)
+    arm = gavrila.part_index["left_forearm"]
+    right = Colors(views, [Body(gavrila, stand)])
+    assert right.score(stand, known).parts[arm] > 0.9 * first.usual[arm]
