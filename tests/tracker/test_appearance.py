@@ -174,10 +174,11 @@ def test_colours_follow_the_light(gavrila, stand, seen):
 
 
 def test_a_part_that_is_not_there_is_not_learnt(gavrila, stand, seen):
-    """An arm beside the picture's arm lies on the wall: what was known of arms stays known."""
+    """Both arms beside the picture's arms lie on the wall: what was known of arms stays known."""
     _, first = seen
     wrong = np.array(stand)
-    wrong[gavrila.dof_names.index("left_shoulder.abduction")] += 1.0
+    for side in ("left", "right"):
+        wrong[gavrila.dof_names.index(f"{side}_shoulder.abduction")] += 1.0
     views, known = dressed([Body(gavrila, stand)], CAMERAS, SUIT), first
     for _ in range(20):
         known = Colors(views, [Body(gavrila, wrong)]).learn(known, 0.3)
