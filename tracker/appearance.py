@@ -31,6 +31,8 @@ _DOUBT = 0.02
 """Share of pixels under a part that may show anything: what has never been seen there is not impossible."""
 
 
+_TWIN_SHARE = 0.2
+"""Share of what is seen under a part's twin in what is expected under itself: sleeves are mostly alike."""
 _SAME = 0.4
 """Colours have changed much where their mean log ratio is below this share of the usual."""
 
@@ -43,7 +45,7 @@ class PartColors(NamedTuple):
     usual: Array
     """Mean of that under each part where it was first learnt, (n_parts,), nats."""
     shares: Array
-    """Share of each colour under each part, its twin's with it, (n_parts, BINS^3)."""
+    """Share of each colour under each part, (n_parts, BINS^3)."""
     around: Array
     """Share of each colour in the regions looked at, (BINS^3,)."""
 
@@ -79,7 +81,7 @@ class Colors:
         self._shapes = [_ellipsoids(b.model) for b in bodies]
 
     def learn(self, before: PartColors | None = None, share: float = 1.0) -> PartColors:
-        """Remember the colours under the parts where the bodies stand; left and right parts share theirs.
+        """Remember the colours under the parts where the bodies stand; left and right parts share some of theirs.
 
         Args:
             before: what was known; None where nothing was.
@@ -90,7 +92,7 @@ class Colors:
         parts, colors = self._samples(self._bodies[self._person].values)
         twins = _twins(model)
         seen = np.zeros((len(model.parts), BINS**3))
-        np.add.at(seen, (twins[parts], colors), 1.0)
+        np.add.at(seen, (parts, colors), 1.0)
         seen = np.array([_share(s) for s in seen])
         shown = [np.bincount(_binned(i), minlength=BINS**3) for i in self._images]
         around = _share(np.sum(shown, axis=0, initial=0.0, dtype=np.float64) + np.zeros(BINS**3))
@@ -98,16 +100,17 @@ class Colors:
         if before is not None:
             now, samples = _mean_by_part(before.log_ratios[parts, colors], parts, len(model.parts))
             trusted = (samples > 0) & (now > _SAME * before.usual)
-            weights = share * _twin_min(trusted, twins)
-            seen = before.shares + weights[:, None] * (seen - before.shares)
+            seen = before.shares + share * trusted[:, None] * (seen - before.shares)
             around = before.around + share * (around - before.around)
             usual = before.usual
         # Half of what a part is told from is the rest of the body, however small it is in the picture.
         other = 0.5 * _smoothed(around) + 0.5 * _share(_smoothed(seen.sum(axis=0)))
-        own = np.array([_smoothed(s) for s in seen])
+        blank = seen.sum(axis=1, keepdims=True) == 0
+        own = np.where(blank, seen[twins], (1 - _TWIN_SHARE) * seen + _TWIN_SHARE * seen[twins])
+        own = np.array([_smoothed(s) for s in own])
         ratios = np.log(((1 - _DOUBT) * own + _DOUBT * other + 1e-7) / (other + 1e-7))
-        ratios[seen.sum(axis=1) == 0] = 0.0
-        ratios = np.clip(ratios, -_MOST_NATS, _MOST_NATS)[twins]
+        ratios[own.sum(axis=1) == 0] = 0.0
+        ratios = np.clip(ratios, -_MOST_NATS, _MOST_NATS)
         if usual is None:
             usual = _mean_by_part(ratios[parts, colors], parts, len(model.parts))[0]
         return PartColors(ratios, usual, seen, around)
@@ -172,18 +175,11 @@ def _mean_by_part(nats: Array, parts: NDArray[np.int64], n_parts: int) -> tuple[
     return np.bincount(parts, weights=nats, minlength=n_parts) / np.maximum(samples, 1), samples.astype(np.float64)
 
 
-def _twin_min(trusted: NDArray[np.bool_], twins: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether all parts that share their colours with each are trusted, (n_parts,)."""
-    out = np.ones_like(trusted)
-    np.logical_and.at(out, twins, trusted)
-    return out
-
-
 def _twins(model: BodyModel) -> NDArray[np.int64]:
-    """Index of the part that each shares its colours with: its left twin, or itself."""
+    """Index of each part's twin on the other side; of itself where there is none."""
     names = [p.name for p in model.parts]
-    lefts = [n.replace("right", "left") for n in names]
-    return np.array([names.index(left) if left in names else i for i, left in enumerate(lefts)])
+    swapped = [n.replace("left", "?").replace("right", "left").replace("?", "right") for n in names]
+    return np.array([names.index(n) if n in names else i for i, n in enumerate(swapped)])
 
 
 def _ellipsoids(model: BodyModel) -> Array:

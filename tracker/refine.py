@@ -121,6 +121,7 @@ class ContourMatch:
         person: int = 0,
         settings: MatchSettings | None = None,
         theta_px: float | None = None,
+        everywhere: bool = False,
     ) -> None:
         """Prepare the evidence for the kernel.
 
@@ -130,6 +131,7 @@ class ContourMatch:
             person: index of the body that is fitted.
             settings: how to match.
             theta_px: outlier distance, px of the footage; by default that of each view.
+            everywhere: keep edge points however far from the predicted contours they are, for poses far from it.
         """
         settings = settings or MatchSettings()
         self._settings = settings
@@ -139,7 +141,8 @@ class ContourMatch:
         self._Ts = contours.part_poses(bodies)
         thetas = [v.theta_px if theta_px is None else theta_px * v.scale for v in views]
         points = [
-            _within(v, bodies, _CAPTURE * theta, settings.silhouette) for v, theta in zip(views, thetas, strict=True)
+            _within(v, bodies, np.inf if everywhere else _CAPTURE * theta, settings.silhouette)
+            for v, theta in zip(views, thetas, strict=True)
         ]
         weights = settings.information_per_px * np.array([settings.model_to_image, settings.image_to_model])
         self._scene = _Scene(
@@ -197,13 +200,15 @@ class ContourMatch:
 
 def _within(view: ViewEvidence, bodies: Sequence[Body], reach_px: float, silhouette: float) -> FloatArray:
     """Points of edges and silhouette within reach of the visible contours, with normals and weights, (5, N)."""
-    contour = contours.trace(bodies, view.camera)
-    pieces = contour.pieces_px[~contour.hidden]
     rows = [_rows(view.points_px, view.normals, 1.0)]
     if view.silhouette is not None and silhouette * view.silhouette.trust > 0:
         outline = view.silhouette
         rows.append(_rows(outline.points_px, outline.normals, silhouette * outline.trust))
     points = np.concatenate(rows, axis=1)
+    if np.isinf(reach_px):
+        return points
+    contour = contours.trace(bodies, view.camera)
+    pieces = contour.pieces_px[~contour.hidden]
     if not len(pieces) or not points.shape[1]:
         return points[:, :0]
     # A coarse raster of the contours' surroundings is enough: this only spares work.

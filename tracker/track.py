@@ -12,6 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from tracker import confidence, contours
+from tracker.apart import KeepApart
 from tracker.appearance import Colors, PartColors
 from tracker.body import Body, BodyModel
 from tracker.cameras import Camera
@@ -239,7 +240,7 @@ class _Scene:
         suspects = [x for x in track.limbs if x.name in found.suspects]
         priors = self._priors(model, predicted, suspects)
         self.views = [unfiltered(v) for v in self.views]
-        match = ContourMatch(self.views, self._bodies(), person, settings.match, settings.theta_px)
+        match = ContourMatch(self.views, self._bodies(), person, settings.match, settings.theta_px, everywhere=True)
         judge = Judge(match, priors, self.colors(person), track.known, settings.recover)
         fit = solve(model, fit.values, [match, *priors], max_iterations=_ITERATIONS, tolerance=_TOLERANCE)
         remarks: list[str] = []
@@ -273,7 +274,7 @@ class _Scene:
         for limb in suspects:
             assert settings.recover is not None
             sigma[limb.dofs] = settings.recover.trust_rad
-        return [StayNear(predicted, 1 / sigma), StayNear(model.neutral(), 1 / model.spreads)]
+        return [StayNear(predicted, 1 / sigma), StayNear(model.neutral(), 1 / model.spreads), KeepApart()]
 
     def _search_body(self, person: int, track: _Track, fit: Fit, judge: Judge) -> tuple[int, Fit]:
         """Best-first search from the prediction and from the last good pose; the best of what refines from there."""
