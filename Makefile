@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 PYTHON_FILES := app tracker tests
 
-.PHONY: install run test check lint format clean
+.PHONY: install run test bench check lint format clean
 
 install: $(VENV)/.installed
 
@@ -16,6 +16,10 @@ run: install
 
 test: check
 	$(BIN)/python -m pytest
+
+# How fast it is here, beside what must hold and the ratios that are kept.
+bench: $(VENV)/.tested
+	$(BIN)/quadrille bench
 
 # What needs no running program: style and types, of Python and of the page.
 check: lint $(VENV)/.typescript

@@ -282,6 +282,35 @@ def simulate(
     print(f"made {out}")
 
 
+@_app.command
+def bench(json: bool = False, baseline: Path | None = None, save: Path | None = None, tolerance: float = 0.4) -> None:
+    """Measure how fast the tracker is on this machine, and compare with what is kept; status 1 where it became slower.
+
+    Args:
+        json: print one JSON object.
+        baseline: file to compare with; that of the program by default.
+        save: keep the ratios in this file instead of comparing them.
+        tolerance: with --save, the share by which a ratio may later be worse.
+    """
+    from app import bench as measuring
+
+    kept = {"tolerance": tolerance, "ratios": {}} if save else measuring.read_baseline(baseline or measuring.BASELINE)
+    rows = []
+    with Reporter(silent=json).over(measuring.N_ROWS, "measuring") as tick:
+        for row in measuring.measure():
+            rows.append(row)
+            tick()
+    if save:
+        measuring.save_baseline(rows, save, tolerance)
+    found = measuring.report(rows, kept)
+    if json:
+        print(commands.as_json(found))
+    else:
+        measuring.show(found, Console())
+    if found["slower"]:
+        sys.exit(1)
+
+
 def _pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> dict[str, T]:
     """Parse NAME=VALUE words."""
     out: dict[str, T] = {}

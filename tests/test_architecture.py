@@ -47,14 +47,15 @@ ORDER = [
     ["tracker.recover"],
     ["tracker.track"],
     # The program: what the screen shows, then who may change it, then who shows it.
-    ["app", "app.access", "app.jobs", "app.viser_proxy", "app.state", "app.tracked"],
-    ["app.commands", "app.curves", "app.frames", "app.overlays", "app.saving", "app.server"],
-    ["app.screen"],
+    ["app", "app.access", "app.jobs", "app.viser_proxy", "app.painting", "app.state", "app.tracked"],
+    ["app.bench_scenes", "app.commands", "app.curves", "app.frames", "app.overlays", "app.saving", "app.server"],
+    ["app.bench_rows", "app.screen"],
     ["app.searching", "app.tracking"],
     ["app.controller", "app.messages", "app.headless"],
     ["app.panes", "app.scene", "app.settings_panel"],
     ["app.panels"],
     ["app.workbench"],
+    ["app.bench"],
     ["app.__main__"],
 ]
 LEVEL = {module: level for level, row in enumerate(ORDER) for module in row}

@@ -309,13 +309,17 @@ class BodyModel:
         return np.swapaxes(J, 1, 2)
 
     def retract(self, values: Array, step: Array) -> Array:
-        """Move a pose by a step in its degrees of freedom, (n_dofs,); angles and lengths add, balls turn."""
-        out = np.array(values, dtype=np.float64)
+        """Move a pose, (n_values,), by steps in its degrees of freedom, (..., n_dofs), to (..., n_values).
+
+        Angles and lengths add, balls turn.
+        """
+        out = np.empty((*step.shape[:-1], len(values)))
+        out[:] = values
         dofs, at = self._plain
-        out[at] += step[dofs]
+        out[..., at] += step[..., dofs]
         for ball in self._balls:
-            turn = rigid.quaternion_exp(step[ball.dofs])
-            out[ball.values] = rigid.quaternion_multiply(out[ball.values], turn)
+            turn = rigid.quaternion_exp(step[..., ball.dofs])
+            out[..., ball.values] = rigid.quaternion_multiply(out[..., ball.values], turn)
         return out
 
     def difference(self, values_to: Array, values_from: Array) -> Array:
@@ -330,12 +334,13 @@ class BodyModel:
         return step
 
     def clip(self, values: Array) -> Array:
-        """Put a pose within the joint limits: angles to their range, balls to their cone and twist."""
+        """Put poses, (..., n_values), within the joint limits: angles to their range, balls to their cone and twist."""
         out = np.array(values, dtype=np.float64)
         dofs, at = self._plain
-        out[at] = np.minimum(np.maximum(out[at], self.limits[dofs, 0]), self.limits[dofs, 1])
+        out[..., at] = np.minimum(np.maximum(out[..., at], self.limits[dofs, 0]), self.limits[dofs, 1])
         for ball in self._balls:
-            out[ball.values] = _clip_ball(out[ball.values], ball.joint.cone, ball.joint.twist)
+            joint = ball.joint
+            out[..., ball.values] = np.apply_along_axis(_clip_ball, -1, out[..., ball.values], joint.cone, joint.twist)
         return out
 
     @cached_property

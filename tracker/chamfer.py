@@ -5,8 +5,12 @@ the image's edges to the model's contour is measured point by piece. Both are no
 averaged over the views. Costs are in undistorted pixels of the footage; images may be matched at a smaller scale.
 """
 
+import os
 import threading
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -16,7 +20,7 @@ from numpy.typing import NDArray
 from tracker import contours
 from tracker.body import Body, BodyModel
 from tracker.contours import FloatArray
-from tracker.evidence import ViewEvidence, default_theta_px
+from tracker.evidence import ViewEvidence
 from tracker.kernels import BORROW, FAST
 from tracker.kinematics import Tree, forward_kinematics
 from tracker.nearest import RowSorted, Segments, nearest_segment, segment_buffer, sort_by_row
@@ -26,6 +30,10 @@ Outliers = Literal["truncated", "paper"]
 
 _JOINED = 10
 """Pieces in a row on one straight edge that are matched as one segment: longer ones would reach too many points."""
+
+
+_WORTH_SHARING = 6
+"""Fewer candidates than this are scored sooner than another thread is awake."""
 
 
 class Cost(NamedTuple):
@@ -91,22 +99,25 @@ class ChamferCost:
         predicted: Sequence[Body],
         theta_px: float | None = None,
         outliers: Outliers = "truncated",
+        threads: int = 2,
     ) -> None:
         """Prepare the evidence for the kernels.
 
         Args:
             views: the evidence of each view.
             predicted: everybody in the scene, as predicted.
-            theta_px: outlier distance, px of the footage; by default `default_theta_px` of each view.
+            theta_px: outlier distance, px of the footage; by default that of each view.
             outliers: "truncated" takes min(d, theta) over all points; "paper" rejects points beyond theta and then
                 beyond mean + 2 standard deviations (GD96 Sect. 4.1), and a direction of which fewer than half is
                 kept costs theta.
+            threads: how many score candidates at a time, where there are as many processors.
         """
+        self._threads = min(threads, os.cpu_count() or 1)
         self.models: tuple[BodyModel, ...] = tuple(b.model for b in predicted)
         self.outliers = outliers
         self._surfaces = contours.surfaces_of(self.models)
         self._scales = np.array([v.scale for v in views])
-        thetas = [default_theta_px(v.camera) if theta_px is None else theta_px * v.scale for v in views]
+        thetas = [v.theta_px if theta_px is None else theta_px * v.scale for v in views]
         near = [_near(v, contours.trace(predicted, v.camera), theta) for v, theta in zip(views, thetas, strict=True)]
         tallest = max(v.camera.height for v in views)
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
@@ -149,12 +160,34 @@ class ChamferCost:
         model = self.models[person]
         first = sum(len(m.parts) for m in self.models[:person])
         directed = np.empty((len(candidates), len(self._seen), 2))
-        _score_candidates(
-            np.ascontiguousarray(candidates, dtype=np.float64), first, model.n_dofs, model.tree,
-            self._part_poses(poses), self._surfaces, self._scene, self.outliers == "paper", self._scratch(), directed,
-        )  # fmt: skip
+        poses_of = np.ascontiguousarray(candidates, dtype=np.float64)
+        Ts, paper = self._part_poses(poses), self.outliers == "paper"
+
+        def score(share: slice) -> None:
+            _score_candidates(
+                poses_of[share], first, model.n_dofs, model.tree, Ts, self._surfaces, self._scene, paper,
+                self._scratch(), directed[share],
+            )  # fmt: skip
+
+        if self._threads > 1 and len(candidates) >= _WORTH_SHARING:
+            shares = np.linspace(0, len(candidates), self._threads + 1).astype(int)
+            slices = [slice(a, b) for a, b in pairwise(shares)]
+            others = [_helpers().submit(score, s) for s in slices[1:]]
+            score(slices[0])
+            for other in others:
+                other.result()
+        else:
+            score(slice(None))
         views_px = self._blank_unseen(directed.mean(axis=-1) / self._scales)
         return self._mean(views_px), views_px
+
+    @property
+    def scene_px(self) -> tuple[FloatArray, ...]:
+        """The edge points that count, of each view, (n, 2), matched px."""
+        scene = self._scene
+        return tuple(
+            scene.points[:, first : first + n].T for first, n in zip(scene.firsts[:-1], scene.counts, strict=True)
+        )
 
     def _part_poses(self, poses: Sequence[Array]) -> Array:
         return contours.part_poses([Body(m, p) for m, p in zip(self.models, poses, strict=True)])
@@ -178,6 +211,12 @@ class ChamferCost:
         if not self._seen.any():
             return np.full(views_px.shape[:-1], np.mean(self._scene.thetas / self._scales))
         return views_px[..., self._seen].mean(axis=-1)
+
+
+@lru_cache(maxsize=1)
+def _helpers() -> ThreadPoolExecutor:
+    """Threads that score besides the caller's; kernels let go of the interpreter's lock."""
+    return ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="chamfer")
 
 
 def _near(view: ViewEvidence, contour: contours.Contour, theta: float) -> RowSorted:

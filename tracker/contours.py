@@ -29,9 +29,9 @@ MAX_PIECES = 6000
 """Room for the pieces of one view; a 22-DOF body that fills a 640x480 image has some 600."""
 _NEAREST_M = 0.05
 """What comes nearer to the camera's plane is not drawn, metres."""
-_SAG_PX = 0.08
+_SAG_PX = 0.11
 """How far the middle of a chord around a part may lie inside the arc, px."""
-_THIN2 = np.float32(0.07**2)
+_THIN2 = np.float32(0.1**2)
 """A point of an outline less than this off the line between its neighbours is left out, px squared."""
 
 

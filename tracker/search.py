@@ -149,9 +149,9 @@ def _search_stage(
     low = np.minimum(0, np.ceil((-bounds - offset) / steps - 1e-9)).astype(int)
     high = np.maximum(0, np.floor((bounds - offset) / steps + 1e-9)).astype(int)
 
-    def pose(node: tuple[int, ...]) -> Array:
-        change = np.zeros(model.n_dofs)
-        change[dofs] = np.array(node) * steps
+    def poses_at(nodes: list[tuple[int, ...]]) -> Array:
+        change = np.zeros((len(nodes), model.n_dofs))
+        change[:, dofs] = np.array(nodes) * steps
         return model.clip(model.retract(center, change))
 
     origin = (0,) * len(dofs)
@@ -170,7 +170,7 @@ def _search_stage(
         expansions, idle = expansions + 1, idle + 1
         candidate, candidate_px = best[person], best_px
         if neighbours:
-            candidates = np.stack([pose(n) for n in neighbours])
+            candidates = poses_at(neighbours)
             totals, views = cost.of_person(person, candidates, best)
             evaluations += len(neighbours)
             for total, neighbour in zip(totals, neighbours, strict=True):

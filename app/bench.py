@@ -1,0 +1,143 @@
+"""`quadrille bench`: how fast the tracker is, beside what it is compared with, and whether it has become slower.
+
+Times depend on the machine. What binds is their ratio to a yardstick that is timed in the same run; the ratios are
+compared with those of a baseline that is kept with the program.
+"""
+
+import json
+import platform
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib import metadata
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import cv2
+from rich.console import Console
+from rich.table import Table
+
+from app import bench_rows
+from app.bench_rows import Row, Yardstick
+from app.bench_scenes import read_frame
+from app.workbench import sample_copy
+from tracker.errors import TrackerError
+from tracker.files import write_text_whole
+from tracker.simulate import simulate
+
+BASELINE = Path(__file__).with_name("bench_baseline.json")
+N_ROWS = 13
+"""Number of rows that `measure` gives where `cma` is installed."""
+_PACKAGES = ("numpy", "opencv-python-headless", "numba", "scipy", "av", "cma")
+
+
+def measure() -> Iterator[Row]:
+    """Measure all rows, one after the other, OpenCV on one thread."""
+    yardstick = Yardstick()
+    frame = read_frame(sample_copy())
+    cones = frame.with_model("gavrila22_cones")
+    with TemporaryDirectory() as folder, _one_thread():
+        simulate(Path(folder) / "six", scene="exercise", n_cameras=6, n_frames=2)
+        six = read_frame(Path(folder) / "six").with_model("gavrila22_cones")
+        yield from bench_rows.candidates(frame, cones, yardstick)
+        yield from bench_rows.searches(frame, cones, yardstick)
+        yield from bench_rows.iterations(cones, six, yardstick)
+        yield from bench_rows.evolution(cones, yardstick)
+    yield from bench_rows.pipeline(frame, yardstick)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)
+
+
+def read_baseline(path: Path = BASELINE) -> dict[str, Any]:
+    """Read a baseline: `tolerance`, and `ratios` of rows by name.
+
+    Raises:
+        TrackerError: it is not one.
+    """
+    try:
+        found = json.loads(path.read_text("utf-8"))
+        return {"tolerance": float(found["tolerance"]), "ratios": {k: float(v) for k, v in found["ratios"].items()}}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise TrackerError(
+            f"expected a baseline with tolerance and ratios in {path}, found {error!r}; make one with --save"
+        ) from error
+
+
+def save_baseline(rows: list[Row], path: Path, tolerance: float) -> None:
+    """Keep the ratios of rows as a baseline."""
+    ratios = {r.name: round(r.ratio, 5) for r in rows}
+    write_text_whole(path, json.dumps({"tolerance": tolerance, "ratios": ratios}, indent=2) + "\n")
+
+
+def report(rows: list[Row], baseline: Mapping[str, Any]) -> dict[str, Any]:
+    """Put the rows beside what must hold and the baseline.
+
+    Returns:
+        `versions`, `tolerance`, `rows` and the names of those that became `slower` than the tolerance allows.
+    """
+    ratios, tolerance = baseline["ratios"], baseline["tolerance"]
+    told = []
+    for r in rows:
+        before = ratios.get(r.name)
+        told.append(
+            {
+                "name": r.name,
+                "what": r.what,
+                "median_us": r.time_us,
+                "yardstick_us": r.yardstick_us,
+                "ratio": r.ratio,
+                "must": r.must,
+                "aim": r.aim,
+                "holds": None if r.must is None else r.ratio <= r.must,
+                "baseline": before,
+                "slower": before is not None and r.ratio > before * (1 + tolerance),
+                "note": r.note,
+            }
+        )
+    return {
+        "versions": versions(),
+        "tolerance": tolerance,
+        "rows": told,
+        "slower": [t["name"] for t in told if t["slower"]],
+    }
+
+
+def versions() -> dict[str, str]:
+    """What the figures depend on besides the machine's load."""
+    found = {"python": platform.python_version(), "machine": platform.machine()}
+    for package in _PACKAGES:
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            found[package] = "none"
+    return found
+
+
+def show(found: Mapping[str, Any], console: Console) -> None:
+    """Print a report as a table. Ratios are told as people compare them: the yardstick by the time, or the reverse."""
+    table = Table("work", "median", "yardstick", "must", "aim", "baseline", "")
+    for r in found["rows"]:
+        verdict = "slower" if r["slower"] else "" if r["holds"] is None else "holds" if r["holds"] else "fails"
+        told = [_ratio(r[k]) for k in ("ratio", "must", "aim", "baseline")]
+        table.add_row(r["what"], _time(r["median_us"]), *told, f"{verdict} {r['note']}".strip())
+    console.print(table)
+    console.print(", ".join(f"{k} {v}" for k, v in found["versions"].items()), highlight=False)
+    if found["slower"]:
+        by = f"{100 * found['tolerance']:.0f}%"
+        console.print(f"slower than the baseline by more than {by}: {', '.join(found['slower'])}", style="bold red")
+
+
+def _ratio(ratio: float | None) -> str:
+    return "" if ratio is None else f"/ {1 / ratio:.1f}" if ratio < 1 else f"x {ratio:.1f}"
+
+
+def _time(us: float) -> str:
+    return f"{us:.0f} us" if us < 2000 else f"{us / 1000:.1f} ms"

@@ -1,0 +1,233 @@
+"""What `quadrille bench` measures: one small function for each row, timed between runs of the yardstick."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from itertools import islice
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from scipy.optimize import least_squares
+
+from app.bench_scenes import BenchFrame, pose_at
+from app.painting import PaintedCost
+from tracker import contours
+from tracker.body import Body
+from tracker.chamfer import ChamferCost
+from tracker.evidence import Observer
+from tracker.fit import Fit, StayNear, solve
+from tracker.recording import Recording
+from tracker.refine import ContourMatch
+from tracker.rigid import Array
+from tracker.search import search
+from tracker.track import TrackSettings, track_chamfer
+
+_CANDIDATES = 100
+_PIPELINE_FRAMES = range(5, 45)
+_SETTINGS = TrackSettings()
+_SEARCH = _SETTINGS.search
+
+
+class Row(NamedTuple):
+    """One measured piece of work."""
+
+    name: str
+    what: str
+    time_us: float
+    """Median, microseconds."""
+    yardstick_us: float
+    """Median of the yardstick between the runs, microseconds."""
+    must: float | None = None
+    """Largest time that must hold, in yardsticks; None for what is only compared with."""
+    aim: float | None = None
+    """Time that is aimed for, in yardsticks."""
+    note: str = ""
+
+    @property
+    def ratio(self) -> float:
+        """Time in yardsticks."""
+        return self.time_us / self.yardstick_us
+
+
+class Timed(NamedTuple):
+    """Medians of some work and of the yardstick, microseconds."""
+
+    work_us: float
+    yardstick_us: float
+
+
+class Yardstick:
+    """The work that all times are compared with: a distance transform (L2, 5x5) of a 640x480 image on one thread."""
+
+    def __init__(self) -> None:
+        """Scatter edges over the image."""
+        edges = np.random.default_rng(0).random((480, 640)) < 0.02
+        self._image = np.where(edges, 0, 255).astype(np.uint8)
+
+    def __call__(self) -> None:
+        """Do the work once."""
+        cv2.distanceTransform(self._image, cv2.DIST_L2, cv2.DIST_MASK_5)
+
+    def beside(self, work: Callable[[], object], runs: int, times: int = 1) -> Timed:
+        """Time some work and the yardstick in turns, so that both meet the same load, after a first run for nothing.
+
+        Args:
+            work: what is timed.
+            runs: how often.
+            times: how many pieces of work one run does.
+        """
+        spent = np.array([(_seconds(work), _seconds(self)) for _ in range(runs + 1)][1:])
+        work_s, yardstick_s = np.median(spent, axis=0)
+        return Timed(1e6 * work_s / times, 1e6 * yardstick_s)
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def candidates(frame: BenchFrame, cones: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
+    """One candidate pose: kinematics, visible contours, both directions, all views, one core."""
+    bodies = (("superquadrics", frame, 15, 25), ("cones", cones, 28, 50))
+    for name, of, must, aim in bodies:
+        cost, poses = of.cost(threads=1), of.candidates(_CANDIDATES)
+        timed = yardstick.beside(partial(cost.of_person, 0, poses, [of.values]), 60, _CANDIDATES)
+        yield Row(f"candidate_{name}", f"one candidate pose, {name}, 4 views", *timed, 1 / must, 1 / aim)
+    painted = PaintedCost(frame.views, frame.model, frame.cost().scene_px)
+    poses, cost = frame.candidates(20), frame.cost()
+    timed = yardstick.beside(lambda: [painted(p) for p in poses], 5, len(poses))
+    off = np.mean([abs(painted(p) - cost([p]).total_px) for p in poses])
+    yield Row(
+        "candidate_painted", "the same with numpy and OpenCV painting", *timed, note=f"{off:.2f} px off on average"
+    )
+
+
+def searches(frame: BenchFrame, cones: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
+    """Best-first search and refinement from a bad prediction; refinement alone from a good one."""
+    for name, of in (("cones", cones), ("superquadrics", frame)):
+        start = of.hard_prediction()
+        steps = list(search(of.cost(start), [start], _SEARCH))
+        fit = _refined(of, steps[-1].best[0], start)
+        timed = yardstick.beside(partial(_searched_and_refined, of, start), 9)
+        note = f"{steps[-1].evaluations} poses scored; {_apart(of, start, fit)}"
+        yield Row(f"search_hard_{name}", f"hard frame: search and refinement, {name}", *timed, 25 / 1.5, 12 / 1.5, note)
+        start = of.near_prediction()
+        fit = _refined(of, start, start)
+        timed = yardstick.beside(partial(_refined, of, start, start), 15)
+        note = f"{fit.iterations} iterations; {_apart(of, start, fit)}"
+        yield Row(f"refine_tracked_{name}", f"tracked frame: refinement, {name}", *timed, 8 / 1.5, 4 / 1.5, note)
+
+
+def _searched(frame: BenchFrame, start: Array) -> Array:
+    *_, last = search(frame.cost(start), [start], _SEARCH)
+    return last.best[0]
+
+
+def _searched_and_refined(frame: BenchFrame, start: Array) -> Fit:
+    return _refined(frame, _searched(frame, start), start)
+
+
+def _refined(frame: BenchFrame, start: Array, predicted: Array) -> Fit:
+    """Refine as the tracker does; see `tracker.track`."""
+    model = frame.model
+    match = ContourMatch(frame.views, [Body(model, start)])
+    sigma = np.where(model.dof_is_length, _SETTINGS.trust_m, _SETTINGS.trust_rad)
+    return solve(model, start, [match, StayNear(predicted, 1 / sigma)], max_iterations=15, tolerance=1e-3)
+
+
+def _apart(frame: BenchFrame, start: Array, fit: Fit) -> str:
+    """How far the body's points are from where the true joints put them, at the start and fitted."""
+    true = frame.model.points_world(frame.values)
+    off = [np.linalg.norm(frame.model.points_world(v) - true, axis=1).mean() for v in (start, fit.values)]
+    return f"{1000 * off[0]:.0f} mm off, then {1000 * off[1]:.0f}"
+
+
+def iterations(cones: BenchFrame, six: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
+    """One iteration of the symmetric Gauss-Newton, and what a numeric Jacobian takes for one."""
+    for name, of, must, aim in (("4", cones, 12, 18), ("6", six, 8, 12)):
+        start = of.near_prediction()
+        match = ContourMatch(of.views, [Body(of.model, start)])
+        steps = np.random.default_rng(3).normal(scale=0.005, size=(50, of.model.n_dofs))
+        poses = [of.model.retract(start, step) for step in steps]
+
+        def all_steps(of: BenchFrame = of, match: ContourMatch = match, poses: Sequence[Array] = poses) -> None:
+            for values in poses:
+                normal = match.normal(of.model, values, of.model.kinematics(values))
+                H = normal.hessian
+                np.linalg.solve(H + 1e-3 * np.diag(np.diag(H) + 1e-6), normal.gradient)
+
+        timed = yardstick.beside(all_steps, 30, len(poses))
+        yield Row(f"iteration_{name}_views", f"Gauss-Newton iteration, cones, {name} views", *timed, 1 / must, 1 / aim)
+    start, cost = cones.near_prediction(), cones.cost(cones.near_prediction())
+
+    def residuals(values: Array) -> Array:
+        return np.concatenate(_edge_distances(cost, cones, values))
+
+    timed = yardstick.beside(lambda: least_squares(residuals, start, method="trf", max_nfev=2), 5, 2)
+    yield Row("iteration_scipy", "the same by scipy's least_squares with numeric Jacobian, edges to contour", *timed)
+
+
+def _edge_distances(cost: ChamferCost, frame: BenchFrame, values: Array) -> list[Array]:
+    """Distance of each edge point to the nearest visible piece of contour, cut off, (n,) for each view, px."""
+    out: list[Array] = []
+    for view, scene in zip(frame.views, cost.scene_px, strict=True):
+        contour = contours.trace([Body(frame.model, values)], view.camera)
+        pieces = contour.pieces_px[~contour.hidden]
+        middles = 0.5 * (pieces[:, :2] + pieces[:, 2:])
+        squared = np.sum((scene[:, None] - middles) ** 2, axis=-1).min(axis=1)
+        out.append(np.minimum(np.sqrt(squared), view.theta_px))
+    return out
+
+
+def evolution(cones: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
+    """CMA-ES on the hard frame by the same evaluator and with as many poses as the search; nothing without `cma`."""
+    try:
+        import cma
+    except ImportError:  # a development extra
+        return
+    model, start = cones.model, cones.hard_prediction()
+    cost = cones.cost(start)
+    steps = list(search(cost, [start], _SEARCH))
+    sigma = np.where(model.dof_is_length, 0.05, np.radians(8))
+
+    def run() -> float:
+        options = {"verbose": -9, "seed": 5, "maxfevals": steps[-1].evaluations, "popsize": 40}
+        strategy = cma.CMAEvolutionStrategy(np.zeros(model.n_dofs), 1.0, options)
+        while not strategy.stop():
+            asked = strategy.ask()
+            poses = np.stack([model.clip(model.retract(start, sigma * step)) for step in asked])
+            strategy.tell(asked, cost.of_person(0, poses, [start])[0])
+        return float(strategy.result.fbest)
+
+    note = f"cost {run():.2f} px where the search ends at {steps[-1].best_px:.2f}"
+    timed = yardstick.beside(run, 3)
+    yield Row("cma_hard", f"hard frame by CMA-ES, {steps[-1].evaluations} poses, cones", *timed, note=note)
+    timed = yardstick.beside(lambda: _searched(cones, start), 9)
+    yield Row("search_alone_hard", "hard frame by best-first search alone, cones", *timed)
+
+
+def pipeline(frame: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
+    """From video to overlay: decode, undistort, edges, predict, refine, judge, trace what is drawn; per frame."""
+    wanted = [k for k in _PIPELINE_FRAMES if k < frame.session.n_frames]
+    model, n = frame.model, len(wanted)
+    first = pose_at(frame.joints, model, wanted[0])
+    spent: list[float] = []
+
+    def run() -> None:
+        with Recording(frame.session.cameras) as recording:
+            observer = Observer(frame.session.cameras, recording)
+            tracked = track_chamfer(observer, [model], [first], wanted, _SETTINGS)
+            next(tracked)  # opening the videos is not part of going on
+            start = time.perf_counter()
+            for found in islice(tracked, n - 1):
+                for camera in observer.matched_cameras:
+                    contours.trace([Body(model, found.poses[0])], camera)
+            spent.append(time.perf_counter() - start)
+
+    timed = yardstick.beside(run, 3)
+    frame_us = 1e6 * float(np.median(spent[1:])) / (n - 1)
+    note = f"{1e6 / frame_us:.1f} frames per second"
+    yield Row("pipeline", "video to overlay, 4 views, per frame", frame_us, timed.yardstick_us, 1e3 / 45 / 1.5,
+              1e3 / 90 / 1.5, note)  # fmt: skip

@@ -1,0 +1,84 @@
+"""What the benchmarks work on: frames of the bundled sample, and of a simulated scene with six cameras."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tracker.body import Body, BodyModel
+from tracker.chamfer import ChamferCost
+from tracker.evidence import Observer, ViewEvidence
+from tracker.fit import fit_to_points
+from tracker.formats.model_toml import load_model
+from tracker.formats.trc import MarkerTable
+from tracker.recording import Recording
+from tracker.references import read_joints
+from tracker.rigid import Array
+from tracker.session import Session, load_session
+
+FRAME = 25
+_SEED = 11
+
+
+@dataclass(frozen=True, eq=False)
+class BenchFrame:
+    """One frame of a session, and the body where it stands in it."""
+
+    session: Session
+    joints: MarkerTable
+    """The true joints of all frames."""
+    views: tuple[ViewEvidence, ...]
+    """All edges of the frame."""
+    model: BodyModel
+    values: Array
+    """Pose fitted to the true joints, (n_values,)."""
+
+    def with_model(self, name: str) -> "BenchFrame":
+        """The same frame with another body of the same height."""
+        model = load_model(name, self.model.height_m)
+        return BenchFrame(self.session, self.joints, self.views, model, pose_at(self.joints, model, FRAME))
+
+    def cost(self, predicted: Array | None = None, threads: int = 2) -> ChamferCost:
+        """The cost around a prediction, the fitted pose by default."""
+        body = Body(self.model, self.values if predicted is None else predicted)
+        return ChamferCost(self.views, [body], threads=threads)
+
+    def candidates(self, n: int) -> Array:
+        """Poses spread around the fitted one by 10 degrees and 5 cm in every degree of freedom, (n, n_values)."""
+        spread = np.where(self.model.dof_is_length, 0.05, np.radians(10))
+        steps = spread * np.random.default_rng(_SEED).normal(size=(n, self.model.n_dofs))
+        return np.stack([self.model.clip(self.model.retract(self.values, step)) for step in steps])
+
+    def hard_prediction(self) -> Array:
+        """A prediction that is 10 cm off in place and 15 degrees off in one angle of the trunk and of every limb."""
+        step = np.zeros(self.model.n_dofs)
+        off = {"torso.x": 0.08, "torso.y": -0.06, "torso.twist": 15, "left_shoulder.abduction": 15,
+               "right_shoulder.elevation": 15, "left_elbow.extension": 15, "left_hip.elevation": 15,
+               "right_hip.abduction": 15, "right_knee.extension": 15}  # fmt: skip
+        for name, amount in off.items():
+            dof = self.model.dof_names.index(name)
+            step[dof] = amount if self.model.dof_is_length[dof] else np.radians(amount)
+        return self.model.clip(self.model.retract(self.values, step))
+
+    def near_prediction(self) -> Array:
+        """A prediction as that of a tracked frame: 1 cm and 3 degrees off in every degree of freedom."""
+        off = np.where(self.model.dof_is_length, 0.01, np.radians(3))
+        signs = np.random.default_rng(_SEED).choice((-1.0, 1.0), self.model.n_dofs)
+        return self.model.clip(self.model.retract(self.values, off * signs))
+
+
+def read_frame(folder: Path) -> BenchFrame:
+    """Read the frame of a simulated session that the benchmarks work on."""
+    session = load_session(folder)
+    joints = read_joints(folder / "truth.trc", session.fps)
+    frame = min(FRAME, session.n_frames - 1)
+    with Recording(session.cameras) as recording:
+        views = Observer(session.cameras, recording).evidence(frame)
+    model = session.people[0].model
+    return BenchFrame(session, joints, views, model, pose_at(joints, model, frame))
+
+
+def pose_at(joints: MarkerTable, model: BodyModel, frame: int, near: Array | None = None) -> Array:
+    """The pose fitted to the true joints of a frame, (n_values,)."""
+    frame = min(frame, len(joints.points) - 1)
+    return fit_to_points(model, dict(zip(joints.names, joints.points[frame], strict=True)), near).values

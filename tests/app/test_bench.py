@@ -1,0 +1,107 @@
+import json
+import sys
+
+import numpy as np
+import pytest
+from command_line import SAMPLE
+
+from app import bench, bench_rows
+from app.__main__ import main
+from app.bench_rows import Row, Yardstick
+from app.bench_scenes import read_frame
+from app.painting import PaintedCost
+from tracker.errors import TrackerError
+
+
+@pytest.fixture(scope="module")
+def frame():
+    return read_frame(SAMPLE)
+
+
+def row(name, time_us, must=None):
+    return Row(name, f"what {name} is", time_us, 1000.0, must)
+
+
+def test_the_painted_cost_is_honest(frame):
+    """Written with other means, it says the same of poses, good and bad: to 0.3 px, and in the same order."""
+    cost = frame.cost()
+    painted = PaintedCost(frame.views, frame.model, cost.scene_px)
+    poses = frame.candidates(25)
+    fast, slow = cost.of_person(0, poses, [frame.values])[0], np.array([painted(p) for p in poses])
+    assert np.ptp(fast) > 2
+    assert np.abs(fast - slow).mean() < 0.3
+    assert np.corrcoef(fast, slow)[0, 1] > 0.99
+    assert np.argmin(fast) == np.argmin(slow)
+
+
+def test_work_and_yardstick_are_timed_in_turns():
+    order = []
+
+    class Logged(Yardstick):
+        def __call__(self):
+            order.append("yardstick")
+            super().__call__()
+
+    timed = Logged().beside(lambda: order.append("work"), 3, times=2)
+    assert order == ["work", "yardstick"] * 4  # a first run for nothing
+    assert 0 < timed.work_us < timed.yardstick_us
+
+
+def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
+    """Not how fast, only that they run and tell what they should."""
+    monkeypatch.setattr(Yardstick, "beside", lambda self, work, runs, times=1: (work(), bench_rows.Timed(2.0, 1.0))[1])
+    monkeypatch.setattr(bench_rows, "_PIPELINE_FRAMES", range(5, 8))
+    cones = frame.with_model("gavrila22_cones")
+    rows = [
+        *bench_rows.candidates(frame, cones, Yardstick()),
+        *bench_rows.searches(frame, cones, Yardstick()),
+        *bench_rows.iterations(cones, cones, Yardstick()),
+        *bench_rows.evolution(cones, Yardstick()),
+    ]
+    names = [r.name for r in rows]
+    assert len(set(names)) == len(names) == bench.N_ROWS - 1
+    assert {r.ratio for r in rows} == {2.0}
+    assert all((r.must is None) == (r.aim is None) for r in rows)
+    assert all(r.aim < r.must for r in rows if r.must is not None)
+
+
+def test_a_ratio_beyond_the_tolerance_is_slower(tmp_path):
+    kept = tmp_path / "kept.json"
+    bench.save_baseline([row("a", 100), row("b", 100), row("c", 100)], kept, 0.3)
+    found = bench.report([row("a", 125, must=0.11), row("b", 135, must=0.2), row("d", 9999)], bench.read_baseline(kept))
+    assert found["slower"] == ["b"]
+    assert [r["holds"] for r in found["rows"]] == [False, True, None]
+    assert [r["baseline"] for r in found["rows"]] == [0.1, 0.1, None]  # what is new is compared with nothing
+    assert found["tolerance"] == 0.3
+    assert {"python", "numpy", "numba", "opencv-python-headless"} <= found["versions"].keys()
+    json.dumps(found)
+
+
+def test_the_baseline_knows_every_row():
+    kept = bench.read_baseline()
+    assert len(kept["ratios"]) == bench.N_ROWS
+    assert 0 < kept["tolerance"] < 1
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"tolerance": 0.3}', '{"tolerance": 0.3, "ratios": {"a": "fast"}}'])
+def test_a_malformed_baseline(tmp_path, text):
+    path = tmp_path / "kept.json"
+    path.write_text(text)
+    with pytest.raises(TrackerError, match=r"expected a baseline with tolerance and ratios in .*kept\.json"):
+        bench.read_baseline(path)
+
+
+def test_the_command_says_by_its_status_what_became_slower(tmp_path, monkeypatch, capsys):
+    kept = tmp_path / "kept.json"
+    for time_us, status in ((100, None), (135, None), (145, 1)):
+        monkeypatch.setattr(bench, "measure", lambda t=time_us: iter([row("a", t, must=0.2)]))
+        words = ["--baseline", str(kept)] if kept.exists() else ["--save", str(kept)]
+        monkeypatch.setattr(sys, "argv", ["quadrille", "bench", "--json", *words])
+        if status is None:
+            main()
+        else:
+            with pytest.raises(SystemExit, match=str(status)):
+                main()
+        told = json.loads(capsys.readouterr().out)
+        assert told["slower"] == (["a"] if status else [])
+        assert told["rows"][0]["median_us"] == time_us
