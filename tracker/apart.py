@@ -59,8 +59,8 @@ def may_touch(model: BodyModel, softness: float) -> NDArray[np.bool_]:
     everything = ~np.eye(n_parts, dtype=bool)
     rows, parts = np.empty((n_parts**2 * _SAMPLES, 7)), np.empty((n_parts**2 * _SAMPLES, 2), np.int64)
     n = _touch(
-        kinematics.Ts_world_part, model.centers_part, np.array([s.half_axes for s in model.shapes]), everything, softness,
-        rows, parts,
+        kinematics.Ts_world_part, model.centers_part, np.array([s.half_axes for s in model.shapes]), everything,
+        softness, rows, parts,
     )  # fmt: skip
     for part, parent in enumerate(model.parents):
         if parent >= 0:

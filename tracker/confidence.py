@@ -21,6 +21,10 @@ Status = Literal["good", "doubtful", "lost"]
 
 _LEAST_SAMPLES = 12
 """Colours of fewer samples say nothing about a part."""
+_LEAST_TRUST = 0.5
+"""Silhouettes trusted less have no say."""
+_MOST_UNEXPLAINED = 0.035
+"""A silhouette of whose contour more than this is explained by no part shows a limb that is elsewhere."""
 _LEAST_SHOWN = 0.15
 """A limb of whose outline less than this is visible in all views together hides somewhere."""
 
@@ -68,13 +72,16 @@ class Quality(NamedTuple):
     """Largest way of a limb's end from where it was predicted, metres."""
     views: int
     """Views that see the body."""
+    unexplained: float
+    """Share of the silhouette's contour that no part explains, in the second worst of the trusted views."""
     limbs: tuple[LimbFigures, ...]
     """The same limb by limb."""
 
     @property
     def suspects(self) -> tuple[str, ...]:
-        """Names of the limbs that their figures speak against."""
-        return tuple(x.name for x in self.limbs if x.suspicious)
+        """Names of the limbs that their figures speak against; all where the image shows what no part explains."""
+        everyone = self.unexplained > _MOST_UNEXPLAINED
+        return tuple(x.name for x in self.limbs if everyone or x.suspicious)
 
 
 def limbs(model: BodyModel) -> tuple[Limb, ...]:
@@ -87,7 +94,7 @@ def limbs(model: BodyModel) -> tuple[Limb, ...]:
             chain.append(part)
             part = model.parents[part]
         dofs = np.isin(model.dof_joint, chain)
-        if dofs.any():
+        if chain != [0] and dofs.any():
             out.append(Limb(model.parts[leaf].name, np.array(chain[::-1]), dofs))
     return tuple(out)
 
@@ -99,6 +106,7 @@ def quality(
     costs: PartCosts,
     thetas_px: Array,
     open_px: Array,
+    trusts: Array,
     colors: tuple[ColorScore, PartColors] | None,
 ) -> Quality:
     """Sum up what speaks for and against a pose.
@@ -110,6 +118,7 @@ def quality(
         costs: of its parts.
         thetas_px: outlier distance of each view, (V,), matched px.
         open_px: length of outline that each part would show in each view in the open, (V, n_parts), matched px.
+        trusts: how far the silhouette of each view is trusted, (V,), 0 to 1; 0 where there is none.
         colors: of its parts; None where there are none.
     """
     length, chains = costs.length_px.sum(axis=0), limbs(model)
@@ -121,7 +130,7 @@ def quality(
         score, known = colors
         seen = score.samples >= _LEAST_SAMPLES
         color, drop = np.where(seen, score.parts, np.inf), np.where(seen, known.usual - score.parts, 0.0)
-    ends = np.array([np.flatnonzero(model.point_parts == c.parts[-1])[-1] for c in chains])
+    ends = np.array([np.flatnonzero(model.point_parts == c.parts[-1])[-1] for c in chains], dtype=np.int64)
     J = _jacobian(model, fit.values, ends)
     cov = J @ covariance(model, fit) @ np.swapaxes(J, 1, 2)
     step = np.linalg.norm((model.points_world(fit.values) - model.points_world(predicted))[ends], axis=-1)
@@ -131,6 +140,7 @@ def quality(
         float(np.sqrt(np.trace(cov, axis1=1, axis2=2).max(initial=0.0))),
         float(step.max(initial=0.0)),
         int(np.count_nonzero(costs.length_px.sum(axis=1) > 0)),
+        _second_largest(1.0 - costs.outline[trusts > _LEAST_TRUST]),
         tuple(
             LimbFigures(
                 c.name, float(forward[c.parts].max()), float(shown[c.parts].max()), float(color[c.parts].min()),
@@ -139,6 +149,11 @@ def quality(
             for c in chains
         ),
     )  # fmt: skip
+
+
+def _second_largest(shares: Array) -> float:
+    """What at least two views say; 0 where there are fewer."""
+    return float(np.sort(shares)[-2]) if len(shares) > 1 else 0.0
 
 
 def judge(found: Quality) -> Status:

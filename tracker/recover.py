@@ -6,7 +6,7 @@ sides. The first few go through the costs that all poses go through, then throug
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from scipy.stats import norm, qmc
@@ -15,6 +15,7 @@ from tracker.appearance import Colors, PartColors
 from tracker.body import BodyModel
 from tracker.confidence import Limb
 from tracker.fit import Block, Fit, solve
+from tracker.kinematics import IntArray
 from tracker.refine import ContourMatch
 from tracker.rigid import Array
 
@@ -30,6 +31,12 @@ class RecoverSettings:
     """Poses of a limb that are looked at; a power of two, so that they fill the space evenly."""
     reach_rad: float = float(np.radians(35))
     """Spread of those proposals that lie around the pose, rad; half of them lie anywhere within the joint limits."""
+    promising: int = 32
+    """Proposals of which the surroundings are looked at."""
+    shakes: int = 16
+    """Poses around each of these; a power of two."""
+    shake_rad: float = float(np.radians(12))
+    """Spread of those, rad."""
     scored: int = 24
     """Proposals whose contours are scored."""
     refined: int = 6
@@ -79,10 +86,12 @@ def search_limb(model: BodyModel, limb: Limb, here: Fit, others: Sequence[Array]
         iterations: most steps of a refinement of the whole body.
     """
     settings, blocks = judge.settings, [judge.match, *judge.priors]
+    look = partial(judge.colors.along_limb, limb=limb.parts, known=judge.known)
     proposals = _proposals(model, limb, here.values, settings)
-    quick = judge.colors.along_limb(proposals, limb.parts, judge.known)
+    promising = proposals[np.argsort(-look(proposals))[: settings.promising]]
+    proposals = np.concatenate([promising, _shaken(model, limb, promising, settings)])
     candidates = [_with_limb(model, here.values, other, limb) for other in others]
-    candidates += list(proposals[np.argsort(-quick)[: settings.scored]])
+    candidates += list(proposals[np.argsort(-look(proposals))[: settings.scored]])
     order = np.argsort(judge.costs(candidates))[: settings.refined]
     alone = [solve(model, candidates[i], blocks, limb.dofs, max_iterations=4, tolerance=1e-2) for i in order]
     alone.sort(key=judge.cost)
@@ -112,12 +121,27 @@ def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSet
     anywhere = low + even * (high - low) - now
     # Joints that people bend little stay near: a collarbone needs no search of its own.
     anywhere = np.where(np.isfinite(model.spreads[dofs]), near, anywhere)
-    out = []
-    for k, steps in enumerate(np.where(np.arange(len(even))[:, None] % 2, near, anywhere)):
-        change = np.zeros(model.n_dofs)
-        change[dofs] = steps * (0.5 if k % 4 == 1 else 1.0)
-        out.append(model.clip(model.retract(values, change)))
-    return np.array(out)
+    steps = np.where(np.arange(len(even))[:, None] % 2, near, anywhere)
+    steps[1::4] *= 0.5
+    return _moved(model, np.repeat(values[None], len(steps), axis=0), dofs, steps)
+
+
+def _shaken(model: BodyModel, limb: Limb, poses: Array, settings: RecoverSettings) -> Array:
+    """Poses with the limb around where it is in each of some, (n, n_values): the best of many is still far off."""
+    dofs = np.flatnonzero(limb.dofs)
+    steps = norm.ppf(0.002 + 0.996 * _even(settings.shakes * len(poses), len(dofs))) * settings.shake_rad
+    return _moved(model, np.repeat(poses, settings.shakes, axis=0), dofs, steps)
+
+
+def _moved(model: BodyModel, poses: Array, dofs: IntArray, steps: Array) -> Array:
+    """Poses (n, n_values) after steps (n, len(dofs)) in some degrees of freedom, within the joint limits."""
+    if all(model.joints[j].kind == "revolute" for j in model.dof_joint[dofs]):
+        out, at = poses.copy(), model.dof_value[dofs]
+        out[:, at] = np.clip(poses[:, at] + steps, *model.limits[dofs].T)
+        return out
+    changes = np.zeros((len(poses), model.n_dofs))
+    changes[:, dofs] = steps
+    return np.array([model.clip(model.retract(pose, change)) for pose, change in zip(poses, changes, strict=True)])
 
 
 @lru_cache(maxsize=16)

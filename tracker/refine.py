@@ -59,7 +59,9 @@ class PartCosts(NamedTuple):
     forward_px: Array
     """Mean distance of it to the edges, outliers cut off, (V, n_parts), matched px; NaN where nothing is visible."""
     points: Array
-    """Edge points that the part explains, (V, n_parts)."""
+    """Points of edges and silhouette that the part explains, (V, n_parts)."""
+    outline: Array
+    """Share of the silhouette's contour that some part explains, (V,); NaN in views without a silhouette."""
 
 
 class _Scene(NamedTuple):
@@ -77,6 +79,8 @@ class _Scene(NamedTuple):
     """u, v of the edge points, their normals' u, v, and their weights, one view after the other, (5, N)."""
     firsts: NDArray[np.int64]
     """Index of the first edge point of each view, and the number of all, (V + 1,)."""
+    outlines: NDArray[np.int64]
+    """Index of the first point of each view's silhouette, which follow those of its edges, (V,)."""
     thetas: Array
     """Outlier distances, (V,)."""
     weights: Array
@@ -105,7 +109,9 @@ class _Sums(NamedTuple):
     b: Array
     """Gradient by each part's twist, (P, 6)."""
     parts: Array
-    """Per view and part: visible length, its summed cut-off distance, explained edge points, (V, P, 3)."""
+    """Per view and part: visible length, its summed cut-off distance, explained points, (V, P, 3)."""
+    outline: Array
+    """Points of each view's silhouette that are explained, (V,)."""
 
 
 class ContourMatch:
@@ -144,14 +150,17 @@ class ContourMatch:
             _within(v, bodies, np.inf if everywhere else _CAPTURE * theta, settings.silhouette)
             for v, theta in zip(views, thetas, strict=True)
         ]
+        firsts = np.cumsum([0] + [p.shape[1] for p in points])
+        self._outline_points = np.array([0 if v.silhouette is None else len(v.silhouette.points_px) for v in views])
         weights = settings.information_per_px * np.array([settings.model_to_image, settings.image_to_model])
         self._scene = _Scene(
             np.stack([contours.projection(v.camera) for v in views]),
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
             np.concatenate([v.distance.ravel() for v in views]),
-            np.ascontiguousarray(np.concatenate(points, axis=1)),
-            np.cumsum([0] + [p.shape[1] for p in points]),
+            np.ascontiguousarray(np.concatenate([p[:5] for p in points], axis=1)),
+            firsts,
+            firsts[:-1] + np.array([int(np.sum(p[5] == 0)) for p in points]),
             np.array(thetas),
             # A view without any edge has nothing to say; its distance image is flat.
             np.array([weights if len(v.points_px) else 0 * weights for v in views]),
@@ -163,7 +172,9 @@ class ContourMatch:
             contour, np.empty((7, room), np.float32), np.empty(room, np.int64), np.empty(n_points, np.float32),
             np.empty(n_points, np.int32),
         )  # fmt: skip
-        self._sums = _Sums(np.empty((n_parts, 6, 6)), np.empty((n_parts, 6)), np.empty((len(views), n_parts, 3)))
+        self._sums = _Sums(
+            np.empty((n_parts, 6, 6)), np.empty((n_parts, 6)), np.empty((len(views), n_parts, 3)), np.empty(len(views))
+        )
 
     def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `fit.Block`."""
@@ -187,7 +198,9 @@ class ContourMatch:
         own = slice(self._first, self._first + len(self._model.parts))
         length, distance, points = np.moveaxis(self._sums.parts[:, own], -1, 0).copy()
         forward = np.divide(distance, length, out=np.full_like(length, np.nan), where=length > 0)
-        return PartCosts(length, forward, points)
+        total = self._outline_points
+        outline = np.divide(self._sums.outline, total, out=np.full(len(total), np.nan), where=total > 0)
+        return PartCosts(length, forward, points, outline)
 
     def _gather(self, kinematics: Kinematics, derive: bool = True) -> float:
         own, settings = slice(self._first, self._first + len(self._model.parts)), self._settings
@@ -199,11 +212,14 @@ class ContourMatch:
 
 
 def _within(view: ViewEvidence, bodies: Sequence[Body], reach_px: float, silhouette: float) -> FloatArray:
-    """Points of edges and silhouette within reach of the visible contours, with normals and weights, (5, N)."""
-    rows = [_rows(view.points_px, view.normals, 1.0)]
+    """Points of edges, then of the silhouette, within reach of the visible contours, (6, N).
+
+    Rows: u, v, normal's u, v, weight, and 0 for edges, 1 for the silhouette.
+    """
+    rows = [_rows(view.points_px, view.normals, 1.0, 0.0)]
     if view.silhouette is not None and silhouette * view.silhouette.trust > 0:
         outline = view.silhouette
-        rows.append(_rows(outline.points_px, outline.normals, silhouette * outline.trust))
+        rows.append(_rows(outline.points_px, outline.normals, silhouette * outline.trust, 1.0))
     points = np.concatenate(rows, axis=1)
     if np.isinf(reach_px):
         return points
@@ -218,9 +234,10 @@ def _within(view: ViewEvidence, bodies: Sequence[Body], reach_px: float, silhoue
     return points[:, near[points[1].astype(np.intp) // 8, points[0].astype(np.intp) // 8]]
 
 
-def _rows(points_px: FloatArray, normals: FloatArray, weight: float) -> FloatArray:
-    """Points (N, 2) with normals (N, 2) as rows, (5, N)."""
-    return np.stack([*points_px.T, *normals.T, np.full(len(points_px), weight)]).astype(np.float32)
+def _rows(points_px: FloatArray, normals: FloatArray, weight: float, kind: float) -> FloatArray:
+    """Points (N, 2) with normals (N, 2) as the rows of `_within`, (6, N)."""
+    n = len(points_px)
+    return np.stack([*points_px.T, *normals.T, np.full(n, weight), np.full(n, kind)]).astype(np.float32)
 
 
 @njit(nogil=True, cache=True)
@@ -362,6 +379,8 @@ def _image_to_model(
         cost += 0.5 * weight * weights[j] * s2 * squared / (s2 + squared)
         if scratch.best[j] >= limit:
             continue
+        if start + j >= scene.outlines[view]:
+            sums.outline[view] += 1.0
         k = scratch.nearest[j]
         i = scratch.which[k]
         part = scratch.contour.parts[i]
@@ -398,12 +417,13 @@ def _gather(
     sums.M[:] = 0.0
     sums.b[:] = 0.0
     sums.parts[:] = 0.0
+    sums.outline[:] = 0.0
     pixel, cost = 0, 0.0
     for view in range(scene.P.shape[0]):
         if scene.weights[view, 0] > 0.0 or scene.weights[view, 1] > 0.0:
             n = contours.trace_view(scene.P[view], scene.eyes[view], Ts, surfaces, contours.PIECE_PX, scratch.contour)
             kept = _visible(scratch.contour, n, scratch.pieces, scratch.which)
-            if scene.weights[view, 0] > 0.0:
+            if scene.weights[view, 0] > 0.0 or not derive:  # whoever asks for the costs of the parts asks for both
                 cost += _model_to_image(view, first, last, pixel, kept, scene, scale, derive, scratch, sums)
             if scene.weights[view, 1] > 0.0:
                 cost += _image_to_model(view, first, last, kept, scene, scale, turn, derive, scratch, sums)

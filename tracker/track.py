@@ -32,6 +32,8 @@ Estimation = Literal["refine", "search"]
 
 _ITERATIONS = 15
 _TOLERANCE = 1e-3  # rad or metres: a tenth of a pixel on a limb
+_LONGEST_PAUSE = 8
+"""A limb that seems lost and is not found is searched at least every so many frames."""
 _LEARN_FRAMES, _TRACKED_SHARE, _GIVEN_SHARE = 3, 0.15, 0.5
 """Every so many frames the colours of the parts are brought up to date, and what such a frame counts; what a keyframe
 counts against the frames before it."""
@@ -179,10 +181,20 @@ class _Track:
         self.last_good = self.past[-1]
         self.known: PartColors | None = None
         self._frames = 0
+        self._pauses: dict[str, tuple[int, int]] = {}  # per limb: when it may be searched again, and the last pause
 
     def expected(self, settings: TrackSettings) -> Array:
         """The predicted pose of the next frame."""
         return predict(self.model, self.past, settings.predict)
+
+    def may_search(self, limb: Limb) -> bool:
+        """Whether a limb is due: one that was searched in vain waits longer each time."""
+        return self._frames >= self._pauses.get(limb.name, (0, 0))[0]
+
+    def searched(self, limb: Limb, found: bool) -> None:
+        """Note how the search for a limb went."""
+        pause = 0 if found else min(_LONGEST_PAUSE, 2 * self._pauses.get(limb.name, (0, 0))[1] + 1)
+        self._pauses[limb.name] = (self._frames + pause + 1, pause)
 
     def update(self, scene: "_Scene", person: int, found: _Found, given: bool) -> None:
         """Take in what a frame brought; a given pose begins the motion anew where it is far from the track."""
@@ -248,8 +260,9 @@ class _Scene:
         if confidence.judge(found) == "lost":
             evaluations, fit = self._search_body(person, track, fit, judge)
             remarks.append("body searched anew")
-        for limb in suspects:
+        for limb in filter(track.may_search, suspects):
             better = search_limb(model, limb, fit, (track.past[-1], predicted), judge, _ITERATIONS)
+            track.searched(limb, better is not fit)
             if better is not fit:
                 remarks.append(f"{_chain(limb)} searched anew")
                 fit = better
@@ -302,7 +315,8 @@ class _Scene:
         if known is not None:
             colors = self.colors(person).score(fit.values, known), known
         costs, open_px = match.part_costs(fit.values), _open_px(self.views, track.model, fit.values)
-        return confidence.quality(track.model, fit, predicted, costs, self._thetas, open_px, colors)
+        trusts = np.array([0.0 if v.silhouette is None else v.silhouette.trust for v in self.views])
+        return confidence.quality(track.model, fit, predicted, costs, self._thetas, open_px, trusts, colors)
 
     def _parts_px(self, match: ContourMatch, values: Array) -> Array:
         """Mean distance of each part's contour to the edges, (n_parts,), px of the footage."""
