@@ -33,7 +33,7 @@ _DOUBT = 0.02
 
 _TWIN_SHARE = 0.2
 """Share of what is seen under a part's twin in what is expected under itself: sleeves are mostly alike."""
-_SAME = 0.4
+_SAME = 0.25
 """Colours have changed much where their mean log ratio is below this share of the usual."""
 
 
@@ -107,7 +107,7 @@ class Colors:
         other = 0.5 * _smoothed(around) + 0.5 * _share(_smoothed(seen.sum(axis=0)))
         blank = seen.sum(axis=1, keepdims=True) == 0
         own = np.where(blank, seen[twins], (1 - _TWIN_SHARE) * seen + _TWIN_SHARE * seen[twins])
-        own = np.array([_smoothed(s) for s in own])
+        own = np.array([_smoothed(_share(s)) for s in own])
         ratios = np.log(((1 - _DOUBT) * own + _DOUBT * other + 1e-7) / (other + 1e-7))
         ratios[own.sum(axis=1) == 0] = 0.0
         ratios = np.clip(ratios, -_MOST_NATS, _MOST_NATS)

@@ -27,16 +27,14 @@ _LEAST_GAIN = 0.1
 class RecoverSettings:
     """How lost limbs are searched for."""
 
-    proposals: int = 1024
+    proposals: int = 2048
     """Poses of a limb that are looked at; a power of two, so that they fill the space evenly."""
     reach_rad: float = float(np.radians(35))
     """Spread of those proposals that lie around the pose, rad; half of them lie anywhere within the joint limits."""
-    promising: int = 32
-    """Proposals of which the surroundings are looked at."""
+    rounds: tuple[tuple[int, float], ...] = ((64, float(np.radians(18))), (32, float(np.radians(8))))
+    """Of how many of the best proposals the surroundings are looked at, and how far around, rad; round by round."""
     shakes: int = 16
     """Poses around each of these; a power of two."""
-    shake_rad: float = float(np.radians(12))
-    """Spread of those, rad."""
     scored: int = 24
     """Proposals whose contours are scored."""
     refined: int = 6
@@ -88,8 +86,9 @@ def search_limb(model: BodyModel, limb: Limb, here: Fit, others: Sequence[Array]
     settings, blocks = judge.settings, [judge.match, *judge.priors]
     look = partial(judge.colors.along_limb, limb=limb.parts, known=judge.known)
     proposals = _proposals(model, limb, here.values, settings)
-    promising = proposals[np.argsort(-look(proposals))[: settings.promising]]
-    proposals = np.concatenate([promising, _shaken(model, limb, promising, settings)])
+    for promising, spread_rad in settings.rounds:
+        best_of = proposals[np.argsort(-look(proposals))[:promising]]
+        proposals = np.concatenate([best_of, _shaken(model, limb, best_of, settings.shakes, spread_rad)])
     candidates = [_with_limb(model, here.values, other, limb) for other in others]
     candidates += list(proposals[np.argsort(-look(proposals))[: settings.scored]])
     order = np.argsort(judge.costs(candidates))[: settings.refined]
@@ -126,11 +125,11 @@ def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSet
     return _moved(model, np.repeat(values[None], len(steps), axis=0), dofs, steps)
 
 
-def _shaken(model: BodyModel, limb: Limb, poses: Array, settings: RecoverSettings) -> Array:
+def _shaken(model: BodyModel, limb: Limb, poses: Array, shakes: int, spread_rad: float) -> Array:
     """Poses with the limb around where it is in each of some, (n, n_values): the best of many is still far off."""
     dofs = np.flatnonzero(limb.dofs)
-    steps = norm.ppf(0.002 + 0.996 * _even(settings.shakes * len(poses), len(dofs))) * settings.shake_rad
-    return _moved(model, np.repeat(poses, settings.shakes, axis=0), dofs, steps)
+    steps = norm.ppf(0.002 + 0.996 * _even(shakes * len(poses), len(dofs))) * spread_rad
+    return _moved(model, np.repeat(poses, shakes, axis=0), dofs, steps)
 
 
 def _moved(model: BodyModel, poses: Array, dofs: IntArray, steps: Array) -> Array:

@@ -121,7 +121,7 @@ def test_parts_hidden_by_the_body_give_no_samples(gavrila):
 
 
 def test_left_and_right_share(gavrila):
-    """What one arm showed is known of the other one, which nobody has seen."""
+    """What one arm showed is known of the other one, which nobody has seen; else each goes by its own."""
     stand, names = gavrila.neutral(), gavrila.part_index
     cameras = [camera_at("left", (0.0, 4.0, 0.2)), camera_at("right", (0.0, -4.0, 0.2))]
     arms = parts(gavrila, "left_upper_arm", "right_upper_arm")

@@ -83,7 +83,8 @@ def test_worse_figures_never_clear_a_limb(before, worse):
     )
     assert after.suspicious >= before.suspicious
     quality_before, quality_after = (
-        Quality(f.forward, 1.0, 0.01, 0.01, 3, (f, LimbFigures("leg", 0.0, 1.0, 1.0, 0.0))) for f in (before, after)
+        Quality(f.forward, 1.0, 0.01, 0.01, 3, 0.0, (f, LimbFigures("leg", 0.0, 1.0, 1.0, 0.0)))
+        for f in (before, after)
     )
     order = ("good", "doubtful", "lost")
     assert order.index(judge(quality_after)) >= order.index(judge(quality_before))
@@ -92,13 +93,15 @@ def test_worse_figures_never_clear_a_limb(before, worse):
 def test_what_is_plain():
     good, bad = LimbFigures("left_forearm", 0.05, 0.9, 1.0, 0.0), LimbFigures("left_calf", 1.0, 0.9, 1.0, 0.0)
     hidden, undressed = LimbFigures("x", 0.0, 0.0, 1.0, 0.0), LimbFigures("y", 0.05, 0.9, -2.0, 4.0)
-    assert judge(Quality(0.05, 1.0, 0.01, 0.01, 3, (good,))) == "good"
+    assert judge(Quality(0.05, 1.0, 0.01, 0.01, 3, 0.0, (good,))) == "good"
     for limb in (bad, hidden, undressed):
-        found = Quality(0.1, 1.0, 0.01, 0.01, 3, (good, limb))
+        found = Quality(0.1, 1.0, 0.01, 0.01, 3, 0.0, (good, limb))
         assert found.suspects == (limb.name,)
         assert judge(found) == "doubtful"
-    assert judge(Quality(1.0, 0.0, 1.0, 0.5, 3, (bad, hidden))) == "lost"
-    assert judge(Quality(0.0, 0.0, 1.0, 0.0, 0, ())) == "lost"  # nothing sees the body
+    assert judge(Quality(1.0, 0.0, 1.0, 0.5, 3, 0.0, (bad, hidden))) == "lost"
+    assert judge(Quality(0.0, 0.0, 1.0, 0.0, 0, 0.0, ())) == "lost"  # nothing sees the body
+    # What no part explains speaks against every limb.
+    assert Quality(0.05, 1.0, 0.01, 0.01, 3, 0.2, (good, bad)).suspects == ("left_forearm", "left_calf")
 
 
 def judged(model, truth, values):
@@ -108,7 +111,7 @@ def judged(model, truth, values):
     fit = solve(model, values, [match, StayNear(values, np.full(model.n_dofs, 5.0))], max_iterations=0)
     thetas = np.array([v.theta_px for v in views])
     shown = np.full((3, len(model.parts)), 80.0)
-    return quality(model, fit, truth, match.part_costs(values), thetas, shown, None)
+    return quality(model, fit, truth, match.part_costs(values), thetas, shown, np.zeros(3), None)
 
 
 def test_quality_of_a_pose_and_of_a_lost_arm(gavrila):
