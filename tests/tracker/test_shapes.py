@@ -105,6 +105,11 @@ def test_profile_runs_along_the_surface_within_the_tolerance(shape):
     np.testing.assert_allclose(shape.inside_outside(unit * shape.half_axes), 1, atol=1e-9)
     outward = np.stack([profile.outward, 0 * profile.outward, profile.along], axis=1)
     assert (shape.inside_outside((unit * 0.999 + 1e-2 * outward) * shape.half_axes) > 1).all()
+    # Normals are at right angles to the profile: on average over a chord to that chord.
+    chords = np.diff(unit[1:-1, [0, 2]], axis=0)
+    normals = np.stack([profile.outward, profile.along], axis=1)[1:-1]
+    slopes = np.sum(chords * (normals[1:] + normals[:-1]), axis=1) / 2 / np.linalg.norm(chords, axis=1)
+    assert np.abs(slopes).max() < 0.15
     # Everything of the surface lies within the tolerance of the polygon.
     points = (shape.grid(300, 4)[0] / shape.half_axes).reshape(-1, 3)
     metric = np.stack([np.hypot(points[:, 0], points[:, 1]), points[:, 2]], 1) * (
