@@ -21,7 +21,7 @@ from tracker import contours
 from tracker.body import Body, BodyModel
 from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence
-from tracker.kernels import BORROW, FAST
+from tracker.kernels import FAST
 from tracker.kinematics import Tree, forward_kinematics
 from tracker.nearest import RowSorted, Segments, nearest_segment, segment_buffer, sort_by_row
 from tracker.rigid import Array
@@ -258,7 +258,7 @@ def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool
     return total / weight if weight >= 0.5 * everything else theta
 
 
-@njit(**BORROW)
+@njit(**FAST)
 def sample_distance(distances: FloatArray, first: int, width: int, height: int, u: np.float32, v: np.float32) -> float:
     """Bilinear distance at a pixel; outside the image, that of the nearest border pixel and the way to it."""
     cu = min(max(u, np.float32(0)), np.float32(width - 1))
@@ -274,7 +274,7 @@ def sample_distance(distances: FloatArray, first: int, width: int, height: int, 
     return inside + np.sqrt((u - cu) * (u - cu) + (v - cv) * (v - cv))
 
 
-@njit(**BORROW)
+@njit(**FAST)
 def _collect(n: int, distances: FloatArray, first: int, width: int, height: int, scratch: _Scratch) -> tuple[int, int]:
     """Sample the distance image at the visible pieces, and join them to segments; the numbers of both."""
     ends, hidden, edges = scratch.pieces.ends, scratch.pieces.hidden, scratch.pieces.edges
@@ -299,7 +299,7 @@ def _collect(n: int, distances: FloatArray, first: int, width: int, height: int,
     return kept, n_segments
 
 
-@njit(**BORROW)
+@njit(**FAST)
 def _score(
     Ts: Array, surfaces: contours.Surfaces, scene: _Scene, paper: bool, scratch: _Scratch, directed: Array
 ) -> None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tracker.body import Body
 from tracker.cameras import Camera
 from tracker.hiding import JOINT_MARGIN_M, LANES, hide
-from tracker.kernels import BORROW, FAST
+from tracker.kernels import FAST
 from tracker.outlines import MAX_POINTS, grid_outline, revolved_outline
 from tracker.rigid import Array
 from tracker.surfaces import FloatArray, Surfaces, surfaces_of
@@ -140,7 +140,7 @@ def piece_buffer(surfaces: Surfaces, room: int) -> Pieces:
 # The kernels below take the arrays they need one by one: handing over a tuple of thirty costs more than the work is.
 
 
-@njit(**BORROW)
+@njit(**FAST)
 def _place(eye: Array, Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
     """Fill the motions between the parts' unit coordinates and the world, and their distances from the eye."""
     to_world, to_unit, distances = out.Ts_world_unit, out.Ts_unit_world, out.distances
@@ -202,7 +202,7 @@ def _project(
     return kept
 
 
-@njit(**BORROW)
+@njit(**FAST)
 def _image_row(i: int, part: int, P: Array, W: Array) -> tuple[np.float32, np.float32, np.float32, np.float32]:
     """Row i of the projection from the unit coordinates of a part."""
     p, q, r = P[i, 0], P[i, 1], P[i, 2]
@@ -254,7 +254,7 @@ def _cut(
     return n
 
 
-@njit(**BORROW)
+@njit(**FAST)
 def _hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
     """Mark what parts hide of one another: those whose boxes in the image meet, and that are not all behind."""
     boxes, distances, radii, firsts, adjoining = (
@@ -288,7 +288,7 @@ def _hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
             hide(b, solids, Q, margin, middles, firsts[a], firsts[a + 1], shared, hidden)
 
 
-@njit(**BORROW)
+@njit(**FAST)
 def trace_pieces(P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: float, out: Pieces) -> int:
     """Fill the pieces of one view; returns their number. See `trace_view`."""
     n_parts = Ts.shape[0]

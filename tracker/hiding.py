@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.kernels import BORROW, FAST
+from tracker.kernels import FAST
 from tracker.surfaces import ALONG, N_ALONG, N_SECTION, SECTION, FloatArray
 
 JOINT_MARGIN_M = 0.03
@@ -64,7 +64,7 @@ def _meet_quadric(
         shared[1, i] = high if disc > _ZERO else -_FAR
 
 
-@njit(**BORROW)
+@njit(**FAST)
 def _fills(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: np.float32) -> bool:
     """Whether a point in unit coordinates is within a superquadric, by the tables of its shape."""
     at = abs(z) * np.float32(N_ALONG)
@@ -87,7 +87,7 @@ def _fills(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: np.fl
     return larger * (below + (at - np.float32(k)) * (solids[part, SECTION + k + 1] - below)) < size
 
 
-@njit(**BORROW)
+@njit(**FAST)
 def hide(
     part: int, solids: FloatArray, Q: FloatArray, margin: float, points: FloatArray, first: int, last: int,
     shared: FloatArray, hidden: NDArray[np.bool_],

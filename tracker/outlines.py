@@ -8,7 +8,7 @@ point of the profile; on other parts the zero line of the function is followed a
 import numpy as np
 from numba import njit
 
-from tracker.kernels import BORROW
+from tracker.kernels import FAST
 from tracker.rigid import Array
 from tracker.surfaces import N_RINGS, N_SECTORS, FloatArray, Surfaces
 
@@ -19,7 +19,7 @@ _ON_AXIS = 1e-9
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 
 
-@njit(**BORROW)
+@njit(**FAST)
 def revolved_outline(
     part: int, n_profile: int, profile: FloatArray, eye: Array, turn: np.float32, half: FloatArray, out: FloatArray
 ) -> int:
@@ -70,7 +70,7 @@ def revolved_outline(
     return 2 * n - 2  # the mirrored first point is the first itself
 
 
-@njit(**BORROW)
+@njit(**FAST)
 def _strip(
     c0: np.float32, c1: np.float32, n0: np.float32, n1: np.float32, first: np.float32, last: np.float32,
     r0: np.float32, z0: np.float32, r1: np.float32, z1: np.float32, turn: np.float32, n: int, half: FloatArray,
@@ -107,7 +107,7 @@ def _strip(
     return n
 
 
-@njit(**BORROW)
+@njit(**FAST)
 def grid_outline(part: int, eye: Array, surfaces: Surfaces, f: FloatArray, out: FloatArray) -> int:
     """Follow the contour generator around the grid of a part, from cell to cell.
 
@@ -160,7 +160,7 @@ def grid_outline(part: int, eye: Array, surfaces: Surfaces, f: FloatArray, out: 
     return 0
 
 
-@njit(**BORROW)
+@njit(**FAST)
 def _start(f: FloatArray) -> tuple[int, int, int]:
     """Where the zero line enters a cell, as ring, sector and side; ring -1 where there is none."""
     for ring in range(N_RINGS + 1):
