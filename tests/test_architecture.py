@@ -42,6 +42,7 @@ ORDER = [
     ["tracker.session"],
     ["tracker.recording", "tracker.references"],
     ["tracker.assemble", "tracker.evidence", "tracker.simulate"],
+    ["tracker.matching"],
     ["tracker.chamfer", "tracker.predict", "tracker.appearance", "tracker.refine", "tracker.apart"],
     ["tracker.search", "tracker.confidence"],
     ["tracker.recover"],

@@ -78,7 +78,7 @@ def grab(model: BodyModel, values: Array, camera: Camera, point: str, pointer_px
     """Take hold of a point of a body.
 
     The root point moves the whole body. A point of a limb moves its chain up to the trunk; a point of the trunk
-    turns the body about its root.
+    turns the body about its root, and bends what of the trunk can bend.
 
     Args:
         model: the body.
@@ -95,10 +95,10 @@ def grab(model: BodyModel, values: Array, camera: Camera, point: str, pointer_px
     of_root = model.dof_joint == 0
     if index == 0:
         free = of_root & model.dof_is_length
-    elif np.any(moving & ~of_root):
+    elif np.any(moving & ~of_root & ~np.isfinite(model.spreads)):
         free = moving & ~of_root
     else:
-        free = of_root & ~model.dof_is_length
+        free = moving & ~model.dof_is_length
     offset = camera.pinhole.project(place) - pointer_px
     return Grab(model, camera.pinhole, index, np.array(values), float(camera.depths(place)), offset, free)
 

@@ -19,7 +19,7 @@ def test_new_info_init_track_evaluate(run, tmp_path):
     videos = sorted(SAMPLE.glob("*.mp4"))
     status, out, _ = run(
         "new", s, "--calibration", SAMPLE / "calibration.toml", "--videos", *videos,
-        "--background", SAMPLE / "background", "--height", "1.78", "--people", "ann",
+        "--background", SAMPLE / "background", "--height", "1.78", "--people", "ann", "--model", "gavrila22",
     )  # fmt: skip
     assert (status, out) == (0, f"made {s}: 4 cameras, 50 frames at 25 per second\n")
 
@@ -30,7 +30,7 @@ def test_new_info_init_track_evaluate(run, tmp_path):
     assert [c["name"] for c in told["cameras"]] == ["FRONT", "RIGHT", "BACK", "LEFT"]
     assert all(c["background"] and not c["masks"] for c in told["cameras"])
     assert told["people"] == [
-        {"name": "ann", "model": "gavrila31", "height_m": 1.78, "dofs": 31, "poses": 0, "keyframes": 0}
+        {"name": "ann", "model": "gavrila22", "height_m": 1.78, "dofs": 22, "poses": 0, "keyframes": 0}
     ]
 
     status, out, _ = run("init", s, "--joints", SAMPLE / "truth.trc", "--frame", "20", "--json")
@@ -54,7 +54,7 @@ def test_new_info_init_track_evaluate(run, tmp_path):
     assert run("evaluate", s, "--reference", SAMPLE / "truth.trc", "--frames", "18:23", "--json")[0] == 0
 
     _, out, _ = run("info", s)
-    assert "person ann: gavrila31 of 1.78 m, 31 degrees of freedom, 3 poses, 1 keyframes" in out
+    assert "person ann: gavrila22 of 1.78 m, 22 degrees of freedom, 3 poses, 1 keyframes" in out
     with_angles = json.loads(run("evaluate", s, "--reference", SAMPLE / "truth.csv", "--json")[1])
     assert with_angles["axis_error_deg"] < 15
     _, out, _ = run("evaluate", s, "--reference", SAMPLE / "truth.csv")

@@ -27,6 +27,7 @@ def balance(data_folder, tmp_path_factory):
         calibration=data / "Calib.toml",
         videos=sorted(data.glob("cam*.mp4")),
         background=data / "background",
+        models="gavrila22",
     )
     session = load_session(folder)
     joints = read_joints(data / "reference_joints.trc", session.fps)
