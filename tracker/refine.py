@@ -48,8 +48,10 @@ class MatchSettings:
     """Weight of the model-to-image residuals; 0 leaves them out."""
     image_to_model: float = 0.5
     """Weight of the image-to-model residuals; 0 leaves them out."""
+    edges: float = 1.0
+    """Weight of the edges among the points of the image; 0 leaves them out."""
     silhouette: float = 0.5
-    """Weight of the silhouette's contour against edges, where its view is fully trusted; 0 leaves it out."""
+    """The same of the silhouette's contour, where its view is fully trusted."""
     information_per_px: float = 0.0125
     """What one pixel of contour tells: 1 / (variance in px^2 times the length over which errors are alike, px)."""
 
@@ -100,7 +102,7 @@ class ContourMatch:
         self._Ts = contours.part_poses(bodies)
         thetas = [v.theta_px if theta_px is None else theta_px * v.scale for v in views]
         points = [
-            _within(v, bodies, np.inf if everywhere else _CAPTURE * theta, settings.silhouette)
+            _within(v, bodies, np.inf if everywhere else _CAPTURE * theta, settings)
             for v, theta in zip(views, thetas, strict=True)
         ]
         blocks = [_by_row(p, v.camera.height) for p, v in zip(points, views, strict=True)]
@@ -165,15 +167,15 @@ class ContourMatch:
         )  # fmt: skip
 
 
-def _within(view: ViewEvidence, bodies: Sequence[Body], reach_px: float, silhouette: float) -> FloatArray:
+def _within(view: ViewEvidence, bodies: Sequence[Body], reach_px: float, settings: MatchSettings) -> FloatArray:
     """Points of edges, then of the silhouette, within reach of the visible contours, (6, N).
 
     Rows: u, v, normal's u, v, weight, and 0 for edges, 1 for the silhouette.
     """
-    rows = [_rows(view.points_px, view.normals, 1.0, 0.0)]
-    if view.silhouette is not None and silhouette * view.silhouette.trust > 0:
+    rows = [_rows(view.points_px, view.normals, settings.edges, 0.0)]
+    if view.silhouette is not None and settings.silhouette * view.silhouette.trust > 0:
         outline = view.silhouette
-        rows.append(_rows(outline.points_px, outline.normals, silhouette * outline.trust, 1.0))
+        rows.append(_rows(outline.points_px, outline.normals, settings.silhouette * outline.trust, 1.0))
     points = np.concatenate(rows, axis=1)
     if np.isinf(reach_px):
         return points
