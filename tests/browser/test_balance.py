@@ -113,11 +113,11 @@ async def test_the_main_job(browser, balance, program, tmp_path):
     assert np.mean(errors) < 60  # px of a body 900 px tall
 
     await page.get_by_role("button", name="Frame", exact=True).click()
-    # Contours under test, and a pose that has changed, while the search is still running.
+    # Contours under test while the search is still running, and a pose that changes. How long it runs after that is a
+    # matter of the machine: it may be over within a picture or two.
     await shows(page, "quadrille.state.state.job.running && quadrille.state.overlay.paths.some("
                 "(p) => p.kind === 'candidate' && p.count)", 60)  # fmt: skip
     await comes(page, lambda pose: distance(pose, placed) > 1, timeout_s=60)
-    assert (await state_of(page))["state"]["job"]["running"]
     await shows(page, "!quadrille.state.state.job.running", 120)
     found_px = (await state_of(page))["state"]["cost_px"]
     assert found_px < placed_px
