@@ -2,14 +2,14 @@
 
 import json
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from typing import Any
 
 import numpy as np
 
 from app.commands import Reporter, Target
-from app.tracked import Keyframes, told_of, tracked_changes
+from app.tracked import keyframes_of, told_of, tracked_changes
 from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
 from tracker.evidence import Observer
@@ -19,7 +19,7 @@ from tracker.records import PoseChange
 from tracker.rigid import Array
 from tracker.session import Person
 from tracker.session_lock import SessionLock
-from tracker.track import TrackSettings, track_chamfer
+from tracker.track import PoseEstimate, TrackSettings, track_chamfer
 
 _SAVE_FRAMES = 10
 """A tracking run is on disk at least every so many frames."""
@@ -87,19 +87,19 @@ class _Run:
         self._at, self._store, self._settings, self._frames, self._label = at, store, settings, frames, label
         self._revisions = [store.add_model_revision(p.name, format_model(p.model)) for p in people]
         self._past = [_past(store, p, frames, i in at.people) for i, p in enumerate(people)]
-        self._fixed = _keyframes(store, people, frames)
+        self._fixed = keyframes_of(store, people, set(frames))
         self._waiting: list[PoseChange] = []
         self._edit: int | None = None
         self.done = 0
         self.costs: list[float] = []
         self.statuses: list[Counter[str]] = [Counter() for _ in people]
 
-    def estimates(self, observer: Observer) -> Any:
+    def estimates(self, observer: Observer) -> Iterator[PoseEstimate]:
         """Track the frames one by one."""
         models = [p.model for p in self._at.session.people]
         return track_chamfer(observer, models, self._past, self._frames, self._settings, self._fixed, self._at.people)
 
-    def take(self, found: Any) -> None:
+    def take(self, found: PoseEstimate) -> None:
         """Keep what was found on a frame; on disk with the next save."""
         names = [p.name for p in self._at.session.people]
         self._waiting += tracked_changes([found], names, self._at.people, self._revisions, self._fixed, self._settings)
@@ -131,7 +131,7 @@ def _left(store: AnnotationStore, task: Any, frames: Sequence[int]) -> Sequence[
 def _past(store: AnnotationStore, person: Person, frames: Sequence[int], needed: bool) -> list[Array]:
     """Poses to begin from, the last one last: those just before the first frame, else the nearest one.
 
-    A pose on the first frame itself comes first of all. Tracking backward, "before" is after.
+    Where there is none just before, one on the first frame itself is nearest. Tracking backward, "before" is after.
     """
     first, step = frames[0], 1 if len(frames) < 2 or frames[1] > frames[0] else -1
     rows = {row.frame for row in store.frames(person.name)}
@@ -157,14 +157,3 @@ def _past(store: AnnotationStore, person: Person, frames: Sequence[int], needed:
         f"expected a pose of '{person.name}' at frame {first} or {where}, found none; place the body in the "
         "page, or use quadrille init"
     )
-
-
-def _keyframes(store: AnnotationStore, people: Sequence[Person], frames: Sequence[int]) -> Keyframes:
-    fixed: dict[int, dict[int, Array]] = {}
-    wanted = set(frames)
-    for index, person in enumerate(people):
-        for row in store.frames(person.name):
-            record = store.pose(person.name, row.frame) if row.keyframe and row.frame in wanted else None
-            if record is not None:
-                fixed.setdefault(row.frame, {})[index] = record.values
-    return fixed

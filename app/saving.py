@@ -7,7 +7,7 @@ from dataclasses import asdict
 import numpy as np
 
 from app.state import Shown, State
-from app.tracked import tracked_changes
+from app.tracked import keyframes_of, tracked_changes
 from tracker.annotations import AnnotationStore
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model
@@ -50,13 +50,7 @@ class Saver:
 
     def keyframes(self, frames: Collection[int]) -> dict[int, dict[int, Array]]:
         """Poses of the keyframes among some frames, by frame and person."""
-        found: dict[int, dict[int, Array]] = {}
-        for person, info in enumerate(self._session.people):
-            for row in self._store.frames(info.name):
-                stored = self.pose(person, row.frame) if row.keyframe and row.frame in frames else None
-                if stored is not None:
-                    found.setdefault(row.frame, {})[person] = stored.values
-        return found
+        return keyframes_of(self._store, self._session.people, frames)
 
     def nearest_pose(self, person: int, frame: int) -> Array | None:
         """The stored pose nearest in time, the earlier one where two are as near; None where there is none."""

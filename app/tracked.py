@@ -1,13 +1,15 @@
 """What a tracker has found, as rows of the store."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from tracker.annotations import AnnotationStore
 from tracker.records import PoseChange, PoseRecord
 from tracker.rigid import Array
+from tracker.session import Person
 from tracker.track import PoseEstimate, TrackSettings
 
 Keyframes = Mapping[int, Mapping[int, Array]]
@@ -53,6 +55,19 @@ def tracked_changes(
         for i in people
         if i not in fixed.get(found.frame, {})
     ]
+
+
+def keyframes_of(
+    store: AnnotationStore, people: Sequence[Person], frames: Collection[int]
+) -> dict[int, dict[int, Array]]:
+    """Poses of the keyframes among some frames, by frame and index of the person."""
+    found: dict[int, dict[int, Array]] = {}
+    for index, person in enumerate(people):
+        for row in store.frames(person.name):
+            record = store.pose(person.name, row.frame) if row.keyframe and row.frame in frames else None
+            if record is not None and len(record.values) == len(person.model.value_names):
+                found.setdefault(row.frame, {})[index] = record.values
+    return found
 
 
 def told_of(settings: TrackSettings) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from app.jobs import Job
 from app.screen import Screen
 from app.state import Shown, TrackState, finite_or_none
+from tracker import confidence
 from tracker.errors import TrackerError
 from tracker.rigid import Array
 from tracker.track import PoseEstimate, TrackSettings, track_chamfer
@@ -140,7 +141,7 @@ class Tracking:
             if run is not self._run:
                 return
             run.waiting.append(found)
-            worst = _worst(found, run.people)
+            worst = confidence.worst([found.statuses[i] for i in run.people])
             track = screen.state.track
             done = track.done + 1
             track = replace(
@@ -212,12 +213,6 @@ class Tracking:
         track = self._screen.state.track
         self._run = None
         self._screen.set(track=TrackState(message=f"{how}: {_summary(track)}", failed=failed))
-
-
-def _worst(found: PoseEstimate, people: Sequence[int]) -> str:
-    """The worst status of the people tracked."""
-    statuses = [found.statuses[i] for i in people]
-    return next((s for s in ("lost", "doubtful") if s in statuses), "good")
 
 
 def _summary(track: TrackState) -> str:

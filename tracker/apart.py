@@ -15,6 +15,7 @@ from tracker.body import BodyModel
 from tracker.fit import Normal, normal_of
 from tracker.kinematics import IntArray, Kinematics
 from tracker.rigid import Array
+from tracker.surfaces import surfaces_of
 
 _SAMPLES = 5
 """Points along the axis of each part that are asked whether they lie within another part."""
@@ -31,7 +32,9 @@ class KeepApart:
 
     def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `fit.Block`."""
-        depths, points, normals, own, other = self._contacts(model, kinematics)
+        depths, points, normals, own, other = _contacts(
+            model, kinematics, may_touch(model, self.softness), self.softness
+        )
         if not len(depths):
             n = model.n_dofs
             return Normal(0.0, np.zeros(n), np.zeros((n, n)))
@@ -40,32 +43,27 @@ class KeepApart:
         weight = 1 / (self.sigma_m * np.sqrt(_SAMPLES))
         return normal_of(weight * depths, -weight * np.einsum("ni,nik->nk", normals, relative))
 
-    def _contacts(self, model: BodyModel, kinematics: Kinematics) -> tuple[Array, Array, Array, IntArray, IntArray]:
-        """Depth (n,), place and outward normal in the world (n, 3), and the two parts (n,) of each contact."""
-        room = len(model.parts) ** 2 * _SAMPLES
-        rows, parts = np.empty((room, 7)), np.empty((room, 2), np.int64)
-        n = _touch(
-            kinematics.Ts_world_part, model.centers_part, np.array([s.half_axes for s in model.shapes]),
-            may_touch(model, self.softness), self.softness, rows, parts,
-        )  # fmt: skip
-        return rows[:n, 0], rows[:n, 1:4], rows[:n, 4:], parts[:n, 0], parts[:n, 1]
+
+def _contacts(
+    model: BodyModel, kinematics: Kinematics, apart: NDArray[np.bool_], softness: float
+) -> tuple[Array, Array, Array, IntArray, IntArray]:
+    """Depth (n,), place and outward normal in the world (n, 3), and the two parts (n,) of each contact."""
+    room = len(model.parts) ** 2 * _SAMPLES
+    rows, parts = np.empty((room, 7)), np.empty((room, 2), np.int64)
+    half_axes = surfaces_of((model,)).half_axes
+    n = _touch(kinematics.Ts_world_part, model.centers_part, half_axes, apart, softness, rows, parts)
+    return rows[:n, 0], rows[:n, 1:4], rows[:n, 4:], parts[:n, 0], parts[:n, 1]
 
 
 @lru_cache(maxsize=32)
 def may_touch(model: BodyModel, softness: float) -> NDArray[np.bool_]:
     """Which parts are apart in a body that stands at ease: neither adjoining nor overlapping then, (P, P)."""
-    kinematics = model.kinematics(model.neutral())
-    n_parts = len(model.parts)
-    everything = ~np.eye(n_parts, dtype=bool)
-    rows, parts = np.empty((n_parts**2 * _SAMPLES, 7)), np.empty((n_parts**2 * _SAMPLES, 2), np.int64)
-    n = _touch(
-        kinematics.Ts_world_part, model.centers_part, np.array([s.half_axes for s in model.shapes]), everything,
-        softness, rows, parts,
-    )  # fmt: skip
+    everything = ~np.eye(len(model.parts), dtype=bool)
+    *_, own, other = _contacts(model, model.kinematics(model.neutral()), everything, softness)
     for part, parent in enumerate(model.parents):
         if parent >= 0:
             everything[part, parent] = everything[parent, part] = False
-    everything[parts[:n, 0], parts[:n, 1]] = everything[parts[:n, 1], parts[:n, 0]] = False
+    everything[own, other] = everything[other, own] = False
     return everything
 
 

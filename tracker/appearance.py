@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from tracker.body import Body, BodyModel
-from tracker.contours import FloatArray
+from tracker.contours import FloatArray, projection
 from tracker.evidence import ViewEvidence
 from tracker.kinematics import Tree, forward_kinematics
 from tracker.rigid import Array
@@ -29,8 +29,6 @@ _MOST_NATS = 3.0
 """One pixel says at most this much."""
 _DOUBT = 0.02
 """Share of pixels under a part that may show anything: what has never been seen there is not impossible."""
-
-
 _TWIN_SHARE = 0.2
 """Share of what is seen under a part's twin in what is expected under itself: sleeves are mostly alike."""
 _SAME = 0.25
@@ -73,9 +71,9 @@ class Colors:
             person: index of the body that is looked at.
         """
         seen = [v for v in views if v.colors is not None]
-        self._P = [v.camera.K @ v.camera.T_camera_world[:3] for v in seen]
+        self._P = [projection(v.camera) for v in seen]
         self._eyes = [v.camera.center_world for v in seen]
-        self._distances = [v.distance / np.float32(v.theta_px) for v in seen]
+        self._distances = [(v.distance, v.theta_px) for v in seen]
         self._images = [v.colors for v in seen if v.colors is not None]
         self._bodies, self._person = list(bodies), person
         self._shapes = [_ellipsoids(b.model) for b in bodies]
@@ -132,10 +130,11 @@ class Colors:
         first = sum(len(b.model.parts) for b in self._bodies[: self._person])
         ratios = np.zeros((len(model.parts), BINS**3)) if known is None else known.log_ratios
         total, shapes = np.zeros(len(candidates)), np.concatenate(self._shapes)
-        for P, eye, image, distance in zip(self._P, self._eyes, self._images, self._distances, strict=True):
+        for P, eye, image, (distance, theta) in zip(self._P, self._eyes, self._images, self._distances, strict=True):
             _look_along(
-                P, eye, candidates, model.tree, model.n_dofs, Ts, shapes, first, limb, image, distance, ratios, total
-            )
+                P, eye, candidates, model.tree, model.n_dofs, Ts, shapes, first, limb, image, distance, theta, ratios,
+                total,
+            )  # fmt: skip
         return total
 
     def _samples(self, values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -212,9 +211,38 @@ def _hidden(eye: Array, X: Array, own: int, Ts: Array, shapes: Array) -> bool:
 
 
 @njit(nogil=True, cache=True)
+def _seen_on_axis(
+    P: Array, eye: Array, Ts: Array, shapes: Array, part: int, sample: int, X: Array, side: Array
+) -> bool:
+    """Whether a sample on the axis of a part is seen; fills its place X and the unit vector across axis and sight."""
+    z = shapes[part, 2] + shapes[part, 5] * 0.8 * (2.0 * sample / (_ALONG - 1) - 1.0)
+    for i in range(3):
+        X[i] = Ts[part, i, 0] * shapes[part, 0] + Ts[part, i, 1] * shapes[part, 1] + Ts[part, i, 2] * z
+        X[i] += Ts[part, i, 3]
+    if P[2, 0] * X[0] + P[2, 1] * X[1] + P[2, 2] * X[2] + P[2, 3] < 0.05 or _hidden(eye, X, part, Ts, shapes):
+        return False
+    ax, ay, az = Ts[part, 0, 2], Ts[part, 1, 2], Ts[part, 2, 2]
+    vx, vy, vz = X[0] - eye[0], X[1] - eye[1], X[2] - eye[2]
+    side[0], side[1], side[2] = ay * vz - az * vy, az * vx - ax * vz, ax * vy - ay * vx
+    norm = np.sqrt(side[0] ** 2 + side[1] ** 2 + side[2] ** 2) + 1e-9
+    side[0], side[1], side[2] = side[0] / norm, side[1] / norm, side[2] / norm
+    return True
+
+
+@njit(nogil=True, cache=True)
+def _pixel_beside(P: Array, X: Array, side: Array, offset: float) -> tuple[int, int]:
+    """Column and row of the pixel that shows the place at an offset from X, metres, to the side."""
+    x, y, w = X[0] + offset * side[0], X[1] + offset * side[1], X[2] + offset * side[2]
+    depth = P[2, 0] * x + P[2, 1] * y + P[2, 2] * w + P[2, 3]
+    u = int(np.floor((P[0, 0] * x + P[0, 1] * y + P[0, 2] * w + P[0, 3]) / depth + 0.5))
+    v = int(np.floor((P[1, 0] * x + P[1, 1] * y + P[1, 2] * w + P[1, 3]) / depth + 0.5))
+    return u, v
+
+
+@njit(nogil=True, cache=True)
 def _look_along(
     P: Array, eye: Array, candidates: Array, tree: Tree, n_dofs: int, Ts: Array, shapes: Array, first: int,
-    limb: NDArray[np.int64], image: Image, distance: FloatArray, ratios: Array, total: Array,
+    limb: NDArray[np.int64], image: Image, distance: FloatArray, theta: float, ratios: Array, total: Array,
 ) -> None:  # fmt: skip
     """Add to the totals (C,) what one view says of each candidate's limb."""
     height, width = distance.shape
@@ -226,27 +254,14 @@ def _look_along(
         for part in limb:
             p = first + part
             for a in range(_ALONG):
-                z = shapes[p, 2] + shapes[p, 5] * 0.8 * (2.0 * a / (_ALONG - 1) - 1.0)
-                for i in range(3):
-                    X[i] = all_Ts[p, i, 0] * shapes[p, 0] + all_Ts[p, i, 1] * shapes[p, 1] + all_Ts[p, i, 2] * z
-                    X[i] += all_Ts[p, i, 3]
-                depth = P[2, 0] * X[0] + P[2, 1] * X[1] + P[2, 2] * X[2] + P[2, 3]
-                if depth < 0.05 or _hidden(eye, X, p, all_Ts, shapes):
+                if not _seen_on_axis(P, eye, all_Ts, shapes, p, a, X, side):
                     continue
-                ax, ay, az = all_Ts[p, 0, 2], all_Ts[p, 1, 2], all_Ts[p, 2, 2]
-                vx, vy, vz = X[0] - eye[0], X[1] - eye[1], X[2] - eye[2]
-                side[0], side[1], side[2] = ay * vz - az * vy, az * vx - ax * vz, ax * vy - ay * vx
-                norm = np.sqrt(side[0] ** 2 + side[1] ** 2 + side[2] ** 2) + 1e-9
                 for s in range(5):
-                    f = 0.5 * (s - 2) * shapes[p, 3] / norm
-                    x, y, w = X[0] + f * side[0], X[1] + f * side[1], X[2] + f * side[2]
-                    d = P[2, 0] * x + P[2, 1] * y + P[2, 2] * w + P[2, 3]
-                    u = int(np.floor((P[0, 0] * x + P[0, 1] * y + P[0, 2] * w + P[0, 3]) / d + 0.5))
-                    v = int(np.floor((P[1, 0] * x + P[1, 1] * y + P[1, 2] * w + P[1, 3]) / d + 0.5))
+                    u, v = _pixel_beside(P, X, side, 0.5 * (s - 2) * shapes[p, 3])
                     if u < 0 or v < 0 or u >= width or v >= height:
                         total[c] -= 0.25
                     elif s == 0 or s == 4:
-                        total[c] += 1.5 * (0.3 - min(distance[v, u], np.float32(1.0)))
+                        total[c] += 1.5 * (0.3 - min(distance[v, u] / theta, 1.0))
                     else:
                         total[c] += ratios[part, _bin_of(image, v, u)]
 
@@ -276,22 +291,10 @@ def _look(
     for part in range(first, last):
         radius = 0.45 * min(shapes[part, 3], shapes[part, 4])
         for a in range(_ALONG):
-            z = shapes[part, 2] + shapes[part, 5] * 0.8 * (2.0 * a / (_ALONG - 1) - 1.0)
-            for i in range(3):
-                X[i] = Ts[part, i, 0] * shapes[part, 0] + Ts[part, i, 1] * shapes[part, 1] + Ts[part, i, 2] * z
-                X[i] += Ts[part, i, 3]
-            if P[2, 0] * X[0] + P[2, 1] * X[1] + P[2, 2] * X[2] + P[2, 3] < 0.05 or _hidden(eye, X, part, Ts, shapes):
+            if not _seen_on_axis(P, eye, Ts, shapes, part, a, X, side):
                 continue
-            ax, ay, az = Ts[part, 0, 2], Ts[part, 1, 2], Ts[part, 2, 2]
-            vx, vy, vz = X[0] - eye[0], X[1] - eye[1], X[2] - eye[2]
-            side[0], side[1], side[2] = ay * vz - az * vy, az * vx - ax * vz, ax * vy - ay * vx
-            norm = np.sqrt(side[0] ** 2 + side[1] ** 2 + side[2] ** 2) + 1e-9
             for s in range(_ACROSS):
-                f = radius * (s - (_ACROSS - 1) / 2) / norm
-                x, y, w = X[0] + f * side[0], X[1] + f * side[1], X[2] + f * side[2]
-                depth = P[2, 0] * x + P[2, 1] * y + P[2, 2] * w + P[2, 3]
-                u = int(np.floor((P[0, 0] * x + P[0, 1] * y + P[0, 2] * w + P[0, 3]) / depth + 0.5))
-                v = int(np.floor((P[1, 0] * x + P[1, 1] * y + P[1, 2] * w + P[1, 3]) / depth + 0.5))
+                u, v = _pixel_beside(P, X, side, radius * (s - (_ACROSS - 1) / 2))
                 if 0 <= u < width and 0 <= v < height:
                     out[n, 0], out[n, 1] = part - first, _bin_of(image, v, u)
                     n += 1

@@ -117,7 +117,7 @@ class ChamferCost:
         self.outliers = outliers
         self._surfaces = contours.surfaces_of(self.models)
         self._scales = np.array([v.scale for v in views])
-        thetas = [v.theta_px if theta_px is None else theta_px * v.scale for v in views]
+        thetas = [v.outlier_px(theta_px) for v in views]
         near = [_near(v, contours.trace(predicted, v.camera), theta) for v, theta in zip(views, thetas, strict=True)]
         tallest = max(v.camera.height for v in views)
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)

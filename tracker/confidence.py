@@ -5,6 +5,7 @@ checked on other scenes.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -84,6 +85,7 @@ class Quality(NamedTuple):
         return tuple(x.name for x in self.limbs if everyone or x.suspicious)
 
 
+@lru_cache(maxsize=32)
 def limbs(model: BodyModel) -> tuple[Limb, ...]:
     """The chains from the leaves of the joint tree up to where it branches."""
     children = np.bincount(np.array(model.parents)[1:], minlength=len(model.parts))

@@ -99,6 +99,10 @@ class ViewEvidence:
         """Distance beyond which an edge says nothing, matched px; that of the whole image, whatever the region."""
         return _theta_px(self.image_size or self.camera.size)
 
+    def outlier_px(self, theta_px: float | None) -> float:
+        """An outlier distance in px of the footage as matched px; `theta_px` of the view for None."""
+        return self.theta_px if theta_px is None else theta_px * self.scale
+
 
 def default_theta_px(camera: Camera) -> float:
     """Distance beyond which an edge says nothing: 3% of the longer side of the image (20 px at 640x480)."""

@@ -43,7 +43,8 @@ class RowSorted(NamedTuple):
     """Points sorted by the row of the image they lie in."""
 
     points: FloatArray
-    """u and v, (2, N) with N filled up to whole `LANES` by points far away, px."""
+    """u and v, px, and whatever else was given with each point, (2 + more, N); N is filled up to whole `LANES` by
+    points far away, of which all else is 0."""
     rows: IntArray
     """Index of the first point in each row or below, (height + 1,); the last is the number of points."""
 
@@ -54,10 +55,11 @@ class RowSorted(NamedTuple):
 
 
 def sort_by_row(points: FloatArray, height: int) -> RowSorted:
-    """Sort points (N, 2) by row; those above or below the image count to its first or last."""
+    """Sort points (N, 2 + more) by row; those above or below the image count to its first or last."""
     rows = np.clip(np.floor(points[:, 1]), 0, height - 1).astype(np.int64)
     order = np.argsort(rows, kind="stable")
-    filled = np.full((2, -(-len(points) // LANES) * LANES), _FAR, np.float32)
+    filled = np.zeros((points.shape[1], -(-len(points) // LANES) * LANES), np.float32)
+    filled[:2] = _FAR
     filled[:, : len(points)] = points[order].T
     return RowSorted(filled, np.searchsorted(rows[order], np.arange(height + 1)).astype(np.int64))
 

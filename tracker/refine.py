@@ -25,13 +25,11 @@ from tracker.body import Body, BodyModel
 from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence
 from tracker.fit import Normal
-from tracker.kinematics import IntArray, Kinematics
+from tracker.kinematics import Kinematics
 from tracker.matching import Scene, Scratch, Sums, gather, to_dofs
-from tracker.nearest import LANES
+from tracker.nearest import sort_by_row
 from tracker.rigid import Array
 
-_FAR = 1e6
-"""Where points are put that fill up whole vectors, px."""
 _CAPTURE = 2.0
 """Edge points farther than this many outlier distances from the predicted contours are left out for good."""
 
@@ -100,12 +98,12 @@ class ContourMatch:
         self._first = sum(len(b.model.parts) for b in bodies[:person])
         self._surfaces = contours.surfaces_of(tuple(b.model for b in bodies))
         self._Ts = contours.part_poses(bodies)
-        thetas = [v.theta_px if theta_px is None else theta_px * v.scale for v in views]
+        thetas = [v.outlier_px(theta_px) for v in views]
         points = [
             _within(v, bodies, np.inf if everywhere else _CAPTURE * theta, settings)
             for v, theta in zip(views, thetas, strict=True)
         ]
-        blocks = [_by_row(p, v.camera.height) for p, v in zip(points, views, strict=True)]
+        sorted_points = [sort_by_row(p.T, v.camera.height) for p, v in zip(points, views, strict=True)]
         tallest = max(v.camera.height for v in views)
         self._outline_points = np.array([0 if v.silhouette is None else len(v.silhouette.points_px) for v in views])
         weights = settings.information_per_px * np.array([settings.model_to_image, settings.image_to_model])
@@ -114,9 +112,9 @@ class ContourMatch:
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
             np.concatenate([v.distance.ravel() for v in views]),
-            np.ascontiguousarray(np.concatenate([p for p, _ in blocks], axis=1)),
-            np.cumsum([0] + [p.shape[1] for p, _ in blocks]),
-            np.stack([np.pad(rows, (0, tallest + 1 - len(rows)), mode="edge") for _, rows in blocks]),
+            np.ascontiguousarray(np.concatenate([s.points for s in sorted_points], axis=1)),
+            np.cumsum([0] + [s.points.shape[1] for s in sorted_points]),
+            np.stack([np.pad(s.rows, (0, tallest + 1 - len(s.rows)), mode="edge") for s in sorted_points]),
             np.array(thetas),
             # A view without any edge has nothing to say; its distance image is flat.
             np.array([weights if len(v.points_px) else 0 * weights for v in views]),
@@ -188,16 +186,6 @@ def _within(view: ViewEvidence, bodies: Sequence[Body], reach_px: float, setting
     near = np.zeros(size, np.bool_)
     _mark(pieces, int(np.ceil(reach_px / 8)), near)
     return points[:, near[points[1].astype(np.intp) // 8, points[0].astype(np.intp) // 8]]
-
-
-def _by_row(points: FloatArray, height: int) -> tuple[FloatArray, IntArray]:
-    """Points (6, N) sorted by the row of the image, filled up as `Scene.points` says, and where each row begins."""
-    rows = np.clip(np.floor(points[1]), 0, height - 1).astype(np.int64)
-    order = np.argsort(rows, kind="stable")
-    filled = np.zeros((len(points), -(-points.shape[1] // LANES) * LANES), np.float32)
-    filled[:2] = _FAR
-    filled[:, : points.shape[1]] = points[:, order]
-    return filled, np.searchsorted(rows[order], np.arange(height + 1)).astype(np.int64)
 
 
 def _rows(points_px: FloatArray, normals: FloatArray, weight: float, kind: float) -> FloatArray:

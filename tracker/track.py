@@ -197,7 +197,7 @@ class _Track:
         self._pauses[limb.name] = (self._frames + pause + 1, pause)
 
     def update(self, scene: "_Scene", person: int, found: _Found, given: bool) -> None:
-        """Take in what a frame brought; a given pose begins the motion anew where it is far from the track."""
+        """Take in what a frame brought."""
         pose = scene.poses[person]
         self._frames += 1
         if self.known is None or given:
@@ -216,9 +216,7 @@ class _Scene:
         self, views: Sequence[ViewEvidence], models: list[BodyModel], poses: list[Array], settings: TrackSettings
     ) -> None:
         self.views, self.models, self.poses, self.settings = list(views), models, poses, settings
-        self._thetas = np.array(
-            [v.theta_px if settings.theta_px is None else settings.theta_px * v.scale for v in views]
-        )
+        self._thetas = np.array([v.outlier_px(settings.theta_px) for v in views])
 
     def colors(self, person: int) -> Colors:
         """The colours of this frame under a person."""
@@ -238,11 +236,12 @@ class _Scene:
         if settings.estimate == "search":
             evaluations = self._search(person)
             fit = solve(model, self.poses[person], blocks, max_iterations=0)
-            return self._take(person, track, match, fit, predicted, evaluations, [])
+            found = self._quality(person, track, match, fit, predicted)
+            return self._take(person, match, fit, found, evaluations, [])
         fit = solve(model, predicted, blocks, max_iterations=_ITERATIONS, tolerance=_TOLERANCE)
         found = self._quality(person, track, match, fit, predicted)
         if settings.recover is None or confidence.judge(found) == "good":
-            return self._take(person, track, match, fit, predicted, 0, [])
+            return self._take(person, match, fit, found, 0, [])
         return self._recover(person, track, fit, found, predicted)
 
     def _recover(self, person: int, track: _Track, fit: Fit, found: Quality, predicted: Array) -> _Found:
@@ -266,18 +265,17 @@ class _Scene:
             if better is not fit:
                 remarks.append(f"{_chain(limb)} searched anew")
                 fit = better
-        return self._take(person, track, match, fit, predicted, evaluations, remarks)
+        found = self._quality(person, track, match, fit, predicted)
+        return self._take(person, match, fit, found, evaluations, remarks)
 
     def _take(
-        self, person: int, track: _Track, match: ContourMatch, fit: Fit, predicted: Array, evaluations: int,
-        remarks: list[str],
-    ) -> _Found:  # fmt: skip
-        """Put a person in the pose that was found, and judge it."""
+        self, person: int, match: ContourMatch, fit: Fit, found: Quality, evaluations: int, remarks: list[str]
+    ) -> _Found:
+        """Put a person in the pose that was found, with the judgement of it."""
         self.poses[person] = fit.values
-        found = self._quality(person, track, match, fit, predicted)
         return _Found(
             confidence.judge(found), ", ".join(remarks), self._parts_px(match, fit.values),
-            covariance(track.model, fit), evaluations, found,
+            covariance(self.models[person], fit), evaluations, found,
         )  # fmt: skip
 
     def _priors(self, model: BodyModel, predicted: Array, suspects: Sequence[Limb]) -> list[Block]:
