@@ -222,9 +222,11 @@ def evaluate(
 ) -> None:
     """Compare stored poses with a reference: mean errors of the limb joints, lost frames, angles.
 
+    Joints and parts are compared by name, so that the reference may be of another body model.
+
     Args:
         session: session folder.
-        reference: TRC file, pose table (CSV) or session folder.
+        reference: TRC file, pose table (CSV; its body in NAME_model.toml beside it) or session folder.
         frames: A:B, half open; from the first to the last pose by default.
         person: name; needed where there are several.
         joint_map: TOML file that maps the file's joint names to the body's.
@@ -246,7 +248,10 @@ def evaluate(
     for joint, error in found["per_joint_mm"].items():
         print(f"  {joint.replace('_', ' '):16} {error:6.1f} mm")
     if found["axis_error_deg"] is not None:
-        print(f"  part axes {found['axis_error_deg']:.2f} deg")
+        worst = f"{found['worst_axis_error_deg']:.2f} in frame {found['worst_axis_frame']}"
+        print(f"  part axes {found['axis_error_deg']:.2f} deg, worst frame's mean {worst}")
+        for part, error in found["per_part_axis_deg"].items():
+            print(f"  {part.replace('_', ' '):16} {error:6.2f} deg")
 
 
 @_app.command

@@ -157,14 +157,14 @@ def evaluate(at: Target, reference: Reference, frames: str | None, align: Alignm
     """
     session, (index,) = at
     person = session.people[index]
-    joints, poses = stored_motion(session, index)
-    if not poses:
+    joints, motion = stored_motion(session, index)
+    if motion is None or not motion.poses:
         raise SessionError(f"'{person.name}' has no poses yet; place the body in the page, or use init and track")
+    poses = motion.poses
     wanted = range(min(poses), max(poses) + 1) if frames is None else frame_range(frames, session)
     result = evaluate_joints(joints, reference.joints, wanted, align)
-    if reference.poses is not None:
-        axis_error, angle_errors = evaluate_poses(person.model, poses, reference.poses, wanted)
-        result = replace(result, axis_error_deg=axis_error, angle_error_deg=angle_errors)
+    if reference.motion is not None:
+        result = evaluate_poses(result, motion, reference.motion, wanted)
     return {"person": person.name, **asdict(result)}
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,9 +47,24 @@ class Evaluation:
     per_joint_mm: Mapping[str, float]
     """Mean distance of each joint that both have, head and neck too."""
     axis_error_deg: float | None = None
-    """Mean angle between true and estimated part axes; None without true poses."""
+    """Mean angle between true and estimated part axes, over frames and parts; None without true poses."""
+    worst_axis_error_deg: float | None = None
+    """The largest mean over the parts of one frame; None without true poses."""
+    worst_axis_frame: int | None = None
+    """The frame that has it; None without true poses."""
+    per_part_axis_deg: Mapping[str, float] | None = None
+    """Mean angle of each part that both bodies have, over the frames; None without true poses."""
     angle_error_deg: Mapping[str, float] | None = None
     """Mean size of each angle's error by degree of freedom; None without true poses of the same model."""
+
+
+class Motion(NamedTuple):
+    """Poses of one body over time."""
+
+    model: BodyModel
+    """The body of all of them."""
+    poses: Mapping[int, Array]
+    """Values by frame, (n_values,) each."""
 
 
 def evaluate_joints(
@@ -99,38 +114,44 @@ def evaluate_joints(
     )
 
 
-def evaluate_poses(
-    model: BodyModel, estimated: Mapping[int, Array], true: Mapping[int, Array], frames: Sequence[int]
-) -> tuple[float, dict[str, float]]:
-    """Compare the angles of poses of the same model (its sizes may differ), over the frames that both have.
+def evaluate_poses(result: Evaluation, estimated: Motion, true: Motion, frames: Sequence[int]) -> Evaluation:
+    """Compare the parts of two bodies by name, over the frames that both have; their models and sizes may differ.
 
     A part's error is the angle between its true and estimated long axis (z). The parts next to an elbow or knee
     count their twist as well, as the angle of the whole rotation, where that joint is bent by more than 20 degrees in
-    the truth; the root and what hangs rigidly on it always do.
+    the truth; the root and what hangs rigidly on it always do. Bodies with the same degrees of freedom are compared
+    angle by angle too.
 
     Args:
-        model: the tree of both.
-        estimated: values by frame, each (n_values,).
-        true: values by frame.
+        result: what is known of the joints; the angles are added.
+        estimated: what was tracked.
+        true: what is taken for true.
         frames: the frames to look at.
 
-    Returns:
-        The mean over parts and frames, and the mean size of each angle's error by degree of freedom, degrees.
-
     Raises:
-        FormatError: no frame in common.
+        FormatError: no frame or no part in common.
     """
-    common = [f for f in frames if f in estimated and f in true]
+    common = [f for f in frames if f in estimated.poses and f in true.poses]
     if not common:
         raise FormatError("the estimate and the reference have no frame in common; check --frames and --person")
-    part_errors, dof_errors = [], []
-    for f in common:
-        part_errors.append(_part_errors(model, estimated[f], true[f]))
-        step = model.difference(estimated[f], true[f])
-        dof_errors.append(np.abs(np.arctan2(np.sin(step), np.cos(step))))  # by the shorter way round
-    mean = np.degrees(np.mean(dof_errors, axis=0))
-    angles = {n: float(mean[i]) for i, n in enumerate(model.dof_names) if not model.dof_is_length[i]}
-    return float(np.degrees(np.mean(part_errors))), angles
+    parts = [p.name for p in true.model.parts if p.name in estimated.model.part_index]
+    if not parts:
+        raise FormatError(
+            f"the bodies '{estimated.model.name}' and '{true.model.name}' have no part of the same name; "
+            "compare joints instead, with a TRC file"
+        )
+    errors = np.degrees([_part_errors(estimated, true, parts, f) for f in common])  # (n, m)
+    of_frames = errors.mean(axis=1)
+    worst = int(np.argmax(of_frames))
+    same = true.model.dof_names == estimated.model.dof_names
+    return replace(
+        result,
+        axis_error_deg=float(errors.mean()),
+        worst_axis_error_deg=float(of_frames[worst]),
+        worst_axis_frame=common[worst],
+        per_part_axis_deg=dict(zip(parts, errors.mean(axis=0).tolist(), strict=True)),
+        angle_error_deg=_dof_errors(estimated, true, common) if same else None,
+    )
 
 
 def joints_of_poses(model: BodyModel, poses: Mapping[int, Array], rate: float) -> MarkerTable:
@@ -213,13 +234,23 @@ def _procrustes_error(estimate: Array, truth: Array) -> Array:
     return np.linalg.norm(rigid.apply(best_rigid(estimate, truth), estimate) - truth, axis=-1)
 
 
-def _part_errors(model: BodyModel, estimated: Array, true: Array) -> Array:
-    """Angle of each part's error, (n_parts,), rad."""
-    R_estimated = model.kinematics(estimated).Ts_world_part[:, :3, :3]
-    R_true = model.kinematics(true).Ts_world_part[:, :3, :3]
+def _part_errors(estimated: Motion, true: Motion, parts: Sequence[str], frame: int) -> Array:
+    """Angle of the error of each named part on a frame, (n_parts,), rad."""
+    R_estimated, R_true = (m.model.kinematics(m.poses[frame]).Ts_world_part[:, :3, :3] for m in (estimated, true))
+    shows = _shows_twist(true.model, R_true)
+    in_estimated, in_true = ([m.model.part_index[p] for p in parts] for m in (estimated, true))
+    R_estimated, R_true = R_estimated[in_estimated], R_true[in_true]
     axis = _angle(R_estimated[:, :, 2], R_true[:, :, 2])
     whole = np.linalg.norm(rigid.so3_log(np.swapaxes(R_true, 1, 2) @ R_estimated), axis=-1)
-    return np.where(_shows_twist(model, R_true), whole, axis)
+    return np.where(shows[in_true], whole, axis)
+
+
+def _dof_errors(estimated: Motion, true: Motion, frames: Sequence[int]) -> dict[str, float]:
+    """Mean size of each angle's error by degree of freedom, by the shorter way round, degrees."""
+    model = true.model
+    steps = np.array([model.difference(estimated.poses[f], true.poses[f]) for f in frames])
+    mean = np.degrees(np.abs(np.arctan2(np.sin(steps), np.cos(steps))).mean(axis=0))
+    return {n: float(mean[i]) for i, n in enumerate(model.dof_names) if not model.dof_is_length[i]}
 
 
 def _shows_twist(model: BodyModel, R_world_part: Array) -> NDArray[np.bool_]:

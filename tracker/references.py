@@ -1,6 +1,6 @@
 """What an estimate can be held against: joints of a TRC file, poses of our CSV, or another session."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
@@ -10,9 +10,9 @@ import numpy as np
 from tracker.annotations import AnnotationStore
 from tracker.body import BodyModel
 from tracker.errors import FormatError, SessionError
-from tracker.evaluate import at_rate, joints_of_poses, remap_axes
+from tracker.evaluate import Motion, at_rate, joints_of_poses, remap_axes
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
-from tracker.formats.pose_table import read_pose_table
+from tracker.formats.pose_table import PoseTable, read_pose_table
 from tracker.formats.trc import MarkerTable, read_trc
 from tracker.joint_maps import joints_of, read_joint_map
 from tracker.rigid import Array
@@ -24,8 +24,8 @@ class Reference(NamedTuple):
 
     joints: MarkerTable
     """Joints under our names."""
-    poses: Mapping[int, Array] | None
-    """Poses by frame where they are known and of the same values as the estimate's model, (n_values,) each."""
+    motion: Motion | None
+    """Poses where they are known, of whatever body."""
 
 
 def read_joints(path: Path, fps: float, joint_map: Path | None = None, axes: str = "x,y,z") -> MarkerTable:
@@ -49,24 +49,19 @@ def read_reference(
 ) -> Reference:
     """Read whatever a path holds: a TRC file, a pose table (CSV), or a session folder.
 
-    A pose table's joints are those of the preset it names at its height, or else of the person's own model: exact where
-    the model is, and then only angles can be trusted.
+    A pose table belongs to the body model in `NAME_model.toml` beside `NAME.csv` (as `simulate` writes it), or to the
+    preset it names at its height, or else to the person's own model: then only its angles can be trusted.
 
     Raises:
-        FormatError: the file is malformed or of an unknown kind.
+        FormatError: the file is malformed or of an unknown kind, or the body of its poses is not known.
         SessionError: the reference session has no such person.
     """
     model = session.people[person].model
     if path.is_dir() or path.name == SESSION_FILE:
         return _of_session(path if path.is_dir() else path.parent, session, person)
     if path.suffix.lower() == ".csv":
-        table = read_pose_table(path)
-        values = table.values_for(model)
-        if values is None:
-            raise FormatError(f"{path} has poses of '{table.model}', not of the person's model '{model.name}'")
-        poses = dict(zip(table.frames.tolist(), values, strict=True))
-        own = load_model(table.model, table.height_m) if table.model in PRESETS else model
-        return Reference(joints_of_poses(own, poses, session.fps), poses)
+        motion = _of_table(read_pose_table(path), path, model)
+        return Reference(joints_of_poses(*motion, session.fps), motion)
     if path.suffix.lower() != ".trc":
         raise FormatError(f"expected a reference as .trc, .csv or session folder, found '{path}'")
     return Reference(read_joints(path, session.fps, joint_map, axes), None)
@@ -89,7 +84,7 @@ def stored_motion(session: Session, person: int) -> Reference:
             models = {r: parse_model(store.model_revision(r).toml, f"of '{name}', revision {r}") for r in by_revision}
     tables = [joints_of_poses(models[r], poses, session.fps) for r, poses in by_revision.items()]
     poses = {frame: values for some in by_revision.values() for frame, values in some.items()}
-    return Reference(_merged(tables) if tables else joints_of_poses(model, {}, session.fps), poses)
+    return Reference(_merged(tables) if tables else joints_of_poses(model, {}, session.fps), Motion(model, poses))
 
 
 def _merged(tables: Sequence[MarkerTable]) -> MarkerTable:
@@ -106,6 +101,22 @@ def _of_session(folder: Path, session: Session, person: int) -> Reference:
     index = next((i for i, p in enumerate(other.people) if p.name == name), 0 if len(other.people) == 1 else None)
     if index is None:
         raise SessionError(f"expected a person '{name}' in {folder}, found {', '.join(p.name for p in other.people)}")
-    found = stored_motion(other, index)
-    same = set(other.people[index].model.value_names) == set(session.people[person].model.value_names)
-    return found if same else found._replace(poses=None)
+    return stored_motion(other, index)
+
+
+def _of_table(table: PoseTable, path: Path, own: BodyModel) -> Motion:
+    """The poses of a table, and their body; `own` is the body of the person to compare."""
+    beside = path.with_name(f"{path.stem}_model.toml")
+    if beside.is_file():
+        model = load_model(beside, table.height_m)
+    elif table.model in PRESETS:
+        model = load_model(table.model, table.height_m)
+    else:
+        model = own
+    values = table.values_for(model)
+    if values is None:
+        raise FormatError(
+            f"{path} has poses of '{table.model}', whose degrees of freedom are not those of '{model.name}'; "
+            f"put its body model beside it as {beside.name}"
+        )
+    return Motion(model, dict(zip(table.frames.tolist(), values, strict=True)))

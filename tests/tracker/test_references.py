@@ -46,24 +46,43 @@ def test_the_samples_truth_as_joints(sample_folder, copy):
     reference = read_reference(sample_folder / "truth.trc", copy, 0)
     assert set(JOINTS) <= set(reference.joints.names)
     assert reference.joints.frames.tolist() == list(range(50))
-    assert reference.poses is None
+    assert reference.motion is None
     points = dict(zip(reference.joints.names, reference.joints.points[0], strict=True))
     assert points["head"][2] > points["left_hip"][2] > points["left_ankle"][2] > 0
     assert points["left_hip"][1] > points["right_hip"][1]
 
 
 def test_the_samples_truth_as_poses(sample_folder, copy):
-    """The table names no preset: its joints are those of the person's own model, its angles those of the truth."""
+    """The true skeleton stands beside the table: its joints are those of the TRC file."""
     reference = read_reference(sample_folder / "truth.csv", copy, 0)
-    assert sorted(reference.poses) == list(range(50))
+    assert sorted(reference.motion.poses) == list(range(50))
+    assert reference.motion.model.name == "gavrila22_true"
+    joints, true = reference.joints, read_reference(sample_folder / "truth.trc", copy, 0).joints
+    for name in ("left_wrist", "right_knee", "neck"):
+        found, expected = (t.points[:, t.names.index(name)] for t in (joints, true))
+        np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+def test_a_table_whose_body_is_not_at_hand_is_of_the_persons_own(sample_folder, copy, tmp_path):
+    shutil.copy(sample_folder / "truth.csv", tmp_path / "alone.csv")
+    reference = read_reference(tmp_path / "alone.csv", copy, 0)
     model = copy.people[0].model
-    expected = model.points_world(reference.poses[7])[model.point_names.index("left_wrist")]
+    assert reference.motion.model is model
+    expected = model.points_world(reference.motion.poses[7])[model.point_names.index("left_wrist")]
     at = reference.joints.names.index("left_wrist")
     np.testing.assert_allclose(reference.joints.points[7, at], expected, atol=1e-6)
     # Bones of another length: near the true joints, not on them.
     true = read_reference(sample_folder / "truth.trc", copy, 0).joints
     off = np.linalg.norm(true.points[:, true.names.index("left_wrist")] - reference.joints.points[:, at], axis=1)
     assert 0.001 < off.mean() < 0.1
+
+
+def test_a_table_of_another_presets_poses(copy, tmp_path):
+    bending = load_model("gavrila31", 1.6)
+    write_pose_table(tmp_path / "poses.csv", bending, bending.neutral()[None])
+    found = read_reference(tmp_path / "poses.csv", copy, 0).motion
+    assert (found.model.name, found.model.height_m) == ("gavrila31", 1.6)
+    np.testing.assert_allclose(found.poses[0], bending.neutral(), atol=1e-9)
 
 
 def test_a_table_of_a_presets_poses_has_that_presets_joints(copy, tmp_path):
@@ -86,10 +105,10 @@ def test_a_session_as_reference(copy, tmp_path):
     people = two_people(tmp_path / "mine", copy)
     for path in (other.folder, other.folder / "session.toml"):
         reference = read_reference(path, people, 1)
-        assert sorted(reference.poses) == [3, 8]
-        np.testing.assert_array_equal(reference.poses[8], poses[8])
+        assert sorted(reference.motion.poses) == [3, 8]
+        np.testing.assert_array_equal(reference.motion.poses[8], poses[8])
         assert reference.joints.frames.tolist() == [3, 8]
-    assert read_reference(other.folder, people, 0).poses == {}  # nobody has placed ann
+    assert read_reference(other.folder, people, 0).motion.poses == {}  # nobody has placed ann
 
 
 def test_a_session_without_the_person(copy, tmp_path):
@@ -101,14 +120,14 @@ def test_a_session_without_the_person(copy, tmp_path):
 def test_a_single_person_may_have_another_name(copy, tmp_path):
     other = two_people(tmp_path, copy, names=("carl",))
     store_poses(other, "carl", {0: other.people[0].model.neutral()})
-    assert sorted(read_reference(other.folder, copy, 0).poses) == [0]
+    assert sorted(read_reference(other.folder, copy, 0).motion.poses) == [0]
 
 
 def test_stored_poses(copy):
-    assert stored_motion(copy, 0).poses == {}
+    assert stored_motion(copy, 0).motion.poses == {}
     values = copy.people[0].model.neutral()
     store_poses(copy, "person", {4: values, 2: values + 0.1})
-    found = stored_motion(copy, 0).poses
+    found = stored_motion(copy, 0).motion.poses
     assert sorted(found) == [2, 4]
     np.testing.assert_array_equal(found[2], values + 0.1)
 
@@ -146,7 +165,7 @@ def test_poses_of_another_model(copy, tmp_path):
     (tmp_path / "odd.toml").write_text(text.replace("left_elbow", "left_ellbow"))
     odd = load_model(tmp_path / "odd.toml")
     write_pose_table(tmp_path / "poses.csv", odd, odd.neutral()[None])
-    with pytest.raises(FormatError, match="not of the person's model"):
+    with pytest.raises(FormatError, match=r"beside it as poses_model\.toml"):
         read_reference(tmp_path / "poses.csv", copy, 0)
 
 

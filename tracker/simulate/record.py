@@ -57,8 +57,9 @@ def simulate(
     """Make a session folder of a simulated recording; it appears complete or not at all.
 
     Besides the session it holds `truth.trc` (joint centres, metres), `truth.csv` (poses of the true skeleton) and
-    `truth_model.toml` (that skeleton); with several people one of each per person, `truth_NAME.trc` and so on. The
-    session's people get the plain preset at the true body height. The same arguments give the same footage.
+    `truth_model.toml` (that skeleton); with several people one of each per person, `truth_NAME.trc`, `truth_NAME.csv`
+    and `truth_NAME_model.toml`. The session's people get the plain preset at the true body height. The same arguments
+    give the same footage.
 
     Args:
         out: the folder; must not exist, or be empty.
@@ -188,4 +189,4 @@ def _write_truth(
         points = np.array([model.points_world(v)[kept] for v in values])
         write_trc(folder / f"truth{suffix}.trc", [model.point_names[i] for i in kept], points, fps)
         write_pose_table(folder / f"truth{suffix}.csv", model, values)
-        write_text_whole(folder / f"truth_model{suffix}.toml", format_model(model))
+        write_text_whole(folder / f"truth{suffix}_model.toml", format_model(model))
