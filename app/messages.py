@@ -11,6 +11,7 @@ from app import overlays
 from app.curves import plots_of, samples
 from app.state import OVERLAYS, JobState, State, TrackState
 from tracker.evidence import ViewEvidence
+from tracker.posing import minor_points
 from tracker.records import FrameNumbers
 from tracker.session import Session
 
@@ -30,6 +31,7 @@ def session(session: Session) -> dict[str, Any]:
                 "name": p.name,
                 "color": p.color,
                 "points": list(p.model.point_names),
+                "minor": list(minor_points(p.model)),
                 "bones": [list(b) for b in overlays.bones(p.model)],
                 "parts": [part.name for part in p.model.parts],
             }

@@ -5,8 +5,9 @@
  * one message per animation frame.
  */
 
-const GRAB_RADIUS = 12;
 const DRAG_THRESHOLD = 3;
+
+import { GRAB_RADIUS } from "./crowding.js";
 
 /**
  * @typedef {import("./drawing.js").PlacedHandle} PlacedHandle
@@ -80,7 +81,7 @@ export class Gestures {
     if (!this.#store.isSettled || !this.#store.facts.state?.overlays.joints) return null;
     let nearest = null;
     let reach = GRAB_RADIUS;
-    for (const placed of pane.placedHandles()) {
+    for (const placed of pane.graspableHandles()) {
       const distance = Math.hypot(placed.x - at.x, placed.y - at.y);
       if (distance <= reach) [nearest, reach] = [placed, distance];
     }

@@ -1,6 +1,7 @@
 /** One camera's pane: two canvases, its labels, zoom and pan. */
 
 import * as drawing from "./drawing.js";
+import { uncrowded } from "./crowding.js";
 import { PaneView } from "./pane_view.js";
 import { px } from "./text.js";
 import { drawsInSoftware } from "./webgl.js";
@@ -89,8 +90,14 @@ export class Pane {
     return { x: event.clientX - box.left, y: event.clientY - box.top };
   }
 
-  /** The joints of this view and where they lie in the pane; none while they are switched off. */
-  placedHandles() {
+  /** The joints that a hand can take in this view, and where they lie in the pane; none while they are switched off. */
+  graspableHandles() {
+    const { session, hover, dragging } = this.#store.facts;
+    return uncrowded(this.#placedHandles(), session?.people ?? [], dragging ? hover : null);
+  }
+
+  /** All joints of this view, and where they lie in the pane. */
+  #placedHandles() {
     const handles = this.#store.facts.overlay?.handles ?? [];
     return handles
       .filter((handle) => handle.camera === this.#camera)
@@ -153,13 +160,12 @@ export class Pane {
    * @param {import("./protocol.js").PersonInfo[]} people
    */
   #drawJoints(context, state, people) {
-    const placed = this.placedHandles();
-    if (state.overlays.skeleton) drawing.drawSkeleton(context, placed, people);
+    if (state.overlays.skeleton) drawing.drawSkeleton(context, this.#placedHandles(), people);
     if (!state.overlays.joints) return;
     const { hover } = this.#store.facts;
     /** @type {drawing.PlacedHandle | null} */
     let named = null;
-    for (const one of placed) {
+    for (const one of this.graspableHandles()) {
       const isHovered = hover?.person === one.handle.person && hover.point === one.handle.point;
       const isSelected = state.person === one.handle.person && state.point === one.handle.point;
       if (isHovered && hover.camera === this.#camera) named = one;

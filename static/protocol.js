@@ -5,7 +5,7 @@
  * @typedef {{contours: boolean, joints: boolean, part_edges: boolean, skeleton: boolean,
  *   segments: boolean}} Overlays
  * @typedef {{name: string, width: number, height: number}} CameraInfo
- * @typedef {{name: string, color: string, points: string[], bones: [string, string][],
+ * @typedef {{name: string, color: string, points: string[], minor: string[], bones: [string, string][],
  *   parts: string[]}} PersonInfo
  * @typedef {{type: "session", name: string, fps: number, n_frames: number, cameras: CameraInfo[],
  *   people: PersonInfo[]}} SessionMessage

@@ -74,6 +74,15 @@ class Grab:
         return self.point == 0
 
 
+def minor_points(model: BodyModel) -> tuple[str, ...]:
+    """Joints that a hand hardly needs: rigid ones, and those that bend the trunk a little (waist, neck, collarbones).
+
+    Dragged, they turn the body about its root, as hips, shoulders and head do; and these bend them too.
+    """
+    stiff = [np.all(np.isfinite(model.spreads[model.dof_joint == i])) for i in range(len(model.joints))]
+    return tuple(j.name for j, is_stiff in zip(model.joints, stiff, strict=True) if is_stiff)
+
+
 def grab(model: BodyModel, values: Array, camera: Camera, point: str, pointer_px: Array) -> Grab:
     """Take hold of a point of a body.
 

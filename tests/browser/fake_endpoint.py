@@ -19,6 +19,7 @@ CAMERA_NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
 COLORS = ("#ffb454", "#6ccbff")
 REST = {
     "torso": (0.0, 0.25, 0.0),
+    "waist": (0.0, 0.18, 0.0),
     "head": (0.0, 1.0, 0.0),
     "l_shoulder": (0.3, 0.7, 0.0),
     "l_elbow": (0.62, 0.55, 0.1),
@@ -273,7 +274,14 @@ class FakeEndpoint:
             for c in range(self.n_cameras)
         ]
         people = [
-            {"name": f"person {p}", "color": COLORS[p], "points": list(REST), "bones": BONES, "parts": PARTS}
+            {
+                "name": f"person {p}",
+                "color": COLORS[p],
+                "points": list(REST),
+                "minor": ["waist"],
+                "bones": BONES,
+                "parts": PARTS,
+            }
             for p in range(self.n_people)
         ]
         await socket.send_str(json.dumps({

@@ -15,6 +15,8 @@ from tracker.session import load_session
 
 JOINTS = ("shoulder", "knee", "ankle", "elbow", "wrist")
 VIEWS = (0, 2)
+CLICK_PX = 4
+"""Shorter ways of the mouse do not drag; one more than the page's own bound."""
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +29,6 @@ def balance(data_folder, tmp_path_factory):
         calibration=data / "Calib.toml",
         videos=sorted(data.glob("cam*.mp4")),
         background=data / "background",
-        models="gavrila22",
     )
     session = load_session(folder)
     joints = read_joints(data / "reference_joints.trc", session.fps)
@@ -56,10 +57,14 @@ async def visit(browser, address):
 
 
 async def drag(page, camera, point, target):
-    """Drag a joint to an undistorted pixel with the mouse, and wait until the page says that it is saved."""
+    """Drag a joint to an undistorted pixel with the mouse, and wait until the page says that it is saved.
+
+    A joint that is there already stays: so short a way is a click.
+    """
     start = await to_client(page, camera, *await handle_of(page, camera, point))
     end = await to_client(page, camera, *target)
-    before = (await state_of(page))["state"]["undo"]
+    if np.hypot(*np.subtract(end, start)) < CLICK_PX:
+        return
     await page.mouse.move(*start)
     await page.mouse.down()
     await page.mouse.move(*end, steps=6)
@@ -67,7 +72,6 @@ async def drag(page, camera, point, target):
     label = f"drag {point.replace('_', ' ')}"
     await shows(page, f"quadrille.state.state.undo?.startsWith('{label}') && quadrille.state.state.saved", 20)
     await asyncio.sleep(0.1)
-    return before
 
 
 async def pose_of(page):

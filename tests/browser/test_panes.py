@@ -4,6 +4,14 @@ import pytest
 from driving import dragging, handle_of, shows, state_of, to_client, until
 from fake_endpoint import FakeEndpoint, project
 
+PIXEL = """([x, y]) => {
+  const canvas = document.querySelector(".pane-overlay");
+  const box = canvas.getBoundingClientRect();
+  const at = [Math.round((x - box.left) * devicePixelRatio), Math.round((y - box.top) * devicePixelRatio)];
+  return [...canvas.getContext("2d").getImageData(...at, 1, 1).data];
+}"""
+"""JavaScript: the colour of the first pane at a place of the window."""
+
 
 async def test_all_cameras_are_shown_with_names_and_costs(page):
     assert await page.locator(".pane").count() == 4
@@ -18,15 +26,7 @@ async def test_image_and_vectors_are_drawn_where_the_maths_says(page, endpoint):
     # A model contour's colour lies where the view puts its first segment.
     segment = endpoint.outline(0, 0, 0.0)[8]
     x, y = await to_client(page, 0, *segment[:2])
-    found = await page.evaluate(
-        """([x, y]) => {
-          const canvas = document.querySelector(".pane-overlay");
-          const box = canvas.getBoundingClientRect();
-          const at = [Math.round((x - box.left) * devicePixelRatio), Math.round((y - box.top) * devicePixelRatio)];
-          return [...canvas.getContext("2d").getImageData(...at, 1, 1).data];
-        }""",
-        [x, y],
-    )
+    found = await page.evaluate(PIXEL, [x, y])
     assert found[3] > 200
     assert found[0] > found[2] + 60  # orange
 
@@ -197,6 +197,34 @@ async def test_hidden_joints_cannot_be_grabbed(page, endpoint):
     async with dragging(page, 0, "head", (10, 10), (20, 20)):
         pass
     assert not endpoint.heard("drag")
+
+
+async def test_a_minor_joint_gives_way_to_a_neighbour_until_one_zooms_in(page, endpoint):
+    waist = await handle_of(page, 0, "waist")
+    x, y = await to_client(page, 0, *waist)
+    await page.mouse.move(x, y)
+    await shows(page, "quadrille.state.hover?.point === 'torso'")
+    await page.mouse.wheel(0, -1400)
+    await shows(page, "quadrille.state.views[0].zoom > 5")
+    async with dragging(page, 0, "waist", (1, 1), (4, 6)):
+        await until(lambda: any(m["phase"] == "move" for m in endpoint.heard("drag")))
+    assert {m["point"] for m in endpoint.heard("drag")} == {"waist"}
+
+
+async def test_a_minor_joint_in_the_hand_stays_there_as_it_meets_another(page, endpoint):
+    await page.mouse.move(*await to_client(page, 0, *await handle_of(page, 0, "waist")))
+    await page.mouse.wheel(0, -1400)
+    await shows(page, "quadrille.state.views[0].zoom > 5")
+    u, v = await handle_of(page, 0, "torso")
+    x, y = await to_client(page, 0, u, v)
+    beside = [x + 15, y - 7]  # where the name of a joint that lies at x, y is written
+    before = await page.evaluate(PIXEL, beside)
+    async with dragging(page, 0, "waist", (1, 1)):
+        await page.mouse.move(x, y)
+        await until(lambda: endpoint.heard("drag")[-1]["v"] == pytest.approx(v, abs=0.5))
+        await shows(page, f"quadrille.state.overlay.seq === {endpoint.heard('drag')[-1]['seq']}")
+        assert max((await page.evaluate(PIXEL, beside))[:3]) < 60 < max(before[:3])
+    await until(lambda: endpoint.heard("drag")[-1]["phase"] == "end")
 
 
 async def test_the_splitter_moves_by_drag_and_key_within_bounds(page):

@@ -5,7 +5,8 @@ import pytest
 from staging import camera_at, cameras_around, shaken
 
 from tracker import rigid
-from tracker.posing import UP_ROTATIONS, drag, grab, standing_pose
+from tracker.formats.model_toml import load_model
+from tracker.posing import UP_ROTATIONS, drag, grab, minor_points, standing_pose
 
 SIDE = camera_at("side", (3.0, 2.5, 1.0))
 
@@ -200,3 +201,21 @@ def test_up_rotations_are_rotations():
         assert np.linalg.det(R) == pytest.approx(1)
         axis = np.eye(3)["xyz".index(up[-1])] * (-1 if up[0] == "-" else 1)
         np.testing.assert_allclose(R[:, 2], axis)
+
+
+def test_what_a_hand_hardly_needs(gavrila):
+    assert minor_points(gavrila) == ("neck",)  # rigid there
+    bending = load_model("gavrila31")
+    assert sorted(minor_points(bending)) == ["left_collarbone", "neck", "right_collarbone", "waist"]
+
+
+@pytest.mark.parametrize(
+    ("point", "bent"), [("left_hip", "waist"), ("right_shoulder", "right_collarbone"), ("head", "neck")]
+)
+def test_minor_joints_are_bent_by_dragging_their_neighbours(point, bent):
+    model = load_model("gavrila31")
+    free = grab(model, model.neutral(), SIDE, point, np.zeros(2)).free
+    assert bent in minor_points(model)
+    assert {n for n, f in zip(model.dof_names, free, strict=True) if f} >= {
+        n for n in model.dof_names if n.startswith(f"{bent}.")
+    }
