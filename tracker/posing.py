@@ -86,8 +86,8 @@ def minor_points(model: BodyModel) -> tuple[str, ...]:
 def grab(model: BodyModel, values: Array, camera: Camera, point: str, pointer_px: Array) -> Grab:
     """Take hold of a point of a body.
 
-    The root point moves the whole body. A point of a limb moves its chain up to the trunk; a point of the trunk
-    turns the body about its root, and bends what of the trunk can bend.
+    The root point moves the whole body. A point of a limb, or of a head on a neck that bends, moves its chain up to the
+    trunk; a point of the trunk turns the body about its root, and bends what of the trunk can bend.
 
     Args:
         model: the body.
@@ -102,10 +102,12 @@ def grab(model: BodyModel, values: Array, camera: Camera, point: str, pointer_px
     if index < len(model.joints):
         moving &= model.dof_joint != index  # a joint turns about itself: that does not move it
     of_root = model.dof_joint == 0
+    own = moving & ~of_root
+    carries_others = model.point_parts[index] in model.parents
     if index == 0:
         free = of_root & model.dof_is_length
-    elif np.any(moving & ~of_root & ~np.isfinite(model.spreads)):
-        free = moving & ~of_root
+    elif np.any(own & ~np.isfinite(model.spreads)) or (np.any(own) and not carries_others):
+        free = own
     else:
         free = moving & ~model.dof_is_length
     offset = camera.pinhole.project(place) - pointer_px

@@ -219,3 +219,14 @@ def test_minor_joints_are_bent_by_dragging_their_neighbours(point, bent):
     assert {n for n, f in zip(model.dof_names, free, strict=True) if f} >= {
         n for n in model.dof_names if n.startswith(f"{bent}.")
     }
+
+
+def test_a_head_nods_where_the_neck_bends_and_else_turns_the_body(gavrila):
+    for model, stays in ((load_model("gavrila31"), True), (gavrila, False)):
+        values = model.neutral()
+        px = SIDE.project(place(model, values, "head"))
+        target = px + np.array([12.0, 3.0])
+        nodded = drag(grab(model, values, SIDE, "head", px), target, values)
+        np.testing.assert_allclose(SIDE.project(place(model, nodded, "head")), target, atol=0.5)
+        moved = place(model, nodded, "left_ankle") - place(model, values, "left_ankle")
+        assert (np.linalg.norm(moved) < 1e-9) == stays
