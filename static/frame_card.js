@@ -37,8 +37,29 @@ export class FrameCard {
     this.#remark.textContent = remark;
     if (this.#card.hidden || !this.#card.open) return;
     const names = session.people[person].parts;
-    this.#parts.replaceChildren(...parts_px.flatMap((cost, part) => row(names[part] ?? "", cost)));
+    const cells = leftBesideRight(names).flatMap((part) => (part === null ? gap() : row(names[part], parts_px[part] ?? null)));
+    this.#parts.replaceChildren(...(parts_px.length ? cells : []));
   }
+}
+
+/**
+ * The order of parts in two columns: those of the trunk, then each part of the left beside that of the right. Null is a gap.
+ *
+ * @param {string[]} names
+ */
+function leftBesideRight(names) {
+  const pairs = names.flatMap((name, left) => {
+    const right = name.startsWith("left_") ? names.indexOf(name.replace("left_", "right_")) : -1;
+    return right < 0 ? [] : [[left, right]];
+  });
+  const paired = new Set(pairs.flat());
+  const trunk = [...names.keys()].filter((part) => !paired.has(part));
+  return [...trunk, ...(trunk.length % 2 ? [null] : []), ...pairs.flat()];
+}
+
+/** An empty place in a row; a value too, so that every second value ends a row. */
+function gap() {
+  return [document.createElement("output")];
 }
 
 /**

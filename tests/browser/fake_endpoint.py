@@ -42,7 +42,7 @@ NO_TRACK = {
     "lost": 0, "message": "",
 }  # fmt: skip
 STAGES = ["torso_head", "arms", "legs"]
-PARTS = ["torso", "head", "left_arm", "right_arm"]
+PARTS = ["torso", "left_arm", "left_leg", "head", "right_leg", "right_arm", "pelvis"]
 ANGLES = ("abduction", "elevation", "twist", "extension")
 PLOTS = {
     "arms": [("Left arm", "deg", ANGLES), ("Right arm", "deg", ANGLES)],
@@ -204,7 +204,7 @@ class FakeEndpoint:
         """What the state says of a frame."""
         status = status_of(frame)
         remark = REMARK if status == "doubtful" else ""
-        return {"frame": frame, "status": status, "remark": remark, "parts_px": [0.8, 1.2, 4.5, None]}
+        return {"frame": frame, "status": status, "remark": remark, "parts_px": [0.8, 4.5, 1.5, 1.2, 2.5, None, 0.9]}
 
     async def track(self, action, until):
         if self.track_task:

@@ -128,14 +128,17 @@ async def test_playback_keeps_no_backlog_and_stops_at_the_end(page, endpoint):
     assert len(frames) < 20
 
 
-async def test_nothing_is_cut_off_at_1280_by_720(page):
-    await page.set_viewport_size({"width": 1280, "height": 720})
+@pytest.mark.parametrize(("width", "height", "scale"), [(1280, 720, 0.55), (1100, 680, 0.5)])
+async def test_nothing_is_cut_off_in_small_windows(page, width, height, scale):
+    await page.set_viewport_size({"width": width, "height": height})
     help_box = await page.locator("#show-help").bounding_box()
-    assert help_box["x"] + help_box["width"] <= 1280
+    assert help_box["x"] + help_box["width"] <= width
+    curves = await page.locator("#show-curves").bounding_box()
+    assert curves["x"] + curves["width"] <= width
     timeline = await page.locator("#timeline").bounding_box()
-    assert timeline["y"] + timeline["height"] <= 720
-    assert await page.evaluate("document.documentElement.scrollWidth") == 1280
-    await shows(page, "quadrille.state.views[0].scale > 0.55")
+    assert timeline["y"] + timeline["height"] <= height
+    assert await page.evaluate("document.documentElement.scrollWidth") == width
+    await shows(page, f"quadrille.state.views[0].scale > {scale}")
 
 
 async def test_every_control_has_a_name_and_a_tooltip(page):
