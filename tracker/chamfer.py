@@ -23,7 +23,7 @@ from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence
 from tracker.kernels import FAST
 from tracker.kinematics import Tree, forward_kinematics
-from tracker.nearest import RowSorted, Segments, nearest_segment, segment_buffer, sort_by_row
+from tracker.nearest import Segments, Sorted, nearest_segment, segment_buffer, sort_points, stack_rows
 from tracker.rigid import Array
 
 Outliers = Literal["truncated", "paper"]
@@ -61,9 +61,9 @@ class _Scene(NamedTuple):
     distances: FloatArray
     """The distance images, one after the other, row by row."""
     points: FloatArray
-    """u and v of the edge points near the prediction, one `RowSorted` view after the other, (2, N)."""
+    """u and v of the edge points near the prediction, one view (see `nearest.Sorted`) after the other, (2, N)."""
     rows: NDArray[np.int64]
-    """Index of the first point of each row among those of its view, (V, largest height + 1)."""
+    """Index of the first point of each strip and row among those of its view, (V, strips, largest height + 1)."""
     firsts: NDArray[np.int64]
     """Index of the first edge point of each view, and the number of all, (V + 1,)."""
     counts: NDArray[np.int64]
@@ -119,7 +119,6 @@ class ChamferCost:
         self._scales = np.array([v.scale for v in views])
         thetas = [v.outlier_px(theta_px) for v in views]
         near = [_near(v, contours.trace(predicted, v.camera), theta) for v, theta in zip(views, thetas, strict=True)]
-        tallest = max(v.camera.height for v in views)
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
         self._scene = _Scene(
             np.stack([contours.projection(v.camera) for v in views]),
@@ -127,7 +126,7 @@ class ChamferCost:
             np.array([v.camera.size for v in views], dtype=np.int64),
             np.concatenate([v.distance.ravel() for v in views]),
             np.concatenate([n.points for n in near], axis=1),
-            np.stack([np.pad(n.rows, (0, tallest + 1 - len(n.rows)), mode="edge") for n in near]),
+            stack_rows([n.rows for n in near]),
             np.concatenate([[0], np.cumsum([n.points.shape[1] for n in near])]).astype(np.int64),
             np.array([n.n_points for n in near], dtype=np.int64),
             np.array(thetas),
@@ -219,15 +218,15 @@ def _helpers() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="chamfer")
 
 
-def _near(view: ViewEvidence, contour: contours.Contour, theta: float) -> RowSorted:
+def _near(view: ViewEvidence, contour: contours.Contour, theta: float) -> Sorted:
     """Edge points within theta of the visible model contour."""
-    everything = sort_by_row(view.points_px, view.camera.height)
+    everything = sort_points(view.points_px, view.camera.size)
     pieces = contour.pieces_px[~contour.hidden]
     segments = Segments(*np.ascontiguousarray(np.column_stack([pieces[:, :2], pieces[:, 2:] - pieces[:, :2]]).T))
     u, v = everything.points
     distances = np.empty(len(u), np.float32)
     nearest_segment(u, v, everything.rows, segments, len(pieces), theta, distances)
-    return sort_by_row(everything.points[:, distances <= theta].T, view.camera.height)
+    return sort_points(everything.points[:, distances <= theta].T, view.camera.size)
 
 
 @njit(**FAST)
@@ -312,7 +311,7 @@ def _score(
         directed[view, 0] = _robust_mean(d, scratch.lengths, kept, theta, paper)
         first, last = scene.firsts[view], scene.firsts[view + 1]
         u, v = scene.points[0][first:last], scene.points[1][first:last]
-        nearest_segment(u, v, scene.rows[view][: height + 1], scratch.segments, n_segments, theta, d)
+        nearest_segment(u, v, scene.rows[view], scratch.segments, n_segments, theta, d)
         directed[view, 1] = _robust_mean(d, scratch.ones, scene.counts[view], theta, paper)
         pixel += width * height
 

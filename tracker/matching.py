@@ -9,13 +9,16 @@ from numpy.typing import NDArray
 from tracker import contours
 from tracker.contours import FloatArray
 from tracker.evidence import SCENE_SPACING_PX
-from tracker.kernels import BORROW, FAST
+from tracker.kernels import FAST
 from tracker.kinematics import IntArray
-from tracker.nearest import LANES
+from tracker.nearest import LANES, cells_within
 from tracker.rigid import Array
+from tracker.twists import add_twists
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernel's arithmetic into float64
 _FAR2 = np.float32(1e12)
+_JOINED = 10
+"""Most pieces of a segment: longer ones would reach too many points."""
 
 
 class Scene(NamedTuple):
@@ -31,11 +34,11 @@ class Scene(NamedTuple):
     """The distance images, one after the other, row by row."""
     points: FloatArray
     """u, v of the points, their normals' u, v, their weights, and 0 for edges, 1 for the silhouette, (6, N); one view
-    after the other, in each sorted by the row of the image and filled up to whole `LANES` by points without weight."""
+    after the other, each as `nearest.Sorted`; those it is filled up with have no weight."""
     firsts: NDArray[np.int64]
     """Index of the first point of each view, and the number of all, (V + 1,)."""
     rows: NDArray[np.int64]
-    """Index, within the view, of the first point in each row of its image or below, (V, rows + 1)."""
+    """Index, within the view, of the first point of each strip and row, (V, strips, rows + 1)."""
     thetas: Array
     """Outlier distances, (V,)."""
     weights: Array
@@ -47,15 +50,31 @@ class Scratch(NamedTuple):
 
     traced: contours.Pieces
     pieces: FloatArray
-    """x, y, dx, dy, 1 / length^2, nx, ny of each visible piece, (7, room)."""
-    which: NDArray[np.int64]
-    """Index of each visible piece among those traced, (room,)."""
-    parts: NDArray[np.int64]
-    """Part of each visible piece, (room,)."""
+    """Visible pieces, part by part: u, v of the middle, length, normal's u, v, and the middle's x, y, z in the unit
+    coordinates of its part, (8, room)."""
+    firsts: NDArray[np.int64]
+    """Index of the first visible piece of each part, and the number of all, (P + 1,)."""
+    pulls: Array
+    """Summed over the residuals of each visible piece, times their weights, (7, room): of those across the piece the
+    squares of their image gradients and the gradients times the residuals; of others, at its ends, g_u^2, g_u g_v,
+    g_v^2, and g_u and g_v times the residuals."""
+    segments: FloatArray
+    """Pieces in a row on one straight edge: u, v, du, dv, 1 / length^2, normal's u, v, (7, room)."""
+    of_segment: NDArray[np.int32]
+    """The first piece of each segment, the number of its pieces, and their part, (3, room)."""
     best: FloatArray
-    """Squared distance of each edge point to its piece, with the turn between them, (room,)."""
+    """Squared distance of each edge point to its segment, with the turn between them, (room,)."""
     nearest: NDArray[np.int32]
-    """Index of that piece among the visible ones, (room,)."""
+    """Index of that segment, (room,)."""
+
+
+def scratch_for(surfaces: contours.Surfaces, room: int, n_points: int) -> Scratch:
+    """Uninitialized room for as many pieces in a view and points in all."""
+    return Scratch(
+        contours.piece_buffer(surfaces, room), np.empty((8, room), np.float32),
+        np.empty(len(surfaces.radii) + 1, np.int64), np.empty((7, room)), np.empty((7, room), np.float32),
+        np.empty((3, room), np.int32), np.empty(n_points, np.float32), np.empty(n_points, np.int32),
+    )  # fmt: skip
 
 
 class Sums(NamedTuple):
@@ -73,128 +92,110 @@ class Sums(NamedTuple):
 
 @njit(**FAST)
 def nearest_alike(
-    u: FloatArray, v: FloatArray, nu: FloatArray, nv: FloatArray, rows: IntArray, pieces: FloatArray, n: int,
+    u: FloatArray, v: FloatArray, nu: FloatArray, nv: FloatArray, rows: IntArray, segments: FloatArray, n: int,
     turn: float, reach: float, best: FloatArray, nearest: NDArray[np.int32],
 ) -> None:  # fmt: skip
-    """For each point (u, v) with normal (nu, nv), (N,) each, the nearest piece within reach.
+    """For each point (u, v) with normal (nu, nv), (N,) each, the nearest segment within reach.
 
-    The turn between the point's edge and the piece counts as squared distance. Beyond the reach anything may be named,
-    at a distance beyond it. As `nearest.nearest_segment`, each piece is held only against points of rows nearby.
+    The turn between the point's edge and the segment counts as squared distance. Beyond the reach anything may be
+    named, at a distance beyond it. As `nearest.nearest_segment`, segments are held only against points nearby.
     """
-    last_row = rows.shape[0] - 1
     best[: u.shape[0]] = _FAR2
     far, weight = np.float32(reach), np.float32(turn)
     for k in range(n):
-        x, y, dx, dy, inverse = pieces[0, k], pieces[1, k], pieces[2, k], pieces[3, k], pieces[4, k]
-        nx, ny, index = pieces[5, k], pieces[6, k], np.int32(k)
-        top, bottom = int(min(y, y + dy) - far) - 1, int(max(y, y + dy) + far) + 1
-        first = rows[min(max(top, 0), last_row - 1)] // LANES * LANES
-        count = (rows[min(max(bottom, 1), last_row)] - first + LANES - 1) // LANES * LANES
-        for j in range(np.uint64(count)):
-            i = np.uint64(first) + j
-            from_u, from_v = u[i] - x, v[i] - y
-            t = (from_u * dx + from_v * dy) * inverse
-            t = t if t > _ZERO else _ZERO
-            t = t if t < _ONE else _ONE
-            off_u, off_v = from_u - t * dx, from_v - t * dy
-            alike = nu[i] * nx + nv[i] * ny
-            squared = off_u * off_u + off_v * off_v + weight * (_ONE - alike * alike)
-            closer = squared < best[i]
-            nearest[i] = index if closer else nearest[i]
-            best[i] = squared if closer else best[i]
+        x, y, dx, dy, inverse = segments[0, k], segments[1, k], segments[2, k], segments[3, k], segments[4, k]
+        nx, ny, index = segments[5, k], segments[6, k], np.int32(k)
+        left, right, top, bottom = cells_within(x, y, x + dx, y + dy, far, rows)
+        for strip in range(left, right + 1):
+            first, last = np.uint64(rows[strip, top]), np.uint64(rows[strip, bottom])
+            for j in range((last - first + np.uint64(LANES - 1)) // np.uint64(LANES) * np.uint64(LANES)):
+                i = first + j
+                from_u, from_v = u[i] - x, v[i] - y
+                t = (from_u * dx + from_v * dy) * inverse
+                t = t if t > _ZERO else _ZERO
+                t = t if t < _ONE else _ONE
+                off_u, off_v = from_u - t * dx, from_v - t * dy
+                alike = nu[i] * nx + nv[i] * ny
+                squared = off_u * off_u + off_v * off_v + weight * (_ONE - alike * alike)
+                closer = squared < best[i]
+                nearest[i] = index if closer else nearest[i]
+                best[i] = squared if closer else best[i]
 
 
-@njit(**BORROW)
-def _add(
-    M: Array, b: Array, P: Array, x: float, y: float, X: float, Y: float, Z: float, gu: float, gv: float,
-    weight: float, r: float,
-) -> None:  # fmt: skip
-    """Add the row of a residual r with image gradient (gu, gv) at the image (x, y) of the surface point (X, Y, Z)."""
-    w = 1.0 / (P[2, 0] * X + P[2, 1] * Y + P[2, 2] * Z + P[2, 3])
-    e = gu * x + gv * y
-    gx = (gu * P[0, 0] + gv * P[1, 0] - e * P[2, 0]) * w
-    gy = (gu * P[0, 1] + gv * P[1, 1] - e * P[2, 1]) * w
-    gz = (gu * P[0, 2] + gv * P[1, 2] - e * P[2, 2]) * w
-    row = (Y * gz - Z * gy, Z * gx - X * gz, X * gy - Y * gx, gx, gy, gz)
-    for i in range(6):
-        scaled = weight * row[i]
-        b[i] += scaled * r
-        for j in range(i, 6):
-            M[i, j] += scaled * row[j]
-
-
-@njit(**BORROW)
+@njit(**FAST)
 def _visible(n_parts: int, scratch: Scratch) -> int:
-    """Pack the visible pieces for `nearest_alike`; their number."""
-    traced, pieces, which, parts = scratch.traced, scratch.pieces, scratch.which, scratch.parts
-    ends, hidden, firsts = traced.ends, traced.hidden, traced.firsts
-    kept = 0
+    """Pack the visible pieces, and join them to segments; returns the number of those."""
+    traced, pieces, segments, of_segment = scratch.traced, scratch.pieces, scratch.segments, scratch.of_segment
+    ends, middles, edges, hidden, firsts = traced.ends, traced.middles, traced.edges, traced.hidden, traced.firsts
+    half, kept, n, edge = np.float32(0.5), 0, 0, -1
     for part in range(n_parts):
+        scratch.firsts[part] = kept
         for i in range(firsts[part], firsts[part + 1]):
             if hidden[i]:
+                edge = -1
                 continue
-            x, y = ends[0, i], ends[1, i]
-            dx, dy = ends[2, i] - x, ends[3, i] - y
+            x, y, x1, y1 = ends[0, i], ends[1, i], ends[2, i], ends[3, i]
+            dx, dy = x1 - x, y1 - y
             length = np.sqrt(max(dx * dx + dy * dy, np.float32(1e-12)))
-            pieces[0, kept], pieces[1, kept], pieces[2, kept], pieces[3, kept] = x, y, dx, dy
-            pieces[4, kept], pieces[5, kept], pieces[6, kept] = 1 / (length * length), -dy / length, dx / length
-            which[kept], parts[kept] = i, part
+            nx, ny = -dy / length, dx / length
+            pieces[0, kept], pieces[1, kept], pieces[2, kept] = half * (x + x1), half * (y + y1), length
+            pieces[3, kept], pieces[4, kept] = nx, ny
+            pieces[5, kept], pieces[6, kept], pieces[7, kept] = middles[0, i], middles[1, i], middles[2, i]
+            if edges[i] != edge or of_segment[1, n - 1] == _JOINED:
+                edge = edges[i]
+                segments[0, n], segments[1, n], segments[5, n], segments[6, n] = x, y, nx, ny
+                of_segment[0, n], of_segment[1, n], of_segment[2, n] = kept, 0, part
+                n += 1
+            of_segment[1, n - 1] += 1
+            dx, dy = x1 - segments[0, n - 1], y1 - segments[1, n - 1]
+            segments[2, n - 1], segments[3, n - 1] = dx, dy
+            segments[4, n - 1] = _ONE / max(dx * dx + dy * dy, np.float32(1e-12))
             kept += 1
-    return kept
+    scratch.firsts[n_parts] = kept
+    return n
 
 
-@njit(**BORROW)
-def _world(k: int, scratch: Scratch) -> tuple[float, float, float]:
-    """The surface point under a visible piece, metres."""
-    W, m, i = scratch.traced.Ts_world_unit[scratch.parts[k]], scratch.traced.middles, scratch.which[k]
-    x, y, z = m[0, i], m[1, i], m[2, i]
-    return (
-        W[0, 0] * x + W[0, 1] * y + W[0, 2] * z + W[0, 3],
-        W[1, 0] * x + W[1, 1] * y + W[1, 2] * z + W[1, 3],
-        W[2, 0] * x + W[2, 1] * y + W[2, 2] * z + W[2, 3],
-    )
-
-
-@njit(**BORROW)
+@njit(**FAST)
 def _model_to_image(
-    view: int, first: int, last: int, pixel: int, kept: int, scene: Scene, scale: float, derive: bool,
-    scratch: Scratch, sums: Sums,
+    view: int, first: int, last: int, pixel: int, scene: Scene, scale: float, derive: bool, scratch: Scratch,
+    sums: Sums,
 ) -> float:  # fmt: skip
     """Add the residuals of the visible pieces of the parts from first to last; their cost."""
     width, height = scene.sizes[view, 0], scene.sizes[view, 1]
-    P, theta, weight = scene.P[view], scene.thetas[view], scene.weights[view, 0]
-    s2, cost = (scale * theta) ** 2, 0.0
-    q, D = scratch.pieces, scene.distances
-    for k in range(kept):
-        part = scratch.parts[k]
-        x, y = q[0, k] + 0.5 * q[2, k], q[1, k] + 0.5 * q[3, k]
-        # What lies outside the image is neither explained nor refuted: a body may be cut off at the border.
-        if part < first or part >= last or x < 0 or y < 0 or x > width - 1 or y > height - 1:
-            continue
-        c, r = min(int(x), width - 2), min(int(y), height - 2)
-        a, b = x - c, y - r
-        at = pixel + r * width + c
-        d00, d01, d10, d11 = D[at], D[at + 1], D[at + width], D[at + width + 1]
-        d = (d00 * (1 - a) + d01 * a) * (1 - b) + (d10 * (1 - a) + d11 * a) * b
-        length = np.sqrt(q[2, k] ** 2 + q[3, k] ** 2)
-        sums.parts[view, part, 0] += length
-        sums.parts[view, part, 1] += length * min(d, theta)
-        w = weight * length
-        cut = min(d, theta)
-        cost += 0.5 * w * s2 * cut * cut / (s2 + cut * cut)
-        if d >= theta or not derive:
-            continue
-        gu, gv = (1 - b) * (d01 - d00) + b * (d11 - d10), (1 - a) * (d10 - d00) + a * (d11 - d01)
-        across = gu * q[5, k] + gv * q[6, k]
-        f = s2 / (s2 + d * d)
-        X, Y, Z = _world(k, scratch)
-        _add(sums.M[part], sums.b[part], P, x, y, X, Y, Z, across * q[5, k], across * q[6, k], w * f * f, d)
-    return cost
+    theta, weight = np.float32(scene.thetas[view]), scene.weights[view, 0]
+    q, pulls, D, firsts = scratch.pieces, scratch.pulls, scene.distances, scratch.firsts
+    s2, cost = np.float32((scale * theta) ** 2), 0.0
+    for part in range(first, last):
+        seen = far = 0.0
+        for k in range(firsts[part], firsts[part + 1]):
+            x, y, length = q[0, k], q[1, k], q[2, k]
+            # What lies outside the image is neither explained nor refuted: a body may be cut off at the border.
+            if x < _ZERO or y < _ZERO or x > np.float32(width - 1) or y > np.float32(height - 1):
+                continue
+            c, r = min(int(x), width - 2), min(int(y), height - 2)
+            a, b = x - np.float32(c), y - np.float32(r)
+            at = pixel + r * width + c
+            d00, d01, d10, d11 = D[at], D[at + 1], D[at + width], D[at + width + 1]
+            top, bottom = d00 + a * (d01 - d00), d10 + a * (d11 - d10)
+            d = top + b * (bottom - top)
+            cut = min(d, theta)
+            f = s2 / (s2 + cut * cut)
+            seen += length
+            far += length * cut
+            cost += length * f * cut * cut
+            if derive and d < theta:
+                across = q[3, k] * ((d01 - d00) + b * (d11 - d10 - d01 + d00)) + q[4, k] * (bottom - top)
+                w = weight * length * (f * f) * across
+                pulls[0, k] += w * across
+                pulls[1, k] += w * d
+        sums.parts[view, part, 0] += seen
+        sums.parts[view, part, 1] += far
+    return 0.5 * weight * cost
 
 
-@njit(**BORROW)
+@njit(**FAST)
 def _image_to_model(
-    view: int, first: int, last: int, kept: int, scene: Scene, scale: float, turn: float, derive: bool,
+    view: int, first: int, last: int, n_segments: int, scene: Scene, scale: float, turn: float, derive: bool,
     scratch: Scratch, sums: Sums,
 ) -> float:  # fmt: skip
     """Add the residuals of the view's edge points whose nearest piece is of the parts from first to last; their cost.
@@ -202,39 +203,52 @@ def _image_to_model(
     The points are the same at every pose, so that their costs compare like with like: one that no piece is near, or
     that is nearest to somebody else, costs what a point at the outlier distance does.
     """
-    P, theta, weight = scene.P[view], scene.thetas[view], scene.weights[view, 1] * SCENE_SPACING_PX
-    s2, limit, cost = (scale * theta) ** 2, theta * theta, 0.0
+    theta, weight = scene.thetas[view], scene.weights[view, 1] * SCENE_SPACING_PX
+    s2, limit, cost = np.float32((scale * theta) ** 2), np.float32(theta * theta), 0.0
     start, stop = scene.firsts[view], scene.firsts[view + 1]
-    us, vs, q = scene.points[0][start:stop], scene.points[1][start:stop], scratch.pieces
+    us, vs, q, of = scene.points[0][start:stop], scene.points[1][start:stop], scratch.segments, scratch.of_segment
     nu, nv, weights = scene.points[2][start:stop], scene.points[3][start:stop], scene.points[4][start:stop]
-    of_silhouette, rows = scene.points[5][start:stop], scene.rows[view][: scene.sizes[view, 1] + 1]
-    nearest_alike(us, vs, nu, nv, rows, q, kept, turn * limit, theta, scratch.best, scratch.nearest)
+    of_silhouette, rows = scene.points[5][start:stop], scene.rows[view]
+    best, nearest, pulls = scratch.best, scratch.nearest, scratch.pulls
+    nearest_alike(us, vs, nu, nv, rows, q, n_segments, turn * limit, theta, best, nearest)
+    for j in range(np.uint64(stop - start)):
+        squared = min(best[j], limit)
+        cost += weights[j] * (s2 * squared / (s2 + squared))
     for j in range(stop - start):
-        squared = min(scratch.best[j], limit)
-        cost += 0.5 * weight * weights[j] * s2 * squared / (s2 + squared)
-        if scratch.best[j] >= limit:
+        squared = best[j]
+        if squared >= limit:
             continue
-        sums.outline[view] += of_silhouette[j]
-        k = scratch.nearest[j]
-        part = scratch.parts[k]
+        k = nearest[j]
+        part = of[2, k]
+        if not derive:  # who asks for the costs of the parts counts what they explain
+            sums.outline[view] += of_silhouette[j]
+            if part >= first and part < last:
+                sums.parts[view, part, 2] += 1
+            continue
         if part < first or part >= last:
             continue
-        sums.parts[view, part, 2] += 1
-        if not derive:
+        f = s2 / (s2 + squared)
+        w = weight * weights[j] * (f * f)
+        u, v, dx, dy, count = us[j] - q[0, k], vs[j] - q[1, k], q[2, k], q[3, k], of[1, k]
+        t = (u * dx + v * dy) * q[4, k]
+        i = of[0, k] + min(max(int(t * np.float32(count)), 0), count - 1)
+        if t > _ZERO and t < _ONE:
+            pulls[0, i] += w
+            pulls[1, i] -= w * (u * q[5, k] + v * q[6, k])
             continue
-        u, v = us[j], vs[j]
-        t = min(max(((u - q[0, k]) * q[2, k] + (v - q[1, k]) * q[3, k]) * q[4, k], 0.0), 1.0)
-        x, y = q[0, k] + t * q[2, k], q[1, k] + t * q[3, k]
-        gu, gv = x - u, y - v
-        d = np.sqrt(gu * gu + gv * gv)
-        if d < 1e-3:
+        if t > _ZERO:
+            u, v = u - dx, v - dy
+        d = np.sqrt(u * u + v * v)
+        if d < np.float32(1e-3):
             gu, gv = q[5, k], q[6, k]
         else:
-            gu, gv = gu / d, gv / d
-        f = s2 / (s2 + squared)
-        X, Y, Z = _world(k, scratch)
-        _add(sums.M[part], sums.b[part], P, x, y, X, Y, Z, gu, gv, weight * weights[j] * f * f, d)
-    return cost
+            gu, gv = -u / d, -v / d
+        pulls[2, i] += w * gu * gu
+        pulls[3, i] += w * gu * gv
+        pulls[4, i] += w * gv * gv
+        pulls[5, i] += w * d * gu
+        pulls[6, i] += w * d * gv
+    return 0.5 * weight * cost
 
 
 @njit(nogil=True, cache=True)
@@ -254,53 +268,15 @@ def gather(
     for view in range(scene.P.shape[0]):
         if scene.weights[view, 0] > 0.0 or scene.weights[view, 1] > 0.0:
             contours.trace_pieces(scene.P[view], scene.eyes[view], Ts, surfaces, contours.PIECE_PX, scratch.traced)
-            kept = _visible(Ts.shape[0], scratch)
+            n_segments = _visible(Ts.shape[0], scratch)
+            scratch.pulls[:, : scratch.firsts[-1]] = 0.0
             if scene.weights[view, 0] > 0.0 or not derive:  # whoever asks for the costs of the parts asks for both
-                cost += _model_to_image(view, first, last, pixel, kept, scene, scale, derive, scratch, sums)
+                cost += _model_to_image(view, first, last, pixel, scene, scale, derive, scratch, sums)
             if scene.weights[view, 1] > 0.0:
-                cost += _image_to_model(view, first, last, kept, scene, scale, turn, derive, scratch, sums)
+                cost += _image_to_model(view, first, last, n_segments, scene, scale, turn, derive, scratch, sums)
+            if derive:
+                for part in range(first, last):
+                    span, W = scratch.firsts[part : part + 2], scratch.traced.Ts_world_unit[part]
+                    add_twists(span, scratch.pieces, scratch.pulls, scene.P[view], W, sums.M[part], sums.b[part])
         pixel += scene.sizes[view, 0] * scene.sizes[view, 1]
     return cost
-
-
-@njit(nogil=True, cache=True)
-def to_dofs(
-    M: Array, b: Array, axes: Array, origins: Array, is_length: NDArray[np.bool_], parts: IntArray, parents: IntArray,
-    moves: NDArray[np.bool_], gradient: Array, hessian: Array,
-) -> None:  # fmt: skip
-    """Carry the parts' normal matrices, upper triangles (n_parts, 6, 6), over to the degrees of freedom.
-
-    The spatial twist of a rotation by axis a through o is (a, o x a), of a translation (0, a). A degree of freedom
-    moves its part and all parts below it alike, so their matrices are summed up the tree first.
-    """
-    n_parts, n = M.shape[0], axes.shape[0]
-    for p in range(n_parts - 1, 0, -1):
-        for i in range(6):
-            b[parents[p], i] += b[p, i]
-            for j in range(i, 6):
-                M[parents[p], i, j] += M[p, i, j]
-    twists, forces = np.empty((n, 6)), np.empty((n, 6))
-    for k in range(n):
-        ax, ay, az = axes[k, 0], axes[k, 1], axes[k, 2]
-        ox, oy, oz = origins[k, 0], origins[k, 1], origins[k, 2]
-        if is_length[k]:
-            twists[k, 0], twists[k, 1], twists[k, 2] = 0.0, 0.0, 0.0
-            twists[k, 3], twists[k, 4], twists[k, 5] = ax, ay, az
-        else:
-            twists[k, 0], twists[k, 1], twists[k, 2] = ax, ay, az
-            twists[k, 3], twists[k, 4], twists[k, 5] = oy * az - oz * ay, oz * ax - ox * az, ox * ay - oy * ax
-        part, total = parts[k], 0.0
-        for i in range(6):
-            force = 0.0
-            for j in range(6):
-                force += (M[part, i, j] if j >= i else M[part, j, i]) * twists[k, j]
-            forces[k, i] = force
-            total += twists[k, i] * b[part, i]
-        gradient[k] = total
-    for k in range(n):
-        for m in range(k, n):
-            total = 0.0
-            if moves[k, parts[m]]:  # the joints come parent first, so m is the deeper one
-                for i in range(6):
-                    total += twists[k, i] * forces[m, i]
-            hessian[k, m] = hessian[m, k] = total

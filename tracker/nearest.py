@@ -1,24 +1,33 @@
 """How far points are from the nearest of many line segments, as far as that matters.
 
-Points are kept sorted by the row of the image they lie in, so that a segment is held only against those whose rows
-come within reach of it: whole vectors of points, one after the other in memory.
+Points are kept sorted by upright strips of the image and, in each strip, by row, so that a segment is held only
+against those that come within reach of it: whole vectors of points, one after the other in memory.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.kernels import FAST
+from tracker.kernels import BORROW, FAST
 
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 
-_ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernel's arithmetic into float64
+_ZERO, _HALF, _ONE = (
+    np.float32(0.0),
+    np.float32(0.5),
+    np.float32(1.0),
+)  # plain numbers would turn the kernel's arithmetic into float64
 _FAR, _FAR2 = np.float32(1e6), np.float32(1e12)
+_SHORT = np.float32(1e-6)
+"""A shorter segment has no direction, px."""
 LANES = 16
 """Points that are worked on together."""
+STRIP_PX = 128
+"""Width of the strips. Narrower ones hold fewer points out of reach, and fewer whole vectors of points within."""
 
 
 class Segments(NamedTuple):
@@ -39,29 +48,58 @@ def segment_buffer(room: int) -> Segments:
     return Segments(*(np.empty(room, np.float32) for _ in range(4)))
 
 
-class RowSorted(NamedTuple):
-    """Points sorted by the row of the image they lie in."""
+class Sorted(NamedTuple):
+    """Points sorted by strip of the image, then by row."""
 
     points: FloatArray
-    """u and v, px, and whatever else was given with each point, (2 + more, N); N is filled up to whole `LANES` by
-    points far away, of which all else is 0."""
+    """u and v, px, and whatever else was given with each point, (2 + more, N); N is a whole number of `LANES`, and at
+    least `LANES` points at the end are far away, of which all else is 0."""
     rows: IntArray
-    """Index of the first point in each row or below, (height + 1,); the last is the number of points."""
+    """Index of the first point of each strip in each row or below, (strips, height + 1); the last of a strip is where
+    the next one begins, the very last the number of points."""
 
     @property
     def n_points(self) -> int:
         """Number of points."""
-        return int(self.rows[-1])
+        return int(self.rows[-1, -1])
 
 
-def sort_by_row(points: FloatArray, height: int) -> RowSorted:
-    """Sort points (N, 2 + more) by row; those above or below the image count to its first or last."""
-    rows = np.clip(np.floor(points[:, 1]), 0, height - 1).astype(np.int64)
-    order = np.argsort(rows, kind="stable")
-    filled = np.zeros((points.shape[1], -(-len(points) // LANES) * LANES), np.float32)
+def sort_points(points: FloatArray, size: tuple[int, int]) -> Sorted:
+    """Sort points (N, 2 + more) of an image of a width and height; those beside it count to its border."""
+    width, height = size
+    n_strips = -(-width // STRIP_PX)
+    cells = np.floor(points[:, :2]).astype(np.int64)
+    strips, rows = np.clip(cells[:, 0] // STRIP_PX, 0, n_strips - 1), np.clip(cells[:, 1], 0, height - 1)
+    keys = strips * height + rows
+    order = np.argsort(keys, kind="stable")
+    filled = np.zeros((points.shape[1], (len(points) // LANES + 2) * LANES), np.float32)
     filled[:2] = _FAR
     filled[:, : len(points)] = points[order].T
-    return RowSorted(filled, np.searchsorted(rows[order], np.arange(height + 1)).astype(np.int64))
+    begins = np.arange(n_strips)[:, None] * height + np.arange(height + 1)
+    return Sorted(filled, np.searchsorted(keys[order], begins).astype(np.int64))
+
+
+def stack_rows(rows: Sequence[IntArray]) -> IntArray:
+    """The `Sorted.rows` of several images in one array, (n, most strips, largest height + 1).
+
+    A smaller image ends in empty rows and in its last strip again; its points must lie within it.
+    """
+    shape = np.max([r.shape for r in rows], axis=0)
+    return np.stack([np.pad(r, [(0, n - k) for n, k in zip(shape, r.shape, strict=True)], mode="edge") for r in rows])
+
+
+@njit(**BORROW)
+def cells_within(
+    u0: np.float32, v0: np.float32, u1: np.float32, v1: np.float32, reach: np.float32, rows: IntArray
+) -> tuple[int, int, int, int]:
+    """The first and last strip, and the first row and the one after the last, that come within reach of a segment."""
+    last_strip, last_row = rows.shape[0] - 1, rows.shape[1] - 2
+    left, right = int(min(u0, u1) - reach) // STRIP_PX, int(max(u0, u1) + reach) // STRIP_PX
+    top, bottom = int(min(v0, v1) - reach) - 1, int(max(v0, v1) + reach) + 1
+    return (
+        min(max(left, 0), last_strip), min(max(right, 0), last_strip),
+        min(max(top, 0), last_row), min(max(bottom, 0), last_row) + 1,
+    )  # fmt: skip
 
 
 @njit(**FAST)
@@ -71,31 +109,34 @@ def nearest_segment(
     """Distance of each point to the nearest of n segments; exact up to the reach, beyond it at least the reach.
 
     Args:
-        u: of the points (see `RowSorted`), (N,), px.
+        u: of the points (see `Sorted`), (N,), px.
         v: (N,), px.
-        rows: index of the first point of each row, (height + 1,).
+        rows: index of the first point of each strip and row, (strips, height + 1).
         segments: the segments.
         n: their number.
         reach: up to where distances matter, px.
         out: the distances, (N,), px.
     """
-    last_row = rows.shape[0] - 1
     out[: u.shape[0]] = _FAR2
     far = np.float32(reach)
     for k in range(n):
         x, y, dx, dy = segments.u[k], segments.v[k], segments.du[k], segments.dv[k]
-        inverse = _ONE / max(dx * dx + dy * dy, np.float32(1e-12))
-        top, bottom = int(min(y, y + dy) - far) - 1, int(max(y, y + dy) + far) + 1
-        first = rows[min(max(top, 0), last_row - 1)] // LANES * LANES  # whole vectors, of points nearby at worst
-        count = (rows[min(max(bottom, 1), last_row)] - first + LANES - 1) // LANES * LANES
-        for j in range(np.uint64(count)):  # unsigned: an index that may be negative is not vectorized
-            i = np.uint64(first) + j
-            from_u, from_v = u[i] - x, v[i] - y
-            t = (from_u * dx + from_v * dy) * inverse
-            t = t if t > _ZERO else _ZERO
-            t = t if t < _ONE else _ONE
-            off_u, off_v = from_u - t * dx, from_v - t * dy
-            squared = off_u * off_u + off_v * off_v
-            out[i] = squared if squared < out[i] else out[i]
+        left, right, top, bottom = cells_within(x, y, x + dx, y + dy, far, rows)
+        # Measured from its middle, along and across.
+        length = np.sqrt(dx * dx + dy * dy)
+        along_u, along_v = (dx / length, dy / length) if length > _SHORT else (_ONE, _ZERO)
+        half = _HALF * length
+        x, y = x + _HALF * dx, y + _HALF * dy
+        for strip in range(left, right + 1):
+            first, last = np.uint64(rows[strip, top]), np.uint64(rows[strip, bottom])
+            # Whole vectors, of points nearby at worst. Unsigned: an index that may be negative is not vectorized.
+            for j in range((last - first + np.uint64(LANES - 1)) // np.uint64(LANES) * np.uint64(LANES)):
+                i = first + j
+                from_u, from_v = u[i] - x, v[i] - y
+                across = from_v * along_u - from_u * along_v
+                beyond = abs(from_u * along_u + from_v * along_v) - half
+                beyond = beyond if beyond > _ZERO else _ZERO
+                squared = across * across + beyond * beyond
+                out[i] = squared if squared < out[i] else out[i]
     for k in range(u.shape[0]):
         out[k] = np.sqrt(out[k])

@@ -26,9 +26,10 @@ from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence
 from tracker.fit import Normal
 from tracker.kinematics import Kinematics
-from tracker.matching import Scene, Scratch, Sums, gather, to_dofs
-from tracker.nearest import sort_by_row
+from tracker.matching import Scene, Sums, gather, scratch_for
+from tracker.nearest import sort_points, stack_rows
 from tracker.rigid import Array
+from tracker.twists import to_dofs
 
 _CAPTURE = 2.0
 """Edge points farther than this many outlier distances from the predicted contours are left out for good."""
@@ -103,8 +104,7 @@ class ContourMatch:
             _within(v, bodies, np.inf if everywhere else _CAPTURE * theta, settings)
             for v, theta in zip(views, thetas, strict=True)
         ]
-        sorted_points = [sort_by_row(p.T, v.camera.height) for p, v in zip(points, views, strict=True)]
-        tallest = max(v.camera.height for v in views)
+        sorted_points = [sort_points(p.T, v.camera.size) for p, v in zip(points, views, strict=True)]
         self._outline_points = np.array([0 if v.silhouette is None else len(v.silhouette.points_px) for v in views])
         weights = settings.information_per_px * np.array([settings.model_to_image, settings.image_to_model])
         self._scene = Scene(
@@ -114,7 +114,7 @@ class ContourMatch:
             np.concatenate([v.distance.ravel() for v in views]),
             np.ascontiguousarray(np.concatenate([s.points for s in sorted_points], axis=1)),
             np.cumsum([0] + [s.points.shape[1] for s in sorted_points]),
-            np.stack([np.pad(s.rows, (0, tallest + 1 - len(s.rows)), mode="edge") for s in sorted_points]),
+            stack_rows([s.rows for s in sorted_points]),
             np.array(thetas),
             # A view without any edge has nothing to say; its distance image is flat.
             np.array([weights if len(v.points_px) else 0 * weights for v in views]),
@@ -122,10 +122,7 @@ class ContourMatch:
         widest = max((v.camera for v in views), key=lambda camera: camera.width)
         room, n_points = contours.contour_room(widest, len(bodies)), self._scene.points.shape[1]
         n_parts = len(self._Ts)
-        self._scratch = Scratch(
-            contours.piece_buffer(self._surfaces, room), np.empty((7, room), np.float32), np.empty(room, np.int64),
-            np.empty(room, np.int64), np.empty(n_points, np.float32), np.empty(n_points, np.int32),
-        )  # fmt: skip
+        self._scratch = scratch_for(self._surfaces, room, n_points)
         self._sums = Sums(
             np.empty((n_parts, 6, 6)), np.empty((n_parts, 6)), np.empty((len(views), n_parts, 3)), np.empty(len(views))
         )

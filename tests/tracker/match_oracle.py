@@ -4,6 +4,7 @@ Matches are made once, at one pose. At another pose the matched surface points h
 else has changed: a cost that can be differentiated numerically. Only the contours' pieces are taken from the tracker.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,29 @@ class Matches(NamedTuple):
     """Squared distance that the turn between edge and piece adds, (N,)."""
     weights: np.ndarray
     """Information, (N,), 1/px^2."""
+
+
+def without_ties(views, bodies, settings, theta_px):
+    """The views without the edge points of which rounding decides what piece they belong to."""
+    out = []
+    for view in views:
+        seen = contours.trace(bodies, view.camera)
+        squared = np.sort(squared_distances(view, seen.pieces_px[~seen.hidden].astype(float), settings, theta_px)[0])
+        clear = squared[:, 1] - squared[:, 0] > 1e-3 if squared.shape[1] > 1 else np.ones(len(squared), bool)
+        out.append(replace(view, points_px=view.points_px[clear], normals=view.normals[clear]))
+    return out
+
+
+def squared_distances(view, pieces_px, settings, theta_px):
+    """From each edge point to each piece, with the turn between them, (n, k); the feet (n, k, 2); the turns (n, k)."""
+    ends, u = pieces_px.reshape(-1, 2, 2), view.points_px.astype(float)
+    steps = ends[:, 1] - ends[:, 0]
+    lengths = np.linalg.norm(steps, axis=1)
+    normals = np.stack([-steps[:, 1], steps[:, 0]], axis=1) / lengths[:, None]
+    t = np.einsum("nkc,kc->nk", u[:, None] - ends[:, 0], steps) / lengths**2
+    feet = ends[:, 0] + np.clip(t, 0, 1)[..., None] * steps
+    turns = settings.turn * theta_px**2 * (1 - (view.normals.astype(float) @ normals.T) ** 2)
+    return np.sum((feet - u[:, None]) ** 2, axis=2) + turns, feet, turns
 
 
 class MatchOracle:
@@ -69,11 +93,8 @@ class MatchOracle:
                 frozen(np.flatnonzero(inside), middles[inside], None, np.zeros(len(w)), w)
             if settings.image_to_model:
                 w = told * settings.image_to_model * SCENE_SPACING_PX
+                squared, feet, turns = squared_distances(view, seen.pieces_px, settings, theta_px)
                 u = view.points_px.astype(float)
-                t = np.einsum("nkc,kc->nk", u[:, None] - ends[:, 0], steps) / lengths**2
-                feet = ends[:, 0] + np.clip(t, 0, 1)[..., None] * steps
-                turns = settings.turn * theta_px**2 * (1 - (view.normals.astype(float) @ normals.T) ** 2)
-                squared = np.sum((feet - u[:, None]) ** 2, axis=2) + turns
                 k, i = squared.argmin(axis=1), np.arange(len(u))
                 matched = (squared[i, k] < theta_px**2) & own[k]
                 rest = np.minimum(squared[i, k][~matched], theta_px**2)

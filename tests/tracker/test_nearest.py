@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracker.nearest import LANES, Segments, nearest_segment, sort_by_row
+from tracker.nearest import LANES, STRIP_PX, Segments, nearest_segment, sort_points, stack_rows
 
-HEIGHT = 200
+WIDTH, HEIGHT = 3 * STRIP_PX - 50, 200
 
 
 def distances(points, segments):
@@ -16,7 +16,7 @@ def distances(points, segments):
 
 
 def run(points, segments, reach):
-    found = sort_by_row(points.astype(np.float32), HEIGHT)
+    found = sort_points(points.astype(np.float32), (WIDTH, HEIGHT))
     out = np.empty(found.points.shape[1], np.float32)
     nearest_segment(
         *found.points, found.rows, Segments(*segments.T.astype(np.float32).copy()), len(segments), reach, out
@@ -28,8 +28,9 @@ def run(points, segments, reach):
 @given(st.integers(0, 10_000), st.integers(0, 70), st.integers(0, 12), st.sampled_from([1.0, 8.0, 500.0]))
 def test_as_by_brute_force_within_reach(seed, n_points, n_segments, reach):
     rng = np.random.default_rng(seed)
-    points = rng.uniform(-20, HEIGHT + 20, (n_points, 2))  # some above and below the image
-    segments = np.column_stack([rng.uniform(-60, HEIGHT + 60, (n_segments, 2)), rng.normal(0, 30, (n_segments, 2))])
+    size = np.array([WIDTH, HEIGHT])
+    points = rng.uniform(-20, size + 20, (n_points, 2))  # some beside the image
+    segments = np.column_stack([rng.uniform(-60, size + 60, (n_segments, 2)), rng.normal(0, 30, (n_segments, 2))])
     segments[: n_segments // 3, 2:] = 0  # points are segments too
     found, out = run(points, segments, reach)
     sorted_points = found.points[:, : found.n_points].T
@@ -41,8 +42,27 @@ def test_as_by_brute_force_within_reach(seed, n_points, n_segments, reach):
 
 
 def test_filled_up_by_points_that_are_nowhere():
-    found, out = run(np.array([[10.0, 10.0], [10.0, 9.5]]), np.array([[10.0, 12.0, 5.0, 0.0]]), 20.0)
-    assert found.points.shape == (2, LANES)
+    points = np.array([[10.0, 10.0], [STRIP_PX, 9.0], [10.0, 9.5]])
+    found, out = run(points, np.array([[10.0, 12.0, 5.0, 0.0]]), 20.0)
+    assert found.points.shape == (2, 2 * LANES)  # whole vectors may begin at any point
     assert out[:2] == pytest.approx([2.5, 2.0])
-    assert out[2:].min() > 1e5
-    assert found.rows[[9, 10, 11, HEIGHT]].tolist() == [0, 1, 2, 2]
+    assert out[3:].min() > 1e5
+    assert found.rows[:, [9, 10, 11, HEIGHT]].tolist() == [[0, 1, 2, 2], [2, 3, 3, 3], [3, 3, 3, 3]]
+
+
+def test_images_of_several_sizes_in_one_array():
+    """Their own points are found as alone, whatever is filled up."""
+    rng = np.random.default_rng(2)
+    sizes = [(3 * STRIP_PX, 90), (STRIP_PX, 150), (2 * STRIP_PX - 9, 70)]
+    found = [sort_points(rng.uniform(0, s, (40, 2)).astype(np.float32), s) for s in sizes]
+    rows = stack_rows([f.rows for f in found])
+    assert rows.shape == (3, 3, 151)
+    segments = np.column_stack([rng.uniform(-20, (400, 160), (60, 2)), rng.normal(0, 20, (60, 2))]).T.astype(np.float32)
+    for one, filled in zip(found, rows, strict=True):
+        alone, together = np.empty((2, one.points.shape[1]), np.float32)
+        nearest_segment(*one.points, one.rows, Segments(*segments), 60, 15.0, alone)
+        nearest_segment(*one.points, filled, Segments(*segments), 60, 15.0, together)
+        near = alone < 15
+        assert near.sum() > 10
+        np.testing.assert_array_equal(together[near], alone[near])
+        assert np.all(together[~near] >= 15)
