@@ -16,9 +16,9 @@ from tracker import contours
 from tracker.body import Body
 from tracker.chamfer import ChamferCost
 from tracker.evidence import Observer
-from tracker.fit import Fit, StayNear, solve
+from tracker.fit import Block, Fit, StayNear, solve
 from tracker.recording import Recording
-from tracker.refine import ContourMatch
+from tracker.refine import WORTH_A_STEP, ContourMatch
 from tracker.rigid import Array
 from tracker.search import search
 from tracker.track import TrackSettings, track_chamfer
@@ -134,7 +134,8 @@ def _refined(frame: BenchFrame, start: Array, predicted: Array) -> Fit:
     model = frame.model
     match = ContourMatch(frame.views, [Body(model, start)])
     sigma = np.where(model.dof_is_length, _SETTINGS.trust_m, _SETTINGS.trust_rad)
-    return solve(model, start, [match, StayNear(predicted, 1 / sigma)], max_iterations=15, tolerance=1e-3)
+    blocks: list[Block] = [match, StayNear(predicted, 1 / sigma)]
+    return solve(model, start, blocks, max_iterations=15, tolerance=1e-3, gain=WORTH_A_STEP)
 
 
 def _apart(frame: BenchFrame, start: Array, fit: Fit) -> str:

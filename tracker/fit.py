@@ -8,10 +8,12 @@ limits.
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dposv
 
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
@@ -19,6 +21,8 @@ from tracker.kinematics import IntArray, Kinematics
 from tracker.rigid import Array
 
 _MOST_DAMPING = 1e8
+_FELT_DAMPING = 1e-2
+"""Damping after a step that was refused, at least: less would hardly change it."""
 _UNKNOWN = 1.0
 """Variance of a degree of freedom that nothing is known of, rad^2 or m^2."""
 
@@ -85,7 +89,11 @@ class StayNear:
         """See `Block`."""
         # d(difference)/d(step) is the identity to first order, for balls up to the curvature of the rotation.
         r = model.difference(values, self.values) * self.weights
-        return Normal(0.5 * float(r @ r), self.weights * r, np.diag(self.weights**2))
+        return Normal(0.5 * float(r @ r), self.weights * r, self._hessian)
+
+    @cached_property
+    def _hessian(self) -> Array:
+        return np.diag(self.weights**2)
 
 
 class Fit(NamedTuple):
@@ -107,6 +115,7 @@ def solve(
     free: NDArray[np.bool_] | None = None,
     max_iterations: int = 50,
     tolerance: float = 1e-6,
+    gain: float = 0.0,
 ) -> Fit:
     """Minimize the summed cost of all blocks within the joint limits (Levenberg-Marquardt with an active set).
 
@@ -117,6 +126,8 @@ def solve(
         free: which degrees of freedom may move, (n_dofs,); all by default.
         max_iterations: how often to take a step at most.
         tolerance: smallest step that is worth another iteration, rad or metres.
+        gain: smallest decrease of the cost that is worth another iteration, promised or found. Costs of image
+            residuals are rough at their bottom, where steps are refused over and over.
     """
     may_move = np.ones(model.n_dofs, dtype=bool) if free is None else free
     values = model.clip(values)
@@ -131,21 +142,32 @@ def solve(
         # Damping by the diagonal leaves metres and radians to themselves; the floor serves dofs nothing speaks of.
         scale = np.diag(H) + 1e-6 * max(1e-12, float(np.trace(H)) / len(H))
         while True:
-            step = np.zeros(model.n_dofs)
-            step[moving] = -np.linalg.solve(H + damping * np.diag(scale), g)
-            trial = model.clip(model.retract(values, step))
-            there = _sum(model, trial, blocks)
-            if there.cost < here.cost or damping > _MOST_DAMPING:
+            step = _damped_step(H, g, damping * scale)
+            worth = -(g + 0.5 * H @ step) @ step > gain
+            change = np.zeros(model.n_dofs)
+            change[moving] = step
+            trial = model.clip(model.retract(values, change))
+            moved = float(np.abs(model.difference(trial, values)).max())
+            there = _sum(model, trial, blocks) if worth else here
+            if there.cost < here.cost or not worth or moved < tolerance or damping > _MOST_DAMPING:
                 break
-            damping *= 10
+            damping = max(10 * damping, _FELT_DAMPING)
         if there.cost >= here.cost:
             break
-        moved = float(np.abs(model.difference(trial, values)).max())
+        gained = here.cost - there.cost
         values, here = trial, there
         damping = max(1e-9, damping / 10)
-        if moved < tolerance:
+        if moved < tolerance or gained < gain:
             break
     return Fit(values, here.cost, iterations, here.hessian)
+
+
+def _damped_step(H: Array, g: Array, damping: Array) -> Array:
+    """The step from normal equations whose diagonal is raised by a damping, (n,)."""
+    raised = H.copy()
+    raised.flat[:: len(g) + 1] += damping
+    _, step, info = dposv(raised, -g)
+    return np.asarray(step) if info == 0 else -g / (np.diag(H) + damping)  # not definite to the last digit
 
 
 def covariance(model: BodyModel, fit: Fit) -> Array:

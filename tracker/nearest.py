@@ -66,17 +66,34 @@ class Sorted(NamedTuple):
 
 def sort_points(points: FloatArray, size: tuple[int, int]) -> Sorted:
     """Sort points (N, 2 + more) of an image of a width and height; those beside it count to its border."""
-    width, height = size
-    n_strips = -(-width // STRIP_PX)
-    cells = np.floor(points[:, :2]).astype(np.int64)
-    strips, rows = np.clip(cells[:, 0] // STRIP_PX, 0, n_strips - 1), np.clip(cells[:, 1], 0, height - 1)
-    keys = strips * height + rows
-    order = np.argsort(keys, kind="stable")
+    n_strips = -(-size[0] // STRIP_PX)
     filled = np.zeros((points.shape[1], (len(points) // LANES + 2) * LANES), np.float32)
     filled[:2] = _FAR
-    filled[:, : len(points)] = points[order].T
-    begins = np.arange(n_strips)[:, None] * height + np.arange(height + 1)
-    return Sorted(filled, np.searchsorted(keys[order], begins).astype(np.int64))
+    begins = np.zeros((n_strips, size[1] + 1), np.int64)
+    _sort(np.ascontiguousarray(points, np.float32), np.empty(len(points), np.int64), begins, filled)
+    return Sorted(filled, begins)
+
+
+@njit(nogil=True, cache=True)
+def _sort(points: FloatArray, cells: IntArray, begins: IntArray, out: FloatArray) -> None:
+    """Sort points (N, n) into out (n, N or more) by counting; cells is room for N numbers, begins holds zeros."""
+    n_strips, height = begins.shape[0], begins.shape[1] - 1
+    flat = begins.reshape(-1)
+    for i in range(points.shape[0]):
+        strip = min(max(int(np.floor(points[i, 0])) // STRIP_PX, 0), n_strips - 1)
+        cells[i] = strip * (height + 1) + min(max(int(np.floor(points[i, 1])), 0), height - 1)
+        flat[cells[i]] += 1
+    total = 0
+    for k in range(flat.shape[0]):
+        here, flat[k] = flat[k], total
+        total += here
+    for i in range(points.shape[0]):
+        for k in range(points.shape[1]):
+            out[k, flat[cells[i]]] = points[i, k]
+        flat[cells[i]] += 1
+    for k in range(flat.shape[0] - 1, 0, -1):  # each cell has moved on to where the next one begins
+        flat[k] = flat[k - 1]
+    flat[0] = 0
 
 
 def stack_rows(rows: Sequence[IntArray]) -> IntArray:
@@ -84,8 +101,13 @@ def stack_rows(rows: Sequence[IntArray]) -> IntArray:
 
     A smaller image ends in empty rows and in its last strip again; its points must lie within it.
     """
-    shape = np.max([r.shape for r in rows], axis=0)
-    return np.stack([np.pad(r, [(0, n - k) for n, k in zip(shape, r.shape, strict=True)], mode="edge") for r in rows])
+    out = np.empty((len(rows), max(r.shape[0] for r in rows), max(r.shape[1] for r in rows)), np.int64)
+    for into, given in zip(out, rows, strict=True):
+        strips, n_rows = given.shape
+        into[:strips, :n_rows] = given
+        into[:strips, n_rows:] = given[:, -1:]
+        into[strips:] = into[strips - 1]
+    return out
 
 
 @njit(**BORROW)

@@ -34,6 +34,11 @@ from tracker.twists import to_dofs
 _CAPTURE = 2.0
 """Edge points farther than this many outlier distances from the predicted contours are left out for good."""
 
+WORTH_A_STEP = 0.1
+"""Decrease of the cost that is worth another iteration of `fit.solve`: at the bottom, where points change from piece to
+piece and pieces come and go, costs are rougher than that. (On 39 frames of three recordings iterations went from 18
+evaluations to 6, and joints ended 2 mm from where endless iteration leads instead of 1.6.)"""
+
 
 @dataclass(frozen=True)
 class MatchSettings:
@@ -104,7 +109,7 @@ class ContourMatch:
             _within(v, bodies, np.inf if everywhere else _CAPTURE * theta, settings)
             for v, theta in zip(views, thetas, strict=True)
         ]
-        sorted_points = [sort_points(p.T, v.camera.size) for p, v in zip(points, views, strict=True)]
+        sorted_points = [sort_points(p, v.camera.size) for p, v in zip(points, views, strict=True)]
         self._outline_points = np.array([0 if v.silhouette is None else len(v.silhouette.points_px) for v in views])
         weights = settings.information_per_px * np.array([settings.model_to_image, settings.image_to_model])
         self._scene = Scene(
@@ -163,41 +168,33 @@ class ContourMatch:
 
 
 def _within(view: ViewEvidence, bodies: Sequence[Body], reach_px: float, settings: MatchSettings) -> FloatArray:
-    """Points of edges, then of the silhouette, within reach of the visible contours, (6, N).
+    """Points of edges, then of the silhouette, within reach of the visible contours, (N, 6).
 
-    Rows: u, v, normal's u, v, weight, and 0 for edges, 1 for the silhouette.
+    Columns: u, v, normal's u, v, weight, and 0 for edges, 1 for the silhouette.
     """
-    rows = [_rows(view.points_px, view.normals, settings.edges, 0.0)]
-    if view.silhouette is not None and settings.silhouette * view.silhouette.trust > 0:
-        outline = view.silhouette
-        rows.append(_rows(outline.points_px, outline.normals, settings.silhouette * outline.trust, 1.0))
-    points = np.concatenate(rows, axis=1)
+    edges, outline = len(view.points_px), view.silhouette
+    weight = 0.0 if outline is None else settings.silhouette * outline.trust
+    points = np.empty((edges + (len(outline.points_px) if outline is not None and weight > 0 else 0), 6), np.float32)
+    points[:edges, :2], points[:edges, 2:4], points[:edges, 4:] = view.points_px, view.normals, (settings.edges, 0.0)
+    if outline is not None and weight > 0:
+        points[edges:, :2], points[edges:, 2:4], points[edges:, 4:] = outline.points_px, outline.normals, (weight, 1.0)
     if np.isinf(reach_px):
         return points
     contour = contours.trace(bodies, view.camera)
-    pieces = contour.pieces_px[~contour.hidden]
-    if not len(pieces) or not points.shape[1]:
-        return points[:, :0]
     # A coarse raster of the contours' surroundings is enough: this only spares work.
-    size = (view.camera.height // 8 + 1, view.camera.width // 8 + 1)
-    near = np.zeros(size, np.bool_)
-    _mark(pieces, int(np.ceil(reach_px / 8)), near)
-    return points[:, near[points[1].astype(np.intp) // 8, points[0].astype(np.intp) // 8]]
-
-
-def _rows(points_px: FloatArray, normals: FloatArray, weight: float, kind: float) -> FloatArray:
-    """Points (N, 2) with normals (N, 2) as the rows of `_within`, (6, N)."""
-    n = len(points_px)
-    return np.stack([*points_px.T, *normals.T, np.full(n, weight), np.full(n, kind)]).astype(np.float32)
+    near = np.zeros((view.camera.height // 8 + 1, view.camera.width // 8 + 1), np.bool_)
+    _mark(contour.pieces_px, contour.hidden, int(np.ceil(reach_px / 8)), near)
+    cells = points[:, :2].astype(np.intp) // 8
+    return points[near[cells[:, 1], cells[:, 0]]]
 
 
 @njit(nogil=True, cache=True)
-def _mark(pieces: FloatArray, reach: int, near: NDArray[np.bool_]) -> None:
-    """Mark the cells of 8 px around the middles of pieces, in steps of one for all cells within reach."""
+def _mark(pieces: FloatArray, hidden: NDArray[np.bool_], reach: int, near: NDArray[np.bool_]) -> None:
+    """Mark the cells of 8 px around the middles of visible pieces, in steps of one for all cells within reach."""
     rows, columns = near.shape
     for i in range(pieces.shape[0]):
         c = int(0.5 * (pieces[i, 0] + pieces[i, 2])) // 8
         r = int(0.5 * (pieces[i, 1] + pieces[i, 3])) // 8
-        if c < -reach or r < -reach or c >= columns + reach or r >= rows + reach:
+        if hidden[i] or c < -reach or r < -reach or c >= columns + reach or r >= rows + reach:
             continue
         near[max(0, r - reach) : max(0, r + reach + 1), max(0, c - reach) : max(0, c + reach + 1)] = True

@@ -208,6 +208,39 @@ def test_the_cost_never_rises():
     assert costs[-1] < 1e-8
 
 
+class Rough:
+    """A prior whose cost is rough at its bottom, as that of image residuals is; it counts how often it is asked."""
+
+    def __init__(self, near, roughness):
+        self.prior, self.roughness, self.asked = StayNear(near, np.full(GAVRILA.n_dofs, 10.0)), roughness, 0
+
+    def normal(self, model, values, kinematics):
+        self.asked += 1
+        found = self.prior.normal(model, values, kinematics)
+        return found._replace(cost=found.cost + self.roughness * np.random.default_rng(self.asked).random())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_gains_too_little_ends_the_descent(seed):
+    """On a rough bottom steps are refused again and again, each time shorter; who says what is enough is spared it."""
+    near, rng = posed(GAVRILA, seed), np.random.default_rng(seed)
+    start = shaken(GAVRILA, near, rng, 0.3, 0.1)
+    patient, content = Rough(near, 0.05), Rough(near, 0.05)
+    ends = [
+        solve(GAVRILA, start, [patient], tolerance=1e-3),
+        solve(GAVRILA, start, [content], tolerance=1e-3, gain=0.1),
+    ]
+    assert content.asked < patient.asked
+    assert content.asked <= 5
+    for end in ends:
+        assert end.cost < 0.1
+    # What no step promises to gain is not tried at all.
+    idle = Rough(near, 0.0)
+    stay = solve(GAVRILA, start, [idle], gain=1e6)
+    assert (idle.asked, stay.iterations) == (1, 1)
+    np.testing.assert_array_equal(stay.values, GAVRILA.clip(start))
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_fit_to_points_recovers_poses_from_their_own_joints(seed):
     """Anywhere, facing any way, limbs at random within their limits; the limb joints alone are known."""
