@@ -47,9 +47,8 @@ class Probes:
 
     def read(self, image: Image) -> Readings:
         """Read a frame as filmed, (H, W, 3)."""
-        patches = np.empty((len(self._rows) * len(self._columns), 3, _TAPS * _TAPS), np.float32)
-        _gather(image, self._rows, self._columns, self._block, patches)
-        responses = patches @ self._kernels  # (n, 3, 3): channels, then smooth and the two derivatives
+        responses = np.empty((len(self._rows) * len(self._columns), 3, 3), np.float32)
+        _respond(image, self._rows, self._columns, self._block, self._kernels, responses)
         strengths = np.abs(responses[..., 1:]).sum(axis=-1).max(axis=-1)
         return Readings(np.ascontiguousarray(responses[..., 0]), strengths)
 
@@ -63,33 +62,53 @@ def _taps(length: int, scale: float) -> NDArray[np.int64]:
 
 
 def _kernels() -> FloatArray:
-    """Smoothing, and Sobel's derivatives along u and v of the smoothed image, as columns, (taps^2, 3)."""
+    """Smoothing, and Sobel's derivatives along u and v of the smoothed image, as rows, (3, taps^2)."""
     smooth = np.pad(cv2.getGaussianKernel(_TAPS - 2, SMOOTHING_PX).ravel(), 1)
     narrow = smooth[1:-1]
     wide, derived = np.convolve(narrow, (1.0, 2.0, 1.0)), np.convolve(narrow, (1.0, 0.0, -1.0))
     pairs = ((smooth, smooth), (wide, derived), (derived, wide))  # along v, along u
-    return np.stack([np.outer(v, u).ravel() for v, u in pairs], axis=1).astype(np.float32)
+    return np.stack([np.outer(v, u).ravel() for v, u in pairs]).astype(np.float32)
 
 
-@njit(nogil=True, cache=True)
-def _gather(image: Image, rows: NDArray[np.int64], columns: NDArray[np.int64], block: int, patches: FloatArray) -> None:
-    """Fill the patches, (n, 3, taps^2); each tap is the mean of a block of pixels, as a reduced image would show."""
-    height, width, _ = image.shape
-    taps = rows.shape[1]
-    share = np.float32(1.0 / (block * block))
+@njit(nogil=True, cache=True, fastmath={"reassoc", "contract"})
+def _respond(
+    image: Image, rows: NDArray[np.int64], columns: NDArray[np.int64], block: int, kernels: FloatArray,
+    responses: FloatArray,
+) -> None:  # fmt: skip
+    """Fill the responses of the kernels, (3, taps^2), at each place: (n, channels, kernels).
+
+    One place after the other: the patches of all of them would be fresh memory, and their product with the kernels so
+    large that BLAS spreads it over threads of its own, which wait for cores that are busy.
+    """
+    patch = np.empty((3, kernels.shape[1]), np.float32)
     n = 0
     for r in range(rows.shape[0]):
         for c in range(columns.shape[0]):
-            for i in range(taps):
-                for j in range(taps):
-                    red, green, blue = 0, 0, 0
-                    for di in range(block):
-                        v = min(rows[r, i] + di, height - 1)
-                        for dj in range(block):
-                            u = min(columns[c, j] + dj, width - 1)
-                            red += image[v, u, 0]
-                            green += image[v, u, 1]
-                            blue += image[v, u, 2]
-                    t = i * taps + j
-                    patches[n, 0, t], patches[n, 1, t], patches[n, 2, t] = red * share, green * share, blue * share
+            _take_patch(image, rows[r], columns[c], block, patch)
+            for channel in range(3):
+                for k in range(3):
+                    total = np.float32(0.0)
+                    for t in range(kernels.shape[1]):
+                        total += patch[channel, t] * kernels[k, t]
+                    responses[n, channel, k] = total
             n += 1
+
+
+@njit(nogil=True, cache=True)
+def _take_patch(
+    image: Image, rows: NDArray[np.int64], columns: NDArray[np.int64], block: int, patch: FloatArray
+) -> None:
+    """Fill a patch, (3, taps^2); each tap is the mean of a block of pixels, as a reduced image would show."""
+    height, width, _ = image.shape
+    share = np.float32(1.0 / (block * block))
+    patch[:] = 0.0
+    for di in range(block):
+        for dj in range(block):
+            for i in range(rows.shape[0]):
+                v = min(rows[i] + di, height - 1)
+                first = i * columns.shape[0]
+                for j in range(columns.shape[0]):
+                    u, t = min(columns[j] + dj, width - 1), first + j
+                    patch[0, t] += share * np.float32(image[v, u, 0])
+                    patch[1, t] += share * np.float32(image[v, u, 1])
+                    patch[2, t] += share * np.float32(image[v, u, 2])

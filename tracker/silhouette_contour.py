@@ -39,7 +39,7 @@ def trace_outline(silhouette: Mask) -> Outline:
     points = np.concatenate(long) if long else np.empty((0, 2), np.int32)
     u, v = points.T
     points = points[(u > 0) & (v > 0) & (u < width - 1) & (v < height - 1)]
-    soft = cv2.blur(np.where(silhouette, np.uint8(255), np.uint8(0)), _NORMAL_WINDOW)
+    soft = cv2.blur(silhouette.view(np.uint8) * np.uint8(255), _NORMAL_WINDOW)
     u, v = points.T
     inward = np.stack([np.asarray(g)[v, u] for g in cv2.spatialGradient(soft)], axis=-1).astype(np.float32)
     lengths = np.linalg.norm(inward, axis=-1, keepdims=True)
@@ -67,5 +67,5 @@ def trust_outline(outline: Outline, silhouette: Mask, edges: Edges) -> float:
     lengths = np.linalg.norm(gradients, axis=-1)
     aligned = np.abs(np.sum(gradients * outline.normals, axis=-1)) > _ALIGNED * lengths
     seen = (float(np.mean(near & aligned)) - _NO_TRUST) / (_FULL_TRUST - _NO_TRUST)
-    plausible = (_TOO_FULL - float(np.mean(silhouette))) / (_TOO_FULL - _FULL)
+    plausible = (_TOO_FULL - cv2.countNonZero(silhouette.view(np.uint8)) / silhouette.size) / (_TOO_FULL - _FULL)
     return min(max(seen, 0.0), 1.0) * min(max(plausible, 0.0), 1.0)

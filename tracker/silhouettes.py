@@ -84,8 +84,8 @@ def subtract_background(smooth: Image, background: Image, threshold: float) -> C
         threshold: see `change_threshold`.
     """
     changed = np.empty(smooth.shape[:2], np.uint8)
-    planes = (np.stack([np.asarray(c).ravel() for c in cv2.split(image)]) for image in (smooth, background))
-    _find_changes(*planes, np.float32(threshold), np.float32(MIN_SHADE), np.float32(MAX_HUE_SHIFT), changed.ravel())
+    bounds = np.float32(threshold), np.float32(MIN_SHADE), np.float32(MAX_HUE_SHIFT)
+    _find_changes(smooth.ravel(), background.ravel(), *bounds, changed.ravel())
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
     inside, anything = (
         np.asarray(cv2.morphologyEx((changed > least).view(np.uint8), cv2.MORPH_OPEN, cross)) > 0
@@ -99,7 +99,7 @@ def _find_changes(
     image: NDArray[np.uint8], empty: NDArray[np.uint8], threshold: float, least: float, hue: float,
     changed: NDArray[np.uint8],
 ) -> None:  # fmt: skip
-    """Fill in what became of each pixel, (n,): the same, in a shadow, or new; colours are (3, n) each.
+    """Fill in what became of each pixel, (n,): the same, in a shadow, or new; colours are (3 n,) each.
 
     In float32, without branches, and without the check for a division by zero, so that it runs on whole vectors: ten
     times as fast.
@@ -107,8 +107,8 @@ def _find_changes(
     one = np.float32(1.0)
     same, shadow, new = np.float32(_SAME), np.float32(_SHADOW), np.float32(_NEW)
     for i in range(changed.shape[0]):
-        r, g, b = np.float32(image[0, i]), np.float32(image[1, i]), np.float32(image[2, i])
-        r0, g0, b0 = np.float32(empty[0, i]), np.float32(empty[1, i]), np.float32(empty[2, i])
+        r, g, b = np.float32(image[3 * i]), np.float32(image[3 * i + 1]), np.float32(image[3 * i + 2])
+        r0, g0, b0 = np.float32(empty[3 * i]), np.float32(empty[3 * i + 1]), np.float32(empty[3 * i + 2])
         shade = (r * r0 + g * g0 + b * b0) / (r0 * r0 + g0 * g0 + b0 * b0 + one)
         red, green, blue = abs(r - r0), abs(g - g0), abs(b - b0)
         difference = red if red > green else green

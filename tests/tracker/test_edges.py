@@ -115,6 +115,15 @@ def test_gradients_are_those_of_the_strongest_channel():
         assert gradients[:, v, u].tolist() == [gx[strongest], gy[strongest]]
 
 
+@pytest.mark.parametrize("shape", [(20, 30), (17, 16), (2, 40), (40, 2)])
+def test_gradients_are_those_of_opencv_up_to_the_border(shape):
+    smooth = np.random.default_rng(4).integers(0, 255, (*shape, 3)).astype(np.uint8)
+    derived = np.array([cv2.spatialGradient(channel) for channel in cv2.split(smooth)], dtype=int)  # (3, 2, H, W)
+    strongest = np.argmax(np.abs(derived).sum(axis=1), axis=0)  # the first of equals
+    expected = np.take_along_axis(derived, strongest[None, None], axis=0)[0]
+    np.testing.assert_array_equal(detect_edges(smooth, Levels(60.0, 30.0)).gradients, expected)
+
+
 def test_levels_follow_the_picture_unless_a_foreground_restricts_it():
     calm, busy = np.linspace(0, 40, 101, dtype=np.float32), np.linspace(0, 400, 101, dtype=np.float32)
     assert levels(calm, restricted=False) == (48, pytest.approx(32))
