@@ -8,7 +8,7 @@ stays in the log but cannot be reached any more. Nothing but the current state a
 import json
 import sqlite3
 import threading
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import cache
@@ -89,8 +89,9 @@ class AnnotationStore:
         """The pose of a person in a frame, or None."""
         row = self._one(
             "SELECT c.numbers, c.sources, c.views_px, c.parts_px, c.model_revision, c.keyframe, c.status, c.cost_px, "
-            "c.settings, e.author, e.time, e.program, c.remark FROM poses p JOIN pose_changes c ON c.id = p.change "
-            "JOIN edits e ON e.id = c.edit WHERE p.person = ? AND p.frame = ?",
+            "coalesce(t.settings, c.settings), e.author, e.time, e.program, c.remark FROM poses p "
+            "JOIN pose_changes c ON c.id = p.change JOIN edits e ON e.id = c.edit LEFT JOIN told t ON t.id = c.told "
+            "WHERE p.person = ? AND p.frame = ?",
             (person, frame),
         )
         if row is None:
@@ -286,18 +287,24 @@ class AnnotationStore:
                 pose.status,
                 pose.cost_px,
                 pose.model_revision,
-                json.dumps(dict(pose.settings)),
+                self._told(pose.settings),
                 _blob(pose.views_px),
                 _blob(pose.parts_px),
                 pose.remark,
             )
         row = self._db.execute(
             "INSERT INTO pose_changes (edit, previous, person, frame, numbers, sources, keyframe, status, cost_px, "
-            "model_revision, settings, views_px, parts_px, remark) VALUES (?1, (SELECT change FROM poses WHERE "
+            "model_revision, told, views_px, parts_px, remark) VALUES (?1, (SELECT change FROM poses WHERE "
             "(person, frame) = (?2, ?3)), ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
             (edit, change.person, change.frame, *content),
         ).lastrowid
         self._show("pose", row, row)
+
+    def _told(self, settings: Mapping[str, Any]) -> int:
+        """Id of settings, which are kept once however many poses were made with them."""
+        text = json.dumps(dict(settings))
+        self._db.execute("INSERT OR IGNORE INTO told (settings) VALUES (?)", (text,))
+        return int(self._db.execute("SELECT id FROM told WHERE settings = ?", (text,)).fetchone()[0])
 
     def _set_pin(self, edit: int, change: PinChange) -> None:
         u, v = change.position_px or (None, None)

@@ -1,11 +1,11 @@
 """The tables of the store of annotations, and how a store of an older version becomes one of today's.
 
-Upgrading adds columns and never rewrites a row: the log of edits is what undo stands on.
+Upgrading adds tables and columns and never rewrites a row: the log of edits is what undo stands on.
 """
 
 import sqlite3
 
-VERSION = 2
+VERSION = 3
 
 _SCHEMA = """
 CREATE TABLE edits (
@@ -24,6 +24,9 @@ CREATE TABLE moves (                                             -- undo and red
 CREATE TABLE model_revisions (
     id INTEGER PRIMARY KEY AUTOINCREMENT, person TEXT NOT NULL, toml TEXT NOT NULL, time TEXT NOT NULL
 );
+CREATE TABLE told (                                              -- what programs were told: once, not with each pose
+    id INTEGER PRIMARY KEY, settings TEXT NOT NULL UNIQUE
+);
 CREATE TABLE pose_changes (
     id INTEGER PRIMARY KEY AUTOINCREMENT,
     edit INTEGER NOT NULL REFERENCES edits,
@@ -31,9 +34,11 @@ CREATE TABLE pose_changes (
     person TEXT NOT NULL, frame INTEGER NOT NULL,
     numbers BLOB,                                                -- little-endian float64; NULL: cleared
     sources BLOB, keyframe INTEGER, status TEXT, cost_px REAL,
-    model_revision INTEGER REFERENCES model_revisions, settings TEXT,
+    model_revision INTEGER REFERENCES model_revisions,
+    settings TEXT,                                               -- as versions 1 and 2 kept them; NULL since: see told
     views_px BLOB, parts_px BLOB,                                -- little-endian float64, NaN: unknown; NULL: none
-    remark TEXT
+    remark TEXT,
+    told INTEGER REFERENCES told
 );
 CREATE INDEX pose_changes_edit ON pose_changes (edit);
 CREATE TABLE poses (
@@ -61,13 +66,14 @@ _UPGRADES = {
         "ALTER TABLE pose_changes ADD COLUMN parts_px BLOB",
         "ALTER TABLE pose_changes ADD COLUMN remark TEXT",
     ),
+    2: (
+        "CREATE TABLE told (id INTEGER PRIMARY KEY, settings TEXT NOT NULL UNIQUE)",
+        "ALTER TABLE pose_changes ADD COLUMN told INTEGER REFERENCES told",
+    ),
 }
-# What a store of each older version is read through where it must not be written. A temporary view stands in front
-# of the table of its name.
-_VIEWS = {
-    1: "CREATE TEMP VIEW pose_changes AS "
-    "SELECT *, NULL AS views_px, NULL AS parts_px, NULL AS remark FROM main.pose_changes",
-}
+# Columns of the changes of poses that a store of each older version lacks. Where it must not be written it is read
+# through temporary views, which stand in front of the tables of their names.
+_LACKING = {1: ("views_px", "parts_px", "remark", "told"), 2: ("told",)}
 
 
 def version(db: sqlite3.Connection) -> int:
@@ -94,7 +100,9 @@ def upgrade(db: sqlite3.Connection) -> int:
 def show_as_new(db: sqlite3.Connection) -> int:
     """Let a store of an older version be read like one of today's, its file untouched; returns what it reads as."""
     found = version(db)
-    if found not in _VIEWS:
+    if found not in _LACKING:
         return found
-    db.execute(_VIEWS[found])
+    nothing = ", ".join(f"NULL AS {column}" for column in _LACKING[found])
+    db.execute(f"CREATE TEMP VIEW pose_changes AS SELECT *, {nothing} FROM main.pose_changes")
+    db.execute("CREATE TEMP VIEW told AS SELECT NULL AS id, NULL AS settings WHERE 0")
     return VERSION

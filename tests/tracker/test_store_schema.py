@@ -30,6 +30,19 @@ def version_1(path):
     return path
 
 
+@pytest.fixture
+def version_2(version_1):
+    """The same store as the program of version 2 has left it, its poses with their settings."""
+    db = sqlite3.connect(version_1)
+    for statement in store_schema._UPGRADES[1]:
+        db.execute(statement)
+    db.execute("UPDATE pose_changes SET settings = '{\"step_deg\": 7}'")
+    db.execute("PRAGMA user_version = 2")
+    db.commit()
+    db.close()
+    return version_1
+
+
 def test_older_version_keeps_everything(version_1):
     store = AnnotationStore(version_1)
     assert xs(store) == {1: 0.3, 2: 2.0, 3: 3.0}
@@ -65,6 +78,35 @@ def test_older_version_that_is_only_read_stays_as_it_is(version_1):
     assert [h.label for h in store.history()] == ["clear", "track", "drag", "place"]
     store.close()
     assert version_1.read_bytes() == before
+
+
+@pytest.mark.parametrize("read_only", [False, True])
+def test_settings_that_version_2_kept_with_each_pose(version_2, read_only):
+    before = version_2.read_bytes()
+    store = AnnotationStore(version_2, read_only=read_only)
+    assert (store.pose("ann", 1).settings, store.pose("ann", 1).values[0]) == ({"step_deg": 7}, 0.3)
+    store.close()
+    assert (version_2.read_bytes() == before) == read_only
+
+
+def test_settings_are_kept_once(path):
+    store = AnnotationStore(path)
+    revision = store.add_model_revision("ann", "")
+    told = {"method": "chamfer", "search": "x" * 1000}
+
+    def poses(frames, settings):
+        return [
+            PoseChange("ann", f, PoseRecord(np.zeros(2), ("tracked",) * 2, revision, settings=settings)) for f in frames
+        ]
+
+    store.commit("place", poses([0], {}))
+    before = path.stat().st_size
+    store.commit("track", poses(range(1, 200), told))
+    assert path.stat().st_size - before < 200 * 200  # bytes
+    store.commit("track", poses([7], told | {"step_deg": 3}))
+    assert [store.pose("ann", f).settings for f in (0, 5, 7)] == [{}, told, told | {"step_deg": 3}]
+    store.undo()
+    assert store.pose("ann", 7).settings == told
 
 
 def test_upgrade_is_whole_or_not_at_all(version_1, monkeypatch):
