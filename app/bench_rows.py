@@ -20,7 +20,7 @@ from tracker.fit import Block, Fit, StayNear, solve
 from tracker.recording import Recording
 from tracker.refine import WORTH_A_STEP, ContourMatch
 from tracker.rigid import Array
-from tracker.search import search
+from tracker.search import BEFORE_REFINEMENT, SearchSettings, search
 from tracker.track import TrackSettings, track_chamfer
 
 _CANDIDATES = 100
@@ -108,7 +108,7 @@ def searches(frame: BenchFrame, cones: BenchFrame, yardstick: Yardstick) -> Iter
     """Best-first search and refinement from a bad prediction; refinement alone from a good one."""
     for name, of in (("cones", cones), ("superquadrics", frame)):
         start = of.hard_prediction()
-        steps = list(search(of.cost(start), [start], _SEARCH))
+        steps = list(search(of.cost(start), [start], BEFORE_REFINEMENT))
         fit = _refined(of, steps[-1].best[0], start)
         timed = yardstick.beside(partial(_searched_and_refined, of, start), 9)
         note = f"{steps[-1].evaluations} poses scored; {_apart(of, start, fit)}"
@@ -120,13 +120,13 @@ def searches(frame: BenchFrame, cones: BenchFrame, yardstick: Yardstick) -> Iter
         yield Row(f"refine_tracked_{name}", f"tracked frame: refinement, {name}", *timed, 8 / 1.5, 4 / 1.5, note)
 
 
-def _searched(frame: BenchFrame, start: Array) -> Array:
-    *_, last = search(frame.cost(start), [start], _SEARCH)
+def _searched(frame: BenchFrame, start: Array, settings: SearchSettings = _SEARCH) -> Array:
+    *_, last = search(frame.cost(start), [start], settings)
     return last.best[0]
 
 
 def _searched_and_refined(frame: BenchFrame, start: Array) -> Fit:
-    return _refined(frame, _searched(frame, start), start)
+    return _refined(frame, _searched(frame, start, BEFORE_REFINEMENT), start)
 
 
 def _refined(frame: BenchFrame, start: Array, predicted: Array) -> Fit:

@@ -6,6 +6,7 @@ per expansion, so that a person can watch it and a program can drain it; whoever
 """
 
 import heapq
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
@@ -39,6 +40,9 @@ class SearchSettings:
     """A stage ends after this many expansions in a row that found nothing better (the paper gives no rule)."""
     max_expansions: int = 60
     """A stage ends after this many expansions in any case."""
+    limbs_apart: bool = False
+    """Whether the limbs of a group are searched one after the other. Two arms hardly know of each other, and together
+    each expansion scores the neighbours of both where one moves. The paper searches them together."""
 
     def lattice(self, model: BodyModel, dofs: Sequence[int]) -> tuple[Array, Array]:
         """Bounds and steps of some degrees of freedom, each (len(dofs),), rad or metres."""
@@ -51,6 +55,12 @@ class SearchSettings:
             self.steps.get(n, self.step_m if is_m else self.step_rad) for n, is_m in zip(names, lengths, strict=True)
         ]
         return np.array(bounds), np.array(steps)
+
+
+BEFORE_REFINEMENT = SearchSettings(passes=(1.5,), patience=1, limbs_apart=True)
+"""A search that only has to come near, because a refinement follows. Of 90 starts 8 to 12 degrees and 5 to 8 cm off in
+every degree of freedom 70 were refined to the true pose after it, with 145 poses scored; after the defaults it were 76,
+with 1,100; without a search 10."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +104,30 @@ class SearchStep:
 def stages(models: Sequence[BodyModel], settings: SearchSettings, people: Sequence[int] | None = None) -> list[Stage]:
     """List the leaves of the decomposition in the order of search: pass by pass, person by person (GD96 Fig. 2)."""
     chosen = range(len(models)) if people is None else people
-    return [Stage(i, g, f) for f in settings.passes for i in chosen for g in models[i].search_groups]
+    return [
+        Stage(person, leaf, factor)
+        for factor in settings.passes
+        for person in chosen
+        for group in models[person].search_groups
+        for leaf in (_limbs(models[person], group) if settings.limbs_apart else (group,))
+    ]
+
+
+def _limbs(model: BodyModel, group: SearchGroup) -> list[SearchGroup]:
+    """Divide a group into the joints that the body branches below, and its limbs one by one."""
+    children = Counter(model.parents)
+    branches = [children[part] > 1 for part in range(len(model.parts))]
+    for part in range(len(model.parts) - 1, 0, -1):
+        branches[model.parents[part]] |= branches[part]
+    leaves: dict[int, list[str]] = {}
+    for name in group.dofs:
+        part = int(model.dof_joint[model.dof_names.index(name)])
+        while not branches[part] and model.parents[part] >= 0 and not branches[model.parents[part]]:
+            part = model.parents[part]
+        leaves.setdefault(-1 if branches[part] else part, []).append(name)
+    if len(leaves) == 1:
+        return [group]
+    return [SearchGroup(f"{group.name}: {dofs[0].split('.')[0]}", tuple(dofs)) for dofs in leaves.values()]
 
 
 def search(

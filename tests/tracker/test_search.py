@@ -4,7 +4,10 @@ from staging import at, cameras_around, own_evidence, shaken, solid
 
 from tracker.body import Body
 from tracker.chamfer import ChamferCost
-from tracker.search import SearchSettings, search, stages
+from tracker.fit import StayNear, solve
+from tracker.formats.model_toml import load_model
+from tracker.refine import WORTH_A_STEP, ContourMatch
+from tracker.search import BEFORE_REFINEMENT, SearchSettings, search, stages
 
 COARSE = SearchSettings(passes=(1.0,))
 
@@ -255,3 +258,42 @@ def test_the_papers_settings(gavrila, views, truth, start):
     # One pass moves by whole steps alone.
     moved = gavrila.difference(found[-1].best[0], start) / np.where(gavrila.dof_is_length, 0.05, np.radians(5))
     np.testing.assert_allclose(moved, np.round(moved), atol=1e-9)
+
+
+def test_limbs_apart(gavrila):
+    """What moves two limbs stays together, each limb is alone, and nothing is lost."""
+    leaves = stages([gavrila], SearchSettings(passes=(1.0,), limbs_apart=True))
+    assert [(s.name, len(s.group.dofs)) for s in leaves] == [
+        ("torso and head", 5), ("arms: torso", 1), ("arms: left_shoulder", 4), ("arms: right_shoulder", 4),
+        ("legs: left_hip", 4), ("legs: right_hip", 4),
+    ]  # fmt: skip
+    bending = load_model("gavrila31")
+    leaves = stages([bending], SearchSettings(passes=(1.0,), limbs_apart=True))
+    named = {s.name: s.group.dofs for s in leaves}
+    assert set(named) == {
+        "torso and head: torso", "torso and head: neck", "arms: torso", "arms: left_collarbone",
+        "arms: right_collarbone", "legs: waist", "legs: left_hip", "legs: right_hip",
+    }  # fmt: skip
+    assert named["arms: left_collarbone"][-1] == "left_elbow.extension"
+    assert sorted(d for dofs in named.values() for d in dofs) == sorted(bending.dof_names)
+    ball = at(solid((0.2, 0.2, 0.2)), 0, 0, 0).model
+    assert [s.group for s in stages([ball], BEFORE_REFINEMENT)] == list(ball.search_groups)
+
+
+def test_a_refinement_makes_up_for_a_short_search(gavrila, views, truth):
+    """From 8 degrees and 5 cm off in every degree of freedom, where a refinement alone goes astray."""
+
+    def found(start, settings):
+        *_, last = search(ChamferCost(views, [Body(gavrila, start)]), [start], settings)
+        return last.best[0], last.evaluations
+
+    def refines(pose):
+        blocks = [ContourMatch(views, [Body(gavrila, pose)]), StayNear(pose, np.ones(gavrila.n_dofs))]
+        values = solve(gavrila, pose, blocks, max_iterations=15, tolerance=1e-3, gain=WORTH_A_STEP).values
+        return np.linalg.norm(gavrila.points_world(values) - gavrila.points_world(truth), axis=1).max() < 0.02
+
+    starts = [gavrila.clip(shaken(gavrila, truth, np.random.default_rng(i), np.radians(8), 0.05)) for i in range(8)]
+    near, scored = zip(*(found(s, BEFORE_REFINEMENT) for s in starts), strict=True)
+    assert max(scored) < 0.25 * found(starts[0], SearchSettings())[1]
+    assert sum(map(refines, starts)) <= 3
+    assert sum(map(refines, near)) >= 7
