@@ -250,6 +250,7 @@ def evaluate(
     if found["axis_error_deg"] is not None:
         worst = f"{found['worst_axis_error_deg']:.2f} in frame {found['worst_axis_frame']}"
         print(f"  part axes {found['axis_error_deg']:.2f} deg, worst frame's mean {worst}")
+        print(f"  without twist {found['long_axis_error_deg']:.2f} deg")
         for part, error in found["per_part_axis_deg"].items():
             print(f"  {part.replace('_', ' '):16} {error:6.2f} deg")
 

@@ -47,7 +47,10 @@ class Evaluation:
     per_joint_mm: Mapping[str, float]
     """Mean distance of each joint that both have, head and neck too."""
     axis_error_deg: float | None = None
-    """Mean angle between true and estimated part axes, over frames and parts; None without true poses."""
+    """Mean angle between true and estimated part axes, over frames and parts, with the twist where the truth shows it;
+    None without true poses."""
+    long_axis_error_deg: float | None = None
+    """The same without any twist: the parts' long axes alone, as KRH08 measured; None without true poses."""
     worst_axis_error_deg: float | None = None
     """The largest mean over the parts of one frame; None without true poses."""
     worst_axis_frame: int | None = None
@@ -140,13 +143,14 @@ def evaluate_poses(result: Evaluation, estimated: Motion, true: Motion, frames: 
             f"the bodies '{estimated.model.name}' and '{true.model.name}' have no part of the same name; "
             "compare joints instead, with a TRC file"
         )
-    errors = np.degrees([_part_errors(estimated, true, parts, f) for f in common])  # (n, m)
+    long_axis, errors = np.degrees([_part_errors(estimated, true, parts, f) for f in common]).swapaxes(0, 1)  # (n, m)
     of_frames = errors.mean(axis=1)
     worst = int(np.argmax(of_frames))
     same = true.model.dof_names == estimated.model.dof_names
     return replace(
         result,
         axis_error_deg=float(errors.mean()),
+        long_axis_error_deg=float(long_axis.mean()),
         worst_axis_error_deg=float(of_frames[worst]),
         worst_axis_frame=common[worst],
         per_part_axis_deg=dict(zip(parts, errors.mean(axis=0).tolist(), strict=True)),
@@ -235,14 +239,14 @@ def _procrustes_error(estimate: Array, truth: Array) -> Array:
 
 
 def _part_errors(estimated: Motion, true: Motion, parts: Sequence[str], frame: int) -> Array:
-    """Angle of the error of each named part on a frame, (n_parts,), rad."""
+    """Angle of the error of each named part on a frame, without twist and with it where it shows, (2, n_parts), rad."""
     R_estimated, R_true = (m.model.kinematics(m.poses[frame]).Ts_world_part[:, :3, :3] for m in (estimated, true))
     shows = _shows_twist(true.model, R_true)
     in_estimated, in_true = ([m.model.part_index[p] for p in parts] for m in (estimated, true))
     R_estimated, R_true = R_estimated[in_estimated], R_true[in_true]
     axis = _angle(R_estimated[:, :, 2], R_true[:, :, 2])
     whole = np.linalg.norm(rigid.so3_log(np.swapaxes(R_true, 1, 2) @ R_estimated), axis=-1)
-    return np.where(shows[in_true], whole, axis)
+    return np.stack([axis, np.where(shows[in_true], whole, axis)])
 
 
 def _dof_errors(estimated: Motion, true: Motion, frames: Sequence[int]) -> dict[str, float]:

@@ -192,6 +192,7 @@ def test_twist_counts_only_where_it_shows(model):
         swing = np.degrees(2 * np.arcsin(np.sin(np.radians(bend)) * np.sin(np.radians(15))))
         wanted = (swing if bend < 20 else 60.0) / n_parts
         assert found.axis_error_deg == pytest.approx(wanted if expected is None else expected, abs=1e-9)
+        assert found.long_axis_error_deg == pytest.approx(swing / n_parts, abs=1e-9)
         assert found.angle_error_deg["left_shoulder.twist"] == pytest.approx(30)
         assert found.angle_error_deg["left_elbow.extension"] == pytest.approx(0)
         assert "torso.x" not in found.angle_error_deg
