@@ -16,7 +16,7 @@ from tracker import contours
 from tracker.body import Body
 from tracker.chamfer import ChamferCost
 from tracker.evidence import Observer
-from tracker.fit import Block, Fit, StayNear, solve
+from tracker.fit import Block, Fit, StayNear, damped_step, solve
 from tracker.recording import Recording
 from tracker.refine import WORTH_A_STEP, ContourMatch
 from tracker.rigid import Array
@@ -156,8 +156,7 @@ def iterations(cones: BenchFrame, six: BenchFrame, yardstick: Yardstick) -> Iter
         def all_steps(of: BenchFrame = of, match: ContourMatch = match, poses: Sequence[Array] = poses) -> None:
             for values in poses:
                 normal = match.normal(of.model, values, of.model.kinematics(values))
-                H = normal.hessian
-                np.linalg.solve(H + 1e-3 * np.diag(np.diag(H) + 1e-6), normal.gradient)
+                damped_step(normal.hessian, normal.gradient, 1e-3 * np.diag(normal.hessian) + 1e-9)
 
         timed = yardstick.beside(all_steps, 30, len(poses))
         yield Row(f"iteration_{name}_views", f"Gauss-Newton iteration, cones, {name} views", *timed, 1 / must, 1 / aim)

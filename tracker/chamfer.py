@@ -25,12 +25,13 @@ from tracker.kernels import FAST
 from tracker.kinematics import Tree, forward_kinematics
 from tracker.nearest import Segments, Sorted, nearest_segment, segment_buffer, sort_points, stack_rows
 from tracker.rigid import Array
+from tracker.sampling import bilinear
 
 Outliers = Literal["truncated", "paper"]
 
+_ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)  # plain numbers would make it all float64
 _JOINED = 10
 """Pieces in a row on one straight edge that are matched as one segment: longer ones would reach too many points."""
-
 
 _WORTH_SHARING = 6
 """Fewer candidates than this are scored sooner than another thread is awake."""
@@ -258,44 +259,64 @@ def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool
 
 
 @njit(**FAST)
-def sample_distance(distances: FloatArray, first: int, width: int, height: int, u: np.float32, v: np.float32) -> float:
-    """Bilinear distance at a pixel; outside the image, that of the nearest border pixel and the way to it."""
-    cu = min(max(u, np.float32(0)), np.float32(width - 1))
-    cv = min(max(v, np.float32(0)), np.float32(height - 1))
-    c, r = min(int(cu), width - 2), min(int(cv), height - 2)
-    a, b = cu - np.float32(c), cv - np.float32(r)
-    i = first + r * width + c
-    top = distances[i] + a * (distances[i + 1] - distances[i])
-    bottom = distances[i + width] + a * (distances[i + width + 1] - distances[i + width])
-    inside = top + b * (bottom - top)
-    if cu == u and cv == v:
-        return inside
-    return inside + np.sqrt((u - cu) * (u - cu) + (v - cv) * (v - cv))
+def _distance(image: FloatArray, width: int, height: int, u: np.float32, v: np.float32) -> np.float32:
+    """Distance at a pixel; outside the image, that of the nearest border pixel and the way to it."""
+    inside = bilinear(image, width, height, u, v)[0]
+    half_u, half_v = _HALF * np.float32(width - 1), _HALF * np.float32(height - 1)
+    off_u, off_v = abs(u - half_u) - half_u, abs(v - half_v) - half_v
+    off_u, off_v = off_u if off_u > _ZERO else _ZERO, off_v if off_v > _ZERO else _ZERO
+    return inside + np.sqrt(off_u * off_u + off_v * off_v)
 
 
 @njit(**FAST)
-def _collect(n: int, distances: FloatArray, first: int, width: int, height: int, scratch: _Scratch) -> tuple[int, int]:
-    """Sample the distance image at the visible pieces, and join them to segments; the numbers of both."""
-    ends, hidden, edges = scratch.pieces.ends, scratch.pieces.hidden, scratch.pieces.edges
-    lengths, d, segments = scratch.lengths, scratch.distances, scratch.segments
-    half = np.float32(0.5)
-    kept, joined, n_segments, edge = 0, 0, 0, -1
+def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, pieces: contours.Pieces) -> float:
+    """Mean distance of the n visible pieces, cut off at theta; theta where none is visible.
+
+    It stores nothing, so that it runs on whole vectors of pieces, hidden ones included.
+    """
+    ends, hidden, limit = pieces.ends, pieces.hidden, np.float32(theta)
+    spared = weight = 0.0
+    for i in range(np.uint64(n)):
+        x0, y0, x1, y1 = ends[0, i], ends[1, i], ends[2, i], ends[3, i]
+        d = _distance(image, width, height, _HALF * (x0 + x1), _HALF * (y0 + y1))
+        length = np.sqrt((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0))
+        length = _ZERO if hidden[i] else length
+        spared += float(length * (limit - d if d < limit else _ZERO))
+        weight += float(length)
+    return theta - spared / weight if weight > 0.0 else theta
+
+
+@njit(**FAST)
+def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: float, scratch: _Scratch) -> float:
+    """The same by the paper's robust mean."""
+    ends, hidden, lengths, d, kept = scratch.pieces.ends, scratch.pieces.hidden, scratch.lengths, scratch.distances, 0
     for i in range(n):
+        if not hidden[i]:
+            x0, y0, x1, y1 = ends[0, i], ends[1, i], ends[2, i], ends[3, i]
+            d[kept] = _distance(image, width, height, _HALF * (x0 + x1), _HALF * (y0 + y1))
+            lengths[kept] = np.sqrt((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0))
+            kept += 1
+    return _robust_mean(d, lengths, kept, theta, True)
+
+
+@njit(**FAST)
+def _join(n: int, pieces: contours.Pieces, segments: Segments) -> int:
+    """Join n pieces, as far as they are visible, to segments; the number of those."""
+    ends, hidden, edges = pieces.ends, pieces.hidden, pieces.edges
+    su, sv, du, dv = segments.u, segments.v, segments.du, segments.dv
+    joined, edge, k = 0, -1, np.uint64(0)
+    for i in range(np.uint64(n)):
         if hidden[i]:
             edge = -1
             continue
-        x0, y0, x1, y1 = ends[0, i], ends[1, i], ends[2, i], ends[3, i]
-        d[kept] = sample_distance(distances, first, width, height, half * (x0 + x1), half * (y0 + y1))
-        lengths[kept] = np.sqrt((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0))
-        kept += 1
         if edges[i] != edge or joined == _JOINED:
             edge, joined = edges[i], 0
-            segments.u[n_segments], segments.v[n_segments] = x0, y0
-            n_segments += 1
+            su[k], sv[k] = ends[0, i], ends[1, i]
+            k += np.uint64(1)
         joined += 1
-        k = n_segments - 1
-        segments.du[k], segments.dv[k] = x1 - segments.u[k], y1 - segments.v[k]
-    return kept, n_segments
+        last = k - np.uint64(1)
+        du[last], dv[last] = ends[2, i] - su[last], ends[3, i] - sv[last]
+    return int(k)
 
 
 @njit(**FAST)
@@ -307,8 +328,12 @@ def _score(
     for view in range(scene.P.shape[0]):
         width, height, theta = scene.sizes[view, 0], scene.sizes[view, 1], scene.thetas[view]
         n = contours.trace_pieces(scene.P[view], scene.eyes[view], Ts, surfaces, contours.PIECE_PX, scratch.pieces)
-        kept, n_segments = _collect(n, scene.distances, pixel, width, height, scratch)
-        directed[view, 0] = _robust_mean(d, scratch.lengths, kept, theta, paper)
+        image = scene.distances[pixel : pixel + width * height]
+        if paper:
+            directed[view, 0] = _forward_paper(n, image, width, height, theta, scratch)
+        else:
+            directed[view, 0] = _forward(n, image, width, height, theta, scratch.pieces)
+        n_segments = _join(n, scratch.pieces, scratch.segments)
         first, last = scene.firsts[view], scene.firsts[view + 1]
         u, v = scene.points[0][first:last], scene.points[1][first:last]
         nearest_segment(u, v, scene.rows[view], scratch.segments, n_segments, theta, d)

@@ -142,7 +142,7 @@ def solve(
         # Damping by the diagonal leaves metres and radians to themselves; the floor serves dofs nothing speaks of.
         scale = np.diag(H) + 1e-6 * max(1e-12, float(np.trace(H)) / len(H))
         while True:
-            step = _damped_step(H, g, damping * scale)
+            step = damped_step(H, g, damping * scale)
             worth = -(g + 0.5 * H @ step) @ step > gain
             change = np.zeros(model.n_dofs)
             change[moving] = step
@@ -162,8 +162,8 @@ def solve(
     return Fit(values, here.cost, iterations, here.hessian)
 
 
-def _damped_step(H: Array, g: Array, damping: Array) -> Array:
-    """The step from normal equations whose diagonal is raised by a damping, (n,)."""
+def damped_step(H: Array, g: Array, damping: Array) -> Array:
+    """The step from a Hessian (n, n), whose diagonal is raised by a damping (n,), and a gradient (n,)."""
     raised = H.copy()
     raised.flat[:: len(g) + 1] += damping
     _, step, info = dposv(raised, -g)

@@ -13,6 +13,7 @@ from tracker.kernels import FAST
 from tracker.kinematics import IntArray
 from tracker.nearest import LANES, cells_within
 from tracker.rigid import Array
+from tracker.sampling import bilinear
 from tracker.twists import add_twists
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernel's arithmetic into float64
@@ -66,6 +67,8 @@ class Scratch(NamedTuple):
     """Squared distance of each edge point to its segment, with the turn between them, (room,)."""
     nearest: NDArray[np.int32]
     """Index of that segment, (room,)."""
+    pull: FloatArray
+    """What each edge point's residual weighs, (room,)."""
 
 
 def scratch_for(surfaces: contours.Surfaces, room: int, n_points: int) -> Scratch:
@@ -74,6 +77,7 @@ def scratch_for(surfaces: contours.Surfaces, room: int, n_points: int) -> Scratc
         contours.piece_buffer(surfaces, room), np.empty((8, room), np.float32),
         np.empty(len(surfaces.radii) + 1, np.int64), np.empty((7, room)), np.empty((7, room), np.float32),
         np.empty((3, room), np.int32), np.empty(n_points, np.float32), np.empty(n_points, np.int32),
+        np.empty(n_points, np.float32),
     )  # fmt: skip
 
 
@@ -127,10 +131,10 @@ def _visible(n_parts: int, scratch: Scratch) -> int:
     """Pack the visible pieces, and join them to segments; returns the number of those."""
     traced, pieces, segments, of_segment = scratch.traced, scratch.pieces, scratch.segments, scratch.of_segment
     ends, middles, edges, hidden, firsts = traced.ends, traced.middles, traced.edges, traced.hidden, traced.firsts
-    half, kept, n, edge = np.float32(0.5), 0, 0, -1
+    half, kept, n, edge, one = np.float32(0.5), np.uint64(0), np.uint64(0), -1, np.uint64(1)
     for part in range(n_parts):
         scratch.firsts[part] = kept
-        for i in range(firsts[part], firsts[part + 1]):
+        for i in range(np.uint64(firsts[part]), np.uint64(firsts[part + 1])):
             if hidden[i]:
                 edge = -1
                 continue
@@ -141,18 +145,19 @@ def _visible(n_parts: int, scratch: Scratch) -> int:
             pieces[0, kept], pieces[1, kept], pieces[2, kept] = half * (x + x1), half * (y + y1), length
             pieces[3, kept], pieces[4, kept] = nx, ny
             pieces[5, kept], pieces[6, kept], pieces[7, kept] = middles[0, i], middles[1, i], middles[2, i]
-            if edges[i] != edge or of_segment[1, n - 1] == _JOINED:
+            if edges[i] != edge or of_segment[1, n - one] == _JOINED:
                 edge = edges[i]
                 segments[0, n], segments[1, n], segments[5, n], segments[6, n] = x, y, nx, ny
                 of_segment[0, n], of_segment[1, n], of_segment[2, n] = kept, 0, part
-                n += 1
-            of_segment[1, n - 1] += 1
-            dx, dy = x1 - segments[0, n - 1], y1 - segments[1, n - 1]
-            segments[2, n - 1], segments[3, n - 1] = dx, dy
-            segments[4, n - 1] = _ONE / max(dx * dx + dy * dy, np.float32(1e-12))
-            kept += 1
+                n += one
+            k = n - one
+            of_segment[1, k] += 1
+            dx, dy = x1 - segments[0, k], y1 - segments[1, k]
+            segments[2, k], segments[3, k] = dx, dy
+            segments[4, k] = _ONE / max(dx * dx + dy * dy, np.float32(1e-12))
+            kept += one
     scratch.firsts[n_parts] = kept
-    return n
+    return int(n)
 
 
 @njit(**FAST)
@@ -162,35 +167,35 @@ def _model_to_image(
 ) -> float:  # fmt: skip
     """Add the residuals of the visible pieces of the parts from first to last; their cost."""
     width, height = scene.sizes[view, 0], scene.sizes[view, 1]
-    theta, weight = np.float32(scene.thetas[view]), scene.weights[view, 0]
-    q, pulls, D, firsts = scratch.pieces, scratch.pulls, scene.distances, scratch.firsts
+    theta, weight = np.float32(scene.thetas[view]), np.float32(scene.weights[view, 0])
+    q, pulls, firsts = scratch.pieces, scratch.pulls, scratch.firsts
+    image, right, bottom = (
+        scene.distances[pixel : pixel + width * height],
+        np.float32(width - 1),
+        np.float32(height - 1),
+    )
     s2, cost = np.float32((scale * theta) ** 2), 0.0
     for part in range(first, last):
         seen = far = 0.0
-        for k in range(firsts[part], firsts[part + 1]):
+        for k in range(np.uint64(firsts[part]), np.uint64(firsts[part + 1])):
             x, y, length = q[0, k], q[1, k], q[2, k]
             # What lies outside the image is neither explained nor refuted: a body may be cut off at the border.
-            if x < _ZERO or y < _ZERO or x > np.float32(width - 1) or y > np.float32(height - 1):
+            if x < _ZERO or y < _ZERO or x > right or y > bottom:
                 continue
-            c, r = min(int(x), width - 2), min(int(y), height - 2)
-            a, b = x - np.float32(c), y - np.float32(r)
-            at = pixel + r * width + c
-            d00, d01, d10, d11 = D[at], D[at + 1], D[at + width], D[at + width + 1]
-            top, bottom = d00 + a * (d01 - d00), d10 + a * (d11 - d10)
-            d = top + b * (bottom - top)
+            d, along_u, along_v = bilinear(image, width, height, x, y)
             cut = min(d, theta)
             f = s2 / (s2 + cut * cut)
             seen += length
             far += length * cut
             cost += length * f * cut * cut
             if derive and d < theta:
-                across = q[3, k] * ((d01 - d00) + b * (d11 - d10 - d01 + d00)) + q[4, k] * (bottom - top)
+                across = q[3, k] * along_u + q[4, k] * along_v
                 w = weight * length * (f * f) * across
                 pulls[0, k] += w * across
                 pulls[1, k] += w * d
         sums.parts[view, part, 0] += seen
         sums.parts[view, part, 1] += far
-    return 0.5 * weight * cost
+    return 0.5 * float(weight) * cost
 
 
 @njit(**FAST)
@@ -203,7 +208,7 @@ def _image_to_model(
     The points are the same at every pose, so that their costs compare like with like: one that no piece is near, or
     that is nearest to somebody else, costs what a point at the outlier distance does.
     """
-    theta, weight = scene.thetas[view], scene.weights[view, 1] * SCENE_SPACING_PX
+    theta, weight = scene.thetas[view], np.float32(scene.weights[view, 1] * SCENE_SPACING_PX)
     s2, limit, cost = np.float32((scale * theta) ** 2), np.float32(theta * theta), 0.0
     start, stop = scene.firsts[view], scene.firsts[view + 1]
     us, vs, q, of = scene.points[0][start:stop], scene.points[1][start:stop], scratch.segments, scratch.of_segment
@@ -211,14 +216,16 @@ def _image_to_model(
     of_silhouette, rows = scene.points[5][start:stop], scene.rows[view]
     best, nearest, pulls = scratch.best, scratch.nearest, scratch.pulls
     nearest_alike(us, vs, nu, nv, rows, q, n_segments, turn * limit, theta, best, nearest)
-    for j in range(np.uint64(stop - start)):
+    n, pull = np.uint64(stop - start), scratch.pull
+    for j in range(n):
         squared = min(best[j], limit)
-        cost += weights[j] * (s2 * squared / (s2 + squared))
-    for j in range(stop - start):
-        squared = best[j]
-        if squared >= limit:
+        f = s2 / (s2 + squared)
+        cost += weights[j] * (f * squared)
+        pull[j] = weight * weights[j] * (f * f)
+    for j in range(n):
+        if best[j] >= limit:
             continue
-        k = nearest[j]
+        k = np.uint64(nearest[j])
         part = of[2, k]
         if not derive:  # who asks for the costs of the parts counts what they explain
             sums.outline[view] += of_silhouette[j]
@@ -227,11 +234,9 @@ def _image_to_model(
             continue
         if part < first or part >= last:
             continue
-        f = s2 / (s2 + squared)
-        w = weight * weights[j] * (f * f)
-        u, v, dx, dy, count = us[j] - q[0, k], vs[j] - q[1, k], q[2, k], q[3, k], of[1, k]
+        w, u, v, dx, dy, count = pull[j], us[j] - q[0, k], vs[j] - q[1, k], q[2, k], q[3, k], of[1, k]
         t = (u * dx + v * dy) * q[4, k]
-        i = of[0, k] + min(max(int(t * np.float32(count)), 0), count - 1)
+        i = np.uint64(of[0, k] + min(max(int(t * np.float32(count)), 0), count - 1))
         if t > _ZERO and t < _ONE:
             pulls[0, i] += w
             pulls[1, i] -= w * (u * q[5, k] + v * q[6, k])
@@ -248,7 +253,7 @@ def _image_to_model(
         pulls[4, i] += w * gv * gv
         pulls[5, i] += w * d * gu
         pulls[6, i] += w * d * gv
-    return 0.5 * weight * cost
+    return 0.5 * float(weight) * cost
 
 
 @njit(nogil=True, cache=True)
