@@ -68,11 +68,12 @@ def _meet_quadric(
 def _fills(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: np.float32) -> bool:
     """Whether a point in unit coordinates is within a superquadric, by the tables of its shape."""
     at = abs(z) * np.float32(N_ALONG)
-    k = int(at)
+    k = np.uint64(at)  # a signed index might count from the end
     if k >= N_ALONG:
         return False
-    below = solids[part, ALONG + k]
-    size = below + (at - np.float32(k)) * (solids[part, ALONG + k + 1] - below)
+    cell = np.uint64(ALONG) + k
+    below = solids[part, cell]
+    size = below + (at - np.float32(k)) * (solids[part, cell + np.uint64(1)] - below)
     if solids[part, 7] > 0:
         size *= _ONE + solids[part, 5] * z
         return x * x + y * y < size * size
@@ -82,9 +83,10 @@ def _fills(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: np.fl
     if larger >= size:
         return False
     at = smaller / max(larger, _TINY) * np.float32(N_SECTION)
-    k = min(int(at), N_SECTION - 1)
-    below = solids[part, SECTION + k]
-    return larger * (below + (at - np.float32(k)) * (solids[part, SECTION + k + 1] - below)) < size
+    k = np.uint64(min(at, np.float32(N_SECTION - 1)))
+    cell = np.uint64(SECTION) + k
+    below = solids[part, cell]
+    return larger * (below + (at - np.float32(k)) * (solids[part, cell + np.uint64(1)] - below)) < size
 
 
 @njit(**FAST)
@@ -111,16 +113,20 @@ def hide(
             i = np.uint64(first) + j
             hidden[i] |= shared[0, i] < shared[1, i]
         return
+    # Read once: for all the compiler knows, marking a point might change them.
+    q00, q01, q02, q03, ex = Q[0, 0], Q[0, 1], Q[0, 2], Q[0, 3], Q[0, 4]
+    q10, q11, q12, q13, ey = Q[1, 0], Q[1, 1], Q[1, 2], Q[1, 3], Q[1, 4]
+    q20, q21, q22, q23, ez = Q[2, 0], Q[2, 1], Q[2, 2], Q[2, 3], Q[2, 4]
     for j in range(np.uint64(last - first)):
         i = np.uint64(first) + j
         far, near = shared[0, i], shared[1, i]
-        if hidden[i] or far >= near:
+        if far >= near or hidden[i]:
             continue
         a, b, c = points[0, i], points[1, i], points[2, i]
-        x = Q[0, 0] * a + Q[0, 1] * b + Q[0, 2] * c + Q[0, 3]
-        y = Q[1, 0] * a + Q[1, 1] * b + Q[1, 2] * c + Q[1, 3]
-        z = Q[2, 0] * a + Q[2, 1] * b + Q[2, 2] * c + Q[2, 3]
-        dx, dy, dz = Q[0, 4] - x, Q[1, 4] - y, Q[2, 4] - z
+        x = q00 * a + q01 * b + q02 * c + q03
+        y = q10 * a + q11 * b + q12 * c + q13
+        z = q20 * a + q21 * b + q22 * c + q23
+        dx, dy, dz = ex - x, ey - y, ez - z
         for share in _TRIES:
             s = far + np.float32(share) * (near - far)
             if _fills(part, solids, x + s * dx, y + s * dy, z + s * dz):

@@ -216,7 +216,7 @@ def _image_to_model(
     of_silhouette, rows = scene.points[5][start:stop], scene.rows[view]
     best, nearest, pulls = scratch.best, scratch.nearest, scratch.pulls
     nearest_alike(us, vs, nu, nv, rows, q, n_segments, turn * limit, theta, best, nearest)
-    n, pull = np.uint64(stop - start), scratch.pull
+    n, pull, explained = np.uint64(stop - start), scratch.pull, 0.0
     for j in range(n):
         squared = min(best[j], limit)
         f = s2 / (s2 + squared)
@@ -228,7 +228,7 @@ def _image_to_model(
         k = np.uint64(nearest[j])
         part = of[2, k]
         if not derive:  # who asks for the costs of the parts counts what they explain
-            sums.outline[view] += of_silhouette[j]
+            explained += of_silhouette[j]
             if part >= first and part < last:
                 sums.parts[view, part, 2] += 1
             continue
@@ -253,6 +253,7 @@ def _image_to_model(
         pulls[4, i] += w * gv * gv
         pulls[5, i] += w * d * gu
         pulls[6, i] += w * d * gv
+    sums.outline[view] = explained
     return 0.5 * float(weight) * cost
 
 

@@ -7,9 +7,10 @@ a residual changes with the pose is asked of the surface point under the piece: 
 contour moves as that material point does, because what it slides on the surface it slides along the line of sight
 (KRH08 Sect. 4).
 
-Residuals are not kept one by one. A point X of a part moves by the part's spatial twist (omega, v) as omega x X + v,
-so the row of its residual is (X x g, g), g the derivative by X. Rows are summed per part into a 6x6 normal matrix;
-only these are carried over to the degrees of freedom, whatever the shapes of the parts.
+Residuals are not kept one by one. Their squares and pulls are summed for each piece in the image, then for each part:
+a point X of a part moves by the part's spatial twist (omega, v) as omega x X + v, so the row of a residual is
+(X x g, g), g its derivative by X. Only the parts' 6x6 normal matrices are carried over to the degrees of freedom,
+whatever the shapes of the parts.
 """
 
 from collections.abc import Sequence
