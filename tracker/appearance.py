@@ -29,6 +29,12 @@ _MOST_NATS = 3.0
 """One pixel says at most this much."""
 _DOUBT = 0.02
 """Share of pixels under a part that may show anything: what has never been seen there is not impossible."""
+_LEAST_SEEN = 6
+"""In a view that shows fewer samples of a part, its colour there says nothing."""
+_OPEN, _HIDDEN = -1, -2
+"""What `_passed` says where it names no part."""
+_SPECK_M = 1e-6
+"""Half axes of parts that are away."""
 _TWIN_SHARE = 0.2
 """Share of what is seen under a part's twin in what is expected under itself: sleeves are mostly alike."""
 _SAME = 0.25
@@ -57,6 +63,8 @@ class ColorScore(NamedTuple):
     """Their mean under each part, (n_parts,), nats; 0 where nothing of it is visible."""
     samples: Array
     """Visible samples of each part, (n_parts,)."""
+    views: Array
+    """Mean log ratio under each part in each view, (V, n_parts), nats; NaN where little of it is visible."""
 
 
 class Colors:
@@ -87,7 +95,7 @@ class Colors:
                 what was known: the part may not be there.
         """
         model = self._bodies[self._person].model
-        parts, colors = self._samples(self._bodies[self._person].values)
+        parts, colors, _ = self._samples(self._bodies[self._person].values)
         twins = _twins(model)
         seen = np.zeros((len(model.parts), BINS**3))
         np.add.at(seen, (parts, colors), 1.0)
@@ -115,21 +123,28 @@ class Colors:
 
     def score(self, values: Array, known: PartColors) -> ColorScore:
         """How well the colours under the person in a pose, (n_values,), go with what is known of its parts."""
-        parts, colors = self._samples(values)
+        n_parts = known.log_ratios.shape[0]
+        parts, colors, views = self._samples(values)
         nats = known.log_ratios[parts, colors]
-        return ColorScore(float(nats.sum()), *_mean_by_part(nats, parts, known.log_ratios.shape[0]))
+        means, samples = _mean_by_part(nats, views * n_parts + parts, len(self._P) * n_parts)
+        by_view = np.where(samples < _LEAST_SEEN, np.nan, means).reshape(-1, n_parts)
+        return ColorScore(float(nats.sum()), *_mean_by_part(nats, parts, n_parts), by_view)
 
-    def along_limb(self, candidates: Array, limb: NDArray[np.int64], known: PartColors | None) -> Array:
+    def along_limb(
+        self, candidates: Array, limb: NDArray[np.int64], known: PartColors | None, away: Sequence[int] = ()
+    ) -> Array:
         """A quick look at one limb in many poses, (C, n_values): how good it seems, (C,), more is better.
 
         At samples along the axes of its parts, where no other part hides them, the colours speak, and the edges at
-        both sides: near ones for it, none against it. Where the limb is hidden nothing is said.
+        both sides: near ones for it, none against it. Where the limb is hidden nothing is said. Parts that are `away`
+        hide nothing.
         """
         model = self._bodies[self._person].model
         Ts = np.concatenate([b.model.kinematics(b.values).Ts_world_part for b in self._bodies])
         first = sum(len(b.model.parts) for b in self._bodies[: self._person])
         ratios = np.zeros((len(model.parts), BINS**3)) if known is None else known.log_ratios
         total, shapes = np.zeros(len(candidates)), np.concatenate(self._shapes)
+        shapes[first + np.array(away, dtype=np.int64), 3:] = _SPECK_M
         for P, eye, image, (distance, theta) in zip(self._P, self._eyes, self._images, self._distances, strict=True):
             _look_along(
                 P, eye, candidates, model.tree, model.n_dofs, Ts, shapes, first, limb, image, distance, theta, ratios,
@@ -137,21 +152,23 @@ class Colors:
             )  # fmt: skip
         return total
 
-    def _samples(self, values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Part and colour of each visible sample, (n,) each."""
+    def _samples(self, values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+        """Part, colour and view of each visible sample, (n,) each."""
         bodies = list(self._bodies)
         bodies[self._person] = Body(bodies[self._person].model, values)
         Ts = [b.model.kinematics(b.values).Ts_world_part for b in bodies]
         first = sum(len(T) for T in Ts[: self._person])
         last = first + len(Ts[self._person])
         room = (last - first) * _ALONG * _ACROSS
-        parts, colors = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+        parts, colors, counts = [np.empty(0, np.int64)], [np.empty(0, np.int64)], []
         for P, eye, image in zip(self._P, self._eyes, self._images, strict=True):
             out = np.empty((room, 2), np.int64)
             n = _look(P, eye, np.concatenate(Ts), np.concatenate(self._shapes), first, last, image, out)
             parts.append(out[:n, 0])
             colors.append(out[:n, 1])
-        return np.concatenate(parts), np.concatenate(colors)
+            counts.append(n)
+        views = np.repeat(np.arange(len(counts)), counts)
+        return np.concatenate(parts), np.concatenate(colors), views
 
 
 def _binned(image: Image) -> NDArray[np.int64]:
@@ -187,8 +204,10 @@ def _ellipsoids(model: BodyModel) -> Array:
 
 
 @njit(nogil=True, cache=True)
-def _hidden(eye: Array, X: Array, own: int, Ts: Array, shapes: Array) -> bool:
-    """Whether the ellipsoid of another part lies before a point X on the axis of a part."""
+def _passed(eye: Array, X: Array, own: int, Ts: Array, shapes: Array) -> int:
+    """What the sight of a point X on the axis of a part passes besides: the index of a part behind the point, `_OPEN`
+    where there is none, and `_HIDDEN` where another part lies before the point."""
+    behind = _OPEN
     for p in range(Ts.shape[0]):
         if p == own:
             continue
@@ -205,28 +224,32 @@ def _hidden(eye: Array, X: Array, own: int, Ts: Array, shapes: Array) -> bool:
             C += o * o
         discriminant = B * B - A * C
         # Where the middle of the chord lies beyond the point, the point is before or just within the other part.
-        if discriminant > 0.0 and 0.0 < -B < A:
-            return True
-    return False
+        if discriminant > 0.0 and B < 0.0:
+            if -B < A:
+                return _HIDDEN
+            behind = p
+    return behind
 
 
 @njit(nogil=True, cache=True)
-def _seen_on_axis(
-    P: Array, eye: Array, Ts: Array, shapes: Array, part: int, sample: int, X: Array, side: Array
-) -> bool:
-    """Whether a sample on the axis of a part is seen; fills its place X and the unit vector across axis and sight."""
+def _seen_on_axis(P: Array, eye: Array, Ts: Array, shapes: Array, part: int, sample: int, X: Array, side: Array) -> int:
+    """What a sample on the axis of a part is seen before, see `_passed`; fills its place X and the unit vector across
+    axis and sight."""
     z = shapes[part, 2] + shapes[part, 5] * 0.8 * (2.0 * sample / (_ALONG - 1) - 1.0)
     for i in range(3):
         X[i] = Ts[part, i, 0] * shapes[part, 0] + Ts[part, i, 1] * shapes[part, 1] + Ts[part, i, 2] * z
         X[i] += Ts[part, i, 3]
-    if P[2, 0] * X[0] + P[2, 1] * X[1] + P[2, 2] * X[2] + P[2, 3] < 0.05 or _hidden(eye, X, part, Ts, shapes):
-        return False
+    behind = _HIDDEN
+    if P[2, 0] * X[0] + P[2, 1] * X[1] + P[2, 2] * X[2] + P[2, 3] >= 0.05:
+        behind = _passed(eye, X, part, Ts, shapes)
+    if behind == _HIDDEN:
+        return behind
     ax, ay, az = Ts[part, 0, 2], Ts[part, 1, 2], Ts[part, 2, 2]
     vx, vy, vz = X[0] - eye[0], X[1] - eye[1], X[2] - eye[2]
     side[0], side[1], side[2] = ay * vz - az * vy, az * vx - ax * vz, ax * vy - ay * vx
     norm = np.sqrt(side[0] ** 2 + side[1] ** 2 + side[2] ** 2) + 1e-9
     side[0], side[1], side[2] = side[0] / norm, side[1] / norm, side[2] / norm
-    return True
+    return behind
 
 
 @njit(nogil=True, cache=True)
@@ -254,8 +277,11 @@ def _look_along(
         for part in limb:
             p = first + part
             for a in range(_ALONG):
-                if not _seen_on_axis(P, eye, all_Ts, shapes, p, a, X, side):
+                behind = _seen_on_axis(P, eye, all_Ts, shapes, p, a, X, side)
+                if behind == _HIDDEN:
                     continue
+                # What would be seen there without the limb: to show its colour again says nothing for the limb.
+                own = first <= behind < first + n_parts
                 for s in range(5):
                     u, v = _pixel_beside(P, X, side, 0.5 * (s - 2) * shapes[p, 3])
                     if u < 0 or v < 0 or u >= width or v >= height:
@@ -263,7 +289,8 @@ def _look_along(
                     elif s == 0 or s == 4:
                         total[c] += 1.5 * (0.3 - min(distance[v, u] / theta, 1.0))
                     else:
-                        total[c] += ratios[part, _bin_of(image, v, u)]
+                        color = _bin_of(image, v, u)
+                        total[c] += ratios[part, color] - (ratios[behind - first, color] if own else 0.0)
 
 
 @njit(nogil=True, cache=True)
@@ -291,7 +318,7 @@ def _look(
     for part in range(first, last):
         radius = 0.45 * min(shapes[part, 3], shapes[part, 4])
         for a in range(_ALONG):
-            if not _seen_on_axis(P, eye, Ts, shapes, part, a, X, side):
+            if _seen_on_axis(P, eye, Ts, shapes, part, a, X, side) == _HIDDEN:
                 continue
             for s in range(_ACROSS):
                 u, v = _pixel_beside(P, X, side, radius * (s - (_ACROSS - 1) / 2))

@@ -1,7 +1,7 @@
-"""How sure a tracker is of a pose: what the evidence says of it, and a status by rules.
+"""How sure a tracker is of a pose: what the evidence says of it, and a status.
 
-The rules were set on simulated footage, where the error is known (`tests/benchmarks/calibrate_status.py`), and are
-checked on other scenes.
+How likely each limb is lost is a logistic function of what the evidence says of it. Its weights were fitted on
+simulated footage, where the error is known, and are checked on other scenes (`tests/benchmarks/calibrate_status.py`).
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from tracker.appearance import ColorScore, PartColors
 from tracker.body import BodyModel
-from tracker.evidence import SCENE_SPACING_PX
 from tracker.fit import Fit, covariance
 from tracker.refine import PartCosts
 from tracker.rigid import Array
@@ -24,10 +23,15 @@ _LEAST_SAMPLES = 12
 """Colours of fewer samples say nothing about a part."""
 _LEAST_TRUST = 0.5
 """Silhouettes trusted less have no say."""
-_MOST_UNEXPLAINED = 0.035
+_MOST_UNEXPLAINED = 0.05
 """A silhouette of whose contour more than this is explained by no part shows a limb that is elsewhere."""
-_LEAST_SHOWN = 0.15
-"""A limb of whose outline less than this is visible in all views together hides somewhere."""
+_WEIGHTS = np.array([-1.995, 0.469, 4.15, 14.652, 24.962, -9.377])
+"""Of the evidence in `evidence`, in its order; the last is the constant."""
+_DOUBTFUL, _SUSPECT, _LOST = -3.3, -2.5, 0.0
+"""Log odds that a limb is lost from which on the frame is doubtful, the limb is searched for, and the frame is lost.
+Few limbs are lost, and a lost one that is called good is the costlier error: doubt begins at 1 to 27."""
+_LOST_FORWARD = 0.6
+"""Of a body whose contours are farther than this from all edges, in outlier distances, nothing holds."""
 
 
 class Limb(NamedTuple):
@@ -45,19 +49,13 @@ class LimbFigures(NamedTuple):
     """What the evidence says of one limb."""
 
     name: str
-    forward: float
-    """Mean cut-off distance to the edges of the part that is worst off, in outlier distances."""
-    shown: float
-    """Visible outline of the part that shows most, as a share of what it would show in the open."""
+    """Name of its last part."""
     color: float
     """Colours under the part that is worst off: how much likelier on this part than elsewhere, nats per sample."""
-    drop: float
-    """How much less that is than where the colours were learnt, nats per sample."""
-
-    @property
-    def suspicious(self) -> bool:
-        """Whether they speak against the limb's pose."""
-        return self.forward > 0.45 or self.shown < _LEAST_SHOWN or (self.drop > 0.6 and self.color < 0.2)
+    worst_drop: float
+    """How much less that is than where the colours were learnt, in the view in which it is most, nats per sample."""
+    spread_px: float
+    """Standard deviation of its end, matched px where the body stands."""
 
 
 class Quality(NamedTuple):
@@ -65,12 +63,6 @@ class Quality(NamedTuple):
 
     forward: float
     """Mean cut-off distance of the visible contour to the edges."""
-    explained: float
-    """Edge points explained, per visible contour of the same length."""
-    spread_m: float
-    """Largest standard deviation of the end of a limb, metres."""
-    step_m: float
-    """Largest way of a limb's end from where it was predicted, metres."""
     views: int
     """Views that see the body."""
     unexplained: float
@@ -79,10 +71,32 @@ class Quality(NamedTuple):
     """The same limb by limb."""
 
     @property
+    def log_odds(self) -> Array:
+        """Log odds that each limb is lost, (n_limbs,)."""
+        return np.array([_WEIGHTS @ [*evidence(self, x), 1.0] for x in self.limbs])
+
+    @property
     def suspects(self) -> tuple[str, ...]:
-        """Names of the limbs that their figures speak against; all where the image shows what no part explains."""
+        """Names of the limbs that are worth a search; all where the image shows what no part explains."""
         everyone = self.unexplained > _MOST_UNEXPLAINED
-        return tuple(x.name for x in self.limbs if everyone or x.suspicious)
+        return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if everyone or odds > _SUSPECT)
+
+    @property
+    def body_lost(self) -> bool:
+        """Whether the body stands elsewhere, not a limb or two of it."""
+        limbs_lost = int(np.count_nonzero(self.log_odds > _LOST))
+        return self.views == 0 or self.forward > _LOST_FORWARD or 2 * limbs_lost > len(self.limbs)
+
+
+def evidence(found: Quality, limb: LimbFigures) -> Array:
+    """What the log odds of a limb are made of, (5,)."""
+    return np.array([
+        np.clip(limb.color, -2, 1),
+        np.clip(limb.worst_drop, -0.5, 3),
+        np.log(np.clip(limb.spread_px, 0.5, 50)),
+        min(found.unexplained, _MOST_UNEXPLAINED),
+        found.forward,
+    ])  # fmt: skip
 
 
 @lru_cache(maxsize=32)
@@ -104,11 +118,10 @@ def limbs(model: BodyModel) -> tuple[Limb, ...]:
 def quality(
     model: BodyModel,
     fit: Fit,
-    predicted: Array,
     costs: PartCosts,
     thetas_px: Array,
-    open_px: Array,
     trusts: Array,
+    px_per_m: float,
     colors: tuple[ColorScore, PartColors] | None,
 ) -> Quality:
     """Sum up what speaks for and against a pose.
@@ -116,41 +129,29 @@ def quality(
     Args:
         model: the body.
         fit: the pose, and the normal matrix there.
-        predicted: where it was expected, (n_values,).
         costs: of its parts.
         thetas_px: outlier distance of each view, (V,), matched px.
-        open_px: length of outline that each part would show in each view in the open, (V, n_parts), matched px.
         trusts: how far the silhouette of each view is trusted, (V,), 0 to 1; 0 where there is none.
+        px_per_m: length of a metre in the images where the body stands, matched px.
         colors: of its parts; None where there are none.
     """
-    length, chains = costs.length_px.sum(axis=0), limbs(model)
-    far = np.nansum(costs.forward_px / thetas_px[:, None] * costs.length_px, axis=0)
-    shown = length / np.maximum(open_px.sum(axis=0), 1e-9)
-    forward = np.where(shown >= _LEAST_SHOWN, far / np.maximum(length, 1e-9), 0.0)
-    color, drop = np.full(len(model.parts), np.inf), np.zeros(len(model.parts))
+    chains = limbs(model)
+    far = np.nansum(costs.forward_px / thetas_px[:, None] * costs.length_px)
+    color, worst_drop = np.full(len(model.parts), np.inf), np.zeros(len(model.parts))
     if colors is not None:
         score, known = colors
-        seen = score.samples >= _LEAST_SAMPLES
-        color, drop = np.where(seen, score.parts, np.inf), np.where(seen, known.usual - score.parts, 0.0)
-    ends = np.array([np.flatnonzero(model.point_parts == c.parts[-1])[-1] for c in chains], dtype=np.int64)
-    J = _jacobian(model, fit.values, ends)
-    cov = J @ covariance(model, fit) @ np.swapaxes(J, 1, 2)
-    step = np.linalg.norm((model.points_world(fit.values) - model.points_world(predicted))[ends], axis=-1)
+        color = np.where(score.samples >= _LEAST_SAMPLES, score.parts, np.inf)
+        worst_drop = np.nan_to_num(known.usual - score.views, nan=-np.inf).max(axis=0, initial=-np.inf)
+    spreads = px_per_m * _end_spreads(model, fit)
     return Quality(
-        float(far.sum() / max(1e-9, length.sum())),
-        float(SCENE_SPACING_PX * costs.points.sum() / max(1e-9, length.sum())),
-        float(np.sqrt(np.trace(cov, axis1=1, axis2=2).max(initial=0.0))),
-        float(step.max(initial=0.0)),
+        float(far / max(1e-9, costs.length_px.sum())),
         int(np.count_nonzero(costs.length_px.sum(axis=1) > 0)),
         _second_largest(1.0 - costs.outline[trusts > _LEAST_TRUST]),
         tuple(
-            LimbFigures(
-                c.name, float(forward[c.parts].max()), float(shown[c.parts].max()), float(color[c.parts].min()),
-                float(drop[c.parts].max()),
-            )
-            for c in chains
+            LimbFigures(c.name, float(color[c.parts].min()), float(worst_drop[c.parts].max()), float(spread))
+            for c, spread in zip(chains, spreads, strict=True)
         ),
-    )  # fmt: skip
+    )
 
 
 def _second_largest(shares: Array) -> float:
@@ -160,9 +161,29 @@ def _second_largest(shares: Array) -> float:
 
 def judge(found: Quality) -> Status:
     """Good, doubtful or lost."""
-    if found.views == 0 or found.forward > 0.6:
+    most = found.log_odds.max(initial=-np.inf)
+    if found.body_lost or most > _LOST:
         return "lost"
-    return "doubtful" if found.suspects else "good"
+    return "doubtful" if most > _DOUBTFUL or found.unexplained > _MOST_UNEXPLAINED else "good"
+
+
+def reason(found: Quality) -> str:
+    """What speaks most against a pose, for people; empty where it is good."""
+    if judge(found) == "good":
+        return ""
+    if found.views == 0:
+        return "no view shows the body"
+    if found.forward > _LOST_FORWARD:
+        return "no edges near the body"
+    odds = found.log_odds
+    if odds.max() <= _DOUBTFUL:
+        return "part of the silhouette unexplained"
+    return f"{spoken(found.limbs[int(odds.argmax())].name)} uncertain"
+
+
+def spoken(limb: str) -> str:
+    """The name of a limb as people say it."""
+    return limb.replace("forearm", "arm").replace("calf", "leg").replace("_", " ")
 
 
 def worst(statuses: Sequence[Status]) -> Status:
@@ -170,7 +191,9 @@ def worst(statuses: Sequence[Status]) -> Status:
     return max(statuses, key=("good", "doubtful", "lost").index, default="good")
 
 
-def _jacobian(model: BodyModel, values: Array, points: NDArray[np.int64]) -> Array:
-    """Derivative of some of the body's points, (n, 3, n_dofs)."""
-    kinematics = model.kinematics(values)
-    return model.point_jacobian(kinematics, model.point_parts[points], model.points_world(values)[points])
+def _end_spreads(model: BodyModel, fit: Fit) -> Array:
+    """Standard deviation of the end of each limb, (n_limbs,), metres."""
+    ends = np.array([np.flatnonzero(model.point_parts == c.parts[-1])[-1] for c in limbs(model)], dtype=np.int64)
+    kinematics, points = model.kinematics(fit.values), model.points_world(fit.values)
+    J = model.point_jacobian(kinematics, model.point_parts[ends], points[ends])
+    return np.sqrt(np.trace(J @ covariance(model, fit) @ np.swapaxes(J, 1, 2), axis1=1, axis2=2))

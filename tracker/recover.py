@@ -1,7 +1,9 @@
 """Lost limbs found again: a limb is tried everywhere it can be, the best places refined (DESIGN section 10).
 
-A thousand poses of the limb are ranked by a quick look along its axis: the colours under it, and edges at both its
-sides. The first few go through the costs that all poses go through, then through refinement, and the cheapest stays.
+Some thousand poses of the limb are ranked by a quick look along its axis: the colours under it, and edges at both its
+sides. The best that are not all in one place improve by small random steps, each by itself, by the same look; then they
+go through the costs that all poses go through, and the cheapest are refined. Limbs that are lost together are searched
+together.
 """
 
 from collections.abc import Sequence
@@ -16,9 +18,11 @@ from tracker.body import BodyModel
 from tracker.confidence import Limb
 from tracker.fit import Block, Fit, solve
 from tracker.kinematics import IntArray
-from tracker.refine import ContourMatch
+from tracker.refine import WORTH_A_STEP, ContourMatch
 from tracker.rigid import Array
 
+_APART_M, _SAME_M = 0.12, 0.06
+"""How far apart the places are that are improved; poses nearer to each other than the second lead to the same one."""
 _LEAST_GAIN = 0.1
 """What a pose must cost less to count as another one: to refine the same pose once more gains a little too."""
 
@@ -27,22 +31,24 @@ _LEAST_GAIN = 0.1
 class RecoverSettings:
     """How lost limbs are searched for."""
 
-    proposals: int = 2048
+    proposals: int = 1024
     """Poses of a limb that are looked at; a power of two, so that they fill the space evenly."""
     reach_rad: float = float(np.radians(35))
     """Spread of those proposals that lie around the pose, rad; half of them lie anywhere within the joint limits."""
-    rounds: tuple[tuple[int, float], ...] = ((64, float(np.radians(18))), (32, float(np.radians(8))))
-    """Of how many of the best proposals the surroundings are looked at, and how far around, rad; round by round."""
+    scored: int = 48
+    """Of these, how many are improved, and have their contours scored."""
     shakes: int = 16
-    """Poses around each of these; a power of two."""
-    scored: int = 24
-    """Proposals whose contours are scored."""
-    refined: int = 6
+    """Steps that are tried around each of them in a round."""
+    shakes_rad: tuple[float, ...] = tuple(np.radians([16.0, 11.0, 7.0, 4.0]).tolist())
+    """Their size, rad, round by round."""
+    refined: int = 10
     """Proposals whose limb is refined alone."""
-    finished: int = 2
+    finished: int = 3
     """Of these, how many go through a refinement of the whole body."""
-    colors: float = 0.1
-    """Weight of the colours against edges; neighbouring pixels say the same, so it is far below 1."""
+    kept: int = 3
+    """Poses that are kept while the next limb is searched."""
+    colors: float = 0.2
+    """Weight of the colours against edges; neighbouring pixels say the same, so it is well below 1."""
     trust_rad: float = 1.0
     """Standard deviation of the prediction of a limb that seems lost, rad: nearly none."""
 
@@ -62,9 +68,9 @@ class Judge:
         """Cost of a refined pose with its colours."""
         return fit.cost + self._of_colors(fit.values)
 
-    def costs(self, candidates: Sequence[Array]) -> Array:
-        """Costs of poses without refinement, (n,); priors are left to the refinement."""
-        return self.match.costs(np.array(candidates)) + np.array([self._of_colors(v) for v in candidates])
+    def costs(self, candidates: Array) -> Array:
+        """Costs of poses, (n, n_values), without refinement, (n,); priors are left to the refinement."""
+        return self.match.costs(candidates) + np.array([self._of_colors(v) for v in candidates])
 
     def _of_colors(self, values: Array) -> float:
         if self.known is None:
@@ -72,35 +78,98 @@ class Judge:
         return -self.settings.colors * self.colors.score(values, self.known).nats
 
 
-def search_limb(model: BodyModel, limb: Limb, here: Fit, others: Sequence[Array], judge: Judge, iterations: int) -> Fit:
-    """Search one limb; returns what is cheapest, `here` itself where nothing is better.
+def search_limbs(
+    model: BodyModel, suspects: Sequence[Limb], here: Fit, others: Sequence[Array], judge: Judge, iterations: int
+) -> Fit:
+    """Search the limbs that seem lost, one after the other; returns what is cheapest, `here` itself where nothing is.
+
+    A limb may stand where another belongs, and each alone looks best as it is: therefore the best few poses of each,
+    worse ones too, are kept while the next is searched.
 
     Args:
         model: the body.
-        limb: the one that seems lost.
+        suspects: the limbs that seem lost.
         here: the pose at hand.
-        others: poses whose limb is tried as it is, e.g. that of the frame before, (n_values,) each.
+        others: poses whose limbs are tried as they are, e.g. that of the frame before, (n_values,) each.
         judge: compares poses.
         iterations: most steps of a refinement of the whole body.
     """
+    kept = [here]
+    for limb in suspects:
+        away = [p for x in suspects if x is not limb for p in x.parts]
+        found = [fit for start in kept for fit in _search_limb(model, limb, away, start, others, judge, iterations)]
+        kept = _distinct(model, [*kept, *found], judge)
+    return kept[0] if judge.cost(kept[0]) < judge.cost(here) - _LEAST_GAIN else here
+
+
+def _search_limb(
+    model: BodyModel, limb: Limb, away: list[int], here: Fit, others: Sequence[Array], judge: Judge, iterations: int
+) -> list[Fit]:
+    """The best poses of one limb, refined with the whole body; parts that are `away` hide nothing at first."""
     settings, blocks = judge.settings, [judge.match, *judge.priors]
-    look = partial(judge.colors.along_limb, limb=limb.parts, known=judge.known)
+    alone = [
+        solve(model, candidate, blocks, limb.dofs, max_iterations=4, tolerance=1e-2, gain=WORTH_A_STEP)
+        for candidate in _candidates(model, limb, away, here, others, judge)
+    ]
+    return [
+        solve(model, start.values, blocks, max_iterations=iterations, tolerance=1e-3, gain=WORTH_A_STEP)
+        for start in _distinct(model, alone, judge)[: settings.finished]
+    ]
+
+
+def _candidates(
+    model: BodyModel, limb: Limb, away: list[int], here: Fit, others: Sequence[Array], judge: Judge
+) -> Array:
+    """The few poses of a limb that are worth a refinement, (n, n_values)."""
+    settings = judge.settings
+    look = partial(judge.colors.along_limb, limb=limb.parts, known=judge.known, away=away)
     proposals = _proposals(model, limb, here.values, settings)
-    for promising, spread_rad in settings.rounds:
-        best_of = proposals[np.argsort(-look(proposals))[:promising]]
-        proposals = np.concatenate([best_of, _shaken(model, limb, best_of, settings.shakes, spread_rad)])
-    candidates = [_with_limb(model, here.values, other, limb) for other in others]
-    candidates += list(proposals[np.argsort(-look(proposals))[: settings.scored]])
-    order = np.argsort(judge.costs(candidates))[: settings.refined]
-    alone = [solve(model, candidates[i], blocks, limb.dofs, max_iterations=4, tolerance=1e-2) for i in order]
-    alone.sort(key=judge.cost)
-    best, best_cost = here, judge.cost(here) - _LEAST_GAIN
-    for start in alone[: settings.finished]:
-        fit = solve(model, start.values, blocks, max_iterations=iterations, tolerance=1e-3)
-        cost = judge.cost(fit)
-        if cost < best_cost:
-            best, best_cost = fit, cost
-    return best
+    best = _best_apart(model, limb, proposals, look(proposals), settings.scored, _APART_M)
+    for round_, spread_rad in enumerate(settings.shakes_rad):
+        around = _shaken(model, limb, best, settings.shakes, spread_rad, round_)
+        of_each = look(around.reshape(-1, best.shape[1])).reshape(len(best), -1).argmax(axis=1)
+        best = around[np.arange(len(best)), of_each]
+    best = np.array([*best, *(_with_limb(model, here.values, other, limb) for other in others)])
+    return _best_apart(model, limb, best, -judge.costs(best), settings.refined, _SAME_M)
+
+
+def _best_apart(model: BodyModel, limb: Limb, poses: Array, scores: Array, n: int, apart_m: float) -> Array:
+    """The best of many poses of a limb, no two of them near each other: one good place does not crowd out all others.
+
+    Args:
+        model: the body.
+        limb: the one whose joints are compared.
+        poses: (m, n_values).
+        scores: of each, (m,); more is better.
+        n: how many are wanted.
+        apart_m: least distance of the joint that is farthest from its place in the other pose, metres.
+    """
+    points = np.isin(model.point_parts, limb.parts)
+    kept, places = np.empty(n, dtype=np.int64), np.empty((n, np.count_nonzero(points), 3))
+    found = 0
+    for i in np.argsort(-scores):
+        places[found] = model.points_world(poses[i])[points]
+        ways = np.linalg.norm(places[:found] - places[found], axis=-1).max(axis=1)
+        if ways.min(initial=np.inf) > apart_m:
+            kept[found] = i
+            found += 1
+            if found == n:
+                break
+    return poses[kept[:found]]
+
+
+def _distinct(model: BodyModel, fits: Sequence[Fit], judge: Judge) -> list[Fit]:
+    """The cheapest of several poses, no two of them the same but for centimetres, cheapest first."""
+    kept: list[Fit] = []
+    places: list[Array] = []
+    for fit in sorted(fits, key=judge.cost):
+        points = model.points_world(fit.values)
+        if all(np.linalg.norm(points - p, axis=-1).max() > _SAME_M for p in places):
+            kept.append(fit)
+            places.append(points)
+        if len(kept) == judge.settings.kept:
+            break
+    return kept
 
 
 def _with_limb(model: BodyModel, values: Array, other: Array, limb: Limb) -> Array:
@@ -125,11 +194,12 @@ def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSet
     return _moved(model, np.repeat(values[None], len(steps), axis=0), dofs, steps)
 
 
-def _shaken(model: BodyModel, limb: Limb, poses: Array, shakes: int, spread_rad: float) -> Array:
-    """Poses with the limb around where it is in each of some, (n, n_values): the best of many is still far off."""
+def _shaken(model: BodyModel, limb: Limb, poses: Array, shakes: int, spread_rad: float, seed: int) -> Array:
+    """Each of some poses (n, n_values) and others with the limb around where it is there, (n, 1 + shakes, n_values)."""
     dofs = np.flatnonzero(limb.dofs)
-    steps = norm.ppf(0.002 + 0.996 * _even(shakes * len(poses), len(dofs))) * spread_rad
-    return _moved(model, np.repeat(poses, shakes, axis=0), dofs, steps)
+    steps = np.random.default_rng(seed).normal(0.0, spread_rad, (len(poses), shakes, len(dofs)))
+    moved = _moved(model, np.repeat(poses, shakes, axis=0), dofs, steps.reshape(-1, len(dofs)))
+    return np.concatenate([poses[:, None], moved.reshape(len(poses), shakes, -1)], axis=1)
 
 
 def _moved(model: BodyModel, poses: Array, dofs: IntArray, steps: Array) -> Array:

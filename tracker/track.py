@@ -6,7 +6,7 @@ The prediction is first refined on the edges around it (`refine`). Only where th
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -23,10 +23,10 @@ from tracker.evidence import Observer, ViewEvidence, unfiltered
 from tracker.fit import Block, Fit, StayNear, covariance, solve
 from tracker.matched import region_around
 from tracker.predict import PredictSettings, predict
-from tracker.recover import Judge, RecoverSettings, search_limb
-from tracker.refine import ContourMatch, MatchSettings
+from tracker.recover import Judge, RecoverSettings, search_limbs
+from tracker.refine import WORTH_A_STEP, ContourMatch, MatchSettings
 from tracker.rigid import Array
-from tracker.search import SearchSettings, SearchStep, search
+from tracker.search import BEFORE_REFINEMENT, SearchSettings, SearchStep, search
 
 Estimation = Literal["refine", "search"]
 
@@ -37,6 +37,10 @@ _LONGEST_PAUSE = 8
 _LEARN_FRAMES, _TRACKED_SHARE, _GIVEN_SHARE = 3, 0.15, 0.5
 """Every so many frames the colours of the parts are brought up to date, and what such a frame counts; what a keyframe
 counts against the frames before it."""
+_MOVED_RAD, _ANEW_RAD = 0.05, 0.3
+"""A search of a limb was not in vain where a joint turned farther; the limb is elsewhere where it turned this far."""
+_NEAREST_M = 0.3
+"""Bodies nearer to a camera, and those behind it, count as this near."""
 _REGION_MARGIN_M = 0.22
 """What is added around the joints to the region that is looked at: the flesh, and what the prediction may be off."""
 
@@ -234,13 +238,14 @@ class _Scene:
         match = ContourMatch(self.views, self._bodies(), person, settings.match, settings.theta_px)
         blocks: list[Block] = [match, *self._priors(model, predicted, [])]
         if settings.estimate == "search":
-            evaluations = self._search(person)
+            evaluations = self._search(person, settings.search)
             fit = solve(model, self.poses[person], blocks, max_iterations=0)
-            found = self._quality(person, track, match, fit, predicted)
+            found = self._quality(person, track, match, fit)
             return self._take(person, match, fit, found, evaluations, [])
-        fit = solve(model, predicted, blocks, max_iterations=_ITERATIONS, tolerance=_TOLERANCE)
-        found = self._quality(person, track, match, fit, predicted)
-        if settings.recover is None or confidence.judge(found) == "good":
+        fit = solve(model, predicted, blocks, max_iterations=_ITERATIONS, tolerance=_TOLERANCE, gain=WORTH_A_STEP)
+        found = self._quality(person, track, match, fit)
+        blind = not any(len(v.points_px) for v in self.views)  # then there is nothing to search in
+        if settings.recover is None or blind or not (found.suspects or found.body_lost):
             return self._take(person, match, fit, found, 0, [])
         return self._recover(person, track, fit, found, predicted)
 
@@ -253,19 +258,23 @@ class _Scene:
         self.views = [unfiltered(v) for v in self.views]
         match = ContourMatch(self.views, self._bodies(), person, settings.match, settings.theta_px, everywhere=True)
         judge = Judge(match, priors, self.colors(person), track.known, settings.recover)
-        fit = solve(model, fit.values, [match, *priors], max_iterations=_ITERATIONS, tolerance=_TOLERANCE)
+        fit = solve(
+            model, fit.values, [match, *priors], max_iterations=_ITERATIONS, tolerance=_TOLERANCE, gain=WORTH_A_STEP
+        )
         remarks: list[str] = []
         evaluations = 0
-        if confidence.judge(found) == "lost":
+        if found.body_lost:
             evaluations, fit = self._search_body(person, track, fit, judge)
             remarks.append("body searched anew")
-        for limb in filter(track.may_search, suspects):
-            better = search_limb(model, limb, fit, (track.past[-1], predicted), judge, _ITERATIONS)
-            track.searched(limb, better is not fit)
-            if better is not fit:
-                remarks.append(f"{_chain(limb)} searched anew")
-                fit = better
-        found = self._quality(person, track, match, fit, predicted)
+        due = [x for x in suspects if track.may_search(x)]
+        better = search_limbs(model, due, fit, (track.past[-1], predicted), judge, _ITERATIONS)
+        turned = np.abs(model.difference(better.values, fit.values))
+        for limb in due:
+            track.searched(limb, found=turned[limb.dofs].max() > _MOVED_RAD)
+            if turned[limb.dofs].max() > _ANEW_RAD:
+                remarks.append(f"{confidence.spoken(limb.name)} searched anew")
+        fit = better
+        found = self._quality(person, track, match, fit)
         return self._take(person, match, fit, found, evaluations, remarks)
 
     def _take(
@@ -274,7 +283,7 @@ class _Scene:
         """Put a person in the pose that was found, with the judgement of it."""
         self.poses[person] = fit.values
         return _Found(
-            confidence.judge(found), ", ".join(remarks), self._parts_px(match, fit.values),
+            confidence.judge(found), ", ".join(remarks) or confidence.reason(found), self._parts_px(match, fit.values),
             covariance(self.models[person], fit), evaluations, found,
         )  # fmt: skip
 
@@ -292,29 +301,31 @@ class _Scene:
         predicted, best, evaluations = self.poses[person], fit, 0
         for start in (predicted, track.last_good):
             self.poses[person] = start
-            evaluations += self._search(person)
-            refined = solve(
-                track.model, self.poses[person], [judge.match, *judge.priors], None, _ITERATIONS, _TOLERANCE
-            )
+            evaluations += self._search(person, BEFORE_REFINEMENT)
+            blocks = [judge.match, *judge.priors]
+            refined = solve(track.model, self.poses[person], blocks, None, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
             if judge.cost(refined) < judge.cost(best):
                 best = refined
         self.poses[person] = best.values
         return evaluations, best
 
-    def _search(self, person: int) -> int:
+    def _search(self, person: int, how: SearchSettings) -> int:
         """Best-first search of one person from where it stands; returns how many poses were scored."""
         evaluations = 0
-        for step in search_frame(self.views, self.models, self.poses, self.settings, [person]):
+        settings = replace(self.settings, search=how)
+        for step in search_frame(self.views, self.models, self.poses, settings, [person]):
             self.poses, evaluations = list(step.best), step.evaluations
         return evaluations
 
-    def _quality(self, person: int, track: _Track, match: ContourMatch, fit: Fit, predicted: Array) -> Quality:
+    def _quality(self, person: int, track: _Track, match: ContourMatch, fit: Fit) -> Quality:
         known, colors = track.known, None
         if known is not None:
             colors = self.colors(person).score(fit.values, known), known
-        costs, open_px = match.part_costs(fit.values), _open_px(self.views, track.model, fit.values)
+        costs = match.part_costs(fit.values)
         trusts = np.array([0.0 if v.silhouette is None else v.silhouette.trust for v in self.views])
-        return confidence.quality(track.model, fit, predicted, costs, self._thetas, open_px, trusts, colors)
+        return confidence.quality(
+            track.model, fit, costs, self._thetas, trusts, _px_per_m(self.views, track.model, fit.values), colors
+        )
 
     def _parts_px(self, match: ContourMatch, values: Array) -> Array:
         """Mean distance of each part's contour to the edges, (n_parts,), px of the footage."""
@@ -328,24 +339,10 @@ class _Scene:
         return [Body(m, p) for m, p in zip(self.models, self.poses, strict=True)]
 
 
-def _chain(limb: Limb) -> str:
-    """A limb as people say it."""
-    words = limb.name.replace("forearm", "arm").replace("calf", "leg")
-    return words.replace("_", " ")
-
-
-def _open_px(views: Sequence[ViewEvidence], model: BodyModel, values: Array) -> Array:
-    """Length of outline that each part would show within each image with nothing before it, (V, n_parts), px."""
-    T = model.kinematics(values).Ts_world_part
-    half = np.array([s.half_axes[2] for s in model.shapes])
-    middles = np.einsum("nij,nj->ni", T[:, :3, :3], model.centers_part) + T[:, :3, 3]
-    ends = np.stack([middles - half[:, None] * T[:, :3, 2], middles + half[:, None] * T[:, :3, 2]])
-    rows = []
-    for view in views:
-        size = np.array(view.camera.size)
-        seen = np.clip(view.camera.project(ends), 0, size - 1)
-        rows.append(2.0 * np.linalg.norm(seen[0] - seen[1], axis=-1))
-    return np.array(rows)
+def _px_per_m(views: Sequence[ViewEvidence], model: BodyModel, values: Array) -> float:
+    """Length of a metre where a body stands, in the view that shows it in between the largest and the smallest."""
+    middle = model.points_world(values).mean(axis=0)
+    return float(np.median([v.camera.K[0, 0] / max(v.camera.depths(middle), _NEAREST_M) for v in views]))
 
 
 def _outline(bodies: Sequence[Body], camera: Camera) -> FloatArray:

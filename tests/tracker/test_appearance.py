@@ -185,3 +185,46 @@ def test_a_part_that_is_not_there_is_not_learnt(gavrila, stand, seen):
     arm = gavrila.part_index["left_forearm"]
     right = Colors(views, [Body(gavrila, stand)])
     assert right.score(stand, known).parts[arm] > 0.9 * first.usual[arm]
+
+
+def test_each_view_has_its_say(gavrila, stand):
+    """One view shows an arm in another colour: the mean hides it, the view does not."""
+    bodies, other = [Body(gavrila, stand)], SUIT | {"forearm": (250, 250, 0)}
+    right, wrong = dressed(bodies, CAMERAS, SUIT), dressed(bodies, CAMERAS[:1], other)
+    known = Colors(right, bodies).learn()
+    score = Colors([*wrong, *right[1:]], bodies).score(stand, known)
+    assert score.views.shape == (len(CAMERAS), len(gavrila.parts))
+    (arm,) = parts(gavrila, "left_forearm")
+    drops = known.usual[arm] - score.views[:, arm]
+    above = gavrila.retract(stand, np.pad([0.0, 0.0, 30.0], (0, gavrila.n_dofs - 3)))
+    assert drops[0] > 1 > 0.5 > np.nanmax(drops[1:])
+    assert np.isnan(Colors(right, [Body(gavrila, stand)]).score(above, known).views).all()
+
+
+def test_a_look_tells_where_a_limb_is(gavrila, stand):
+    """Where it is, it looks best. Before the trunk it shows what shows without it, and that says nothing for it."""
+    colors = colors_of(gavrila, stand, SUIT | dict.fromkeys(("upper_arm", "forearm", "torso"), (200, 40, 40)))
+    arm, known = np.array(parts(gavrila, "left_upper_arm", "left_forearm")), colors.learn()
+    before_trunk = np.array(stand)
+    for name, angle in (("shoulder.abduction", 0.0), ("shoulder.elevation", 0.6), ("shoulder.twist", -1.4)):
+        before_trunk[gavrila.dof_names.index(f"left_{name}")] = angle
+    before_trunk[gavrila.dof_names.index("left_elbow.extension")] = 1.8
+    rng = np.random.default_rng(2)
+    others = [shaken(gavrila, stand, rng, 0.5, 0.0) for _ in range(20)]
+    found = colors.along_limb(np.array([stand, before_trunk, *others]), arm, known)
+    assert found.argmax() == 0
+    assert found[1] < 0
+
+
+def test_a_limb_that_is_away_hides_nothing(gavrila):
+    """The left arm lies behind the right one as the body seems to stand; taken away, that says nothing against it."""
+    stand = gavrila.neutral()
+    bodies = [Body(gavrila, stand)]
+    view = dressed(bodies, [camera_at("right", (0.0, -4.0, 0.2))], SUIT)
+    colors = Colors(view, bodies)
+    arm, twin = (np.array(parts(gavrila, f"{s}_upper_arm", f"{s}_forearm")) for s in ("left", "right"))
+    trunk = parts(gavrila, "torso", "head")
+    known = colors.learn()
+    hidden, open_ = (colors.along_limb(stand[None], arm, known, x) for x in ([], [*twin, *trunk]))
+    assert hidden[0] == 0
+    assert open_[0] != 0

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from staging import cameras_around, own_evidence, posed
+from staging import SUIT, cameras_around, dressed, own_evidence, posed
 from test_body import BALLS
 
+from tracker.appearance import Colors
 from tracker.body import Body
-from tracker.confidence import LimbFigures, Quality, judge, limbs, quality, worst
+from tracker.confidence import LimbFigures, Quality, judge, limbs, quality, reason, worst
 from tracker.fit import StayNear, solve
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 from tracker.refine import ContourMatch
@@ -69,69 +70,86 @@ def test_worst():
 figures = st.builds(
     LimbFigures,
     name=st.just("arm"),
-    forward=st.floats(0, 1),
-    shown=st.floats(0, 1.2),
     color=st.floats(-3, 3),
-    drop=st.floats(-3, 6),
+    worst_drop=st.floats(-3, 6),
+    spread_px=st.floats(0.1, 80),
 )
+CLEAR = LimbFigures("leg", 1.0, 0.0, 1.2)
 
 
-@given(before=figures, worse=st.tuples(*[st.floats(0, 3)] * 4))
-def test_worse_figures_never_clear_a_limb(before, worse):
-    after = LimbFigures(
-        "arm", before.forward + worse[0], before.shown - worse[1], before.color - worse[2], before.drop + worse[3]
-    )
-    assert after.suspicious >= before.suspicious
-    quality_before, quality_after = (
-        Quality(f.forward, 1.0, 0.01, 0.01, 3, 0.0, (f, LimbFigures("leg", 0.0, 1.0, 1.0, 0.0)))
-        for f in (before, after)
-    )
+@given(before=figures, worse=st.tuples(*[st.floats(0, 3)] * 3), body=st.tuples(*[st.floats(0, 0.1)] * 2))
+def test_worse_figures_never_clear_a_limb(before, worse, body):
+    after = LimbFigures("arm", before.color - worse[0], before.worst_drop + worse[1], before.spread_px + worse[2])
+    better = Quality(0.05, 3, 0.0, (before, CLEAR))
+    worst_of = Quality(0.05 + body[0], 3, body[1], (after, CLEAR))
+    assert (worst_of.log_odds >= better.log_odds).all()
+    assert set(better.suspects) <= set(worst_of.suspects)
     order = ("good", "doubtful", "lost")
-    assert order.index(judge(quality_after)) >= order.index(judge(quality_before))
+    assert order.index(judge(worst_of)) >= order.index(judge(better))
 
 
 def test_what_is_plain():
-    good, bad = LimbFigures("left_forearm", 0.05, 0.9, 1.0, 0.0), LimbFigures("left_calf", 1.0, 0.9, 1.0, 0.0)
-    hidden, undressed = LimbFigures("x", 0.0, 0.0, 1.0, 0.0), LimbFigures("y", 0.05, 0.9, -2.0, 4.0)
-    assert judge(Quality(0.05, 1.0, 0.01, 0.01, 3, 0.0, (good,))) == "good"
-    for limb in (bad, hidden, undressed):
-        found = Quality(0.1, 1.0, 0.01, 0.01, 3, 0.0, (good, limb))
+    undressed, vague = LimbFigures("x", -2.0, 3.0, 4.0), LimbFigures("y", 0.2, 1.0, 40.0)
+    assert judge(Quality(0.05, 3, 0.0, (CLEAR, CLEAR))) == "good"
+    for limb in (undressed, vague):
+        found = Quality(0.15, 3, 0.03, (CLEAR, CLEAR, limb))
         assert found.suspects == (limb.name,)
-        assert judge(found) == "doubtful"
-    assert judge(Quality(1.0, 0.0, 1.0, 0.5, 3, 0.0, (bad, hidden))) == "lost"
-    assert judge(Quality(0.0, 0.0, 1.0, 0.0, 0, 0.0, ())) == "lost"  # nothing sees the body
+        assert judge(found) == "lost"
+        assert not found.body_lost
+    assert Quality(0.15, 3, 0.03, (CLEAR, undressed, vague)).body_lost  # most of it
+    assert judge(Quality(1.0, 3, 0.0, (CLEAR, CLEAR))) == "lost"  # no edge anywhere near
+    assert judge(Quality(0.0, 0, 0.0, ())) == "lost"  # nothing sees the body
     # What no part explains speaks against every limb.
-    assert Quality(0.05, 1.0, 0.01, 0.01, 3, 0.2, (good, bad)).suspects == ("left_forearm", "left_calf")
+    assert (Quality(0.05, 3, 0.12, (CLEAR, vague)).log_odds > Quality(0.05, 3, 0.0, (CLEAR, vague)).log_odds).all()
 
 
-def judged(model, truth, values):
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        (Quality(0.05, 3, 0.0, (CLEAR, CLEAR)), ""),
+        (Quality(0.15, 3, 0.03, (CLEAR, LimbFigures("left_forearm", -2.0, 3.0, 4.0))), "left arm uncertain"),
+        (Quality(0.15, 3, 0.03, (LimbFigures("right_calf", -2.0, 3.0, 4.0), CLEAR)), "right leg uncertain"),
+        (Quality(0.02, 3, 0.2, (CLEAR, CLEAR)), "part of the silhouette unexplained"),
+        (Quality(1.0, 3, 0.0, (CLEAR, CLEAR)), "no edges near the body"),
+        (Quality(0.0, 0, 0.0, ()), "no view shows the body"),
+    ],
+)
+def test_what_is_said_against_a_pose(found, words):
+    assert reason(found) == words
+
+
+def judged(model, truth, values, colors=False):
     """Quality of a pose before the evidence of another one."""
-    views = own_evidence([Body(model, truth)], cameras_around())
+    bodies = [Body(model, truth)]
+    views = dressed(bodies, cameras_around(), SUIT) if colors else own_evidence(bodies, cameras_around())
     match = ContourMatch(views, [Body(model, values)])
     fit = solve(model, values, [match, StayNear(values, np.full(model.n_dofs, 5.0))], max_iterations=0)
     thetas = np.array([v.theta_px for v in views])
-    shown = np.full((3, len(model.parts)), 80.0)
-    return quality(model, fit, truth, match.part_costs(values), thetas, shown, np.zeros(3), None)
+    score = None
+    if colors:
+        known = Colors(views, bodies).learn()
+        score = Colors(views, [Body(model, values)]).score(values, known), known
+    return quality(model, fit, match.part_costs(values), thetas, np.zeros(len(views)), 100.0, score)
 
 
-def test_quality_of_a_pose_and_of_a_lost_arm(gavrila):
+@pytest.mark.parametrize("colors", [False, True])
+def test_quality_of_a_pose_and_of_a_lost_arm(gavrila, colors):
     truth = posed(gavrila, 1)
     off = np.array(truth)
     off[gavrila.dof_names.index("left_shoulder.abduction")] += 1.0
-    right, wrong = judged(gavrila, truth, truth), judged(gavrila, truth, off)
+    right, wrong = judged(gavrila, truth, truth, colors), judged(gavrila, truth, off, colors)
     assert right.views == wrong.views == 3
     assert right.forward < 0.05 < wrong.forward
-    assert right.explained > wrong.explained
-    assert right.step_m == 0
-    end = gavrila.point_names.index("left_wrist")
-    moved = np.linalg.norm(gavrila.points_world(off) - gavrila.points_world(truth), axis=1)
-    assert wrong.step_m == pytest.approx(moved[end])
     arm = [x.name for x in wrong.limbs].index("left_forearm")
-    forward = [x.forward for x in wrong.limbs]
-    assert forward[arm] == max(forward) > 0.45 > 2 * sorted(forward)[-2]
-    assert "left_forearm" in wrong.suspects
-    assert all(x.drop == 0 and x.color == np.inf for x in right.limbs)  # without colours they say nothing
-    assert 0 < right.spread_m < wrong.spread_m
+    assert wrong.log_odds[arm] > right.log_odds[arm]
+    assert (right.unexplained, wrong.unexplained) == (0, 0)
+    assert all(0 < x.spread_px < 10 for x in right.limbs)
+    if colors:
+        assert wrong.log_odds.argmax() == arm
+        assert wrong.limbs[arm].color < right.limbs[arm].color - 0.5
+        assert wrong.limbs[arm].worst_drop > right.limbs[arm].worst_drop + 0.5
+    else:  # they say nothing
+        assert all((x.color, x.worst_drop) == (np.inf, -np.inf) or x.worst_drop == 0 for x in right.limbs)
 
 
 def test_quality_where_nothing_is_seen(gavrila):
@@ -139,4 +157,3 @@ def test_quality_where_nothing_is_seen(gavrila):
     found = judged(gavrila, truth, gavrila.retract(truth, np.pad([0.0, 0.0, 30.0], (0, gavrila.n_dofs - 3))))
     assert found.views == 0
     assert judge(found) == "lost"
-    assert np.isfinite([found.forward, found.explained, found.spread_m, found.step_m]).all()

@@ -10,7 +10,7 @@ from tracker.body import Body
 from tracker.confidence import limbs
 from tracker.fit import StayNear, solve
 from tracker.formats.model_toml import load_model
-from tracker.recover import Judge, RecoverSettings, search_limb
+from tracker.recover import Judge, RecoverSettings, search_limbs
 from tracker.refine import ContourMatch
 
 
@@ -42,7 +42,7 @@ class Staged:
         self.here = solve(model, wrong, self.blocks, max_iterations=15, tolerance=1e-3)
 
     def search(self, limb, others=()):
-        return search_limb(self.model, limb, self.here, others, self.judge, 15)
+        return search_limbs(self.model, [limb], self.here, others, self.judge, 15)
 
     def off_m(self, fit, parts):
         """Largest distance of the points of some parts from the truth, metres."""
@@ -64,10 +64,10 @@ LOST = {
 
 
 @pytest.mark.parametrize(
-    ("name", "colors", "least"), [("gavrila22", True, 4), ("gavrila22", False, 3), ("gavrila31", True, 4)]
+    ("name", "colors", "least"), [("gavrila22", True, 7), ("gavrila22", False, 7), ("gavrila31", True, 8)]
 )
 def test_lost_arms_are_found(name, colors, least):
-    """Nine lost arms: about half are found at least; whatever is done costs less than before."""
+    """Nine lost arms: nearly all are found; whatever is done costs less than before."""
     model = load_model(name)
     arm, n_found = limb_of(model, "left_forearm"), 0
     for seed, lost in itertools.product((1, 2, 3), LOST.values()):
@@ -91,6 +91,35 @@ def test_a_lost_leg_is_found(gavrila):
     staged, leg = Staged(gavrila, truth, wrong), limb_of(gavrila, "left_calf")
     assert staged.off_m(staged.here, leg.parts) > 0.15
     assert staged.off_m(staged.search(leg), leg.parts) < 0.03
+
+
+def test_limbs_that_are_lost_together(gavrila):
+    """An arm on a leg that went elsewhere: neither finds its place while the other is in the way."""
+    n_found = 0
+    for seed in (1, 2, 3):
+        truth = posed(gavrila, seed)
+        wrong = turned(gavrila, truth, **LOST["inside the trunk"], left_hip__elevation=-20, left_knee__extension=0)
+        staged = Staged(gavrila, truth, wrong)
+        suspects = [limb_of(gavrila, n) for n in ("left_forearm", "left_calf")]
+        assert all(staged.off_m(staged.here, x.parts) > 0.15 for x in suspects)
+        found = search_limbs(gavrila, suspects, staged.here, (), staged.judge, 15)
+        n_found += all(staged.off_m(found, x.parts) < 0.03 for x in suspects)
+    assert n_found >= 2
+
+
+def test_best_places_apart(gavrila):
+    """One good place does not take all the room: the best pose of each place is there, best first."""
+    arm, base = limb_of(gavrila, "left_forearm"), gavrila.neutral()
+    there = turned(gavrila, base, left_shoulder__abduction=90)
+    rng = np.random.default_rng(0)
+    near = [turned(gavrila, base, left_elbow__extension=a) for a in rng.uniform(0, 3, 20)]
+    poses, scores = np.array([*near, there]), np.array([*rng.uniform(1, 2, 20), 0.5])
+    found = recover._best_apart(gavrila, arm, poses, scores, 5, 0.05)
+    np.testing.assert_array_equal(found, [poses[np.argmax(scores)], there])
+    np.testing.assert_array_equal(recover._best_apart(gavrila, arm, poses, scores, 1, 0.05), found[:1])
+    # Where another limb is does not count.
+    legs = np.array([base, turned(gavrila, base, left_knee__extension=90)])
+    assert len(recover._best_apart(gavrila, arm, legs, np.zeros(2), 5, 0.05)) == 1
 
 
 def test_where_nothing_is_better_the_pose_is_kept(gavrila):
@@ -117,7 +146,7 @@ def test_other_poses_are_tried_as_they_are(gavrila):
     truth = posed(gavrila, 1)
     arm = limb_of(gavrila, "left_forearm")
     staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["inside the trunk"]))
-    few = RecoverSettings(proposals=2, reach_rad=1e-3, scored=0)
+    few = RecoverSettings(proposals=2, reach_rad=1e-3, scored=2, shakes_rad=(1e-3,))
     staged.judge = Judge(staged.judge.match, staged.judge.priors, staged.judge.colors, staged.judge.known, few)
     assert staged.search(arm, [staged.here.values]) is staged.here
     before = turned(gavrila, truth, left_knee__extension=100, right_hip__elevation=60)
@@ -134,8 +163,8 @@ def test_colours_tell_limbs_apart_that_edges_do_not(gavrila):
     for staged in (with_colors, without):
         there, here = staged.judge.cost(crossed) - crossed.cost, staged.judge.cost(staged.here) - staged.here.cost
         assert (there > here) if staged is with_colors else (there == here == 0)
-    candidates = [staged.here.values, crossed.values]
+    candidates = np.array([staged.here.values, crossed.values])
     np.testing.assert_allclose(
         with_colors.judge.costs(candidates) - without.judge.costs(candidates),
-        [-0.1 * with_colors.judge.colors.score(v, with_colors.judge.known).nats for v in candidates],
+        [-0.2 * with_colors.judge.colors.score(v, with_colors.judge.known).nats for v in candidates],
     )

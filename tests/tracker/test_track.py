@@ -174,7 +174,7 @@ def test_an_arm_that_jumps_is_searched_and_the_frame_says_so(gavrila):
     alone = list(track_chamfer(Shown(views), [gavrila], truth[:1], range(5), TrackSettings(recover=None)))
     assert off_m(gavrila, alone[3].poses[0], truth[3]).max() > 0.1
     assert alone[3].statuses[0] != "good"
-    assert alone[3].remarks == ("",)
+    assert alone[3].remarks == ("left arm uncertain",)
 
 
 class Film:

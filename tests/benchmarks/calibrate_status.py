@@ -1,0 +1,162 @@
+"""How sure the tracker may be of itself: the weights and thresholds of `tracker/confidence.py`, fitted and checked.
+
+`python tests/benchmarks/calibrate_status.py` makes simulated scenes (people whose shape is not the model's, clutter,
+noise), tracks them with and without the search for lost limbs, fits the logistic function of the evidence to the
+scenes of `FIT`, and prints its weights. It then prints, for thresholds of doubt, how many of the lost frames are
+flagged and how many of the frames called good are lost: on each scene of `FIT` by weights fitted to the other scenes,
+and on the scenes of `CHECK`, which nothing was set by, as the tracker calls them now. A limb is lost when one of its
+joints is off by more than 150 mm. With `--scenes DIR` scenes are kept there and taken up again.
+"""
+
+import argparse
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from tracker import confidence
+from tracker.assemble import DEFAULT_MODEL
+from tracker.body import BodyModel
+from tracker.confidence import Status
+from tracker.evidence import Observer
+from tracker.fit import fit_to_points
+from tracker.formats.model_toml import load_model
+from tracker.joint_maps import LIMB_JOINTS
+from tracker.recording import Recording
+from tracker.references import read_joints
+from tracker.rigid import Array
+from tracker.session import load_session
+from tracker.simulate import simulate
+from tracker.track import TrackSettings, track_chamfer
+
+VGA, SMALL = (640, 480), (320, 240)
+FIT = (
+    ("exercise", 1, 4, VGA), ("exercise", 2, 4, VGA), ("dance", 1, 4, VGA), ("dance", 2, 4, VGA), ("dance", 3, 4, VGA),
+    ("leaving", 1, 4, VGA), ("leaving", 2, 4, VGA), ("reach_and_cross", 1, 4, VGA), ("reach_and_cross", 3, 4, VGA),
+)  # fmt: skip
+CHECK = (
+    ("exercise", 11, 4, VGA), ("exercise", 12, 4, VGA), ("dance", 11, 4, VGA), ("dance", 12, 4, VGA),
+    ("leaving", 11, 4, VGA), ("leaving", 12, 4, VGA), ("reach_and_cross", 11, 4, VGA),
+    ("reach_and_cross", 12, 4, VGA), ("dance", 13, 3, SMALL), ("exercise", 13, 6, SMALL),
+)  # fmt: skip
+"""Scene, seed, cameras, image size."""
+LOST_M = 0.15
+UNSEARCHED_WEIGHT = 0.3
+"""What a frame counts that was tracked without search: more is lost there, but not as it is lost with search."""
+RIDGE = 3e-3
+THRESHOLDS = (-4.0, -3.5, -3.0, -2.5, -2.0, -1.0, 0.0)
+
+
+class Limbs:
+    """What is known of the limbs of all frames of a scene, one row each."""
+
+    def __init__(self) -> None:
+        self.evidence: list[Array] = []
+        self.lost: list[bool] = []
+        self.searched: list[bool] = []
+        self.frames: list[int] = []
+        self.statuses: list[Status] = []
+
+    def add(self, scene: Path, settings: TrackSettings) -> None:
+        """Track a scene and note what there is to know of each limb."""
+        session = load_session(scene)
+        model = load_model(DEFAULT_MODEL, session.people[0].model.height_m)
+        truth = read_joints(scene / "truth.trc", session.fps)
+        columns = [truth.names.index(n) for n in LIMB_JOINTS]
+        start = fit_to_points(model, dict(zip(LIMB_JOINTS, truth.points[0][columns], strict=True))).values
+        with Recording(session.cameras) as recording:
+            observer, frames = Observer(session.cameras, recording), range(session.n_frames)
+            for found in track_chamfer(observer, [model], [start], frames, settings, {0: {0: start}}):
+                (quality,), (pose,), (status,) = found.qualities, found.poses, found.statuses
+                if quality is None:
+                    continue
+                joints = model.points_world(pose)[[model.point_names.index(n) for n in LIMB_JOINTS]]
+                off = np.linalg.norm(joints - truth.points[found.frame][columns], axis=-1) > LOST_M
+                for limb in quality.limbs:
+                    of_limb = _joints(model, limb.name)
+                    if of_limb.any():
+                        self.evidence.append(confidence.evidence(quality, limb))
+                        self.lost.append(bool(off[of_limb].any()))
+                        self.searched.append(settings.recover is not None)
+                        self.frames.append(found.frame)
+                        self.statuses.append(status)
+
+
+def _joints(model: BodyModel, limb: str) -> NDArray[np.bool_]:
+    """Which of the limb joints belong to a limb."""
+    parts = next(x.parts for x in confidence.limbs(model) if x.name == limb)
+    return np.isin([model.point_parts[model.point_names.index(n)] for n in LIMB_JOINTS], parts)
+
+
+def fitted(scenes: Sequence[Limbs]) -> Array:
+    """Weights of the evidence and, last, the constant, by ridge regression on standardized evidence."""
+    X = np.concatenate([np.array(s.evidence) for s in scenes])
+    y = np.concatenate([np.array(s.lost, dtype=float) for s in scenes])
+    w = np.concatenate([np.where(s.searched, 1.0, UNSEARCHED_WEIGHT) for s in scenes])
+    middle, spread = X.mean(axis=0), X.std(axis=0) + 1e-9
+    Z = np.column_stack([(X - middle) / spread, np.ones(len(X))])
+
+    def loss(b: Array) -> tuple[float, Array]:
+        odds = Z @ b
+        ridge = np.append(b[:-1], 0.0)
+        value = np.average(np.logaddexp(0, odds) - y * odds, weights=w) + RIDGE * ridge @ ridge
+        return float(value), Z.T @ (w * (1 / (1 + np.exp(-odds)) - y)) / w.sum() + 2 * RIDGE * ridge
+
+    b = minimize(loss, np.zeros(Z.shape[1]), jac=True).x
+    return np.append(b[:-1] / spread, b[-1] - np.sum(b[:-1] * middle / spread))
+
+
+def by_frame(scene: Limbs, values: NDArray[Any], merge: Callable[[NDArray[Any]], Any]) -> NDArray[Any]:
+    """One figure for each frame that was tracked as the tracker does, from one for each of its limbs."""
+    frames, searched = np.array(scene.frames), np.array(scene.searched)
+    return np.array([merge(values[(frames == k) & searched]) for k in np.unique(frames[searched])])
+
+
+def report(flags: NDArray[np.bool_], lost: NDArray[np.bool_]) -> str:
+    """What flags are worth."""
+    return (
+        f"{flags[lost].mean():.0%} of {lost.sum()} lost frames flagged, {lost[~flags].mean():.1%} of the others lost, "
+        f"{(~flags[~lost]).mean():.0%} of the found frames called good"
+    )
+
+
+def main() -> None:
+    """Fit, check and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", type=Path, help="folder where simulated scenes are kept")
+    parser.add_argument("--frames", type=int, default=90, help="frames of a scene that is made")
+    words = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = words.scenes or Path(name)
+        tracked = {}
+        for spec in FIT + CHECK:
+            scene, seed, n_cameras, size = spec
+            path = folder / f"{scene}_{seed}"
+            if not path.exists():
+                simulate(path, scene, n_cameras, words.frames, seed, size)
+            tracked[spec] = limbs = Limbs()
+            limbs.add(path, TrackSettings())
+            if spec in FIT:
+                limbs.add(path, replace(TrackSettings(), recover=None))
+            print(f"{scene} {seed}: {sum(limbs.lost)} limbs of {len(limbs.lost)} lost", flush=True)
+    fit = [tracked[s] for s in FIT]
+    print("weights:", np.round(fitted(fit), 3).tolist())
+    weights = [fitted(fit[:i] + fit[i + 1 :]) for i in range(len(fit))]
+    odds = [by_frame(x, np.array(x.evidence) @ w[:-1] + w[-1], np.max) for x, w in zip(fit, weights, strict=True)]
+    lost = np.concatenate([by_frame(x, np.array(x.lost), np.any) for x in fit])
+    for threshold in THRESHOLDS:
+        print(f"left out one by one, doubt from {threshold}:", report(np.concatenate(odds) > threshold, lost))
+    for size in (VGA, SMALL):
+        check = [tracked[s] for s in CHECK if s[3] == size]
+        flags = np.concatenate([by_frame(x, np.array([s != "good" for s in x.statuses]), np.any) for x in check])
+        lost = np.concatenate([by_frame(x, np.array(x.lost), np.any) for x in check])
+        print(f"as called, on other scenes, {size[0]}x{size[1]}:", report(flags, lost))
+
+
+if __name__ == "__main__":
+    main()
