@@ -23,7 +23,7 @@ _LEAST_SAMPLES = 12
 """Colours of fewer samples say nothing about a part."""
 _LEAST_TRUST = 0.5
 """Silhouettes trusted less have no say."""
-_MOST_UNEXPLAINED = 0.05
+_MOST_UNEXPLAINED = 0.07
 """A silhouette of whose contour more than this is explained by no part shows a limb that is elsewhere."""
 _WEIGHTS = np.array([-1.995, 0.469, 4.15, 14.652, 24.962, -9.377])
 """Of the evidence in `evidence`, in its order; the last is the constant."""
@@ -77,9 +77,9 @@ class Quality(NamedTuple):
 
     @property
     def suspects(self) -> tuple[str, ...]:
-        """Names of the limbs that are worth a search; all where the image shows what no part explains."""
-        everyone = self.unexplained > _MOST_UNEXPLAINED
-        return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if everyone or odds > _SUSPECT)
+        """Names of limbs worth a search, likeliest first; all where the image shows what no part explains."""
+        odds, everyone = self.log_odds, self.unexplained > _MOST_UNEXPLAINED
+        return tuple(self.limbs[i].name for i in np.argsort(-odds) if everyone or odds[i] > _SUSPECT)
 
     @property
     def body_lost(self) -> bool:

@@ -46,7 +46,9 @@ class RecoverSettings:
     finished: int = 3
     """Of these, how many go through a refinement of the whole body."""
     kept: int = 3
-    """Poses that are kept while the next limb is searched."""
+    """Poses that are kept while the next limb is searched, at most."""
+    margin: float = 40.0
+    """What they may cost more than the best: more than another limb can make good."""
     colors: float = 0.2
     """Weight of the colours against edges; neighbouring pixels say the same, so it is well below 1."""
     trust_rad: float = 1.0
@@ -96,6 +98,8 @@ def search_limbs(
     """
     kept = [here]
     for limb in suspects:
+        enough = judge.cost(kept[0]) + judge.settings.margin
+        kept = [fit for fit in kept if judge.cost(fit) < enough]
         away = [p for x in suspects if x is not limb for p in x.parts]
         found = [fit for start in kept for fit in _search_limb(model, limb, away, start, others, judge, iterations)]
         kept = _distinct(model, [*kept, *found], judge)

@@ -37,6 +37,8 @@ _LONGEST_PAUSE = 8
 _LEARN_FRAMES, _TRACKED_SHARE, _GIVEN_SHARE = 3, 0.15, 0.5
 """Every so many frames the colours of the parts are brought up to date, and what such a frame counts; what a keyframe
 counts against the frames before it."""
+_AT_ONCE = 2
+"""Limbs that are searched in a frame at most, the likeliest to be lost first; the others come in the next frames."""
 _MOVED_RAD, _ANEW_RAD = 0.05, 0.3
 """A search of a limb was not in vain where a joint turned farther; the limb is elsewhere where it turned this far."""
 _NEAREST_M = 0.3
@@ -253,7 +255,7 @@ class _Scene:
         """Search what the refinement alone did not find, among all edges: the prediction may refuse the right ones."""
         model, settings = track.model, self.settings
         assert settings.recover is not None
-        suspects = [x for x in track.limbs if x.name in found.suspects]
+        suspects = [x for name in found.suspects for x in track.limbs if x.name == name]
         priors = self._priors(model, predicted, suspects)
         self.views = [unfiltered(v) for v in self.views]
         match = ContourMatch(self.views, self._bodies(), person, settings.match, settings.theta_px, everywhere=True)
@@ -266,7 +268,7 @@ class _Scene:
         if found.body_lost:
             evaluations, fit = self._search_body(person, track, fit, judge)
             remarks.append("body searched anew")
-        due = [x for x in suspects if track.may_search(x)]
+        due = [x for x in suspects if track.may_search(x)][:_AT_ONCE]
         better = search_limbs(model, due, fit, (track.past[-1], predicted), judge, _ITERATIONS)
         turned = np.abs(model.difference(better.values, fit.values))
         for limb in due:
