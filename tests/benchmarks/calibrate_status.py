@@ -42,7 +42,8 @@ FIT = (
 CHECK = (
     ("exercise", 11, 4, VGA), ("exercise", 12, 4, VGA), ("dance", 11, 4, VGA), ("dance", 12, 4, VGA),
     ("leaving", 11, 4, VGA), ("leaving", 12, 4, VGA), ("reach_and_cross", 11, 4, VGA),
-    ("reach_and_cross", 12, 4, VGA), ("dance", 13, 3, SMALL), ("exercise", 13, 6, SMALL),
+    ("reach_and_cross", 12, 4, VGA), ("exercise", 31, 4, VGA), ("dance", 31, 4, VGA), ("leaving", 31, 4, VGA),
+    ("reach_and_cross", 31, 4, VGA), ("dance", 13, 3, SMALL), ("exercise", 13, 6, SMALL),
 )  # fmt: skip
 """Scene, seed, cameras, image size."""
 LOST_M = 0.15
@@ -117,11 +118,16 @@ def by_frame(scene: Limbs, values: NDArray[Any], merge: Callable[[NDArray[Any]],
     return np.array([merge(values[(frames == k) & searched]) for k in np.unique(frames[searched])])
 
 
+def share(of: NDArray[np.bool_]) -> float:
+    """Share of what holds; 0 of nothing."""
+    return float(of.mean()) if len(of) else 0.0
+
+
 def report(flags: NDArray[np.bool_], lost: NDArray[np.bool_]) -> str:
     """What flags are worth."""
     return (
-        f"{flags[lost].mean():.0%} of {lost.sum()} lost frames flagged, {lost[~flags].mean():.1%} of the others lost, "
-        f"{(~flags[~lost]).mean():.0%} of the found frames called good"
+        f"{share(flags[lost]):.0%} of {lost.sum()} lost frames flagged, {share(lost[~flags]):.1%} of the others lost, "
+        f"{share(~flags[~lost]):.0%} of the found frames called good"
     )
 
 
