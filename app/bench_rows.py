@@ -18,7 +18,7 @@ from tracker.chamfer import ChamferCost
 from tracker.evidence import Observer
 from tracker.fit import Block, Fit, StayNear, damped_step, solve
 from tracker.recording import Recording
-from tracker.refine import WORTH_A_STEP, ContourMatch
+from tracker.refine import ContourMatch
 from tracker.rigid import Array
 from tracker.search import BEFORE_REFINEMENT, SearchSettings, search
 from tracker.track import TrackSettings, track_chamfer
@@ -135,7 +135,7 @@ def _refined(frame: BenchFrame, start: Array, predicted: Array) -> Fit:
     match = ContourMatch(frame.views, [Body(model, start)])
     sigma = np.where(model.dof_is_length, _SETTINGS.trust_m, _SETTINGS.trust_rad)
     blocks: list[Block] = [match, StayNear(predicted, 1 / sigma)]
-    return solve(model, start, blocks, max_iterations=15, tolerance=1e-3, gain=WORTH_A_STEP)
+    return solve(model, start, blocks, max_iterations=15, tolerance=1e-3)
 
 
 def _apart(frame: BenchFrame, start: Array, fit: Fit) -> str:

@@ -27,9 +27,9 @@ _MOST_UNEXPLAINED = 0.07
 """A silhouette of whose contour more than this is explained by no part shows a limb that is elsewhere."""
 _WEIGHTS = np.array([-1.995, 0.469, 4.15, 14.652, 24.962, -9.377])
 """Of the evidence in `evidence`, in its order; the last is the constant."""
-_DOUBTFUL, _SUSPECT, _LOST = -4.0, -2.5, 0.0
+_DOUBTFUL, _SUSPECT, _LOST = -3.8, -2.5, 0.0
 """Log odds that a limb is lost from which on the frame is doubtful, the limb is searched for, and the frame is lost.
-Few limbs are lost, and a lost one that is called good is the costlier error: doubt begins at 1 to 55."""
+Few limbs are lost, and a lost one that is called good is the costlier error: doubt begins at 1 to 45."""
 _LOST_FORWARD = 0.6
 """Of a body whose contours are farther than this from all edges, in outlier distances, nothing holds."""
 

@@ -23,8 +23,8 @@ from tracker.rigid import Array
 
 _APART_M, _SAME_M = 0.12, 0.06
 """How far apart the places are that are improved; poses nearer to each other than the second lead to the same one."""
-_LEAST_GAIN = 0.1
-"""What a pose must cost less to count as another one: to refine the same pose once more gains a little too."""
+_LEAST_GAIN = 3.0
+"""What a pose must cost less to take the place of the one at hand: it must be some 20 times likelier."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def _search_limb(
         for candidate in _candidates(model, limb, away, here, others, judge)
     ]
     return [
-        solve(model, start.values, blocks, max_iterations=iterations, tolerance=1e-3, gain=WORTH_A_STEP)
+        solve(model, start.values, blocks, max_iterations=iterations, tolerance=1e-3)
         for start in _distinct(model, alone, judge)[: settings.finished]
     ]
 

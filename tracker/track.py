@@ -244,7 +244,7 @@ class _Scene:
             fit = solve(model, self.poses[person], blocks, max_iterations=0)
             found = self._quality(person, track, match, fit)
             return self._take(person, match, fit, found, evaluations, [])
-        fit = solve(model, predicted, blocks, max_iterations=_ITERATIONS, tolerance=_TOLERANCE, gain=WORTH_A_STEP)
+        fit = solve(model, predicted, blocks, max_iterations=_ITERATIONS, tolerance=_TOLERANCE)
         found = self._quality(person, track, match, fit)
         blind = not any(len(v.points_px) for v in self.views)  # then there is nothing to search in
         if settings.recover is None or blind or not (found.suspects or found.body_lost):
