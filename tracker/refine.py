@@ -36,9 +36,9 @@ _CAPTURE = 2.0
 """Edge points farther than this many outlier distances from the predicted contours are left out for good."""
 
 WORTH_A_STEP = 0.1
-"""Decrease of the cost that is worth another iteration of `fit.solve` where poses are only compared: at the bottom, where
-points change from piece to piece and pieces come and go, costs are rougher than that. (On 39 frames of three recordings
-iterations went from 18 evaluations to 6, and joints ended 2 mm from where endless iteration leads instead of 1.6.)"""
+"""Decrease of the cost that is worth another iteration of `fit.solve` where poses are only compared: at the bottom,
+where points change from piece to piece and pieces come and go, costs are rougher than that. (On 39 frames of three
+recordings iterations went from 18 evaluations to 6, and joints ended 2 mm from the converged pose instead of 1.6.)"""
 
 
 @dataclass(frozen=True)
