@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 from command_line import SAMPLE
-from hands import wait_for
+from fake_tracker import FakeTracker
+from hands import drag, wait_for
 
 from app import __main__
 from app.controller import Controller
@@ -65,3 +66,19 @@ def opened(session):
 
     yield open_it
     close()
+
+
+@pytest.fixture
+def tracker(monkeypatch):
+    """Stands for the tracker: takes its steps when it is let go."""
+    return FakeTracker(monkeypatch)
+
+
+@pytest.fixture
+def placed(opened, tracker):
+    """A controller whose body stands on frame 2."""
+    controller = opened()
+    controller.seek(2)
+    drag(controller, "torso", (4.0, 0.0))
+    yield controller
+    tracker.let_go(1000)  # nobody waits at the end

@@ -9,24 +9,14 @@ import aiohttp
 import numpy as np
 import pytest
 from aiohttp import web
-from fake_tracker import FakeTracker
 from hands import drag
 
 from app.panes import Panes
 
 
 @pytest.fixture
-def tracker(monkeypatch):
-    return FakeTracker(monkeypatch)
-
-
-@pytest.fixture
-def controller(opened, tracker):
-    controller = opened()
-    controller.seek(2)
-    drag(controller, "torso", (4.0, 0.0))
-    yield controller
-    tracker.let_go(1000)
+def controller(placed):
+    return placed
 
 
 class Page:

@@ -5,26 +5,11 @@ import time
 
 import numpy as np
 import pytest
-from fake_tracker import STEP_M, FakeTracker
+from fake_tracker import STEP_M
 from hands import FRONT, PAGE, drag, wait_for
 
 from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError, TrackerError
-
-
-@pytest.fixture
-def tracker(monkeypatch):
-    return FakeTracker(monkeypatch)
-
-
-@pytest.fixture
-def placed(opened, tracker):
-    """A controller whose body stands on frame 2."""
-    controller = opened()
-    controller.seek(2)
-    drag(controller, "torso", (4.0, 0.0))
-    yield controller
-    tracker.let_go(1000)  # nobody waits at the end
 
 
 def at(controller, frame):
