@@ -73,7 +73,7 @@ class Quality(NamedTuple):
     @property
     def log_odds(self) -> Array:
         """Log odds that each limb is lost, (n_limbs,)."""
-        return np.array([_WEIGHTS @ [*evidence(self, x), 1.0] for x in self.limbs])
+        return _log_odds(self)
 
     @property
     def suspects(self) -> tuple[str, ...]:
@@ -97,6 +97,13 @@ def evidence(found: Quality, limb: LimbFigures) -> Array:
         min(found.unexplained, _MOST_UNEXPLAINED),
         found.forward,
     ])  # fmt: skip
+
+
+@lru_cache(maxsize=8)  # asked several times for each frame
+def _log_odds(found: Quality) -> Array:
+    odds = np.array([_WEIGHTS @ [*evidence(found, x), 1.0] for x in found.limbs])
+    odds.flags.writeable = False
+    return odds
 
 
 @lru_cache(maxsize=32)

@@ -6,7 +6,7 @@ go through the costs that all poses go through, and the cheapest are refined. Li
 together.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
@@ -102,7 +102,7 @@ def search_limbs(
         kept = [fit for fit in kept if judge.cost(fit) < enough]
         away = [p for x in suspects if x is not limb for p in x.parts]
         found = [fit for start in kept for fit in _search_limb(model, limb, away, start, others, judge, iterations)]
-        kept = _distinct(model, [*kept, *found], judge)
+        kept = _distinct(model, [*kept, *found], judge, judge.settings.kept)
     return kept[0] if judge.cost(kept[0]) < judge.cost(here) - _LEAST_GAIN else here
 
 
@@ -117,7 +117,7 @@ def _search_limb(
     ]
     return [
         solve(model, start.values, blocks, max_iterations=iterations, tolerance=1e-3)
-        for start in _distinct(model, alone, judge)[: settings.finished]
+        for start in _distinct(model, alone, judge, settings.finished)
     ]
 
 
@@ -149,30 +149,26 @@ def _best_apart(model: BodyModel, limb: Limb, poses: Array, scores: Array, n: in
         apart_m: least distance of the joint that is farthest from its place in the other pose, metres.
     """
     points = np.isin(model.point_parts, limb.parts)
-    kept, places = np.empty(n, dtype=np.int64), np.empty((n, np.count_nonzero(points), 3))
-    found = 0
-    for i in np.argsort(-scores):
-        places[found] = model.points_world(poses[i])[points]
-        ways = np.linalg.norm(places[:found] - places[found], axis=-1).max(axis=1)
-        if ways.min(initial=np.inf) > apart_m:
-            kept[found] = i
-            found += 1
-            if found == n:
-                break
-    return poses[kept[:found]]
+    return poses[_apart(lambda i: model.points_world(poses[i])[points], np.argsort(-scores), n, apart_m)]
 
 
-def _distinct(model: BodyModel, fits: Sequence[Fit], judge: Judge) -> list[Fit]:
+def _distinct(model: BodyModel, fits: Sequence[Fit], judge: Judge, n: int) -> list[Fit]:
     """The cheapest of several poses, no two of them the same but for centimetres, cheapest first."""
-    kept: list[Fit] = []
+    order = np.argsort([judge.cost(fit) for fit in fits], kind="stable")
+    return [fits[i] for i in _apart(lambda i: model.points_world(fits[i].values), order, n, _SAME_M)]
+
+
+def _apart(place: Callable[[int], Array], order: Iterable[int], n: int, apart_m: float) -> list[int]:
+    """The first few of some indices whose places, (m, 3) each, differ by more than `apart_m` in some point."""
+    kept: list[int] = []
     places: list[Array] = []
-    for fit in sorted(fits, key=judge.cost):
-        points = model.points_world(fit.values)
-        if all(np.linalg.norm(points - p, axis=-1).max() > _SAME_M for p in places):
-            kept.append(fit)
-            places.append(points)
-        if len(kept) == judge.settings.kept:
-            break
+    for i in order:
+        here = place(i)
+        if not places or np.linalg.norm(np.array(places) - here, axis=-1).max(axis=1).min() > apart_m:
+            kept.append(i)
+            places.append(here)
+            if len(kept) == n:
+                break
     return kept
 
 

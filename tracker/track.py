@@ -24,7 +24,7 @@ from tracker.fit import Block, Fit, StayNear, covariance, solve
 from tracker.matched import region_around
 from tracker.predict import PredictSettings, predict
 from tracker.recover import Judge, RecoverSettings, search_limbs
-from tracker.refine import WORTH_A_STEP, ContourMatch, MatchSettings
+from tracker.refine import WORTH_A_STEP, ContourMatch, MatchSettings, PartCosts
 from tracker.rigid import Array
 from tracker.search import BEFORE_REFINEMENT, SearchSettings, SearchStep, search
 
@@ -232,7 +232,7 @@ class _Scene:
         """Judge nobody: a pose that was given is taken as it is."""
         match = ContourMatch(self.views, self._bodies(), person, self.settings.match, self.settings.theta_px)
         n = track.model.n_dofs
-        return _Found("good", "", self._parts_px(match, self.poses[person]), np.zeros((n, n)), 0, None)
+        return _Found("good", "", self._parts_px(match.part_costs(self.poses[person])), np.zeros((n, n)), 0, None)
 
     def estimate(self, person: int, track: _Track) -> _Found:
         """Find the pose of one person, the others as they stand; it takes its place in `poses`."""
@@ -242,13 +242,15 @@ class _Scene:
         if settings.estimate == "search":
             evaluations = self._search(person, settings.search)
             fit = solve(model, self.poses[person], blocks, max_iterations=0)
-            found = self._quality(person, track, match, fit)
-            return self._take(person, match, fit, found, evaluations, [])
+            costs = match.part_costs(fit.values)
+            found = self._quality(person, track, costs, fit)
+            return self._take(person, costs, fit, found, evaluations, [])
         fit = solve(model, predicted, blocks, max_iterations=_ITERATIONS, tolerance=_TOLERANCE)
-        found = self._quality(person, track, match, fit)
+        costs = match.part_costs(fit.values)
+        found = self._quality(person, track, costs, fit)
         blind = not any(len(v.points_px) for v in self.views)  # then there is nothing to search in
         if settings.recover is None or blind or not (found.suspects or found.body_lost):
-            return self._take(person, match, fit, found, 0, [])
+            return self._take(person, costs, fit, found, 0, [])
         return self._recover(person, track, fit, found, predicted)
 
     def _recover(self, person: int, track: _Track, fit: Fit, found: Quality, predicted: Array) -> _Found:
@@ -276,16 +278,17 @@ class _Scene:
             if turned[limb.dofs].max() > _ANEW_RAD:
                 remarks.append(f"{confidence.spoken(limb.name)} searched anew")
         fit = better
-        found = self._quality(person, track, match, fit)
-        return self._take(person, match, fit, found, evaluations, remarks)
+        costs = match.part_costs(fit.values)
+        found = self._quality(person, track, costs, fit)
+        return self._take(person, costs, fit, found, evaluations, remarks)
 
     def _take(
-        self, person: int, match: ContourMatch, fit: Fit, found: Quality, evaluations: int, remarks: list[str]
+        self, person: int, costs: PartCosts, fit: Fit, found: Quality, evaluations: int, remarks: list[str]
     ) -> _Found:
         """Put a person in the pose that was found, with the judgement of it."""
         self.poses[person] = fit.values
         return _Found(
-            confidence.judge(found), ", ".join(remarks) or confidence.reason(found), self._parts_px(match, fit.values),
+            confidence.judge(found), ", ".join(remarks) or confidence.reason(found), self._parts_px(costs),
             covariance(self.models[person], fit), evaluations, found,
         )  # fmt: skip
 
@@ -319,19 +322,17 @@ class _Scene:
             self.poses, evaluations = list(step.best), step.evaluations
         return evaluations
 
-    def _quality(self, person: int, track: _Track, match: ContourMatch, fit: Fit) -> Quality:
+    def _quality(self, person: int, track: _Track, costs: PartCosts, fit: Fit) -> Quality:
         known, colors = track.known, None
         if known is not None:
             colors = self.colors(person).score(fit.values, known), known
-        costs = match.part_costs(fit.values)
         trusts = np.array([0.0 if v.silhouette is None else v.silhouette.trust for v in self.views])
         return confidence.quality(
             track.model, fit, costs, self._thetas, trusts, _px_per_m(self.views, track.model, fit.values), colors
         )
 
-    def _parts_px(self, match: ContourMatch, values: Array) -> Array:
+    def _parts_px(self, costs: PartCosts) -> Array:
         """Mean distance of each part's contour to the edges, (n_parts,), px of the footage."""
-        costs = match.part_costs(values)
         scales = np.array([v.scale for v in self.views])
         length = (costs.length_px / scales[:, None]).sum(axis=0)
         far = np.nansum(costs.forward_px * costs.length_px / scales[:, None] ** 2, axis=0)
