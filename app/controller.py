@@ -4,29 +4,19 @@ Methods may be called from any thread. Views subscribe and are told the new stat
 must not call back.
 """
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
-
-import numpy as np
 
 from app.frames import Frames
+from app.hand import Hand
 from app.saving import Saver
 from app.screen import Screen
 from app.searching import Searching
-from app.state import BASES, OVERLAYS, Base, DragState, Shown, State
+from app.state import BASES, OVERLAYS, Base, State
 from app.tracking import Tracking
-from tracker import posing
 from tracker.records import FrameNumbers
-from tracker.rigid import Array
 from tracker.session import Session
 from tracker.track import TrackSettings
-
-_CHECKPOINT_S = 1.0
-"""A long drag is on disk at least this often."""
-_SAME_GESTURE_S = 1.0
-"""Changes of one slider within this time of each other are one entry of the history."""
 
 
 class Controller:
@@ -44,8 +34,8 @@ class Controller:
         self._screen = Screen(session, saver, frames)
         self._searching, self._tracking = Searching(self._screen), Tracking(self._screen)
         self._lock, self.models = self._screen.lock, self._screen.models
-        self._grab: posing.Grab | None = None
-        self._grab_page = 0
+        self.hand = Hand(self._screen, self.editing)
+        """Poses people by hand."""
 
     # --- views -------------------------------------------------------------------------------------------------
 
@@ -81,7 +71,7 @@ class Controller:
             return
         self._searching.halt()
         with self._lock:
-            self._finish_gesture()
+            self.hand.finish()
             self._searching.forget()
             self._tracking.flush()
             self._screen.show(frame, follow=self.state.follow and not self.state.track.running)
@@ -103,70 +93,6 @@ class Controller:
             others = self.state.holding_3d - {page}
             self._screen.set(holding_3d=others | {page} if hold else others)
 
-    # --- posing ------------------------------------------------------------------------------------------------
-
-    def begin_drag(
-        self, page: int, camera: int, person: int, point: str, pointer_px: tuple[float, float], frame: int | None = None
-    ) -> None:
-        """Take hold of a point in a view; pointer in undistorted px.
-
-        The hand means the frame that it saw, which a tracker may have left meanwhile; None for the one shown.
-        """
-        if not (0 <= camera < len(self.session.cameras) and 0 <= person < len(self.models)):
-            return
-        if point not in self.models[person].point_names:
-            return
-        with self._editing():
-            if frame is not None and frame != self.state.frame and 0 <= frame < self.session.n_frames:
-                self._screen.show(frame)
-            values = self.state.poses[person]
-            view = self.session.cameras[camera].camera
-            self._grab = posing.grab(self.models[person], values, view, point, np.array(pointer_px))
-            self._grab_page, self._screen.last_save = page, time.monotonic()
-            self._screen.set(person=person, point=point, drag=DragState(camera, person, point, pointer_px))
-
-    def move_drag(self, page: int, pointer_px: tuple[float, float], seq: int) -> None:
-        """Let the held point follow the pointer."""
-        with self._lock:
-            drag = self.state.drag
-            if self._grab is None or drag is None or page != self._grab_page:
-                return
-            values = posing.drag(self._grab, np.array(pointer_px), self.state.poses[drag.person])
-            seqs = (*(s for s in self.state.drag_seqs if s[0] != page), (page, seq))[-16:]
-            self._pose(drag.person, values, drag=replace(drag, pointer_px=pointer_px), drag_seqs=seqs)
-            if time.monotonic() - self._screen.last_save > _CHECKPOINT_S:
-                self._screen.save(f"drag {_spoken(drag.point)}", "manual", self._grab)
-
-    def end_drag(self, page: int) -> None:
-        """Let go: the gesture is one entry of the history, on disk when this returns."""
-        with self._lock:
-            if page == self._grab_page:
-                self._finish_gesture()
-
-    def cancel_drag(self, page: int) -> None:
-        """Let go and put the body back where it was."""
-        with self._lock:
-            hand, drag = self._grab, self.state.drag
-            if hand is None or drag is None or page != self._grab_page:
-                return
-            checkpointed = self._screen.edit_of is hand
-            self._grab = self._screen.edit_of = None
-            if checkpointed:
-                self._saver.undo()
-                self._screen.refresh_saving()
-            self._screen.show(self.state.frame)
-
-    def set_dof(self, person: int, dof: int, value: float) -> None:
-        """Set one degree of freedom of a revolute joint or of the root, rad or metres."""
-        with self._editing():
-            model, values = self.models[person], self.state.poses[person].copy()
-            values[model.dof_value[dof]] = value
-            self._pose(person, model.clip(values))
-            gesture = ("dof", person, dof, self.state.frame)
-            if gesture != self._screen.edit_of or time.monotonic() - self._screen.last_save > _SAME_GESTURE_S:
-                self._screen.edit_of = None
-            self._screen.save(f"set {_spoken(model.dof_names[dof])}", "manual", gesture)
-
     # --- searching and tracking --------------------------------------------------------------------------------
 
     def set_settings(self, settings: TrackSettings) -> None:
@@ -181,14 +107,14 @@ class Controller:
         """Do one expansion of the search on this frame, beginning one where none stands."""
         self._stop_tracking()
         with self._lock:
-            self._finish_gesture()
+            self.hand.finish()
             self._searching.step()
 
     def search_frame(self) -> None:
         """Search this frame to the end, going on with a search that stands."""
         self._stop_tracking()
         with self._lock:
-            self._finish_gesture()
+            self.hand.finish()
             self._searching.run()
 
     def track(self, backward: bool, until: int | None) -> None:
@@ -197,7 +123,7 @@ class Controller:
         Raises:
             TrackerError: nobody has been placed, or there is no frame to track.
         """
-        with self._editing():
+        with self.editing():
             self._tracking.start(backward, until)
 
     def pause_tracking(self) -> None:
@@ -208,7 +134,7 @@ class Controller:
         """Go on with a tracking run that is paused."""
         self._searching.halt()
         with self._lock:
-            self._finish_gesture()
+            self.hand.finish()
             self._searching.forget()
             self._tracking.go_on()
 
@@ -233,14 +159,14 @@ class Controller:
 
     def close(self) -> None:
         """Stop and save what is at hand; the controller is done."""
-        with self._editing():
+        with self.editing():
             pass
         self.frames.close()
 
     # --- within ------------------------------------------------------------------------------------------------
 
     @contextmanager
-    def _editing(self) -> Iterator[None]:
+    def editing(self) -> Iterator[None]:
         """Hold the lock with nothing at work, no gesture at hand, and no job that would go on from here."""
         while True:
             # Not within the lock: the last step of a job takes it.
@@ -249,7 +175,7 @@ class Controller:
             with self._lock:
                 if self._searching.running or self._tracking.running:
                     continue  # another thread was faster
-                self._finish_gesture()
+                self.hand.finish()
                 self._searching.forget()
                 self._tracking.forget()
                 yield
@@ -259,31 +185,9 @@ class Controller:
         self._tracking.halt(stay=True)
         self._tracking.forget()
 
-    def _pose(self, person: int, values: Array, **changes: object) -> None:
-        """Show a new pose of one person."""
-        people = list(self.state.people)
-        people[person] = Shown(values, "manual")
-        poses = tuple(p.values for p in people)
-        self._screen.set(people=tuple(people), **self._screen.costs(poses), **changes)
-
-    def _finish_gesture(self) -> None:
-        """End the drag at hand, if there is one, and save it."""
-        hand, drag = self._grab, self.state.drag
-        if hand is None or drag is None:
-            return
-        if not np.array_equal(hand.values, self.state.poses[drag.person]) or self._screen.edit_of is hand:
-            self._screen.save(f"drag {_spoken(drag.point)}", "manual", hand)
-        self._grab = self._screen.edit_of = None
-        self._screen.set(drag=None)
-
     def _through_history(self, move: Callable[[], list[int]]) -> None:
-        with self._editing():
+        with self.editing():
             here = self.state.frame
             changed = move()
             self._screen.refresh_saving()
             self._screen.show(min(changed, key=lambda frame: abs(frame - here), default=here))
-
-
-def _spoken(name: str) -> str:
-    """`left_shoulder.abduction` as people say it."""
-    return name.replace("_", " ").replace(".", " ")

@@ -79,7 +79,7 @@ class Panels:
         return slider
 
     def _apply(self, change: _Change) -> None:
-        self._controller.set_dof(change.person, change.dof, change.value)
+        self._controller.hand.set_dof(change.person, change.dof, change.value)
 
     def _show(self, state: State) -> None:
         if state.rests_3d:

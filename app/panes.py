@@ -5,14 +5,13 @@ import itertools
 import json
 import logging
 from collections import deque
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from typing import Any
 
 import aiohttp
-import numpy as np
 from aiohttp import web
 
-from app import curves, messages
+from app import curves, intentions, messages
 from app.controller import Controller
 from app.state import State
 from tracker.errors import TrackerError
@@ -68,7 +67,7 @@ class _Page:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            await asyncio.to_thread(self._controller.end_drag, self._number)
+            await asyncio.to_thread(self._controller.hand.end_drag, self._number)
             await asyncio.to_thread(self._controller.hold_3d, self._number, False)
 
     def _wake(self, _: State) -> None:
@@ -111,57 +110,10 @@ class _Page:
                     await self._notice(f"the page sent a message that is not understood ({error}); reload it")
 
     def _carry_out(self, message: dict[str, Any]) -> None:
-        controller = self._controller
-        actions: dict[str, Callable[[], None]] = {
-            "seek": lambda: controller.seek(int(message["frame"])),
-            "select": lambda: controller.select(int(message["person"]), message.get("point")),
-            "drag": lambda: self._drag(message),
-            "view": lambda: controller.set_view(str(message["base"]), dict(message["overlays"])),
-            "search": lambda: self._search(str(message["action"])),
-            "track": lambda: self._track(str(message["action"]), message.get("until")),
-            "follow": lambda: controller.follow(bool(message["follow"])),
-            "curves": lambda: self._open_curves(message["group"]),
-            "hold_3d": lambda: controller.hold_3d(self._number, bool(message["hold"])),
-            "undo": controller.undo,
-            "redo": controller.redo,
-        }
-        actions[message["type"]]()
-
-    def _drag(self, message: dict[str, Any]) -> None:
-        controller, page = self._controller, self._number
-        phase, pointer_px = message["phase"], (float(message["u"]), float(message["v"]))
-        if not np.all(np.isfinite(pointer_px)):
-            raise ValueError("a position that is not a number")
-        if phase == "start":
-            controller.begin_drag(
-                page,
-                int(message["camera"]),
-                int(message["person"]),
-                message["point"],
-                pointer_px,
-                int(message["frame"]),
-            )
-        if phase == "cancel":
-            controller.cancel_drag(page)
+        if message["type"] == "curves":
+            self._open_curves(message["group"])
         else:
-            controller.move_drag(page, pointer_px, int(message["seq"]))
-        if phase == "end":
-            controller.end_drag(page)
-
-    def _search(self, action: str) -> None:
-        controller = self._controller
-        {"step": controller.search_step, "frame": controller.search_frame, "stop": controller.stop}[action]()
-
-    def _track(self, action: str, until: Any) -> None:
-        controller = self._controller
-        last = None if until is None else int(until)
-        {
-            "forward": lambda: controller.track(False, last),
-            "backward": lambda: controller.track(True, last),
-            "pause": controller.pause_tracking,
-            "go_on": controller.go_on_tracking,
-            "stop": controller.stop,
-        }[action]()
+            intentions.carry_out(self._controller, self._number, message)
 
     def _open_curves(self, group: str | None) -> None:
         if group is not None and group not in curves.GROUPS:

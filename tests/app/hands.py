@@ -22,7 +22,7 @@ def pixel_of(controller, point, camera=FRONT):
 
 def drag(controller, point, by, camera=FRONT):
     start = pixel_of(controller, point, camera)
-    controller.begin_drag(PAGE, camera, 0, point, tuple(start))
+    controller.hand.begin_drag(PAGE, camera, 0, point, tuple(start))
     for t in (0.5, 1.0):
-        controller.move_drag(PAGE, tuple(start + t * np.array(by)), int(10 * t))
-    controller.end_drag(PAGE)
+        controller.hand.move_drag(PAGE, tuple(start + t * np.array(by)), int(10 * t))
+    controller.hand.end_drag(PAGE)

@@ -45,25 +45,25 @@ def test_a_cancelled_drag_leaves_nothing(opened):
     controller = opened()
     values = controller.state.poses[0]
     start = pixel_of(controller, "torso")
-    controller.begin_drag(PAGE, FRONT, 0, "torso", tuple(start))
-    controller.move_drag(PAGE, tuple(start + 40), 1)
+    controller.hand.begin_drag(PAGE, FRONT, 0, "torso", tuple(start))
+    controller.hand.move_drag(PAGE, tuple(start + 40), 1)
     assert not np.array_equal(controller.state.poses[0], values)
-    controller.cancel_drag(PAGE)
+    controller.hand.cancel_drag(PAGE)
     np.testing.assert_array_equal(controller.state.poses[0], values)
     assert controller.state.undo is None
 
 
 def test_a_long_drag_is_on_disk_before_it_ends(opened, session, monkeypatch):
-    monkeypatch.setattr("app.controller._CHECKPOINT_S", 0.0)
+    monkeypatch.setattr("app.hand._CHECKPOINT_S", 0.0)
     controller = opened()
     start = pixel_of(controller, "torso")
-    controller.begin_drag(PAGE, FRONT, 0, "torso", tuple(start))
-    controller.move_drag(PAGE, tuple(start + 40), 1)
+    controller.hand.begin_drag(PAGE, FRONT, 0, "torso", tuple(start))
+    controller.hand.move_drag(PAGE, tuple(start + 40), 1)
     other = AnnotationStore(session / "annotations.sqlite", read_only=True)
     np.testing.assert_array_equal(other.pose("person", 0).values, controller.state.poses[0])
     other.close()
-    controller.move_drag(PAGE, tuple(start + 60), 2)
-    controller.cancel_drag(PAGE)
+    controller.hand.move_drag(PAGE, tuple(start + 60), 2)
+    controller.hand.cancel_drag(PAGE)
     assert controller.state.undo is None
     assert controller.state.people[0].source is None
 
@@ -71,10 +71,10 @@ def test_a_long_drag_is_on_disk_before_it_ends(opened, session, monkeypatch):
 def test_another_page_cannot_move_what_this_one_holds(opened):
     controller = opened()
     start = pixel_of(controller, "torso")
-    controller.begin_drag(PAGE, FRONT, 0, "torso", tuple(start))
+    controller.hand.begin_drag(PAGE, FRONT, 0, "torso", tuple(start))
     values = controller.state.poses[0]
-    controller.move_drag(PAGE + 1, tuple(start + 40), 1)
-    controller.end_drag(PAGE + 1)
+    controller.hand.move_drag(PAGE + 1, tuple(start + 40), 1)
+    controller.hand.end_drag(PAGE + 1)
     np.testing.assert_array_equal(controller.state.poses[0], values)
     assert controller.state.drag is not None
 
@@ -109,7 +109,7 @@ def test_a_slider_is_one_entry_however_often_it_moves(opened):
     model = controller.models[0]
     dof = model.dof_names.index("left_shoulder.abduction")
     for value in (0.1, 0.2, 9.0):
-        controller.set_dof(0, dof, value)
+        controller.hand.set_dof(0, dof, value)
     assert controller.state.poses[0][dof] == pytest.approx(model.limits[dof, 1])  # within its limit
     assert controller.state.undo == "set left shoulder abduction, frame 0"
     controller.undo()
@@ -184,7 +184,7 @@ def test_whatever_a_hand_does_stops_a_running_search(opened, interruption):
         "seek": lambda: controller.seek(3),
         "drag": lambda: drag(controller, "left_knee", (3.0, 3.0)),
         "undo": controller.undo,
-        "set": lambda: controller.set_dof(0, 8, 0.3),
+        "set": lambda: controller.hand.set_dof(0, 8, 0.3),
     }[interruption]()
     assert not controller.state.job.running
     values = controller.state.poses[0]
@@ -224,7 +224,7 @@ def test_many_hands_at_once_leave_one_consistent_state(opened):
 
     def nudge(dof):
         for value in np.linspace(0.0, 0.4, 8):
-            controller.set_dof(0, dof, float(value))
+            controller.hand.set_dof(0, dof, float(value))
 
     threads = [threading.Thread(target=nudge, args=(d,)) for d in (6, 7, 10)]
     for t in threads:

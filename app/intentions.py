@@ -1,0 +1,75 @@
+"""What a page wants, carried out: messages of the pane socket to methods of the controller (docs/protocol.md).
+
+Whatever is missing from a message or is of the wrong kind ends in a KeyError, TypeError or ValueError, and nothing
+has happened then.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from app.controller import Controller
+
+Message = Mapping[str, Any]
+
+
+def carry_out(controller: Controller, page: int, message: Message) -> None:
+    """Do what a page asks for.
+
+    Args:
+        controller: of the session.
+        page: number of the page.
+        message: as it came.
+
+    Raises:
+        TrackerError: it cannot be done; says why.
+        KeyError, TypeError, ValueError: the message is not understood.
+    """
+    _INTENTIONS[message["type"]](controller, page, message)
+
+
+def _drag(controller: Controller, page: int, message: Message) -> None:
+    hand, phase, pointer_px = controller.hand, message["phase"], (float(message["u"]), float(message["v"]))
+    if not np.all(np.isfinite(pointer_px)):
+        raise ValueError("a position that is not a number")
+    if phase == "start":
+        camera, person, frame = int(message["camera"]), int(message["person"]), int(message["frame"])
+        hand.begin_drag(page, camera, person, message["point"], pointer_px, frame)
+    if phase == "cancel":
+        hand.cancel_drag(page)
+    else:
+        hand.move_drag(page, pointer_px, int(message["seq"]))
+    if phase == "end":
+        hand.end_drag(page)
+
+
+def _search(controller: Controller, _: int, message: Message) -> None:
+    actions = {"step": controller.search_step, "frame": controller.search_frame, "stop": controller.stop}
+    actions[message["action"]]()
+
+
+def _track(controller: Controller, _: int, message: Message) -> None:
+    last = None if message.get("until") is None else int(message["until"])
+    actions: dict[str, Callable[[], None]] = {
+        "forward": lambda: controller.track(False, last),
+        "backward": lambda: controller.track(True, last),
+        "pause": controller.pause_tracking,
+        "go_on": controller.go_on_tracking,
+        "stop": controller.stop,
+    }
+    actions[message["action"]]()
+
+
+_INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
+    "seek": lambda controller, _, message: controller.seek(int(message["frame"])),
+    "select": lambda controller, _, message: controller.select(int(message["person"]), message.get("point")),
+    "drag": _drag,
+    "view": lambda controller, _, message: controller.set_view(str(message["base"]), dict(message["overlays"])),
+    "search": _search,
+    "track": _track,
+    "follow": lambda controller, _, message: controller.follow(bool(message["follow"])),
+    "hold_3d": lambda controller, page, message: controller.hold_3d(page, bool(message["hold"])),
+    "undo": lambda controller, _, __: controller.undo(),
+    "redo": lambda controller, _, __: controller.redo(),
+}
