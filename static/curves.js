@@ -3,9 +3,10 @@
  * axis; a click goes to the frame. The program sends them only while they are open.
  */
 
-import { button, byId } from "./elements.js";
 import { colorName, drawCurves } from "./curve_drawing.js";
+import { CURVE_GROUPS } from "./drawer.js";
 import { prepare } from "./drawing.js";
+import { byId } from "./elements.js";
 import { FrameAxis } from "./frame_axis.js";
 import { keyframesOf } from "./timeline_drawing.js";
 
@@ -14,8 +15,6 @@ import { keyframesOf } from "./timeline_drawing.js";
  * @typedef {import("./series.js").Curves} Data
  */
 
-const STORED_OPEN = "quadrille.curves-open";
-const STORED_GROUP = "quadrille.curves-group";
 const STORED_HIDDEN = "quadrille.curves-hidden";
 const SIGNS = { deg: "°", cm: " cm", px: " px" };
 
@@ -23,14 +22,12 @@ export class Curves {
   #store;
   #navigation;
   #actions;
-  #panel = byId("curves", HTMLElement);
-  #stage = byId("curves-stage", HTMLElement);
+  #stage = byId("curves", HTMLElement);
   #legend = byId("curves-legend", HTMLElement);
-  #groups = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll("input[name=curves]")]);
-  #toggle;
   #lines = document.createElement("canvas");
   #cursor = document.createElement("canvas");
-  #isOpen = localStorage.getItem(STORED_OPEN) === "yes";
+  /** The group that is shown; null while the drawer is closed or shows something else. */
+  #group = /** @type {CurveGroup | null} */ (null);
   /** Names of the curves that are switched off. */
   #hidden = new Set(/** @type {string[]} */ (JSON.parse(localStorage.getItem(STORED_HIDDEN) ?? "[]")));
   #hovered = /** @type {number | null} */ (null);
@@ -46,35 +43,18 @@ export class Curves {
     this.#store = store;
     this.#navigation = navigation;
     this.#actions = actions;
-    this.#toggle = button("show-curves", () => this.toggle());
     this.#stage.append(this.#lines, this.#cursor);
-    const stored = localStorage.getItem(STORED_GROUP);
-    for (const input of this.#groups) {
-      input.checked = input.value === stored || (!stored && input.value === "arms");
-      input.addEventListener("change", () => this.#choose());
-    }
     store.subscribe((changed) => this.#update(changed));
     new ResizeObserver(() => this.#drawAll()).observe(this.#stage);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#drawAll());
     this.#listen();
-    this.#show();
-  }
-
-  toggle() {
-    this.#isOpen = !this.#isOpen;
-    localStorage.setItem(STORED_OPEN, this.#isOpen ? "yes" : "no");
-    this.#show();
-    this.#ask();
-  }
-
-  get #group() {
-    return /** @type {CurveGroup} */ (this.#groups.find(({ checked }) => checked)?.value ?? "arms");
+    this.#open();
   }
 
   /** The curves to be drawn; null while those asked for are on their way. */
   get #data() {
     const { curves } = this.#store.facts;
-    return curves?.group === this.#group ? curves : null;
+    return this.#group !== null && curves?.group === this.#group ? curves : null;
   }
 
   get #axis() {
@@ -83,26 +63,23 @@ export class Curves {
 
   /** @param {Set<keyof import("./store.js").Facts>} changed */
   #update(changed) {
-    if (changed.has("connected") && this.#store.facts.connected && this.#isOpen) this.#ask();
-    if (!this.#isOpen) return;
+    if (changed.has("drawer")) this.#open();
+    if (this.#group === null) return;
+    if (changed.has("connected") && this.#store.facts.connected) this.#actions.openCurves(this.#group);
     if (changed.has("curves")) this.#describe();
     if (changed.has("curves") || changed.has("session") || changed.has("timeline")) this.#drawLines();
     if (changed.has("curves") || changed.has("session") || changed.has("target")) this.#drawCursor();
   }
 
-  #show() {
-    this.#panel.hidden = !this.#isOpen;
-    this.#toggle.setAttribute("aria-pressed", String(this.#isOpen));
+  /** Ask for the group that the drawer calls for, or for no more. */
+  #open() {
+    const { drawer } = this.#store.facts;
+    const group = CURVE_GROUPS.find((one) => one === drawer) ?? null;
+    this.#stage.hidden = this.#legend.hidden = group === null;
+    if (group === this.#group) return;
+    this.#group = group;
+    if (this.#store.facts.connected) this.#actions.openCurves(group);
     this.#drawAll();
-  }
-
-  #choose() {
-    localStorage.setItem(STORED_GROUP, this.#group);
-    this.#ask();
-  }
-
-  #ask() {
-    this.#actions.openCurves(this.#isOpen ? this.#group : null);
   }
 
   #listen() {
@@ -164,7 +141,7 @@ export class Curves {
   }
 
   #drawAll() {
-    if (!this.#isOpen) return;
+    if (this.#group === null) return;
     this.#drawLines();
     this.#drawCursor();
   }
@@ -183,7 +160,7 @@ export class Curves {
   /** Lines at the current frame and under the pointer, and in the legend the values at the latter, else the former. */
   #drawCursor() {
     const { clientWidth, clientHeight } = this.#stage;
-    if (clientWidth === 0 || !this.#isOpen) return;
+    if (clientWidth === 0 || this.#group === null) return;
     const context = prepare(this.#cursor, clientWidth, clientHeight, true);
     const style = getComputedStyle(this.#stage);
     const axis = this.#axis;

@@ -47,7 +47,7 @@ function control(key, shift) {
  * @property {import("./navigation.js").Navigation} navigation
  * @property {import("./pane_grid.js").PaneGrid} grid
  * @property {import("./gestures.js").Gestures} gestures
- * @property {import("./curves.js").Curves} curves
+ * @property {import("./drawer.js").Drawer} drawer
  * @property {() => void} showHelp
  */
 
@@ -55,7 +55,7 @@ function control(key, shift) {
  * @param {Parts} parts
  * @returns {Binding[]}
  */
-export function bindings({ store, actions, navigation, grid, gestures, curves, showHelp }) {
+export function bindings({ store, actions, navigation, grid, gestures, drawer, showHelp }) {
   const escape = () => {
     if (gestures.cancel()) return;
     if (hasTrack(store.facts.state)) actions.stopTracking();
@@ -104,7 +104,7 @@ export function bindings({ store, actions, navigation, grid, gestures, curves, s
     },
     { keys: ["["], label: "A range begins here", matches: plain("[", "BracketLeft"), run: mark("first") },
     { keys: ["]"], label: "The range ends here", matches: plain("]", "BracketRight"), run: mark("last") },
-    { keys: ["C"], label: "Curves", matches: plain("c"), run: () => curves.toggle() },
+    { keys: ["C"], label: "Curves", matches: plain("c"), run: () => drawer.toggleCurves() },
     {
       keys: ["1 – 9"],
       label: "Fill the grid with a camera, and back",

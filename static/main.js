@@ -3,6 +3,7 @@
 import { Actions } from "./actions.js";
 import { Connection } from "./connection.js";
 import { Curves } from "./curves.js";
+import { Drawer } from "./drawer.js";
 import { button, byId } from "./elements.js";
 import { FrameCard } from "./frame_card.js";
 import { Gestures } from "./gestures.js";
@@ -38,13 +39,14 @@ new TopBar(store, actions);
 new Transport(store, navigation);
 new TrackBar(store, actions, navigation);
 new FrameCard(store);
-const curves = new Curves(store, navigation, actions);
+const drawer = new Drawer(store);
+new Curves(store, navigation, actions);
 new Timeline(byId("timeline", HTMLElement), store, navigation);
 watchConnection(byId("banner", HTMLElement), store);
 makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement));
 
 const help = byId("help", HTMLDialogElement);
-const table = keys.bindings({ store, actions, navigation, grid, gestures, curves, showHelp: () => help.showModal() });
+const table = keys.bindings({ store, actions, navigation, grid, gestures, drawer, showHelp: () => help.showModal() });
 keys.describe(byId("help-keys", HTMLElement), table);
 button("show-help", () => help.showModal());
 help.addEventListener("click", (event) => event.target === help && help.close());

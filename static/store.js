@@ -13,6 +13,7 @@
  * @property {import("./protocol.js").StateMessage | null} state
  * @property {Map<number, import("./protocol.js").Cell>} timeline the known cells by frame
  * @property {import("./series.js").Curves | null} curves the group of curves that came last
+ * @property {import("./drawer.js").Tab | null} drawer what the drawer shows; null while it is closed
  * @property {{first: number, last: number} | null} range the frames that the user has marked
  * @property {Shown | null} shown the images on the screen
  * @property {import("./protocol.js").Overlay | null} overlay the vectors on the screen
@@ -33,6 +34,7 @@ export class Store {
     state: null,
     timeline: new Map(),
     curves: null,
+    drawer: null,
     range: null,
     shown: null,
     overlay: null,

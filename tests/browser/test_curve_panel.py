@@ -9,7 +9,7 @@ from fake_endpoint import FakeEndpoint, curve
 GUTTER, PADDING = 52, 8
 
 DRAWN = """([first, last, index]) => {
-  const canvas = document.querySelector("#curves-stage canvas");
+  const canvas = document.querySelector("#curves canvas");
   const count = quadrille.state.session.n_frames;
   const x = (frame) => Math.round((52 + frame * (canvas.clientWidth - 60) / count) * devicePixelRatio);
   const context = document.createElement("canvas").getContext("2d");
@@ -33,7 +33,7 @@ async def curves(page):
 
 
 async def place_of(page, frame, height=0.5):
-    box = await page.locator("#curves-stage").bounding_box()
+    box = await page.locator("#curves").bounding_box()
     n_frames = (await state_of(page))["session"]["n_frames"]
     x = box["x"] + GUTTER + (frame + 0.5) * (box["width"] - GUTTER - PADDING) / n_frames
     return x, box["y"] + height * box["height"]
@@ -47,7 +47,7 @@ async def test_curves_are_sent_only_while_they_are_open(page, endpoint):
     await page.get_by_text("Legs", exact=True).click()
     await shows(page, "quadrille.state.curves.group === 'legs'")
     await page.keyboard.press("c")
-    await page.locator("#curves").wait_for(state="hidden")
+    await page.locator("#drawer").wait_for(state="hidden")
     await until(lambda: len(endpoint.heard("curves")) == 3)
     assert [m["group"] for m in endpoint.heard("curves")] == ["arms", "legs", None]
 
@@ -120,7 +120,7 @@ async def test_changes_are_taken_over_frame_by_frame(curves, endpoint):
 
 
 async def test_costs_have_a_curve_for_each_view(curves):
-    await curves.locator("#curves").get_by_text("Cost", exact=True).click()
+    await curves.locator("#drawer").get_by_text("Cost", exact=True).click()
     await shows(curves, "quadrille.state.curves.group === 'cost'")
     names = await curves.locator(".legend-switch").all_inner_texts()
     assert [n.split("\n")[0] for n in names] == ["mean", "FRONT", "RIGHT", "BACK", "LEFT"]

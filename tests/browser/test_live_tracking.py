@@ -88,7 +88,7 @@ async def test_a_run_is_watched_paused_looked_at_and_taken_back(live):
     timeline = (await state_of(live))["timeline"]
     assert {timeline[str(f)]["source"] for f in range(START + 1, at + 1)} == {"tracked"}
     assert timeline[str(START)]["keyframe"]
-    box = await live.locator("#curves-stage").bounding_box()
+    box = await live.locator("#curves").bounding_box()
     await live.mouse.click(box["x"] + 52 + (START + 2.5) * (box["width"] - 60) / 50, box["y"] + 60)
     await shows(live, FOLLOWED.format(START + 2), 60)
 
