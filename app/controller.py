@@ -9,6 +9,7 @@ from contextlib import contextmanager
 
 from app.frames import Frames
 from app.hand import Hand
+from app.locks import Locks
 from app.saving import Saver
 from app.screen import Screen
 from app.searching import Searching
@@ -36,6 +37,8 @@ class Controller:
         self._lock, self.models = self._screen.lock, self._screen.models
         self.hand = Hand(self._screen, self.editing)
         """Poses people by hand."""
+        self.locks = Locks(self._screen, self.editing)
+        """Holds degrees of freedom still."""
 
     # --- views -------------------------------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ import numpy as np
 from app.screen import Screen
 from app.state import DragState, Shown
 from tracker import posing
+from tracker.errors import TrackerError
 from tracker.rigid import Array
 
 _CHECKPOINT_S = 1.0
@@ -48,7 +49,9 @@ class Hand:
                 self._screen.show(frame)
             values = self._screen.state.poses[person]
             view = self._screen.session.cameras[camera].camera
-            self._grab = posing.grab(self._screen.models[person], values, view, point, np.array(pointer_px))
+            self._grab = posing.grab(
+                self._screen.models[person], values, view, point, np.array(pointer_px), self._screen.free(person)
+            )
             self._grab_page, self._screen.last_save = page, time.monotonic()
             self._screen.set(person=person, point=point, drag=DragState(camera, person, point, pointer_px))
 
@@ -97,6 +100,8 @@ class Hand:
         """Set one degree of freedom of a revolute joint or of the root, rad or metres."""
         with self._editing():
             model, values = self._screen.models[person], self._screen.state.poses[person].copy()
+            if dof in self._screen.state.locked[person]:
+                raise TrackerError(f"{spoken(model.dof_names[dof])} is locked; unlock it to change it")
             values[model.dof_value[dof]] = value
             self._pose(person, model.clip(values))
             gesture = ("dof", person, dof, self._screen.state.frame)

@@ -91,6 +91,7 @@ class Panels:
                 plain = [d for d in range(model.n_dofs) if model.joints[model.dof_joint[d]].kind != "ball"]
                 for slider, dof in zip(sliders, plain, strict=True):
                     value = _in_slider(model, dof, state.poses[index])
+                    slider.disabled = dof in state.locked[index]
                     shown = min(max(value, slider.min), slider.max)
                     if abs(slider.value - shown) > 1e-6:
                         slider.value = shown  # type: ignore[misc]

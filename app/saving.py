@@ -3,6 +3,7 @@
 from bisect import bisect_left
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +37,14 @@ class Saver:
         self.error: str | None = None
         """Why the last edit is not on disk; None where it is."""
         self._reload()
+
+    def setting(self, key: str, default: Any = None) -> Any:
+        """A setting that is kept with the session: anything that JSON holds."""
+        return self._store.setting(key, default)
+
+    def keep_setting(self, key: str, value: Any) -> None:
+        """Keep a setting with the session; not part of the history."""
+        self._store.set_setting(key, value)
 
     def pose(self, person: int, frame: int) -> Shown | None:
         """The stored pose of a person on a frame."""

@@ -5,6 +5,9 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from app.frames import Frames
 from app.saving import Saver
 from app.state import Shown, State, finite_or_none
@@ -37,9 +40,13 @@ class Screen:
         """The gesture whose next save amends the last entry of the history; None makes a new entry."""
         self.last_save = 0.0
         """When poses were last written, s of the monotonic clock."""
-        self.state = State(frame=0, people=self._load(0))
+        self.state = State(frame=0, people=self._load(0), locked=(frozenset(),) * len(self.models))
         self.refresh_saving()
         self.frames.request(0, self._evidence_ready)
+
+    def free(self, person: int) -> NDArray[np.bool_]:
+        """The degrees of freedom of a person that may move, (n_dofs,): those that are not locked."""
+        return ~np.isin(np.arange(self.models[person].n_dofs), list(self.state.locked[person]))
 
     def subscribe(self, view: Callable[[State], None]) -> Callable[[], None]:
         """Tell a view every new state from now on; returns what ends it."""

@@ -59,15 +59,20 @@ class Searching:
         screen, state = self._screen, self._screen.state
         if self._job is None or self._job.ended:
             frame, poses, settings = state.frame, state.poses, state.settings
+            free = [screen.free(person) for person in range(len(screen.models))]
+            standing = stages(screen.models, settings.search, free=free)
+            if not standing:
+                raise TrackerError(
+                    "expected something that a search may move, found everything locked; unlock some of it"
+                )
             job: Job[SearchStep] = Job(
-                lambda: search_frame(screen.frames.evidence(frame), screen.models, poses, settings),
+                lambda: search_frame(screen.frames.evidence(frame), screen.models, poses, settings, free=free),
                 lambda step, seconds: self._stepped(job, step, seconds),
                 lambda error: self._ended(job, error),
                 lambda: self._paused(job),
             )
             self._job, screen.edit_of = job, None
-            names = tuple(s.name for s in stages(screen.models, settings.search))
-            screen.set(job=JobState(kind="search", stages=names))
+            screen.set(job=JobState(kind="search", stages=tuple(s.name for s in standing)))
         return self._job
 
     def _stepped(self, job: Job[SearchStep], step: SearchStep, seconds: float) -> None:

@@ -110,6 +110,8 @@ class State:
     track: TrackState = field(default_factory=TrackState)
     follow: bool = True
     """Whether the frame that is being tracked is shown, or the user looks around meanwhile."""
+    locked: tuple[frozenset[int], ...] = ()
+    """Of each person the degrees of freedom that neither hand nor search nor fit moves, by index."""
     drag: DragState | None = None
     drag_seqs: tuple[tuple[int, int], ...] = ()
     """For each page that drags: its number, and the last of its drag messages that this state takes in."""

@@ -51,7 +51,7 @@ ORDER = [
     ["app", "app.access", "app.jobs", "app.viser_proxy", "app.painting", "app.state", "app.tracked"],
     ["app.bench_scenes", "app.commands", "app.curves", "app.frames", "app.overlays", "app.saving", "app.server"],
     ["app.bench_rows", "app.screen"],
-    ["app.hand", "app.searching", "app.tracking"],
+    ["app.hand", "app.locks", "app.searching", "app.tracking"],
     ["app.controller", "app.messages", "app.headless"],
     ["app.intentions", "app.scene", "app.settings_panel"],
     ["app.panels", "app.panes"],

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tracker import rigid
 from tracker.body import BodyModel
 from tracker.cameras import Camera, viewed_point
+from tracker.errors import TrackerError
 from tracker.fit import Block, Normal, StayNear, fit_to_points, normal_of, solve
 from tracker.kinematics import Kinematics
 from tracker.rigid import Array
@@ -83,7 +84,14 @@ def minor_points(model: BodyModel) -> tuple[str, ...]:
     return tuple(j.name for j, is_stiff in zip(model.joints, stiff, strict=True) if is_stiff)
 
 
-def grab(model: BodyModel, values: Array, camera: Camera, point: str, pointer_px: Array) -> Grab:
+def grab(
+    model: BodyModel,
+    values: Array,
+    camera: Camera,
+    point: str,
+    pointer_px: Array,
+    free: NDArray[np.bool_] | None = None,
+) -> Grab:
     """Take hold of a point of a body.
 
     The root point moves the whole body. A point of a limb, or of a head on a neck that bends, moves its chain up to the
@@ -95,6 +103,10 @@ def grab(model: BodyModel, values: Array, camera: Camera, point: str, pointer_px
         camera: the view.
         point: name of the point.
         pointer_px: where the pointer is, undistorted px, (2,).
+        free: which degrees of freedom may give way, (n_dofs,); all by default.
+
+    Raises:
+        TrackerError: whatever moves the point is locked.
     """
     index = model.point_names.index(point)
     place = model.points_world(values)[index]
@@ -105,13 +117,20 @@ def grab(model: BodyModel, values: Array, camera: Camera, point: str, pointer_px
     own = moving & ~of_root
     carries_others = model.point_parts[index] in model.parents
     if index == 0:
-        free = of_root & model.dof_is_length
+        gives = of_root & model.dof_is_length
     elif np.any(own & ~np.isfinite(model.spreads)) or (np.any(own) and not carries_others):
-        free = own
+        gives = own
     else:
-        free = moving & ~model.dof_is_length
+        gives = moving & ~model.dof_is_length
+    if free is not None:
+        gives &= free
+        # Where the limb is locked as a whole nothing else is moved in its place: a lock is meant to hold the hand too.
+        if not np.any(gives):
+            raise TrackerError(
+                f"expected a point that something moves, found {point} with all of that locked; unlock it"
+            )
     offset = camera.pinhole.project(place) - pointer_px
-    return Grab(model, camera.pinhole, index, np.array(values), float(camera.depths(place)), offset, free)
+    return Grab(model, camera.pinhole, index, np.array(values), float(camera.depths(place)), offset, gives)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,8 +172,8 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
     target = hand.camera.back_project(np.asarray(pointer_px) + hand.offset_px, hand.depth_m)
     if hand.moves_body:
         step = np.zeros(model.n_dofs)
-        step[hand.free] = target - model.points_world(hand.values)[0]
-        return model.retract(hand.values, step)
+        step[:3] = target - model.points_world(hand.values)[0]
+        return model.retract(hand.values, np.where(hand.free, step, 0.0))
     blocks: list[Block] = [
         _UnderPointer(hand, target),
         StayNear(hand.values, np.where(np.isfinite(model.spreads), _STIFF_WEIGHT, _REST_WEIGHT)),

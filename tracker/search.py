@@ -8,9 +8,10 @@ per expansion, so that a person can watch it and a program can drain it; whoever
 import heapq
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.body import BodyModel, SearchGroup
 from tracker.chamfer import ChamferCost
@@ -101,16 +102,32 @@ class SearchStep:
     """Whether this was the last step of its stage."""
 
 
-def stages(models: Sequence[BodyModel], settings: SearchSettings, people: Sequence[int] | None = None) -> list[Stage]:
-    """List the leaves of the decomposition in the order of search: pass by pass, person by person (GD96 Fig. 2)."""
+def stages(
+    models: Sequence[BodyModel],
+    settings: SearchSettings,
+    people: Sequence[int] | None = None,
+    free: Sequence[NDArray[np.bool_]] | None = None,
+) -> list[Stage]:
+    """List the leaves of the decomposition in the order of search: pass by pass, person by person (GD96 Fig. 2).
+
+    Degrees of freedom that are not `free`, (n_dofs,) of each person, are left out, and so are leaves left empty.
+    """
     chosen = range(len(models)) if people is None else people
     return [
-        Stage(person, leaf, factor)
+        Stage(person, left, factor)
         for factor in settings.passes
         for person in chosen
         for group in models[person].search_groups
         for leaf in (_limbs(models[person], group) if settings.limbs_apart else (group,))
+        if (left := _free_of(leaf, models[person], None if free is None else free[person])).dofs
     ]
+
+
+def _free_of(group: SearchGroup, model: BodyModel, free: NDArray[np.bool_] | None) -> SearchGroup:
+    """What of a group may move."""
+    if free is None:
+        return group
+    return replace(group, dofs=tuple(d for d in group.dofs if free[model.dof_names.index(d)]))
 
 
 def _limbs(model: BodyModel, group: SearchGroup) -> list[SearchGroup]:
@@ -135,6 +152,7 @@ def search(
     poses: Sequence[Array],
     settings: SearchSettings | None = None,
     people: Sequence[int] | None = None,
+    free: Sequence[NDArray[np.bool_]] | None = None,
 ) -> Iterator[SearchStep]:
     """Search the poses of all people one stage after the other.
 
@@ -145,6 +163,7 @@ def search(
         poses: the predicted pose of each person, (n_values,) each.
         settings: bounds, steps and stopping rule.
         people: whom to search; everybody by default. The others are held, and still hide and explain.
+        free: of each person the degrees of freedom that may move, (n_dofs,); all by default.
 
     Yields:
         One step per expansion; at least one per stage.
@@ -154,7 +173,7 @@ def search(
     best = list(predicted)
     first = cost(best)
     best_px, views_px, evaluations = first.total_px, first.views_px, 1
-    for stage in stages(cost.models, settings, people):
+    for stage in stages(cost.models, settings, people, free):
         for step in _search_stage(cost, stage, settings, predicted[stage.person], best, best_px, views_px, evaluations):
             yield step
             best, best_px, views_px = list(step.best), step.best_px, step.best_views_px

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker import confidence, contours
 from tracker.apart import KeepApart
@@ -111,10 +112,11 @@ def search_frame(
     predicted: Sequence[Array],
     settings: TrackSettings,
     people: Sequence[int] | None = None,
+    free: Sequence[NDArray[np.bool_]] | None = None,
 ) -> Iterator[SearchStep]:
     """Search the poses of one frame from their prediction, step by step; see `search`."""
     cost = pose_cost(views, models, predicted, settings)
-    return search(cost, predicted, settings.search, people)
+    return search(cost, predicted, settings.search, people, free)
 
 
 def track_chamfer(

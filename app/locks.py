@@ -1,0 +1,58 @@
+"""Locked degrees of freedom: what neither a hand nor a search nor a fit moves; kept with the session."""
+
+from collections.abc import Callable, Collection
+from contextlib import AbstractContextManager
+
+from app.screen import Screen
+from tracker.body import BodyModel
+
+_KEY = "locked"
+"""Setting of the session: by name of the person the names of the degrees of freedom."""
+
+
+class Locks:
+    """The locks of everybody in the session."""
+
+    def __init__(self, screen: Screen, editing: Callable[[], AbstractContextManager[None]]) -> None:
+        """Take over the locks that are kept with the session; names that a model has no more are passed over.
+
+        Args:
+            screen: holds the state.
+            editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
+        """
+        self._screen, self._editing = screen, editing
+        kept = screen.saver.setting(_KEY, {})
+        screen.set(
+            locked=tuple(
+                frozenset(i for i, name in enumerate(p.model.dof_names) if name in kept.get(p.name, ()))
+                for p in screen.session.people
+            )
+        )
+
+    def set(self, person: int, dofs: Collection[int], locked: bool) -> None:
+        """Lock or unlock degrees of freedom of a person, each ball joint as a whole; on disk when this returns.
+
+        Raises:
+            TrackerError: the session's settings cannot be written.
+        """
+        model = self._screen.models[person]
+        chosen = _with_whole_balls(model, {d for d in dofs if 0 <= d < model.n_dofs})
+        with self._editing():
+            before = self._screen.state.locked
+            now = before[person] | chosen if locked else before[person] - chosen
+            if now == before[person]:
+                return
+            everybody = (*before[:person], now, *before[person + 1 :])
+            people = self._screen.session.people
+            kept = {
+                p.name: [p.model.dof_names[i] for i in sorted(dofs)] for p, dofs in zip(people, everybody, strict=True)
+            }
+            self._screen.saver.keep_setting(_KEY, kept)
+            self._screen.set(locked=everybody)
+
+
+def _with_whole_balls(model: BodyModel, dofs: Collection[int]) -> frozenset[int]:
+    """Degrees of freedom with the others of their ball joints: a rotation vector has no component to hold alone."""
+    balls = {int(model.dof_joint[d]) for d in dofs if model.joints[model.dof_joint[d]].kind == "ball"}
+    turned = (i for i in range(model.n_dofs) if model.dof_joint[i] in balls and not model.dof_is_length[i])
+    return frozenset(dofs) | frozenset(turned)
