@@ -30,7 +30,7 @@ ORDER = [
         "tracker.footage",
         "tracker.records",
     ],
-    ["tracker.nearest", "tracker.sampling", "tracker.twists"],
+    ["tracker.nearest", "tracker.sampling", "tracker.scenery", "tracker.twists"],
     ["tracker.session_lock", "tracker.annotations", "tracker.body", "tracker.matched", "tracker.silhouette_contour"],
     ["tracker.formats.anipose", "tracker.formats.trc", "tracker.formats.model_toml", "tracker.formats.pose_table"],
     ["tracker.surfaces"],

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from tracker import silhouettes
 from tracker.cameras import Camera, Region
-from tracker.edges import Edges, Levels, detect_edges, levels
+from tracker.edges import Edges, detect_edges, levels
 from tracker.matched import MatchedView, fit_region
 from tracker.probes import Probes, Readings
 from tracker.recording import Recording, read_background, read_mask
+from tracker.scenery import Scenery
 from tracker.segments import Segments, accept, link_edges, pixels_of
 from tracker.session import CameraSource
 from tracker.silhouette_contour import Outline, trace_outline, trust_outline
@@ -90,7 +91,8 @@ class ViewEvidence:
     """All edges found, linked, in px of the region; None where the directions of the edges are unknown."""
     accepted: NDArray[np.bool_] | None = None
     """Which segments the prediction accepts, (S,); `points_px` and `distance` hold only those. None: all of them."""
-
+    still: NDArray[np.bool_] | None = None
+    """Which segments are edges of the room, (S,), and never accepted; None where nothing is known of it."""
     silhouette: Silhouette | None = None
     """The silhouette in the region; None where neither a mask nor a background tells it."""
 
@@ -132,6 +134,7 @@ def view_evidence(
     gradients: NDArray[np.int16] | None = None,
     colors: Image | None = None,
     predicted_px: FloatArray | None = None,
+    scenery: Scenery | None = None,
 ) -> ViewEvidence:
     """Make the evidence of a view from its edge map.
 
@@ -144,19 +147,23 @@ def view_evidence(
         gradients: of the image along u and v, (2, H, W); None where the directions of the edges are unknown.
         colors: see `ViewEvidence`.
         predicted_px: see `accepted`; None keeps all edges. Without gradients no edges are refused.
+        scenery: what is known to stand still in the view; such edges are refused.
     """
     assert edge_map.shape == (camera.height, camera.width), (edge_map.shape, camera.size)
     found, theta = edge_map.view(np.uint8), _theta_px(image_size or camera.size)
-    segments = chosen = None
+    segments = chosen = still = None
     if gradients is not None:
         segments = link_edges(found, gradients)
         if predicted_px is not None:
             chosen = accept(segments, predicted_px, ACCEPTED_SHARE * theta)
+        if scenery is not None:
+            still = scenery.holds(segments, corner_px)
+            chosen = ~still if chosen is None else chosen & ~still
     points, normals, found = _matched_edges(segments, chosen, found)
     # Beyond twice theta nothing asks for the distance any more.
     distance = distance_image(found, 2 * theta)
     return ViewEvidence(
-        camera, scale, points, distance, corner_px, image_size, normals, colors, segments, chosen
+        camera, scale, points, distance, corner_px, image_size, normals, colors, segments, chosen, still
     )  # fmt: skip
 
 
@@ -177,14 +184,16 @@ def accepted(view: ViewEvidence, predicted_px: FloatArray, threshold_px: float |
 
 
 def unfiltered(view: ViewEvidence) -> ViewEvidence:
-    """The same view with all its edges: where the prediction is wrong, what it refused may be what it missed."""
+    """The same view with all edges but the room's: a wrong prediction may have refused what it missed."""
     if view.segments is None or view.accepted is None or view.accepted.all():
         return view
-    everything = np.ones(len(view.accepted), np.bool_)
+    everything = np.ones(len(view.accepted), np.bool_) if view.still is None else ~view.still
     nothing = np.zeros((view.camera.height, view.camera.width), np.uint8)
     points, normals, found = _matched_edges(view.segments, everything, nothing)
     distance = distance_image(found, 2 * view.theta_px)
-    return replace(view, points_px=points, normals=normals, distance=distance, accepted=None)
+    return replace(
+        view, points_px=points, normals=normals, distance=distance, accepted=None if view.still is None else everything
+    )
 
 
 def _matched_edges(
@@ -229,8 +238,8 @@ class _Prepared(NamedTuple):
     """As filmed, (H, W, 3) RGB."""
     mask: NDArray[np.uint8] | None
     """As filmed, (H, W); None where there is none."""
-    bounds: Levels
-    """Thresholds of edges."""
+    strengths: FloatArray
+    """Strengths of the gradient all over the image, which set the thresholds of edges, (n,)."""
     threshold: float
     """Difference from the background that is a change, gray levels."""
     gain: FloatArray
@@ -298,6 +307,7 @@ class Observer:
         k: int,
         regions: Sequence[Region | None] | None = None,
         predicted_px: Sequence[FloatArray | None] | None = None,
+        scenery: Sequence[Scenery] | None = None,
     ) -> tuple[ViewEvidence, ...]:
         """The edges of frame k in each view, kept to the foreground where masks or a background tell it.
 
@@ -308,13 +318,14 @@ class Observer:
             regions: where to look in each view, matched px, see `matched.region_around`; None is the whole image.
             predicted_px: visible pieces of the predicted contours in each view, (M, 4), px of `matched_cameras`, by
                 which segments of edges are accepted; None keeps all edges.
+            scenery: what is known to stand still in each view; asked where neither masks nor a background tell.
         """
         with self._lock:
             ahead = self._ahead.pop(k, None)
         prepared = self._prepare(k) if ahead is None else ahead.result()
         everywhere = [None] * len(self.cameras)
-        boxes, predictions = regions or everywhere, predicted_px or everywhere
-        return tuple(self._pool.map(self._observe, range(len(self.cameras)), prepared, boxes, predictions))
+        boxes, predictions, still = regions or everywhere, predicted_px or everywhere, scenery or everywhere
+        return tuple(self._pool.map(self._observe, range(len(self.cameras)), prepared, boxes, predictions, still))
 
     def _prepare(self, k: int) -> list[_Prepared | None]:
         return [
@@ -325,12 +336,11 @@ class Observer:
     def _prepare_view(self, i: int, frame: Image, k: int) -> _Prepared:
         empty, mask = self._empty[i], read_mask(self.cameras[i], k)
         readings = self._probes[i].read(frame)
-        bounds = levels(readings.strengths, restricted=empty is not None or mask is not None)
         if empty is None:
-            return _Prepared(frame, mask, bounds, 0.0, np.ones(3, np.float32))
+            return _Prepared(frame, mask, readings.strengths, 0.0, np.ones(3, np.float32))
         gain = silhouettes.exposure_gain(readings.colors, empty.readings.colors)
         differences = np.abs(readings.colors - gain * empty.readings.colors).max(axis=-1)
-        return _Prepared(frame, mask, bounds, silhouettes.change_threshold(differences), gain)
+        return _Prepared(frame, mask, readings.strengths, silhouettes.change_threshold(differences), gain)
 
     def _empty_scene(self, i: int, background: Image | None) -> _Empty | None:
         if background is None:
@@ -339,7 +349,12 @@ class Observer:
         return _Empty(silhouettes.smoothed(view.image(background, view.whole)), self._probes[i].read(background))
 
     def _observe(
-        self, i: int, prepared: _Prepared | None, region: Region | None, predicted_px: FloatArray | None
+        self,
+        i: int,
+        prepared: _Prepared | None,
+        region: Region | None,
+        predicted_px: FloatArray | None,
+        scenery: Scenery | None,
     ) -> ViewEvidence:
         view = self._views[i]
         box = view.whole if region is None else fit_region(region, view.camera.size)
@@ -351,12 +366,15 @@ class Observer:
         changes = self._changes(i, prepared, smooth, box)
         margin_px = FOREGROUND_MARGIN * max(view.camera.size)
         foreground = None if changes is None else silhouettes.grow(changes.anything, margin_px)
-        edges = detect_edges(smooth, prepared.bounds, foreground)
+        # Texture that stands still need not be kept out by thresholds, which would keep out the weaker edges of bodies.
+        bounds = levels(prepared.strengths, restricted=changes is not None or scenery is not None)
+        edges = detect_edges(smooth, bounds, foreground)
         if predicted_px is not None:
             predicted_px = predicted_px - np.array([*box[:2], *box[:2]], np.float32)
         seen = view_evidence(
-            camera, view.scale, edges.found, box[:2], view.camera.size, edges.gradients, smooth, predicted_px
-        )
+            camera, view.scale, edges.found, box[:2], view.camera.size, edges.gradients, smooth, predicted_px,
+            scenery if changes is None else None,
+        )  # fmt: skip
         if changes is None:
             return seen
         return replace(seen, silhouette=_silhouette(changes.inside, edges, 2 * seen.theta_px))

@@ -20,13 +20,14 @@ from tracker.cameras import Camera
 from tracker.chamfer import ChamferCost, Outliers
 from tracker.confidence import Limb, Quality, Status
 from tracker.contours import FloatArray
-from tracker.evidence import Observer, ViewEvidence, unfiltered
+from tracker.evidence import ACCEPTED_SHARE, Observer, ViewEvidence, unfiltered
 from tracker.fit import Block, Fit, StayNear, covariance, solve
 from tracker.matched import region_around
 from tracker.predict import PredictSettings, predict
 from tracker.recover import Judge, RecoverSettings, search_limbs
 from tracker.refine import WORTH_A_STEP, ContourMatch, MatchSettings, PartCosts
 from tracker.rigid import Array
+from tracker.scenery import Scenery
 from tracker.search import BEFORE_REFINEMENT, SearchSettings, SearchStep, search
 
 Estimation = Literal["refine", "search"]
@@ -67,7 +68,8 @@ class TrackSettings:
     outliers: Outliers = "truncated"
     """How the search treats outliers, see `ChamferCost`."""
     segments: bool = True
-    """Whether edges count only in segments that the prediction accepts as wholes (GD96 Sect. 4.2)."""
+    """Whether edges count only in segments that the prediction accepts as wholes (GD96 Sect. 4.2), and never those
+    that stand still away from everybody."""
     trust_rad: float = 0.15
     """Standard deviation of the prediction of an angle, rad."""
     trust_m: float = 0.05
@@ -145,6 +147,7 @@ def track_chamfer(
     """
     everybody = tuple(range(len(models))) if people is None else tuple(people)
     tracks = [_Track(m, s) for m, s in zip(models, start, strict=True)]
+    scenery = [Scenery(c.size) for c in observer.matched_cameras] if settings.segments else None
     for i, frame in enumerate(frames):
         for ahead in frames[i : i + 2]:
             observer.prefetch(ahead)
@@ -152,7 +155,7 @@ def track_chamfer(
         poses = [held.get(p, t.expected(settings) if p in everybody else t.past[-1]) for p, t in enumerate(tracks)]
         regions, bodies = _regions(observer, models, poses), [Body(m, p) for m, p in zip(models, poses, strict=True)]
         outlines = [_outline(bodies, c) for c in observer.matched_cameras] if settings.segments else None
-        views = observer.evidence(frame, regions, outlines)
+        views = observer.evidence(frame, regions, outlines, scenery)
         scene = _Scene(views, list(models), poses, settings)
         found = [
             scene.held(p, tracks[p]) if p in held or p not in everybody else scene.estimate(p, tracks[p])
@@ -160,6 +163,8 @@ def track_chamfer(
         ]
         for p, (track, pose) in enumerate(zip(tracks, found, strict=True)):
             track.update(scene, p, pose, given=p in held)
+        if scenery is not None:
+            scene.teach(scenery)
         cost = pose_cost(views, models, scene.poses, settings)(scene.poses)
         yield PoseEstimate(
             frame, tuple(scene.poses), cost.total_px, cost.views_px, sum(f.evaluations for f in found),
@@ -225,6 +230,13 @@ class _Scene:
     ) -> None:
         self.views, self.models, self.poses, self.settings = list(views), models, poses, settings
         self._thetas = np.array([v.outlier_px(settings.theta_px) for v in views])
+
+    def teach(self, scenery: Sequence[Scenery]) -> None:
+        """Show what remembers the room the edges away from everybody, of views whose silhouette nothing tells."""
+        for view, room in zip(self.views, scenery, strict=True):
+            if view.segments is not None and view.silhouette is None:
+                pieces = _outline(self._bodies(), view.camera)
+                room.learn(view.segments, view.corner_px, view.camera.size, pieces, ACCEPTED_SHARE * view.theta_px)
 
     def colors(self, person: int) -> Colors:
         """The colours of this frame under a person."""

@@ -32,7 +32,7 @@ class Shown:
     def prefetch(self, k):
         pass
 
-    def evidence(self, k, regions, outlines):
+    def evidence(self, k, regions, outlines, scenery):
         assert len(regions) == len(self.matched_cameras)
         self.asked.append(k)
         return self.views[k]
@@ -274,3 +274,22 @@ def test_a_real_recording(data_folder, tmp_path):
     errors = evaluate_joints(joints_of_poses(model, poses, session.fps), reference, range(3))
     assert errors.mpjpe_mm < 90
     assert (errors.frames, errors.missing_frames, errors.lost_frames) == (3, 0, 0)
+
+
+def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folder, tmp_path):
+    """Without a background: an arm swings before a patterned picture and along a skirting board."""
+    folder = data_folder("walk")
+    session = assemble(
+        tmp_path / "s", calibration=folder / "Calib.toml", videos=sorted(folder.glob("*.mp4")), heights=1.75
+    )
+    model, frames = session.people[0].model, range(12)
+    reference = read_joints(folder / "ground_truth.trc", session.fps)
+    places = dict(zip(reference.names, reference.points[0], strict=True))
+    start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).values
+    with Recording(session.cameras) as recording:
+        observer = Observer(session.cameras, recording)
+        found = list(track_chamfer(observer, [model], [start], frames, TrackSettings(), {0: {0: start}}))
+    poses = {f.frame: f.poses[0] for f in found}
+    errors = evaluate_joints(joints_of_poses(model, poses, session.fps), reference, frames)
+    assert errors.mpjpe_mm < 42
+    assert (errors.missing_frames, errors.lost_frames) == (0, 0)
