@@ -7,9 +7,11 @@ must not call back.
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from app.disagreements import Disagreements
 from app.frames import Frames
 from app.hand import Hand
 from app.locks import Locks
+from app.ranges import Ranges
 from app.saving import Saver
 from app.screen import Screen
 from app.searching import Searching
@@ -39,6 +41,9 @@ class Controller:
         """Poses people by hand."""
         self.locks = Locks(self._screen, self.editing)
         """Holds degrees of freedom still."""
+        self.ranges = Ranges(self._screen, self._tracking, self.editing)
+        """Works on ranges of frames, and marks them."""
+        self._disagreements = Disagreements(self._screen)
 
     # --- views -------------------------------------------------------------------------------------------------
 
@@ -148,6 +153,7 @@ class Controller:
     def stop(self) -> None:
         """Stop what is at work, with the best so far on disk: a search stands and can go on, a tracking run is over."""
         self._searching.halt()
+        self.ranges.halt()
         self._stop_tracking()
 
     # --- history -----------------------------------------------------------------------------------------------
@@ -164,6 +170,7 @@ class Controller:
         """Stop and save what is at hand; the controller is done."""
         with self.editing():
             pass
+        self._disagreements.close()
         self.frames.close()
 
     # --- within ------------------------------------------------------------------------------------------------
@@ -175,8 +182,9 @@ class Controller:
             # Not within the lock: the last step of a job takes it.
             self._searching.halt()
             self._tracking.halt(stay=True)
+            self.ranges.halt()
             with self._lock:
-                if self._searching.running or self._tracking.running:
+                if self._searching.running or self._tracking.running or self.ranges.running:
                     continue  # another thread was faster
                 self.hand.finish()
                 self._searching.forget()

@@ -61,6 +61,28 @@ def _track(controller: Controller, _: int, message: Message) -> None:
     actions[message["action"]]()
 
 
+def _range(controller: Controller, _: int, message: Message) -> None:
+    ranges, first, last = controller.ranges, int(message["first"]), int(message["last"])
+    person = message.get("person")
+    people = None if person is None else [int(person)]
+    actions: dict[str, Callable[[], None]] = {
+        "interpolate": lambda: ranges.interpolate(first, last, people),
+        "clear": lambda: ranges.clear(first, last, people),
+        "track_forward": lambda: ranges.track(first, last, backward=False),
+        "track_backward": lambda: ranges.track(first, last, backward=True),
+        "keyframe": lambda: ranges.mark(first, last, "keyframe", people),
+        "reviewed": lambda: ranges.mark(first, last, "reviewed", people),
+        "unreviewed": lambda: ranges.mark(first, last, "unreviewed", people),
+        "none": lambda: ranges.mark(first, last, "none", people),
+    }
+    actions[message["action"]]()
+
+
+def _mark(controller: Controller, _: int, message: Message) -> None:
+    ranges = controller.ranges
+    {"keyframe": ranges.toggle_keyframe, "reviewed": ranges.toggle_reviewed}[message["toggle"]]()
+
+
 _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "seek": lambda controller, _, message: controller.seek(int(message["frame"])),
     "select": lambda controller, _, message: controller.select(int(message["person"]), message.get("point")),
@@ -70,6 +92,9 @@ _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "track": _track,
     "follow": lambda controller, _, message: controller.follow(bool(message["follow"])),
     "hold_3d": lambda controller, page, message: controller.hold_3d(page, bool(message["hold"])),
+    "range": _range,
+    "mark": _mark,
+    "stop_range": lambda controller, _, __: controller.ranges.halt(),
     "undo": lambda controller, _, __: controller.undo(),
     "redo": lambda controller, _, __: controller.redo(),
 }

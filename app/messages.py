@@ -2,7 +2,8 @@
 
 import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,13 @@ from app.curves import plots_of, samples
 from app.state import OVERLAYS, JobState, State, TrackState
 from tracker.evidence import ViewEvidence
 from tracker.posing import minor_points
-from tracker.records import FrameNumbers
+from tracker.records import SOURCES, STATUSES, FrameNumbers
 from tracker.session import Session
+
+_FEW_CELLS = 2000
+"""Cells of the timeline that travel by name; more go as columns, a tenth of the bytes and of the work."""
+_NO_POSE = 255
+_NO_CELL: dict[str, Any] = {"source": "", "cost_px": None, "keyframe": False, "status": "", "remark": "", "reviewed": False}
 
 
 def session(session: Session) -> dict[str, Any]:
@@ -58,6 +64,7 @@ def state(state: State) -> dict[str, Any]:
         "parts_px": list(shown.parts_px),
         "job": _job(state.job),
         "track": _track(state.track),
+        "range": asdict(state.ranges),
         "follow": state.follow,
         "undo": state.undo,
         "redo": state.redo,
@@ -100,6 +107,43 @@ def overlay(session: Session, state: State, page: int, views: Sequence[ViewEvide
         "handles": [h._asdict() for h in overlays.handles(session, state)] if joints else [],
     }
     return binary(header, np.concatenate(segments).astype("<f4").tobytes() if segments else b"")
+
+
+def timeline(cells: Mapping[int, dict[str, Any] | None], replace: bool) -> dict[str, Any] | bytes:
+    """Cells of the timeline: a few by name, many as columns.
+
+    Args:
+        cells: by frame; None for a frame that has no pose any more.
+        replace: whether all other frames have no pose.
+    """
+    if len(cells) <= _FEW_CELLS:
+        return {"type": "timeline", "cells": {str(k): cell for k, cell in cells.items()}, "replace": replace}
+    frames = sorted(cells)
+    rows = [cells[k] or _NO_CELL for k in frames]
+    header = {
+        "type": "cells",
+        "replace": replace,
+        "count": len(frames),
+        "sources": SOURCES,
+        "statuses": STATUSES,
+        "remarks": {str(k): row["remark"] for k, row in zip(frames, rows, strict=True) if row["remark"]},
+    }
+    costs = np.array([row["cost_px"] for row in rows], dtype="<f4")  # None becomes NaN
+    source, status = {name: i for i, name in enumerate(SOURCES)}, {name: i for i, name in enumerate(STATUSES)}
+    columns = np.array(
+        [
+            [source.get(row["source"], _NO_POSE) for row in rows],
+            [status[row["status"]] for row in rows],
+            [row["keyframe"] + 2 * row["reviewed"] for row in rows],
+        ],
+        dtype=np.uint8,
+    )
+    return binary(header, np.array(frames, dtype="<u4").tobytes() + costs.tobytes() + columns.tobytes())
+
+
+def disagreeing(frames: Sequence[int]) -> dict[str, Any]:
+    """The frames that disagree with their neighbours, all of them."""
+    return {"type": "disagreeing", "frames": list(frames)}
 
 
 def curves(

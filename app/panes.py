@@ -136,6 +136,8 @@ class _Page:
                 await self._send_images(state)
                 if sent is None or sent.timeline_version != state.timeline_version:
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
+                if sent is None or sent.disagreeing != state.disagreeing:
+                    await self._send(messages.disagreeing(state.disagreeing))
                 await self._send_curves(state)
                 if state.track.failed and (sent is None or sent.track is not state.track):
                     await self._notice(state.track.message)
@@ -178,8 +180,11 @@ class _Page:
         await self._socket.send_bytes(message)
 
     async def _send_timeline(self, since: int) -> None:
-        cells = {str(k): cell for k, cell in self._controller.timeline(since).items()}
-        await self._send({"type": "timeline", "cells": cells, "replace": since == 0})
+        message = await asyncio.to_thread(messages.timeline, self._controller.timeline(since), since == 0)
+        if isinstance(message, bytes):
+            await self._socket.send_bytes(message)
+        else:
+            await self._send(message)
 
     async def _send_curves(self, state: State) -> None:
         """Send the open group of curves: whole where it is another than before, else the frames that changed."""

@@ -3,6 +3,7 @@
 from bisect import bisect_left
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from app.tracked import keyframes_of, tracked_changes
 from tracker.annotations import AnnotationStore
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model
-from tracker.records import SOURCES, FrameNumbers, FrameRow, HistoryEntry, PoseChange, PoseRecord
+from tracker.records import SOURCES, Change, FrameNumbers, FrameRow, HistoryEntry, PoseChange, PoseRecord
 from tracker.rigid import Array
 from tracker.session import Session
 from tracker.track import PoseEstimate, TrackSettings
@@ -31,7 +32,7 @@ class Saver:
         self._revisions = [store.add_model_revision(p.name, format_model(p.model)) for p in session.people]
         self._cells: dict[int, dict] = {}
         self._frames: list[list[int]] = [[] for _ in session.people]
-        self._changes: list[tuple[int, int]] = []  # timeline version, frame
+        self._changed: dict[int, int] = {}  # frame -> version of the timeline it changed in last, latest last
         self.timeline_version = 1
         """Rises with every change of stored poses."""
         self.error: str | None = None
@@ -108,7 +109,7 @@ class Saver:
                 shown.values, sources, revision, keyframe, "", state.cost_px, told, views_px=state.view_costs_px
             )
             changes.append(PoseChange(name, state.frame, record))
-        return self._write(f"{label}, frame {state.frame}", changes, amend, by_program=False)
+        return self.write(f"{label}, frame {state.frame}", changes, amend, by_program=False)
 
     def save_tracked(
         self,
@@ -134,7 +135,7 @@ class Saver:
         """
         names = [p.name for p in self._session.people]
         changes = tracked_changes(estimates, names, people, self._revisions, fixed, settings)
-        return self._write(label, changes, amend, by_program=True)
+        return self.write(label, changes, amend, by_program=True)
 
     def undo(self) -> list[int]:
         """Take back the last entry of the history; returns the frames it is about, ascending."""
@@ -166,8 +167,8 @@ class Saver:
         """Cells of the frames that changed after a version of the timeline; all for 0."""
         if since <= 0:
             return dict(self._cells)
-        frames = {frame for _, frame in self._changes[bisect_left(self._changes, (since + 1, 0)) :]}
-        return {frame: self._cells.get(frame) for frame in frames}
+        latest = takewhile(lambda change: change[1] > since, reversed(self._changed.items()))
+        return {frame: self._cells.get(frame) for frame, _ in latest}
 
     def _next_undo(self) -> HistoryEntry | None:
         return next((e for e in self._store.history(1) if not e.undone), None)
@@ -177,11 +178,30 @@ class Saver:
 
     def _moved(self, entry: HistoryEntry) -> list[int]:
         frames = self._store.frames_of(entry.edit)
-        self._reload(frames)
+        if frames:
+            self._note(frames)
         return frames
 
-    def _write(self, label: str, changes: Sequence[PoseChange], amend: int | None, by_program: bool) -> int | None:
-        """Commit changes, or add them to an entry; returns its id, None where nothing was written."""
+    def rows(self, person: int, frames: range) -> list[FrameRow]:
+        """The frames of a range on which a person has a stored pose, ascending, in short."""
+        return self._store.frames(self._session.people[person].name, frames)
+
+    def revision(self, person: int) -> int:
+        """The body model that new poses of a person belong to."""
+        return self._revisions[person]
+
+    def write(self, label: str, changes: Sequence[Change], amend: int | None, by_program: bool) -> int | None:
+        """Commit changes, or add them to an entry of the history.
+
+        Args:
+            label: what the history says.
+            changes: of poses, their marks, or pins.
+            amend: the entry of the history to add to; None makes a new one.
+            by_program: leave keyframes as they are.
+
+        Returns:
+            Id of the entry; None where nothing was written. Where writing fails, `error` says why.
+        """
         if not changes:
             return amend
         try:
@@ -196,8 +216,8 @@ class Saver:
         self._note(sorted({change.frame for change in changes}))
         return amend
 
-    def _reload(self, changed: Sequence[int] = ()) -> None:
-        """List all frames anew, and note those that changed."""
+    def _reload(self) -> None:
+        """List all frames anew."""
         rows: dict[int, dict[str, FrameRow]] = {}
         for person, info in enumerate(self._session.people):
             found = self._store.frames(info.name)
@@ -205,25 +225,25 @@ class Saver:
             for row in found:
                 rows.setdefault(row.frame, {})[info.name] = row
         self._cells = {frame: _cell(people) for frame, people in rows.items()}
-        self._mark(changed)
 
     def _note(self, frames: Sequence[int]) -> None:
-        """Bring the cells of some frames, in which poses were set, up to date."""
+        """Bring the cells of some frames, ascending, up to date."""
+        changed = set(frames)
         rows: dict[int, dict[str, FrameRow]] = {}
         for person, info in enumerate(self._session.people):
-            listed = self._frames[person]
-            for row in self._store.frames(info.name, range(frames[0], frames[-1] + 1)):
+            found = self._store.frames(info.name, range(frames[0], frames[-1] + 1))
+            for row in found:
                 rows.setdefault(row.frame, {})[info.name] = row
-                at = bisect_left(listed, row.frame)
-                if listed[at : at + 1] != [row.frame]:
-                    listed.insert(at, row.frame)
-        self._cells |= {frame: _cell(people) for frame, people in rows.items()}
-        self._mark(frames)
-
-    def _mark(self, frames: Sequence[int]) -> None:
-        """Begin a new version of the timeline, in which the cells of some frames have changed."""
+            # Only what lies between the first and the last of them can have changed.
+            listed = self._frames[person]
+            between = slice(bisect_left(listed, frames[0]), bisect_left(listed, frames[-1] + 1))
+            listed[between] = [row.frame for row in found]
         self.timeline_version += 1
-        self._changes += [(self.timeline_version, frame) for frame in frames]
+        for frame in changed:
+            self._cells.pop(frame, None)
+            self._changed.pop(frame, None)
+            self._changed[frame] = self.timeline_version
+        self._cells |= {frame: _cell(people) for frame, people in rows.items() if frame in changed}
 
 
 def _cell(rows: Mapping[str, FrameRow]) -> dict:
@@ -236,6 +256,7 @@ def _cell(rows: Mapping[str, FrameRow]) -> dict:
         "keyframe": any(row.keyframe for row in rows.values()),
         "status": min((row.status for row in rows.values()), key=_WORST_FIRST.index),
         "remark": "; ".join(remarks),
+        "reviewed": all(row.reviewed for row in rows.values()),
     }
 
 

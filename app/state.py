@@ -80,6 +80,21 @@ class TrackState:
 
 
 @dataclass(frozen=True)
+class RangeState:
+    """The work on a range of frames that is under way, or how the last one ended."""
+
+    running: bool = False
+    what: str = ""
+    """What is being done, for people to read: `interpolating`."""
+    done: int = 0
+    """Number of frames written."""
+    total: int = 0
+    """Number of frames to write."""
+    message: str = ""
+    """How the last one ended."""
+
+
+@dataclass(frozen=True)
 class DragState:
     """A hand on a point."""
 
@@ -112,6 +127,9 @@ class State:
     """Whether the frame that is being tracked is shown, or the user looks around meanwhile."""
     locked: tuple[frozenset[int], ...] = ()
     """Of each person the degrees of freedom that neither hand nor search nor fit moves, by index."""
+    ranges: RangeState = field(default_factory=RangeState)
+    disagreeing: tuple[int, ...] = ()
+    """Frames whose poses do not go together with those around them, ascending (see `tracker.disagree`)."""
     drag: DragState | None = None
     drag_seqs: tuple[tuple[int, int], ...] = ()
     """For each page that drags: its number, and the last of its drag messages that this state takes in."""

@@ -13,30 +13,24 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import cache
 from importlib import metadata
-from math import isfinite
 from pathlib import Path
-from struct import iter_unpack
 from typing import Any
 
-import numpy as np
-
-from tracker import store_schema
+from tracker import store_schema, stored_poses
 from tracker.errors import SessionError
 from tracker.records import (
-    SOURCES,
-    STATUSES,
     Change,
     Committed,
     FrameNumbers,
     FrameRow,
     HistoryEntry,
+    MarkChange,
     ModelRevision,
     Pin,
     PinChange,
     PoseChange,
     PoseRecord,
 )
-from tracker.rigid import Array
 
 # What each kind of current state is found by, and the column that is NULL where a change clears.
 _KEYS = {"pose": ("person, frame", "numbers"), "pin": ("person, frame, point, camera", "u")}
@@ -88,40 +82,19 @@ class AnnotationStore:
     def pose(self, person: str, frame: int) -> PoseRecord | None:
         """The pose of a person in a frame, or None."""
         row = self._one(
-            "SELECT c.numbers, c.sources, c.views_px, c.parts_px, c.model_revision, c.keyframe, c.status, c.cost_px, "
-            "coalesce(t.settings, c.settings), e.author, e.time, e.program, c.remark FROM poses p "
-            "JOIN pose_changes c ON c.id = p.change JOIN edits e ON e.id = c.edit LEFT JOIN told t ON t.id = c.told "
-            "WHERE p.person = ? AND p.frame = ?",
+            f"SELECT {stored_poses.RECORD} {stored_poses.SHOWN} JOIN edits e ON e.id = c.edit "
+            "LEFT JOIN told t ON t.id = c.told WHERE p.person = ? AND p.frame = ?",
             (person, frame),
         )
-        if row is None:
-            return None
-        numbers, sources, views, parts, revision, keyframe, status, cost, settings, author, time, program, remark = row
-        return PoseRecord(
-            _array(numbers), tuple(SOURCES[i] for i in sources), revision, bool(keyframe), status, cost,
-            json.loads(settings), author, time, program, _costs(views), _costs(parts), remark or "",
-        )  # fmt: skip
+        return None if row is None else stored_poses.record_of(row)
 
     def frames(self, person: str, within: range = range(1 << 31)) -> list[FrameRow]:
         """The frames of a range in which the person has a pose, ascending, in short; by default of all frames."""
-        rows = self._all(
-            "SELECT c.frame, c.sources, c.status, c.cost_px, c.keyframe, c.views_px, c.remark FROM poses p "
-            "JOIN pose_changes c ON c.id = p.change WHERE p.person = ? AND p.frame BETWEEN ? AND ? ORDER BY p.frame",
-            (person, within.start, within.stop - 1),
-        )
-        return [
-            FrameRow(frame, SOURCES[min(sources)], status, cost, bool(keyframe), _costs(views), remark or "")
-            for frame, sources, status, cost, keyframe, views, remark in rows
-        ]
+        return [stored_poses.frame_of(row) for row in self._within(stored_poses.FRAME, person, within)]
 
     def numbers(self, person: str, frames: range) -> list[FrameNumbers]:
         """Poses and costs of a person in those frames of a range that have a pose, ascending: what a curve shows."""
-        rows = self._all(
-            "SELECT c.frame, c.numbers, c.cost_px, c.views_px FROM poses p JOIN pose_changes c ON c.id = p.change "
-            "WHERE p.person = ? AND p.frame BETWEEN ? AND ? ORDER BY p.frame",
-            (person, frames.start, frames.stop - 1),
-        )
-        return [FrameNumbers(frame, _array(numbers), cost, _costs(views)) for frame, numbers, cost, views in rows]
+        return [stored_poses.numbers_of(row) for row in self._within(stored_poses.NUMBERS, person, frames)]
 
     def pins(self, person: str, frame: int) -> list[Pin]:
         """The pins of a person in a frame, by point and camera."""
@@ -261,6 +234,8 @@ class AnnotationStore:
         for change in changes:
             if isinstance(change, PinChange):
                 self._set_pin(edit, change)
+            elif isinstance(change, MarkChange):
+                self._mark(edit, change)
             elif by_program and self._is_keyframe(change.person, change.frame):
                 skipped.append((change.person, change.frame))
             else:
@@ -274,31 +249,26 @@ class AnnotationStore:
 
     def _set_pose(self, edit: int, change: PoseChange) -> None:
         pose = change.pose
-        if pose is None:
-            content: tuple[Any, ...] = (None,) * 10
-        else:
-            assert len(pose.sources) == len(pose.values)
-            assert np.all(np.isfinite(pose.values))
-            assert pose.status in STATUSES, pose.status
-            content = (
-                np.asarray(pose.values, dtype="<f8").tobytes(),
-                bytes(SOURCES.index(s) for s in pose.sources),
-                pose.keyframe,
-                pose.status,
-                pose.cost_px,
-                pose.model_revision,
-                self._told(pose.settings),
-                _blob(pose.views_px),
-                _blob(pose.parts_px),
-                pose.remark,
-            )
+        content = (None,) * 11 if pose is None else (*stored_poses.content_of(pose), self._told(pose.settings))
         row = self._db.execute(
-            "INSERT INTO pose_changes (edit, previous, person, frame, numbers, sources, keyframe, status, cost_px, "
-            "model_revision, told, views_px, parts_px, remark) VALUES (?1, (SELECT change FROM poses WHERE "
-            "(person, frame) = (?2, ?3)), ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
+            f"INSERT INTO pose_changes (edit, previous, person, frame, {stored_poses.CONTENT}) VALUES (?1, (SELECT "
+            "change FROM poses WHERE (person, frame) = (?2, ?3)), ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, "
+            "?14)",
             (edit, change.person, change.frame, *content),
         ).lastrowid
         self._show("pose", row, row)
+
+    def _mark(self, edit: int, change: MarkChange) -> None:
+        """Write the pose that is there again with other marks: the log holds every state of a frame as a whole."""
+        same = stored_poses.UNMARKED
+        found = self._db.execute(
+            f"INSERT INTO pose_changes (edit, previous, person, frame, keyframe, reviewed, {same}) "
+            f"SELECT ?, id, person, frame, ?, ?, {same} FROM pose_changes "
+            "WHERE id = (SELECT change FROM poses WHERE (person, frame) = (?, ?))",
+            (edit, change.keyframe, change.reviewed, change.person, change.frame),
+        )
+        if found.rowcount:
+            self._show("pose", found.lastrowid, found.lastrowid)
 
     def _told(self, settings: Mapping[str, Any]) -> int:
         """Id of settings, which are kept once however many poses were made with them."""
@@ -347,6 +317,11 @@ class AnnotationStore:
         self._db.execute("INSERT INTO moves (kind, edit, time) VALUES (?, ?, ?)", (kind, edit, _now()))
         self._db.execute("UPDATE head SET edit = ?", (head,))
 
+    def _within(self, columns: str, person: str, frames: range) -> list[Any]:
+        """Some columns of the poses that a person has within a range of frames, ascending."""
+        sql = f"SELECT {columns} {stored_poses.SHOWN} WHERE p.person = ? AND p.frame BETWEEN ? AND ? ORDER BY p.frame"
+        return self._all(sql, (person, frames.start, frames.stop - 1))
+
     def _one(self, sql: str, parameters: tuple[Any, ...]) -> Any:
         with self._lock, self._errors():
             return self._db.execute(sql, parameters).fetchone()
@@ -373,23 +348,6 @@ class AnnotationStore:
             raise SessionError(
                 f"annotations {self._path} cannot be read or written: {error}; check the disk and who has the file open"
             ) from error
-
-
-def _array(blob: bytes) -> Array:
-    """Numbers as stored, not writable."""
-    values = np.frombuffer(blob, dtype="<f8").astype(np.float64)
-    values.setflags(write=False)
-    return values
-
-
-def _blob(costs_px: Sequence[float | None]) -> bytes | None:
-    """Costs as stored: NaN for None, nothing where there are none."""
-    return np.array([np.nan if c is None else c for c in costs_px], dtype="<f8").tobytes() if costs_px else None
-
-
-def _costs(blob: bytes | None) -> tuple[float | None, ...]:
-    """Costs from what is stored."""
-    return () if blob is None else tuple(c if isfinite(c) else None for (c,) in iter_unpack("<d", blob))
 
 
 def _now() -> str:

@@ -42,6 +42,8 @@ class PoseRecord:
     """Cost of each part in the order of the body model's, px; None for an unseen part, empty where unknown."""
     remark: str = ""
     """What the tracker did on the frame, for people to read: `left arm searched anew`."""
+    reviewed: bool = False
+    """Whether a person has looked at it and left it as it is; a keyframe counts as reviewed besides."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +54,17 @@ class PoseChange:
     frame: int
     pose: PoseRecord | None
     """The new pose; None clears."""
+
+
+class MarkChange(NamedTuple):
+    """Mark the pose of a person in a frame, which stays as it is; nothing happens where there is none."""
+
+    person: str
+    frame: int
+    keyframe: bool
+    """Whether a person vouches for it, so that no program may change it."""
+    reviewed: bool
+    """Whether a person has looked at it."""
 
 
 class PinChange(NamedTuple):
@@ -75,7 +88,7 @@ class Pin(NamedTuple):
     """Original pixels."""
 
 
-Change = PoseChange | PinChange
+Change = PoseChange | MarkChange | PinChange
 
 
 class Committed(NamedTuple):
@@ -100,6 +113,8 @@ class FrameRow(NamedTuple):
     """Cost of each view, px; None without edges, empty where unknown."""
     remark: str = ""
     """What the tracker did on the frame."""
+    reviewed: bool = False
+    """Whether a person has looked at it, or set it."""
 
 
 class FrameNumbers(NamedTuple):

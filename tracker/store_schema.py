@@ -5,7 +5,7 @@ Upgrading adds tables and columns and never rewrites a row: the log of edits is 
 
 import sqlite3
 
-VERSION = 3
+VERSION = 4
 
 _SCHEMA = """
 CREATE TABLE edits (
@@ -38,7 +38,8 @@ CREATE TABLE pose_changes (
     settings TEXT,                                               -- as versions 1 and 2 kept them; NULL since: see told
     views_px BLOB, parts_px BLOB,                                -- little-endian float64, NaN: unknown; NULL: none
     remark TEXT,
-    told INTEGER REFERENCES told
+    told INTEGER REFERENCES told,
+    reviewed INTEGER                                             -- NULL: written before version 4, nobody has said so
 );
 CREATE INDEX pose_changes_edit ON pose_changes (edit);
 CREATE TABLE poses (
@@ -70,10 +71,11 @@ _UPGRADES = {
         "CREATE TABLE told (id INTEGER PRIMARY KEY, settings TEXT NOT NULL UNIQUE)",
         "ALTER TABLE pose_changes ADD COLUMN told INTEGER REFERENCES told",
     ),
+    3: ("ALTER TABLE pose_changes ADD COLUMN reviewed INTEGER",),
 }
 # Columns of the changes of poses that a store of each older version lacks. Where it must not be written it is read
 # through temporary views, which stand in front of the tables of their names.
-_LACKING = {1: ("views_px", "parts_px", "remark", "told"), 2: ("told",)}
+_LACKING = {1: ("views_px", "parts_px", "remark", "told", "reviewed"), 2: ("told", "reviewed"), 3: ("reviewed",)}
 
 
 def version(db: sqlite3.Connection) -> int:
@@ -104,5 +106,6 @@ def show_as_new(db: sqlite3.Connection) -> int:
         return found
     nothing = ", ".join(f"NULL AS {column}" for column in _LACKING[found])
     db.execute(f"CREATE TEMP VIEW pose_changes AS SELECT *, {nothing} FROM main.pose_changes")
-    db.execute("CREATE TEMP VIEW told AS SELECT NULL AS id, NULL AS settings WHERE 0")
+    if "told" in _LACKING[found]:
+        db.execute("CREATE TEMP VIEW told AS SELECT NULL AS id, NULL AS settings WHERE 0")
     return VERSION

@@ -11,6 +11,7 @@ import pytest
 from aiohttp import web
 from hands import drag
 
+from app import messages
 from app.panes import Panes
 
 
@@ -251,3 +252,49 @@ async def test_segments_are_sent_when_the_evidence_has_come(controller):
 
 def kinds(message):
     return {p["kind"] for p in message["paths"]}
+
+
+async def test_a_range_is_worked_on_and_told(controller):
+    async with visiting(controller) as page:
+        await page.hear("disagreeing", lambda m: m["frames"] == [])
+        await page.send("seek", frame=6)
+        await page.send("mark", toggle="keyframe")
+        await page.hear("timeline", lambda m: m["cells"].get("6", {}).get("keyframe"))
+        await page.send("range", action="interpolate", first=2, last=6, person=None)
+        cells = (await page.hear("timeline"))["cells"]
+        assert {k: (c["source"], c["reviewed"]) for k, c in cells.items()} == dict.fromkeys(
+            "345", ("interpolated", False)
+        )
+        await page.hear("state", lambda m: m["range"]["message"] == "interpolated 3 frames")
+        await page.send("range", action="reviewed", first=3, last=4, person=0)
+        assert set((await page.hear("timeline"))["cells"]) == {"3", "4"}
+        await page.send("range", action="fold", first=3, last=4, person=0)
+        assert "fold" in (await page.hear("notice"))["text"]
+        await page.send("range", action="interpolate", first=10, last=12, person=None)
+        assert "poses at both ends" in (await page.hear("notice"))["text"]
+
+
+async def test_many_cells_travel_as_columns(controller, monkeypatch):
+    controller.seek(6)
+    controller.ranges.toggle_keyframe()
+    controller.ranges.interpolate(2, 6)
+    controller.ranges.mark(4, 4, "reviewed")
+    named = controller.timeline()
+    monkeypatch.setattr(messages, "_FEW_CELLS", 0)
+    async with visiting(controller) as page:
+        message = await page.hear("cells")
+        n, payload = message["count"], message["payload"]
+        assert (n, message["replace"], len(payload)) == (5, True, 5 * 11)
+        assert np.frombuffer(payload, "<u4", n).tolist() == [2, 3, 4, 5, 6]
+        costs = np.frombuffer(payload, "<f4", n, 4 * n)
+        source, status, marks = np.frombuffer(payload, np.uint8, 3 * n, 8 * n).reshape(3, n)
+        for k, frame in enumerate(range(2, 7)):
+            cell = named[frame]
+            assert message["sources"][source[k]] == cell["source"]
+            assert message["statuses"][status[k]] == cell["status"]
+            assert marks[k] == cell["keyframe"] + 2 * cell["reviewed"]
+            assert costs[k] == pytest.approx(cell["cost_px"]) if cell["cost_px"] else np.isnan(costs[k])
+        await page.send("undo")
+        await page.send("undo")
+        gone = await page.hear("cells", lambda m: not m["replace"] and m["count"] == 3)
+        assert np.frombuffer(gone["payload"], np.uint8, 3, 8 * 3).tolist() == [255] * 3

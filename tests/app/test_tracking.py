@@ -54,6 +54,7 @@ def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, sess
     store.close()
     assert placed.timeline()[4] == {
         "source": "tracked", "cost_px": 1.4, "keyframe": False, "status": "doubtful", "remark": shown.remark,
+        "reviewed": False,
     }  # fmt: skip
     placed.undo()
     assert set(placed.timeline()) == {2}
@@ -185,7 +186,7 @@ def test_edits_stop_a_run(placed, tracker, edit):
     end_the_step_soon(tracker)
     {
         "drag": lambda: drag(placed, "left_knee", (3.0, 3.0)),
-        "set": lambda: placed.set_dof(0, 8, 0.3),
+        "set": lambda: placed.hand.set_dof(0, 8, 0.3),
         "search": placed.search_step,
         "undo": placed.undo,
     }[edit]()
@@ -217,11 +218,11 @@ def test_a_hand_takes_hold_of_the_frame_that_it_saw(placed, tracker):
     tracker.let_go(4)
     wait_for(at(placed, 6))
     end_the_step_soon(tracker)
-    placed.begin_drag(PAGE, FRONT, 0, "torso", (320.0, 240.0), frame=4)
+    placed.hand.begin_drag(PAGE, FRONT, 0, "torso", (320.0, 240.0), frame=4)
     assert placed.state.frame == 4
     assert placed.state.people[0].status == "doubtful"
-    placed.move_drag(PAGE, (330.0, 240.0), 1)
-    placed.end_drag(PAGE)
+    placed.hand.move_drag(PAGE, (330.0, 240.0), 1)
+    placed.hand.end_drag(PAGE)
     assert placed.state.undo == "drag torso, frame 4"
 
 

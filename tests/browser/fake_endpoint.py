@@ -41,6 +41,7 @@ NO_TRACK = {
     "running": False, "first": None, "last": None, "at": None, "done": 0, "total": 0, "per_second": 0.0, "doubtful": 0,
     "lost": 0, "message": "",
 }  # fmt: skip
+NO_RANGE = {"running": False, "what": "", "done": 0, "total": 0, "message": ""}
 STAGES = ["torso_head", "arms", "legs"]
 PARTS = ["torso", "left_arm", "left_leg", "head", "right_leg", "right_arm", "pelvis"]
 ANGLES = ("abduction", "elevation", "twist", "extension")
@@ -101,7 +102,7 @@ class FakeEndpoint:
             "overlays": {"contours": True, "joints": True, "part_edges": False, "skeleton": True, "segments": False},
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
             "source": "manual", "status": "", "remark": "", "parts_px": [], "job": self.idle_job(""),
-            "track": dict(NO_TRACK), "follow": True, "undo": "drag l_wrist", "redo": None,
+            "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "saved": True, "save_error": None,
         }  # fmt: skip
 
@@ -234,7 +235,14 @@ class FakeEndpoint:
         at = track["first"] if track["at"] is None else track["at"] + step
         for frame in range(at, track["last"] + step, step):
             track |= {"at": frame, "done": track["done"] + 1, "per_second": 20.0}
-            cell = {"source": "tracked", "cost_px": 1.0, "keyframe": False, "status": status_of(frame), "remark": ""}
+            cell = {
+                "source": "tracked",
+                "cost_px": 1.0,
+                "keyframe": False,
+                "status": status_of(frame),
+                "remark": "",
+                "reviewed": False,
+            }
             await self.broadcast({"type": "timeline", "cells": {frame: cell}, "replace": False})
             if self.state["follow"]:
                 self.state |= self.judged(frame)
@@ -297,6 +305,7 @@ class FakeEndpoint:
                 "keyframe": k % 20 == 0,
                 "status": "" if k < 10 else status_of(k),
                 "remark": REMARK if k in (31, 32) else "",
+                "reviewed": k % 20 == 0 or k < 16,
             }
             for k in range(self.n_frames * 100 // N_FRAMES)
         }

@@ -11,7 +11,7 @@ import pytest
 
 from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
-from tracker.records import FrameRow, Pin, PinChange, PoseChange, PoseRecord
+from tracker.records import FrameRow, MarkChange, Pin, PinChange, PoseChange, PoseRecord
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def xs(store, person="ann"):
 def test_pose_comes_back_whole(store, path):
     full = pose(
         0.1, keyframe=True, status="lost", cost_px=1.25, settings={"step_deg": 5, "tree": ["arms"]},
-        views_px=(0.5, None, 2.0), parts_px=(None, 0.25), remark="left arm searched anew",
+        views_px=(0.5, None, 2.0), parts_px=(None, 0.25), remark="left arm searched anew", reviewed=True,
     )  # fmt: skip
     store.commit("Place", [PoseChange("ann", 7, full)], author="eve")
     store.close()
@@ -51,6 +51,7 @@ def test_pose_comes_back_whole(store, path):
     np.testing.assert_array_equal(back.values, full.values)  # to the bit
     for name in (
         "sources", "model_revision", "keyframe", "status", "cost_px", "settings", "views_px", "parts_px", "remark",
+        "reviewed",
     ):  # fmt: skip
         assert getattr(back, name) == getattr(full, name), name
     assert back.author == "eve"
@@ -79,8 +80,35 @@ def test_frames_in_short(store):
     store.commit("a", [put(9, 1.0, keyframe=True), PoseChange("ann", 3, searched)])
     assert store.frames("ann") == [
         FrameRow(3, "searched", "good", 0.5, False, (None, 0.5), "twice"),
-        FrameRow(9, "manual", "", None, True),
+        FrameRow(9, "manual", "", None, True, reviewed=True),
     ]
+
+
+def test_a_mark_leaves_the_pose_as_it_is(store):
+    told = {"method": "chamfer"}
+    put_it = put(3, 1.0, cost_px=0.5, status="good", settings=told, views_px=(None, 0.5), parts_px=(2.0,), remark="x")
+    store.commit("a", [put_it])
+    before = store.pose("ann", 3)
+    store.commit("verify", [MarkChange("ann", 3, keyframe=True, reviewed=True), MarkChange("ann", 4, True, True)])
+    after = store.pose("ann", 3)
+    assert (after.keyframe, after.reviewed) == (True, True)
+    np.testing.assert_array_equal(after.values, before.values)
+    for name in ("sources", "model_revision", "status", "cost_px", "settings", "views_px", "parts_px", "remark"):
+        assert getattr(after, name) == getattr(before, name), name
+    assert [row.frame for row in store.frames("ann")] == [3]  # where there is no pose there is nothing to mark
+    assert store.frames_of(2) == [3]
+    assert store.commit("track", [put(3, 9.0)], by_program=True).skipped == (("ann", 3),)
+    store.undo()
+    store.undo()
+    assert not store.pose("ann", 3).keyframe
+
+
+def test_a_new_pose_is_not_reviewed(store):
+    store.commit("a", [put(3, 1.0)])
+    store.commit("b", [MarkChange("ann", 3, False, True)])
+    assert [row.reviewed for row in store.frames("ann")] == [True]
+    store.commit("track", [put(3, 2.0)], by_program=True)
+    assert [row.reviewed for row in store.frames("ann")] == [False]
 
 
 def test_numbers_of_a_range(store):

@@ -7,7 +7,7 @@ import pytest
 from tracker import store_schema
 from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
-from tracker.records import Pin, PoseChange, PoseRecord
+from tracker.records import MarkChange, Pin, PoseChange, PoseRecord
 from tracker.store_schema import VERSION
 
 
@@ -41,6 +41,39 @@ def version_2(version_1):
     db.commit()
     db.close()
     return version_1
+
+
+@pytest.fixture
+def version_3(path):
+    """A store as its version 3 was written: a keyframe, two tracked frames, one cleared and brought back by undo."""
+    db = sqlite3.connect(path)
+    db.executescript(Path(__file__).with_name("store_version_3.sql").read_text("utf-8"))
+    db.close()
+    return path
+
+
+@pytest.mark.parametrize("read_only", [False, True])
+def test_in_version_3_nobody_had_reviewed_but_keyframes(version_3, read_only):
+    before = version_3.read_bytes()
+    store = AnnotationStore(version_3, read_only=read_only)
+    assert [(r.frame, r.keyframe, r.reviewed) for r in store.frames("ann")] == [
+        (1, True, True), (2, False, False), (3, False, False),
+    ]  # fmt: skip
+    found = store.pose("ann", 3)
+    assert (found.reviewed, found.remark, found.views_px) == (False, "late", (1.0, None))
+    assert found.settings == {"step_deg": 5}
+    store.close()
+    assert (version_3.read_bytes() == before) == read_only
+
+
+def test_a_store_of_version_3_takes_marks_and_gives_them_back(version_3):
+    store = AnnotationStore(version_3)
+    store.commit("review", [MarkChange("ann", 3, keyframe=False, reviewed=True)])
+    assert [r.reviewed for r in store.frames("ann")] == [True, False, True]
+    assert (store.undo(), store.undo(), store.redo()) == ("review", "track", "track")
+    assert [r.reviewed for r in store.frames("ann")] == [True, False, False]
+    store.close()
+    assert AnnotationStore(version_3).redo() == "review"
 
 
 def test_older_version_keeps_everything(version_1):

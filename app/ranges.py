@@ -1,0 +1,268 @@
+"""Work on a range of frames: interpolate, clear, mark, track within it; each is one entry of the history."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from app.jobs import Job
+from app.screen import Screen
+from app.state import RangeState
+from app.tracking import Tracking
+from tracker.errors import TrackerError
+from tracker.interpolate import between
+from tracker.records import Change, FrameRow, MarkChange, PoseChange, PoseRecord
+
+Mark = Literal["keyframe", "reviewed", "unreviewed", "none"]
+"""`unreviewed` leaves keyframes, which a person has vouched for; `none` takes that away too."""
+
+_AT_ONCE = 500
+"""Frames written at once; what is not more is done before the call returns."""
+
+
+@dataclass(eq=False)
+class _Run:
+    """One piece of work."""
+
+    label: str
+    """What the history says."""
+    did: str
+    """How its end is told: `interpolated`."""
+    by_program: bool
+    """Whether keyframes stay as they are."""
+    job: Job[Sequence[Change]] = field(init=False)
+    edit: int | None = None
+    """Its entry of the history; None before the first frames are written."""
+
+
+class Ranges:
+    """At most one piece of work on a range of frames. Ranges name their first and last frame."""
+
+    def __init__(self, screen: Screen, tracking: Tracking, editing: Callable[[], AbstractContextManager[None]]) -> None:
+        """Work on the poses of this screen.
+
+        Args:
+            screen: holds the state.
+            tracking: tracks within a range.
+            editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
+        """
+        self._screen, self._tracking, self._editing = screen, tracking, editing
+        self._run: _Run | None = None
+
+    @property
+    def running(self) -> bool:
+        """Whether a piece of work is under way."""
+        return self._run is not None and self._run.job.running
+
+    def interpolate(self, first: int, last: int, people: Sequence[int] | None = None) -> None:
+        """Fill a range between the poses at its ends and its keyframes, which stay as they are.
+
+        Args:
+            first: first frame of the range.
+            last: last frame of the range.
+            people: whose poses; None for everybody.
+
+        Raises:
+            TrackerError: nobody has two poses to go between, or no frame lies between them.
+        """
+        first, last = self._within(first, last)
+        with self._editing():
+            gaps = [(i, *gap) for i in self._whose(people) for gap in self._gaps(i, first, last)]
+            if not gaps:
+                raise TrackerError(
+                    f"expected poses at both ends of frames {first} to {last} and frames between them, found none; "
+                    "set a pose at each end first"
+                )
+            total = sum(end - start - 1 for _, start, end in gaps)
+            run = _Run(f"interpolate frames {first} to {last}", "interpolated", by_program=True)
+            self._begin(run, "interpolating", total, (c for gap in gaps for c in self._filled(*gap)))
+
+    def clear(self, first: int, last: int, people: Sequence[int] | None = None) -> None:
+        """Remove the poses of a range but for keyframes.
+
+        Raises:
+            TrackerError: there is none to remove.
+        """
+        first, last = self._within(first, last)
+        with self._editing():
+            rows = [(i, row) for i, row in self._rows(first, last, people) if not row.keyframe]
+            if not rows:
+                raise TrackerError(
+                    f"expected poses in frames {first} to {last} that are no keyframes, found none; take the marks of "
+                    "keyframes away first if they are to go too"
+                )
+            changes = (PoseChange(self._name(i), row.frame, None) for i, row in rows)
+            run = _Run(f"clear frames {first} to {last}", "cleared", by_program=True)
+            self._begin(run, "clearing", len(rows), changes)
+
+    def mark(self, first: int, last: int, mark: Mark, people: Sequence[int] | None = None) -> None:
+        """Mark the poses of a range.
+
+        Raises:
+            TrackerError: there is no pose to mark.
+        """
+        first, last = self._within(first, last)
+        with self._editing():
+            rows = self._rows(first, last, people)
+            if not rows:
+                raise TrackerError(f"expected poses in frames {first} to {last} to mark, found none; set or track some")
+            changes = [c for i, row in rows if (c := _marked(self._name(i), row, mark)) is not None]
+            where = f"frame {first}" if first == last else f"frames {first} to {last}"
+            how = {"keyframe": "as keyframe", "none": "as no keyframe"}.get(mark, f"as {mark}")
+            run = _Run(f"mark {where} {how}", "marked", by_program=False)
+            self._begin(run, "marking", len(changes), iter(changes))
+
+    def toggle_keyframe(self) -> None:
+        """Vouch for the shown pose of the person worked on, or take that back; a draft is stored by it."""
+        state, saver = self._screen.state, self._screen.saver
+        rows = saver.rows(state.person, range(state.frame, state.frame + 1))
+        if rows:
+            self.mark(state.frame, state.frame, "none" if rows[0].keyframe else "keyframe", [state.person])
+            return
+        with self._editing():
+            state = self._screen.state
+            values = state.poses[state.person]
+            record = PoseRecord(
+                values, ("manual",) * len(values), saver.revision(state.person), keyframe=True, reviewed=True
+            )
+            change = PoseChange(self._name(state.person), state.frame, record)
+            run = _Run(f"keyframe, frame {state.frame}", "marked", by_program=False)
+            self._begin(run, "marking", 1, iter([change]))
+
+    def toggle_reviewed(self) -> None:
+        """Say that the shown pose of the person worked on has been looked at, or take that back."""
+        state = self._screen.state
+        rows = self._screen.saver.rows(state.person, range(state.frame, state.frame + 1))
+        isnt = bool(rows) and rows[0].reviewed
+        self.mark(state.frame, state.frame, "unreviewed" if isnt else "reviewed", [state.person])
+
+    def track(self, first: int, last: int, backward: bool) -> None:
+        """Track from one end of a range to the other; the poses at the end it begins at are where it starts.
+
+        Raises:
+            TrackerError: nobody has been placed.
+        """
+        first, last = self._within(first, last)
+        with self._editing():
+            begin, end = (last, first) if backward else (first, last)
+            if self._screen.state.frame != begin:
+                self._screen.show(begin)
+            self._tracking.start(backward, end)
+
+    def halt(self) -> None:
+        """Stop what is under way; what is written stays. Must not be called holding the lock, which its steps take."""
+        run = self._run
+        if run is not None:
+            run.job.stop()
+            with self._screen.lock:
+                if self._run is run:
+                    self._end(run, "stopped")
+
+    def _begin(self, run: _Run, what: str, total: int, changes: Iterator[Change]) -> None:
+        """Write changes: a few before this returns, many in the background."""
+        self._screen.edit_of = None
+        self._screen.set(ranges=RangeState(running=True, what=what, total=total))
+        run.job = Job(
+            lambda: _pieces(changes),
+            lambda piece, _: self._write(run, piece),
+            lambda error: self._ended(run, error),
+            lambda: None,
+        )
+        self._run = run
+        if total <= _AT_ONCE:
+            for piece in _pieces(changes):
+                self._write(run, piece)
+            self._end(run, "done")
+        else:
+            run.job.run()
+
+    def _write(self, run: _Run, piece: Sequence[Change]) -> None:
+        screen = self._screen
+        with screen.lock:
+            if run is not self._run:
+                return
+            run.edit = screen.saver.write(run.label, piece, run.edit, run.by_program)
+            if screen.saver.error is not None:
+                raise TrackerError(screen.saver.error)
+            done = screen.state.ranges
+            screen.set(ranges=replace(done, done=done.done + len(piece)))
+            screen.refresh_saving()
+            if any(c.frame == screen.state.frame for c in piece):
+                screen.show(screen.state.frame)
+
+    def _ended(self, run: _Run, error: Exception | None) -> None:
+        with self._screen.lock:
+            if run is self._run:
+                self._end(run, "done" if error is None else f"stopped, because {error}")
+
+    def _end(self, run: _Run, how: str) -> None:
+        state = self._screen.state.ranges
+        frames = "1 frame" if state.done == 1 else f"{state.done} frames"
+        did = f"{run.did} {frames}" if how == "done" else f"{how}: {run.did} {frames} of {state.total}"
+        self._run = None
+        self._screen.refresh_saving()
+        self._screen.set(ranges=RangeState(message=did))
+
+    def _within(self, first: int, last: int) -> tuple[int, int]:
+        """A range in order and within the recording."""
+        first, last = sorted((first, last))
+        end = self._screen.session.n_frames - 1
+        if last < 0 or first > end:
+            raise TrackerError(f"expected frames from 0 to {end}, found {first} to {last}; mark another range")
+        return max(0, first), min(last, end)
+
+    def _whose(self, people: Sequence[int] | None) -> Sequence[int]:
+        everybody = range(len(self._screen.models))
+        if people is not None and not set(people) <= set(everybody):
+            raise TrackerError(f"expected people from 0 to {everybody[-1]}, found {list(people)}; reload the page")
+        return everybody if people is None else people
+
+    def _rows(self, first: int, last: int, people: Sequence[int] | None) -> list[tuple[int, FrameRow]]:
+        return [(i, row) for i in self._whose(people) for row in self._screen.saver.rows(i, range(first, last + 1))]
+
+    def _name(self, person: int) -> str:
+        return self._screen.session.people[person].name
+
+    def _gaps(self, person: int, first: int, last: int) -> Iterator[tuple[int, int]]:
+        """Neighbouring frames with poses that stay, with others between them."""
+        rows = self._screen.saver.rows(person, range(first, last + 1))
+        stay = [row.frame for row in rows if row.keyframe or row.frame in (first, last)]
+        return ((a, b) for a, b in pairwise(stay) if b - a > 1)
+
+    def _filled(self, person: int, start: int, end: int) -> Iterator[PoseChange]:
+        """Poses for the frames between two that have one."""
+        saver, name, model = self._screen.saver, self._name(person), self._screen.models[person]
+        ends = [saver.pose(person, frame) for frame in (start, end)]
+        if ends[0] is None or ends[1] is None:  # of a body model of other values
+            return
+        revision, sources = saver.revision(person), ("interpolated",) * len(ends[0].values)
+        frames = range(start + 1, end)
+        for at in range(0, len(frames), _AT_ONCE):
+            piece = frames[at : at + _AT_ONCE]
+            shares = (np.array(piece) - start) / (end - start)
+            for frame, values in zip(piece, between(model, ends[0].values, ends[1].values, shares), strict=True):
+                told = {"method": "interpolate", "between": [start, end]}
+                yield PoseChange(name, frame, PoseRecord(values, sources, revision, settings=told))
+
+
+def _marked(name: str, row: FrameRow, mark: Mark) -> MarkChange | None:
+    """The change that gives a frame a mark; None where it has it."""
+    keyframe = mark == "keyframe" or (mark != "none" and row.keyframe)
+    reviewed = keyframe or mark == "reviewed"
+    same = keyframe == row.keyframe and reviewed == row.reviewed
+    return None if same else MarkChange(name, row.frame, keyframe, reviewed)
+
+
+def _pieces(changes: Iterator[Change]) -> Iterator[Sequence[Change]]:
+    """Changes in pieces that are written at once."""
+    piece: list[Change] = []
+    for change in changes:
+        piece.append(change)
+        if len(piece) == _AT_ONCE:
+            yield piece
+            piece = []
+    if piece:
+        yield piece
