@@ -19,7 +19,14 @@ from tracker.session import Session
 _FEW_CELLS = 2000
 """Cells of the timeline that travel by name; more go as columns, a tenth of the bytes and of the work."""
 _NO_POSE = 255
-_NO_CELL: dict[str, Any] = {"source": "", "cost_px": None, "keyframe": False, "status": "", "remark": "", "reviewed": False}
+_NO_CELL: dict[str, Any] = {
+    "source": "",
+    "cost_px": None,
+    "keyframe": False,
+    "status": "",
+    "remark": "",
+    "reviewed": False,
+}
 
 
 def session(session: Session) -> dict[str, Any]:
