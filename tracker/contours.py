@@ -138,9 +138,11 @@ def piece_buffer(surfaces: Surfaces, room: int) -> Pieces:
 
 
 # The kernels below take the arrays they need one by one: handing over a tuple of thirty costs more than the work is.
+# Those called once for each part or pair of parts are inlined, with `hide` and `revolved_outline`: even half a dozen
+# arrays take as long to hand over as the work does.
 
 
-@njit(**FAST)
+@njit(inline="always", **FAST)
 def _place(eye: Array, Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
     """Fill the motions between the parts' unit coordinates and the world, and their distances from the eye."""
     to_world, to_unit, distances = out.Ts_world_unit, out.Ts_unit_world, out.distances
@@ -164,7 +166,7 @@ def _place(eye: Array, Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
                 to_unit[part, i, 4] += to_unit[part, i, k] * (eye[k] - to_world[part, k, 3])
 
 
-@njit(**FAST)
+@njit(inline="always", **FAST)
 def _project(
     part: int, P: Array, n: int, Ts_world_unit: Array, outline: FloatArray, image: FloatArray, boxes: Array
 ) -> int:
@@ -214,7 +216,7 @@ def _image_row(i: int, part: int, P: Array, W: Array) -> tuple[np.float32, np.fl
     )
 
 
-@njit(**FAST)
+@njit(inline="always", **FAST)
 def _cut(
     n_edges: int, edge: int, piece_px: float, n: int, outline: FloatArray, image: FloatArray, ends: FloatArray,
     middles: FloatArray, edges: NDArray[np.int32],
@@ -254,7 +256,7 @@ def _cut(
     return n
 
 
-@njit(**FAST)
+@njit(inline="always", **FAST)
 def _hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
     """Mark what parts hide of one another: those whose boxes in the image meet, and that are not all behind."""
     boxes, distances, radii, firsts, adjoining = (

@@ -23,7 +23,7 @@ _TRIES = (0.5, 0.25, 0.75, 0.001)
 """Where on what the line of sight shares with the quadric the shape is asked, from its far end (0) to the near."""
 
 
-@njit(**FAST)
+@njit(inline="always", **FAST)
 def _meet_quadric(
     part: int, solids: FloatArray, Q: FloatArray, margin: float, points: FloatArray, first: int, last: int,
     shared: FloatArray,
@@ -89,7 +89,7 @@ def _fills(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: np.fl
     return larger * (below + (at - np.float32(k)) * (solids[part, cell + np.uint64(1)] - below)) < size
 
 
-@njit(**FAST)
+@njit(inline="always", **FAST)
 def hide(
     part: int, solids: FloatArray, Q: FloatArray, margin: float, points: FloatArray, first: int, last: int,
     shared: FloatArray, hidden: NDArray[np.bool_],

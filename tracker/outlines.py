@@ -19,7 +19,7 @@ _ON_AXIS = 1e-9
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 
 
-@njit(**FAST)
+@njit(inline="always", **FAST)
 def revolved_outline(
     part: int, n_profile: int, profile: FloatArray, eye: Array, turn: np.float32, half: FloatArray, out: FloatArray
 ) -> int:
@@ -70,7 +70,7 @@ def revolved_outline(
     return 2 * n - 2  # the mirrored first point is the first itself
 
 
-@njit(**FAST)
+@njit(inline="always", **FAST)
 def _strip(
     c0: np.float32, c1: np.float32, n0: np.float32, n1: np.float32, first: np.float32, last: np.float32,
     r0: np.float32, z0: np.float32, r1: np.float32, z1: np.float32, turn: np.float32, n: int, half: FloatArray,
