@@ -12,6 +12,7 @@ from app.frames import Frames
 from app.hand import Hand
 from app.locks import Locks
 from app.ranges import Ranges
+from app.pinning import Pinning
 from app.saving import Saver
 from app.screen import Screen
 from app.searching import Searching
@@ -44,6 +45,8 @@ class Controller:
         self.ranges = Ranges(self._screen, self._tracking, self.editing)
         """Works on ranges of frames, and marks them."""
         self._disagreements = Disagreements(self._screen)
+        self.pinning = Pinning(self._screen, self.editing)
+        """Sets pins, and fits people to them."""
 
     # --- views -------------------------------------------------------------------------------------------------
 
@@ -79,7 +82,7 @@ class Controller:
             return
         self._searching.halt()
         with self._lock:
-            self.hand.finish()
+            self._let_go()
             self._searching.forget()
             self._tracking.flush()
             self._screen.show(frame, follow=self.state.follow and not self.state.track.running)
@@ -115,14 +118,14 @@ class Controller:
         """Do one expansion of the search on this frame, beginning one where none stands."""
         self._stop_tracking()
         with self._lock:
-            self.hand.finish()
+            self._let_go()
             self._searching.step()
 
     def search_frame(self) -> None:
         """Search this frame to the end, going on with a search that stands."""
         self._stop_tracking()
         with self._lock:
-            self.hand.finish()
+            self._let_go()
             self._searching.run()
 
     def track(self, backward: bool, until: int | None) -> None:
@@ -142,7 +145,7 @@ class Controller:
         """Go on with a tracking run that is paused."""
         self._searching.halt()
         with self._lock:
-            self.hand.finish()
+            self._let_go()
             self._searching.forget()
             self._tracking.go_on()
 
@@ -186,11 +189,16 @@ class Controller:
             with self._lock:
                 if self._searching.running or self._tracking.running or self.ranges.running:
                     continue  # another thread was faster
-                self.hand.finish()
+                self._let_go()
                 self._searching.forget()
                 self._tracking.forget()
                 yield
                 return
+
+    def _let_go(self) -> None:
+        """End and save the gesture at hand, of whatever kind."""
+        self.hand.finish()
+        self.pinning.finish()
 
     def _stop_tracking(self) -> None:
         self._tracking.halt(stay=True)

@@ -30,9 +30,7 @@ def carry_out(controller: Controller, page: int, message: Message) -> None:
 
 
 def _drag(controller: Controller, page: int, message: Message) -> None:
-    hand, phase, pointer_px = controller.hand, message["phase"], (float(message["u"]), float(message["v"]))
-    if not np.all(np.isfinite(pointer_px)):
-        raise ValueError("a position that is not a number")
+    hand, phase, pointer_px = controller.hand, message["phase"], _place(message)
     if phase == "start":
         camera, person, frame = int(message["camera"]), int(message["person"]), int(message["frame"])
         hand.begin_drag(page, camera, person, message["point"], pointer_px, frame)
@@ -42,6 +40,32 @@ def _drag(controller: Controller, page: int, message: Message) -> None:
         hand.move_drag(page, pointer_px, int(message["seq"]))
     if phase == "end":
         hand.end_drag(page)
+
+
+def _pin(controller: Controller, page: int, message: Message) -> None:
+    pinning, phase, place_px = controller.pinning, message["phase"], _place(message)
+    if phase == "start":
+        camera, person, frame = int(message["camera"]), int(message["person"]), int(message["frame"])
+        pinning.begin(page, frame, camera, person, message["point"], place_px, bool(message["live"]))
+    elif phase == "cancel":
+        pinning.cancel(page)
+    else:
+        pinning.move(page, place_px)
+    if phase == "end":
+        pinning.end(page)
+
+
+def _unpin(controller: Controller, _: int, message: Message) -> None:
+    camera = None if message["camera"] is None else int(message["camera"])
+    controller.pinning.remove(int(message["frame"]), int(message["person"]), message["point"], camera)
+
+
+def _place(message: Message) -> tuple[float, float]:
+    """Where the pointer is, undistorted px."""
+    place_px = float(message["u"]), float(message["v"])
+    if not np.all(np.isfinite(place_px)):
+        raise ValueError("a position that is not a number")
+    return place_px
 
 
 def _search(controller: Controller, _: int, message: Message) -> None:
@@ -87,6 +111,9 @@ _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "seek": lambda controller, _, message: controller.seek(int(message["frame"])),
     "select": lambda controller, _, message: controller.select(int(message["person"]), message.get("point")),
     "drag": _drag,
+    "pin": _pin,
+    "unpin": _unpin,
+    "fit": lambda controller, _, message: controller.pinning.fit(int(message["frame"])),
     "view": lambda controller, _, message: controller.set_view(str(message["base"]), dict(message["overlays"])),
     "search": _search,
     "track": _track,

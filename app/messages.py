@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from app import overlays
+from app import overlays, pin_marks
 from app.curves import plots_of, samples
 from app.state import OVERLAYS, JobState, State, TrackState
 from tracker.evidence import ViewEvidence
@@ -90,7 +90,7 @@ def overlay(session: Session, state: State, page: int, views: Sequence[ViewEvide
         views: the evidence of the shown frame, where it is at hand.
     """
     segments, rows, first = [], [], 0
-    for path in overlays.paths(session, state, views):
+    for path in [*overlays.paths(session, state, views), *pin_marks.pin_lines(session, state)]:
         count = len(path.segments_px)
         rows.append(
             {
@@ -105,6 +105,7 @@ def overlay(session: Session, state: State, page: int, views: Sequence[ViewEvide
         segments.append(path.segments_px)
         first += count
     joints = not state.overlays.isdisjoint(("joints", "skeleton"))
+    meeting = pin_marks.meeting(session, state)
     header = {
         "type": "overlay",
         "frame": state.frame,
@@ -112,6 +113,8 @@ def overlay(session: Session, state: State, page: int, views: Sequence[ViewEvide
         "job": state.job.running,
         "paths": rows,
         "handles": [h._asdict() for h in overlays.handles(session, state)] if joints else [],
+        "pins": [p._asdict() for p in pin_marks.pin_marks(session, state)],
+        "meeting": None if meeting is None else meeting._asdict() | {"marks": [m._asdict() for m in meeting.marks]},
     }
     return binary(header, np.concatenate(segments).astype("<f4").tobytes() if segments else b"")
 

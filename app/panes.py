@@ -68,6 +68,7 @@ class _Page:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
             await asyncio.to_thread(self._controller.hand.end_drag, self._number)
+            await asyncio.to_thread(self._controller.pinning.end, self._number)
             await asyncio.to_thread(self._controller.hold_3d, self._number, False)
 
     def _wake(self, _: State) -> None:
@@ -90,7 +91,7 @@ class _Page:
         """Queue a message; a newer seek, or a newer move of the same drag, takes the place of one that waits."""
         last = self._waiting[-1] if self._waiting else None
         if last is not None and last["type"] == message.get("type"):
-            moves = message["type"] == "drag" and last.get("phase") == message.get("phase") == "move"
+            moves = message["type"] in ("drag", "pin") and last.get("phase") == message.get("phase") == "move"
             if moves or message["type"] in _COALESCED:
                 self._waiting.pop()
         self._waiting.append(message)
@@ -150,7 +151,7 @@ class _Page:
         if message == self._sent_text:
             return
         wait = self._sent_text_at + _READABLE_S - loop.time()
-        if state.drag is not None and wait > 0 and self._sent_text is not None:
+        if state.in_hand and wait > 0 and self._sent_text is not None:
             loop.call_later(wait, self._changed.set)  # the vectors go first: they are what the hand follows
             return
         self._sent_text, self._sent_text_at = message, loop.time()
@@ -214,4 +215,9 @@ def _drawn(state: State) -> tuple[object, ...]:
     """What an overlay depends on, to be compared."""
     poses = tuple(id(p.values) for p in state.people)
     candidate = None if state.job.candidate is None else tuple(id(c) for c in state.job.candidate)
-    return state.frame, poses, candidate, state.job.running, state.overlays, state.drag, state.drag_seqs
+    return state.frame, poses, candidate, state.job.running, state.overlays, state.drag, state.drag_seqs, _pins(state)
+
+
+def _pins(state: State) -> object:
+    """What the drawing of pins depends on: the joint worked on has lines and a meeting point."""
+    return (state.pins, state.person, state.point) if any(state.pins) else None

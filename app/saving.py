@@ -13,12 +13,17 @@ from app.tracked import keyframes_of, tracked_changes
 from tracker.annotations import AnnotationStore
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model
-from tracker.records import SOURCES, Change, FrameNumbers, FrameRow, HistoryEntry, PoseChange, PoseRecord
+from tracker.pins import ViewPin
+from tracker.records import SOURCES, Change, FrameNumbers, FrameRow, HistoryEntry, PinChange, PoseChange, PoseRecord
 from tracker.rigid import Array
 from tracker.session import Session
 from tracker.track import PoseEstimate, TrackSettings
 
 _WORST_FIRST = ("lost", "doubtful", "good", "")
+_BY_HAND = ("manual", "pinned", "fitted")
+"""Sources of a person's own edits: a frame that a person's word was fitted to is a keyframe as one set by drags is."""
+_SAME_PX = 1e-6
+"""Pins nearer than this are the same: what lens distortion there and back leaves."""
 _READ_FRAMES = 2000
 """Frames whose numbers are read at once."""
 
@@ -54,6 +59,18 @@ class Saver:
             return None
         return Shown(record.values, _summary(record.sources), record.status, record.remark, record.parts_px)
 
+    def pins(self, person: int, frame: int) -> tuple[ViewPin, ...]:
+        """The stored pins of a person on a frame, undistorted px; those of other cameras and bodies are passed over."""
+        info, cameras = self._session.people[person], self._session.cameras
+        index = {c.camera.name: i for i, c in enumerate(cameras)}
+        found = []
+        for pin in self._store.pins(info.name, frame):
+            if pin.camera in index and pin.point in info.model.point_names:
+                camera = index[pin.camera]
+                u, v = cameras[camera].camera.undistort_points(np.array(pin.position_px))
+                found.append(ViewPin(pin.point, camera, (float(u), float(v))))
+        return tuple(found)
+
     def frames(self, person: int) -> list[int]:
         """The frames on which a person has a stored pose, ascending."""
         return list(self._frames[person])
@@ -81,18 +98,18 @@ class Saver:
         return found
 
     def save(self, state: State, label: str, source: str, amend: int | None) -> int | None:
-        """Write the poses shown that are not drafts and differ from the stored ones.
+        """Write what is shown and differs from what is stored: pins, and poses that are not drafts.
 
         Args:
-            state: with the poses.
+            state: with the poses and pins.
             label: what the history says.
-            source: who set the values that changed.
+            source: who set the values that changed, where the pose itself does not say so.
             amend: the entry of the history to add to; None makes a new one.
 
         Returns:
             Id of the entry; None where nothing was written. Where writing fails, `error` says why.
         """
-        changes = []
+        changes: list[Change] = self._pin_changes(state)
         for person, (shown, revision) in enumerate(zip(state.people, self._revisions, strict=True)):
             name = self._session.people[person].name
             stored = self._store.pose(name, state.frame)
@@ -100,16 +117,37 @@ class Saver:
                 continue
             known = stored is not None and len(stored.values) == len(shown.values)
             sources = tuple(
-                stored.sources[i] if known and stored.values[i] == value else source  # type: ignore[union-attr]
+                stored.sources[i]  # type: ignore[union-attr]
+                if known and stored.values[i] == value  # type: ignore[union-attr]
+                else (shown.sources[i] if shown.sources else source)
                 for i, value in enumerate(shown.values)
             )
-            keyframe = source == "manual" or (stored is not None and stored.keyframe)
-            told = asdict(state.settings) if source == "searched" else {}
+            keyframe = source in _BY_HAND or (stored is not None and stored.keyframe)
+            told = asdict(state.settings) if source in ("searched", "fitted") else {}
             record = PoseRecord(
                 shown.values, sources, revision, keyframe, "", state.cost_px, told, views_px=state.view_costs_px
             )
             changes.append(PoseChange(name, state.frame, record))
         return self.write(f"{label}, frame {state.frame}", changes, amend, by_program=False)
+
+    def _pin_changes(self, state: State) -> list[Change]:
+        """What makes the stored pins of the frame those that are shown."""
+        changes: list[Change] = []
+        for person, shown in enumerate(state.pins):
+            name = self._session.people[person].name
+            before = {(p.point, p.camera): p.place_px for p in self.pins(person, state.frame)}
+            after = {(p.point, p.camera): p.place_px for p in shown}
+            for point, index in sorted({*before, *after}):
+                camera = self._session.cameras[index].camera
+                old, new = before.get((point, index)), after.get((point, index))
+                if old is not None and new is not None and np.allclose(old, new, rtol=0, atol=_SAME_PX):
+                    continue
+                place_px = None
+                if new is not None:
+                    u, v = camera.distort_points(np.array(new))
+                    place_px = (float(u), float(v))
+                changes.append(PinChange(name, state.frame, point, camera.name, place_px))
+        return changes
 
     def save_tracked(
         self,

@@ -12,6 +12,7 @@ from app.frames import Frames
 from app.saving import Saver
 from app.state import Shown, State, finite_or_none
 from tracker import posing
+from tracker.pins import ViewPin
 from tracker.rigid import Array
 from tracker.session import Session
 from tracker.track import pose_cost
@@ -40,7 +41,8 @@ class Screen:
         """The gesture whose next save amends the last entry of the history; None makes a new entry."""
         self.last_save = 0.0
         """When poses were last written, s of the monotonic clock."""
-        self.state = State(frame=0, people=self._load(0), locked=(frozenset(),) * len(self.models))
+        unlocked = (frozenset[int](),) * len(self.models)
+        self.state = State(frame=0, people=self._load(0), pins=self._load_pins(0), locked=unlocked)
         self.refresh_saving()
         self.frames.request(0, self._evidence_ready)
 
@@ -63,6 +65,8 @@ class Screen:
     def set(self, **changes: object) -> None:
         """Make a new state and tell the views."""
         with self.lock:
+            if changes.get("frame", self.state.frame) != self.state.frame and "pins" not in changes:
+                changes["pins"] = self._load_pins(changes["frame"])  # type: ignore[arg-type]
             self.state = replace(self.state, **changes)  # type: ignore[arg-type]
             for view in list(self._subscribers):
                 view(self.state)
@@ -72,7 +76,8 @@ class Screen:
         self.edit_of = None
         people = self._load(frame)
         costs = self.costs(tuple(p.values for p in people), frame)
-        self.set(frame=frame, people=people, drag=None, **costs, **changes)
+        pins = self._load_pins(frame)
+        self.set(frame=frame, people=people, pins=pins, drag=None, holds_pin=False, **costs, **changes)
         self.request_evidence()
 
     def request_evidence(self) -> None:
@@ -114,6 +119,10 @@ class Screen:
                 nearest = self.saver.nearest_pose(person, frame)
                 shown.append(Shown(standing if nearest is None else nearest, None))
         return tuple(shown)
+
+    def _load_pins(self, frame: int) -> tuple[tuple[ViewPin, ...], ...]:
+        """The pins of everybody on a frame."""
+        return tuple(self.saver.pins(person, frame) for person in range(len(self.models)))
 
     def _evidence_ready(self, frame: int) -> None:
         with self.lock:

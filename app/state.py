@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 
+from tracker.pins import ViewPin
 from tracker.rigid import Array
 from tracker.track import TrackSettings
 
@@ -27,6 +28,8 @@ class Shown:
     """What the tracker did on the frame, for people to read."""
     parts_px: tuple[float | None, ...] = ()
     """Cost of each part, px; None for an unseen part, empty where unknown."""
+    sources: tuple[str, ...] = ()
+    """Where each value of a pose that is not stored yet comes from, (n_values,); empty: all from `source`."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +133,10 @@ class State:
     ranges: RangeState = field(default_factory=RangeState)
     disagreeing: tuple[int, ...] = ()
     """Frames whose poses do not go together with those around them, ascending (see `tracker.disagree`)."""
+    pins: tuple[tuple[ViewPin, ...], ...] = ()
+    """The pins of each person on the frame, by point and camera."""
+    holds_pin: bool = False
+    """Whether a hand holds a pin."""
     drag: DragState | None = None
     drag_seqs: tuple[tuple[int, int], ...] = ()
     """For each page that drags: its number, and the last of its drag messages that this state takes in."""
@@ -148,7 +155,12 @@ class State:
     @property
     def rests_3d(self) -> bool:
         """Whether the 3-D view and its panels wait for the end of a drag."""
-        return self.drag is not None and bool(self.holding_3d)
+        return self.in_hand and bool(self.holding_3d)
+
+    @property
+    def in_hand(self) -> bool:
+        """Whether a gesture is at hand, which changes the state many times a second."""
+        return self.drag is not None or self.holds_pin
 
     @property
     def poses(self) -> tuple[Array, ...]:

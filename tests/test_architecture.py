@@ -51,6 +51,7 @@ ORDER = [
         "tracker.interpolate",
         "tracker.disagree",
     ],
+    ["tracker.occlusion", "tracker.pins", "tracker.posing", "tracker.sizes", "tracker.evaluate"],
     # The session keeps its cameras and models in files of these formats, so it reads and writes by them; a format
     # knows cameras, bodies and tables, never a session.
     ["tracker.session"],
@@ -61,12 +62,13 @@ ORDER = [
     ["tracker.search", "tracker.confidence"],
     ["tracker.recover"],
     ["tracker.track"],
+    ["tracker.frame_fit"],
     # The program: what the screen shows, then who may change it, then who shows it.
     ["app", "app.access", "app.jobs", "app.viser_proxy", "app.painting", "app.state", "app.tracked"],
     ["app.bench_scenes", "app.commands", "app.curves", "app.frames", "app.overlays", "app.saving", "app.server"],
-    ["app.bench_rows", "app.screen"],
+    ["app.bench_rows", "app.pin_marks", "app.screen"],
     ["app.hand", "app.locks", "app.searching", "app.tracking", "app.disagreements"],
-    ["app.ranges"],
+    ["app.pinning", "app.ranges"],
     ["app.controller", "app.messages", "app.headless"],
     ["app.intentions", "app.scene", "app.settings_panel"],
     ["app.panels", "app.panes"],

@@ -121,6 +121,17 @@ def search_frame(
     return search(cost, predicted, settings.search, people, free)
 
 
+def prior_blocks(model: BodyModel, expected: Array, sigmas: Array) -> list[Block]:
+    """What holds a pose besides the image: the one that is expected, how people bend, and that flesh keeps apart.
+
+    Args:
+        model: the body.
+        expected: the pose, (n_values,).
+        sigmas: its standard deviations, (n_dofs,), rad or metres.
+    """
+    return [StayNear(expected, 1 / sigmas), StayNear(model.neutral(), 1 / model.spreads), KeepApart()]
+
+
 def track_chamfer(
     observer: Observer,
     models: Sequence[BodyModel],
@@ -313,7 +324,7 @@ class _Scene:
         for limb in suspects:
             assert settings.recover is not None
             sigma[limb.dofs] = settings.recover.trust_rad
-        return [StayNear(predicted, 1 / sigma), StayNear(model.neutral(), 1 / model.spreads), KeepApart()]
+        return prior_blocks(model, predicted, sigma)
 
     def _search_body(self, person: int, track: _Track, fit: Fit, judge: Judge) -> tuple[int, Fit]:
         """Best-first search from the prediction and from the last good pose; the best of what refines from there."""

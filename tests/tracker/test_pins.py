@@ -122,7 +122,8 @@ def test_noisy_views_scatter_as_their_geometry_says(n):
 def test_no_other_point_is_nearer_in_the_images():
     """Two views at very different distances: there the linear start is not the answer."""
     views = [camera_at("near", (0.6, 0.0, 0.2)), camera_at("far", (0.0, 9.0, 1.0))]
-    places = np.stack([c.project(np.array([0.05, 0.1, 0.0])) for c in views]) + [[12.0, -9.0], [-6.0, 8.0]]
+    places = np.stack([c.project(np.array([0.05, 0.1, 0.0])) for c in views])
+    places += [[12.0, -9.0], [-6.0, 8.0]]
     found = triangulate(views, places)
 
     def squares(point):
@@ -152,7 +153,10 @@ def test_parallel_lines_of_sight_tell_no_depth():
 
 
 def test_lines_of_sight_that_meet_behind_a_camera_are_a_mistake():
-    views = [camera_at("left", (4.0, 0.5, 0.0), (0.0, 0.5, 0.0)), camera_at("right", (4.0, -0.5, 0.0), (0.0, -0.5, 0.0))]
+    views = [
+        camera_at("left", (4.0, 0.5, 0.0), (0.0, 0.5, 0.0)),
+        camera_at("right", (4.0, -0.5, 0.0), (0.0, -0.5, 0.0)),
+    ]
     found = triangulate(views, np.array([[600.0, 240.0], [40.0, 240.0]]))  # they part
     assert found.point_world is None
     assert "behind left and right" in found.why

@@ -1,0 +1,214 @@
+"""Pins by hand: set, moved, removed; the fit that takes them in. Each gesture is one entry of the history."""
+
+import time
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.hand import spoken
+from app.screen import Screen
+from app.state import Shown
+from tracker.errors import TrackerError
+from tracker.frame_fit import fit_frame
+from tracker.pins import ViewPin
+
+_CHECKPOINT_S = 1.0
+"""A long drag of a pin is on disk at least this often."""
+
+Pins = tuple[tuple[ViewPin, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """A pin in the hand."""
+
+    page: int
+    """Number of the page whose hand it is."""
+    person: int
+    point: str
+    camera: int
+    pins: Pins
+    """The pins of everybody before the gesture."""
+    people: tuple[Shown, ...]
+    """Everybody before the gesture: where each of its fits starts from, so that only the pin's place decides."""
+    live: bool
+    """Whether the body follows while the pin moves."""
+
+
+class Pinning:
+    """The pins of the frame that is shown; at most one is in a hand."""
+
+    def __init__(self, screen: Screen, editing: Callable[[], AbstractContextManager[None]]) -> None:
+        """Pin who is on this screen.
+
+        Args:
+            screen: holds the state.
+            editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
+        """
+        self._screen, self._editing = screen, editing
+        self._held: _Held | None = None
+
+    def begin(
+        self, page: int, frame: int, camera: int, person: int, point: str, place_px: tuple[float, float], live: bool
+    ) -> None:
+        """Set a pin, or take hold of the one that the point has in this view.
+
+        Args:
+            page: number of the page.
+            frame: the frame that the hand saw, which a tracker may have left meanwhile.
+            camera: index of the view.
+            person: index of the person.
+            point: name of the point.
+            place_px: where it is seen, undistorted px.
+            live: whether the body follows as the pin is moved.
+
+        Raises:
+            TrackerError: the place is outside of the image.
+        """
+        session = self._screen.session
+        if not (0 <= frame < session.n_frames and 0 <= camera < len(session.cameras)):
+            return
+        if not (0 <= person < len(self._screen.models) and point in self._screen.models[person].point_names):
+            return
+        source = session.cameras[camera].camera
+        if _within(place_px, source.size) != place_px:
+            raise TrackerError(
+                f"expected a pin within the {source.width}x{source.height} px of {source.name}, found it at "
+                f"({place_px[0]:.0f}, {place_px[1]:.0f}); set it where the image shows the joint"
+            )
+        with self._editing():
+            self._go_to(frame)
+            state = self._screen.state
+            self._held = _Held(page, person, point, camera, state.pins, state.people, live)
+            self._screen.last_save = time.monotonic()
+            pins = _with(state.pins, person, ViewPin(point, camera, place_px))
+            self._screen.set(person=person, point=point, pins=pins, holds_pin=True)
+
+    def move(self, page: int, place_px: tuple[float, float]) -> None:
+        """Move the pin in the hand, at most to the border of the image; the body follows where that was wanted."""
+        with self._screen.lock:
+            held = self._held
+            if held is None or page != held.page:
+                return
+            place_px = _within(place_px, self._screen.session.cameras[held.camera].camera.size)
+            pins = _with(self._screen.state.pins, held.person, ViewPin(held.point, held.camera, place_px))
+            if held.live:
+                self._show_fit([held.person], held.people, pins)
+            else:
+                self._screen.set(pins=pins)
+            if time.monotonic() - self._screen.last_save > _CHECKPOINT_S:
+                self._save(held)
+
+    def end(self, page: int) -> None:
+        """Let go: the gesture is one entry of the history, on disk when this returns."""
+        with self._screen.lock:
+            if self._held is not None and page == self._held.page:
+                self.finish()
+
+    def cancel(self, page: int) -> None:
+        """Let go and put pins and body back where they were."""
+        with self._screen.lock:
+            held = self._held
+            if held is None or page != held.page:
+                return
+            checkpointed = self._screen.edit_of is held
+            self._held = self._screen.edit_of = None
+            if checkpointed:
+                self._screen.saver.undo()
+                self._screen.refresh_saving()
+            self._screen.show(self._screen.state.frame)
+
+    def finish(self) -> None:
+        """End the gesture at hand, if there is one, and save it; called under the lock."""
+        held = self._held
+        if held is None:
+            return
+        self._save(held)
+        self._held = self._screen.edit_of = None
+        self._screen.set(holds_pin=False)
+
+    def remove(self, frame: int, person: int, point: str | None = None, camera: int | None = None) -> None:
+        """Take away the pins of a person on a frame: of one point, in one view, or all; one entry of the history."""
+        if not (0 <= frame < self._screen.session.n_frames and 0 <= person < len(self._screen.models)):
+            return
+        with self._editing():
+            self._go_to(frame)
+            pins = list(self._screen.state.pins)
+            pins[person] = tuple(
+                p for p in pins[person]
+                if not ((point is None or p.point == point) and (camera is None or p.camera == camera))
+            )  # fmt: skip
+            if len(pins[person]) == len(self._screen.state.pins[person]):
+                return
+            self._screen.set(pins=tuple(pins))
+            what = "remove all pins" if point is None else f"remove pin {spoken(point)}{self._in(camera)}"
+            self._screen.save(what, "manual", object())
+            self._screen.edit_of = None
+
+    def fit(self, frame: int) -> None:
+        """Fit the person worked on, and everybody with pins, to pins and edges together.
+
+        Raises:
+            TrackerError: there is nothing to fit to: neither pins nor, yet, edges.
+        """
+        if not 0 <= frame < self._screen.session.n_frames:
+            return
+        with self._editing():
+            self._go_to(frame)
+            state = self._screen.state
+            views = self._screen.frames.evidence_at_hand(frame)
+            pinned = [i for i, pins in enumerate(state.pins) if pins]
+            if views is None and not pinned:
+                raise TrackerError(
+                    "expected pins or edges to fit to, found no pin on this frame and its edges not there yet; "
+                    "set pins, or try again in a moment"
+                )
+            people = sorted({state.person, *pinned}) if views is not None else pinned
+            self._show_fit(people, state.people, state.pins)
+            told = " and ".join([*(["pins"] if pinned else []), *(["edges"] if views is not None else [])])
+            self._screen.save(f"fit to {told}", "fitted", object())
+            self._screen.edit_of = None
+
+    def _go_to(self, frame: int) -> None:
+        if frame != self._screen.state.frame:
+            self._screen.show(frame)
+
+    def _show_fit(self, fitted: Iterable[int], start: tuple[Shown, ...], pins: Pins) -> None:
+        """Fit some people from a start, the others as they stand, and show them."""
+        screen = self._screen
+        fitted = list(fitted)
+        views = screen.frames.evidence_at_hand(screen.state.frame)
+        cameras = [c.camera for c in screen.session.cameras]
+        found = fit_frame(screen.models, [p.values for p in start], pins, cameras, views, screen.state.settings, fitted)
+        people = list(start)
+        for person in fitted:
+            sources = tuple("pinned" if by_pin else "fitted" for by_pin in found.pinned[person])
+            people[person] = Shown(found.poses[person], "pinned" if pins[person] else "fitted", sources=sources)
+        poses = tuple(p.values for p in people)
+        screen.set(people=tuple(people), pins=pins, **screen.costs(poses))
+
+    def _save(self, held: _Held) -> None:
+        """Write what the gesture has done so far."""
+        had = any((p.point, p.camera) == (held.point, held.camera) for p in held.pins[held.person])
+        if held.pins == self._screen.state.pins and self._screen.edit_of is not held:
+            return
+        what = f"{'move' if had else 'set'} pin {spoken(held.point)}{self._in(held.camera)}"
+        self._screen.save(what, "fitted", held)
+
+    def _in(self, camera: int | None) -> str:
+        return "" if camera is None else f" in {self._screen.session.cameras[camera].camera.name}"
+
+
+def _with(pins: Pins, person: int, pin: ViewPin) -> Pins:
+    """The same pins but for one that is set or moved, by point and camera."""
+    others = [p for p in pins[person] if (p.point, p.camera) != (pin.point, pin.camera)]
+    own = tuple(sorted([*others, pin], key=lambda p: (p.point, p.camera)))
+    return (*pins[:person], own, *pins[person + 1 :])
+
+
+def _within(place_px: tuple[float, float], size: tuple[int, int]) -> tuple[float, float]:
+    """The nearest place within an image."""
+    u, v = np.clip(place_px, -0.5, (size[0] - 0.5, size[1] - 0.5))
+    return float(u), float(v)

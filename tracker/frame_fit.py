@@ -1,0 +1,116 @@
+"""One frame fitted at a person's word: pins and edges together, by the one solver and the tracker's blocks.
+
+First the pins alone, where there are any, bring the body near; then the edges come in, at first from twice as far.
+(On 12 frames of three recordings, from limb joints 140 mm off on average: 75 mm with the edges of one distance alone,
+55 mm with both; with the wrists and ankles pinned in two views, 3 px off, 49 and 41 mm.)
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.body import Body, BodyModel
+from tracker.cameras import Camera
+from tracker.evidence import ViewEvidence
+from tracker.fit import Block, solve
+from tracker.pins import PinBlock, ViewPin, pin_block
+from tracker.refine import ContourMatch
+from tracker.rigid import Array
+from tracker.track import TrackSettings, prior_blocks
+
+_REACHES = (2.0, 1.0)
+"""Outlier distances of one round after the other, in those of the settings."""
+_TRUST_RAD, _TRUST_M = 0.3, 0.1
+"""Standard deviation of the pose that a round begins with: a hand places a limb less well than a tracker predicts."""
+_LOOSE = 1.0
+"""The same for pins alone, rad or metres: it only decides what they leave open."""
+_ITERATIONS, _TOLERANCE = 30, 1e-3
+
+
+class FrameFit(NamedTuple):
+    """Everybody on a frame, fitted or left as they were."""
+
+    poses: tuple[Array, ...]
+    """Pose of each person, (n_values,)."""
+    pinned: tuple[NDArray[np.bool_], ...]
+    """Which values the pins determine, (n_values,) for each person: those of degrees of freedom of which pins tell more
+    than edges and priors together, by the diagonals of their normal matrices."""
+
+
+def fit_frame(
+    models: Sequence[BodyModel],
+    poses: Sequence[Array],
+    pins: Sequence[Sequence[ViewPin]],
+    cameras: Sequence[Camera],
+    views: Sequence[ViewEvidence] | None,
+    settings: TrackSettings,
+    people: Iterable[int],
+    free: Sequence[NDArray[np.bool_]] | None = None,
+) -> FrameFit:
+    """Fit some of the people on a frame to their pins and to the edges, the others as they stand.
+
+    Args:
+        models: the body of each person.
+        poses: where each stands, (n_values,).
+        pins: the pins of each.
+        cameras: all views.
+        views: the evidence of each; without it pins are all there is, and who has none stays.
+        settings: how contours match edges.
+        people: whom to fit.
+        free: which degrees of freedom of each person may move, (n_dofs,); all by default.
+    """
+    people = list(people)
+    now = [np.array(p) for p in poses]
+    blocks = [pin_block(m, cameras, p) if p else None for m, p in zip(models, pins, strict=True)]
+    pinned = [np.zeros(len(m.value_names), dtype=bool) for m in models]
+    for person in people:
+        block = blocks[person]
+        if block is not None:
+            now[person], pinned[person] = _fit_one(models[person], now[person], block, [], _LOOSE, _LOOSE, free, person)
+    for reach in _REACHES if views is not None else ():
+        for person in people:
+            assert views is not None
+            bodies = [Body(m, v) for m, v in zip(models, now, strict=True)]
+            theta_px = reach * (settings.theta_px or max(v.theta_px / v.scale for v in views))
+            match = ContourMatch(views, bodies, person, settings.match, theta_px, everywhere=True)
+            now[person], pinned[person] = _fit_one(
+                models[person], now[person], blocks[person], [match], _TRUST_RAD, _TRUST_M, free, person
+            )
+    return FrameFit(tuple(now), tuple(pinned))
+
+
+def _fit_one(
+    model: BodyModel,
+    values: Array,
+    pins: PinBlock | None,
+    evidence: Sequence[Block],
+    trust_rad: float,
+    trust_m: float,
+    free: Sequence[NDArray[np.bool_]] | None,
+    person: int,
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Fit one person from a pose that is trusted so far; returns the pose and which of its values pins determine."""
+    sigma = np.where(model.dof_is_length, trust_m, trust_rad)
+    blocks = [*evidence, *prior_blocks(model, values, sigma), *([pins] if pins is not None else [])]
+    mask = None if free is None else free[person]
+    fit = solve(model, values, blocks, mask, _ITERATIONS, _TOLERANCE)
+    if mask is not None:  # the solver's start is put within the limits: what is locked stays even outside of them
+        held = ~_of_values(model, mask)
+        fit = fit._replace(values=np.where(held, values, fit.values))
+    if pins is None:
+        return fit.values, np.zeros(len(model.value_names), dtype=bool)
+    by_pins = np.diag(pins.normal(model, fit.values, model.kinematics(fit.values)).hessian)
+    return fit.values, _of_values(model, by_pins > 0.5 * np.diag(fit.hessian))
+
+
+def _of_values(model: BodyModel, of_dofs: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """What is said of degrees of freedom, (n_dofs,), said of the values; of a quaternion where any turn of it is."""
+    out = np.zeros(len(model.value_names), dtype=bool)
+    np.logical_or.at(out, model.dof_value, of_dofs)
+    for i, joint in enumerate(model.joints):
+        if joint.kind == "ball":
+            first = model.dof_value[np.flatnonzero(model.dof_joint == i)[-1]]
+            out[first : first + 4] = out[first]
+    return out
