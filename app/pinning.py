@@ -181,7 +181,10 @@ class Pinning:
         fitted = list(fitted)
         views = screen.frames.evidence_at_hand(screen.state.frame)
         cameras = [c.camera for c in screen.session.cameras]
-        found = fit_frame(screen.models, [p.values for p in start], pins, cameras, views, screen.state.settings, fitted)
+        free = [screen.free(person) for person in range(len(screen.models))]
+        found = fit_frame(
+            screen.models, [p.values for p in start], pins, cameras, views, screen.state.settings, fitted, free
+        )
         people = list(start)
         for person in fitted:
             sources = tuple("pinned" if by_pin else "fitted" for by_pin in found.pinned[person])

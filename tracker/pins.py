@@ -16,9 +16,10 @@ from tracker.fit import Normal, normal_of
 from tracker.kinematics import IntArray, Kinematics
 from tracker.rigid import Array
 
-_SIGMA_SHARE = 0.003
-"""Standard deviation of a hand's click against the longer side of the image: 2 px of 640. Large pictures are shown
-smaller, so that a hand is off by more of their pixels."""
+_SIGMA_SHARE = 0.001
+"""Standard deviation of a pin against the longer side of the image: 0.64 px of 640. A hand is off by three times as
+much; but where edges and a pin disagree the edges of a body of another shape are wrong together, and the hand is to
+win. Large pictures are shown smaller, so that a hand is off by more of their pixels."""
 _NEAREST_M = 0.05
 """Depths below this count as this: what lies behind a camera pulls as if it were just before it."""
 _LEAST_ANGLE_RAD = np.radians(1.0)
