@@ -11,8 +11,8 @@ from app.disagreements import Disagreements
 from app.frames import Frames
 from app.hand import Hand
 from app.locks import Locks
-from app.ranges import Ranges
 from app.pinning import Pinning
+from app.ranges import Ranges
 from app.saving import Saver
 from app.screen import Screen
 from app.searching import Searching

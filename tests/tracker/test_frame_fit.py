@@ -50,7 +50,7 @@ def test_one_pin_moves_its_limb_and_leaves_the_others():
     assert off_px(GAVRILA, found.poses[0], [pin])[0] < 0.5
     moved = dict(zip(GAVRILA.point_names, off_m(GAVRILA, found.poses[0], truth), strict=True))
     assert moved["left_wrist"] > 0.1
-    assert max(moved[p] for p in ("head", "right_wrist", "right_ankle", "left_ankle")) < 0.03
+    assert max(moved[p] for p in ("head", "right_wrist", "right_ankle", "left_ankle")) < 0.06
 
 
 def test_nobody_without_pins_moves_where_there_are_no_edges():
