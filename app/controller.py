@@ -5,14 +5,20 @@ must not call back.
 """
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
+
+import numpy as np
+from numpy.typing import NDArray
 
 from app.disagreements import Disagreements
 from app.frames import Frames
 from app.hand import Hand
+from app.landscape import Landscapes
 from app.locks import Locks
 from app.pinning import Pinning
 from app.ranges import Ranges
+from app.replay import Replay
+from app.runs import Runs
 from app.saving import Saver
 from app.screen import Screen
 from app.searching import Searching
@@ -36,7 +42,8 @@ class Controller:
         """
         self.session, self.frames, self._saver = session, frames, saver
         self._screen = Screen(session, saver, frames)
-        self._searching, self._tracking = Searching(self._screen), Tracking(self._screen)
+        runs = Runs()
+        self._searching, self._tracking = Searching(self._screen, runs), Tracking(self._screen)
         self._lock, self.models = self._screen.lock, self._screen.models
         self.hand = Hand(self._screen, self.editing)
         """Poses people by hand."""
@@ -47,6 +54,10 @@ class Controller:
         self._disagreements = Disagreements(self._screen)
         self.pinning = Pinning(self._screen, self.editing)
         """Sets pins, and fits people to them."""
+        self.replay = Replay(self._screen, runs, self.editing)
+        """Looks back at searches."""
+        self.landscape = Landscapes(self._screen, self.editing)
+        """Looks at the cost along one degree of freedom."""
 
     # --- views -------------------------------------------------------------------------------------------------
 
@@ -54,6 +65,14 @@ class Controller:
     def state(self) -> State:
         """What the screen shows now."""
         return self._screen.state
+
+    def free(self) -> list[NDArray[np.bool_]]:
+        """Of each person the degrees of freedom that are not locked, (n_dofs,)."""
+        return [self._screen.free(person) for person in range(len(self.models))]
+
+    def locked(self) -> AbstractContextManager[object]:
+        """The lock under which nothing changes, for who reads more than the state; to be held for a moment only."""
+        return self._lock
 
     def subscribe(self, view: Callable[[State], None]) -> Callable[[], None]:
         """Tell a view every new state from now on; returns what ends it."""
@@ -84,6 +103,7 @@ class Controller:
         with self._lock:
             self._let_go()
             self._searching.forget()
+            self.replay.forget()
             self._tracking.flush()
             self._screen.show(frame, follow=self.state.follow and not self.state.track.running)
 
@@ -116,17 +136,32 @@ class Controller:
 
     def search_step(self) -> None:
         """Do one expansion of the search on this frame, beginning one where none stands."""
-        self._stop_tracking()
-        with self._lock:
-            self._let_go()
-            self._searching.step()
+        self._search(self._searching.step)
+
+    def search_stage(self) -> None:
+        """Search this frame to the end of the stage at hand."""
+        self._search(self._searching.run_stage)
 
     def search_frame(self) -> None:
         """Search this frame to the end, going on with a search that stands."""
-        self._stop_tracking()
-        with self._lock:
-            self._let_go()
-            self._searching.run()
+        self._search(self._searching.run)
+
+    def search_again(self, run: int | None = None) -> None:
+        """Search this frame from where a run of it began, by the settings of now; None for the newest run.
+
+        Raises:
+            TrackerError: the run is kept no more.
+        """
+        self._searching.halt()
+        self._search(lambda: self._searching.run_again(run))
+
+    def pace_search(self, speed: float | None) -> None:
+        """Watch so many expansions a second; None for as many as there can be.
+
+        Raises:
+            TrackerError: the speed is no positive number.
+        """
+        self._searching.pace(speed)
 
     def track(self, backward: bool, until: int | None) -> None:
         """Track from the shown frame to the end of the recording, or until a frame; one entry of the history.
@@ -174,6 +209,7 @@ class Controller:
         with self.editing():
             pass
         self._disagreements.close()
+        self.landscape.close()
         self.frames.close()
 
     # --- within ------------------------------------------------------------------------------------------------
@@ -199,6 +235,13 @@ class Controller:
         """End and save the gesture at hand, of whatever kind."""
         self.hand.finish()
         self.pinning.finish()
+        self.replay.leave()
+
+    def _search(self, go: Callable[[], None]) -> None:
+        self._stop_tracking()
+        with self._lock:
+            self._let_go()
+            go()
 
     def _stop_tracking(self) -> None:
         self._tracking.halt(stay=True)

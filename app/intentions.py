@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from app.controller import Controller
+from app.search_intentions import SEARCHING
 
 Message = Mapping[str, Any]
 
@@ -68,11 +69,6 @@ def _place(message: Message) -> tuple[float, float]:
     return place_px
 
 
-def _search(controller: Controller, _: int, message: Message) -> None:
-    actions = {"step": controller.search_step, "frame": controller.search_frame, "stop": controller.stop}
-    actions[message["action"]]()
-
-
 def _track(controller: Controller, _: int, message: Message) -> None:
     last = None if message.get("until") is None else int(message["until"])
     actions: dict[str, Callable[[], None]] = {
@@ -115,7 +111,6 @@ _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "unpin": _unpin,
     "fit": lambda controller, _, message: controller.pinning.fit(int(message["frame"])),
     "view": lambda controller, _, message: controller.set_view(str(message["base"]), dict(message["overlays"])),
-    "search": _search,
     "track": _track,
     "follow": lambda controller, _, message: controller.follow(bool(message["follow"])),
     "hold_3d": lambda controller, page, message: controller.hold_3d(page, bool(message["hold"])),
@@ -124,4 +119,5 @@ _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "stop_range": lambda controller, _, __: controller.ranges.halt(),
     "undo": lambda controller, _, __: controller.undo(),
     "redo": lambda controller, _, __: controller.redo(),
+    **SEARCHING,
 }

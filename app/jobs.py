@@ -40,6 +40,8 @@ class Job(Generic[T]):
         self._start, self._on_step, self._on_end, self._on_pause = start, on_step, on_end, on_pause
         self._steps: Iterator[T] | None = None
         self._stop = threading.Event()
+        self._rest_s = 0.0
+        self._wake = threading.Event()
         self._future: Future[None] | None = None
         self._seconds = 0.0
         self.running = False
@@ -49,11 +51,16 @@ class Job(Generic[T]):
 
     def step(self) -> None:
         """Do one step in the background; nothing if the job runs already."""
-        self._launch(1)
+        self._launch(lambda _: True)
 
-    def run(self) -> None:
-        """Go on to the end in the background; nothing if the job runs already."""
-        self._launch(None)
+    def run(self, until: Callable[[T], bool] = lambda _: False) -> None:
+        """Go on in the background to a step that `until` accepts, or to the end; nothing if the job runs already."""
+        self._launch(until)
+
+    def pace(self, rest_s: float) -> None:
+        """Rest so long after each step, seconds, so that a person can watch; a rest at hand is changed at once."""
+        self._rest_s = rest_s
+        self._wake.set()
 
     def stop(self, timeout: float = 30.0) -> None:
         """Stop after the step at hand, and wait for that. Never call it holding a lock that `on_step` takes.
@@ -62,6 +69,7 @@ class Job(Generic[T]):
             TrackerError: the step takes longer than `timeout`, s.
         """
         self._stop.set()
+        self._wake.set()
         try:
             if self._future is not None:
                 self._future.exception(timeout)
@@ -71,16 +79,16 @@ class Job(Generic[T]):
                 "first time; it stops as soon as it can, so wait and try again"
             ) from error
 
-    def _launch(self, limit: int | None) -> None:
+    def _launch(self, until: Callable[[T], bool]) -> None:
         if not self.running and not self.ended:
             self._stop.clear()
             self.running = True
-            self._future = _POOL.submit(self._work, limit)
+            self._future = _POOL.submit(self._work, until)
 
-    def _work(self, limit: int | None) -> None:
-        done = 0
+    def _work(self, until: Callable[[T], bool]) -> None:
+        done = False
         try:
-            while not self._stop.is_set() and (limit is None or done < limit):
+            while not self._stop.is_set() and not done:
                 began = time.perf_counter()
                 if self._steps is None:
                     self._steps = self._start()
@@ -91,13 +99,21 @@ class Job(Generic[T]):
                     self._on_end(None)
                     return
                 self._on_step(step, self._seconds)
-                done += 1
+                done = until(step)
+                if not done:
+                    self._rest()
             self.running = False
             self._on_pause()
         except Exception as error:
             self.ended, self.running = True, False
             _LOG.exception("a job failed")
             self._on_end(error)
+
+    def _rest(self) -> None:
+        began = time.monotonic()
+        while not self._stop.is_set() and (left := began + self._rest_s - time.monotonic()) > 0:
+            self._wake.wait(left)
+            self._wake.clear()
 
 
 class Latest(Generic[T]):

@@ -10,7 +10,7 @@ import numpy as np
 
 from app import overlays, pin_marks
 from app.curves import plots_of, samples
-from app.state import OVERLAYS, JobState, State, TrackState
+from app.state import OVERLAYS, JobState, ReplayState, State, TrackState
 from tracker.evidence import ViewEvidence
 from tracker.posing import minor_points
 from tracker.records import SOURCES, STATUSES, FrameNumbers
@@ -55,7 +55,7 @@ def session(session: Session) -> dict[str, Any]:
 
 def state(state: State) -> dict[str, Any]:
     """The texts and figures of the page."""
-    shown = state.people[state.person]
+    shown, drawn = state.people[state.person], state.drawn
     return {
         "type": "state",
         "frame": state.frame,
@@ -63,13 +63,14 @@ def state(state: State) -> dict[str, Any]:
         "point": state.point,
         "base": state.base,
         "overlays": {name: name in state.overlays for name in OVERLAYS},
-        "cost_px": state.cost_px,
-        "view_costs_px": list(state.view_costs_px),
+        "cost_px": drawn.cost_px,
+        "view_costs_px": list(drawn.view_costs_px),
         "source": shown.source,
         "status": shown.status,
         "remark": shown.remark,
         "parts_px": list(shown.parts_px),
         "job": _job(state.job),
+        "replay": _replay(state.look.replay),
         "track": _track(state.track),
         "range": asdict(state.ranges),
         "follow": state.follow,
@@ -104,7 +105,8 @@ def overlay(session: Session, state: State, page: int, views: Sequence[ViewEvide
         )
         segments.append(path.segments_px)
         first += count
-    joints = not state.overlays.isdisjoint(("joints", "skeleton"))
+    # Joints are there to be taken, and a step that is replayed is no pose to be taken.
+    joints = not state.overlays.isdisjoint(("joints", "skeleton")) and state.look.replay is None
     meeting = pin_marks.meeting(session, state)
     header = {
         "type": "overlay",
@@ -200,6 +202,12 @@ def _job(job: JobState) -> dict[str, Any]:
         "best_px": job.best_px,
         "message": job.message,
     }
+
+
+def _replay(replay: ReplayState | None) -> dict[str, Any] | None:
+    if replay is None:
+        return None
+    return {"run": replay.run, "step": replay.step, "steps": replay.steps, "stage": replay.stage}
 
 
 def _track(track: TrackState) -> dict[str, Any]:

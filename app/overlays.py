@@ -16,6 +16,8 @@ from tracker.segments import accept
 from tracker.session import Session
 
 CANDIDATE_COLOR = "#ffffff"
+COMPARED_COLOR = "#ff9df2"
+PREVIEW_COLOR = "#5ce1ff"
 PART_EDGE_COLOR = "#9aa3ad"
 EPIPOLAR_COLOR = "#ffd54a"
 ACCEPTED_COLOR = "#35e0c8"
@@ -30,7 +32,7 @@ class Path(NamedTuple):
     camera: int
     person: int
     kind: str
-    """`model`, `candidate`, `part_edge`, `epipolar`, `accepted` or `rejected`."""
+    """`model`, `candidate`, `ghost`, `part_edge`, `epipolar`, `accepted` or `rejected`."""
     color: str
     segments_px: FloatArray
     """x0, y0, x1, y1, (N, 4), undistorted px."""
@@ -69,13 +71,18 @@ def paths(session: Session, state: State, views: Sequence[ViewEvidence] | None) 
         state: what to draw.
         views: the evidence of the shown frame; without it there are no segments of edges to draw.
     """
+    state = state.drawn
     bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
     for index, source in enumerate(session.cameras):
         camera = source.camera.pinhole
+        for ghost, color in ((state.look.compared, COMPARED_COLOR), (state.look.preview, PREVIEW_COLOR)):
+            if ghost is not None:
+                others = [Body(p.model, v) for p, v in zip(session.people, ghost, strict=True)]
+                out += _contours(session, others, camera, index, "ghost", [color] * len(others))
         if "contours" in state.overlays:
             out += _contours(session, bodies, camera, index, "model", [p.color for p in session.people])
-            if state.job.candidate is not None and state.job.running:
+            if state.job.candidate is not None and (state.job.running or state.look.replay is not None):
                 tested = [Body(b.model, v) for b, v in zip(bodies, state.job.candidate, strict=True)]
                 out += _contours(session, tested, camera, index, "candidate", [CANDIDATE_COLOR] * len(tested))
         if "part_edges" in state.overlays:

@@ -43,7 +43,7 @@ class Panels:
             with folder:
                 self._sliders.append(self._add_sliders(index, person.model, middle))
             self._folders.append(folder)
-        SettingsPanel(server, controller)
+        self._settings = SettingsPanel(server, controller)
         latest = Latest(self._show, "panels", _REST_S)
         controller.subscribe(latest.offer)
         latest.offer(controller.state)
@@ -85,6 +85,7 @@ class Panels:
         if state.rests_3d:
             return
         with self._server.atomic():
+            self._settings.show(state.settings)
             for index, (sliders, folder) in enumerate(zip(self._sliders, self._folders, strict=True)):
                 folder.visible = index == state.person
                 model = self._controller.models[index]

@@ -13,13 +13,16 @@ from aiohttp import web
 
 from app import curves, intentions, messages
 from app.controller import Controller
+from app.search_feed import SearchFeed
 from app.state import State
 from tracker.errors import TrackerError
 
 _LOG = logging.getLogger(__name__)
 _READABLE_S = 0.2
 """Time between updates of the page's numbers during a drag."""
-_COALESCED = ("seek", "view")
+_WATCHABLE_S = 1 / 30
+"""Time between two looks at a search at work: more nobody sees, and the search needs the processor too."""
+_COALESCED = ("seek", "view", "replay", "preview", "search_speed")
 """Of these only the newest that waits is carried out."""
 
 
@@ -52,6 +55,7 @@ class _Page:
         self._sent_images: tuple[int, str] | None = None
         self._curves: str | None = None
         self._sent_curves: tuple[str, int, int] | None = None  # group, person, version of the timeline
+        self._feed = SearchFeed()
         self._loop = asyncio.get_running_loop()
 
     async def serve(self) -> None:
@@ -70,6 +74,7 @@ class _Page:
             await asyncio.to_thread(self._controller.hand.end_drag, self._number)
             await asyncio.to_thread(self._controller.pinning.end, self._number)
             await asyncio.to_thread(self._controller.hold_3d, self._number, False)
+            self._controller.landscape.watch(self._number, False)
 
     def _wake(self, _: State) -> None:
         """Let the sender look again; called from any thread."""
@@ -113,6 +118,10 @@ class _Page:
     def _carry_out(self, message: dict[str, Any]) -> None:
         if message["type"] == "curves":
             self._open_curves(message["group"])
+        elif message["type"] == "watch":
+            self._feed = SearchFeed(message["tab"])
+            self._controller.landscape.watch(self._number, message["tab"] == "landscape")
+            self._wake(self._controller.state)
         else:
             intentions.carry_out(self._controller, self._number, message)
 
@@ -130,7 +139,7 @@ class _Page:
             await self._changed.wait()
             self._changed.clear()
             state, sent = self._controller.state, self._sent
-            self._sent = state
+            self._sent, began = state, self._loop.time()
             try:
                 await self._send_state(state)
                 await self._send_overlay(state, sent)
@@ -140,10 +149,14 @@ class _Page:
                 if sent is None or sent.disagreeing != state.disagreeing:
                     await self._send(messages.disagreeing(state.disagreeing))
                 await self._send_curves(state)
+                for news in await asyncio.to_thread(self._feed.news, self._controller, state):
+                    await (self._socket.send_bytes(news) if isinstance(news, bytes) else self._send(news))
                 if state.track.failed and (sent is None or sent.track is not state.track):
                     await self._notice(state.track.message)
             except TrackerError as error:
                 await self._notice(str(error))
+            if state.job.running:
+                await asyncio.sleep(max(0.0, began + _WATCHABLE_S - self._loop.time()))
 
     async def _send_state(self, state: State) -> None:
         """Send what the page's text shows, if it changed; at a readable rate while a hand drags."""
@@ -215,7 +228,8 @@ def _drawn(state: State) -> tuple[object, ...]:
     """What an overlay depends on, to be compared."""
     poses = tuple(id(p.values) for p in state.people)
     candidate = None if state.job.candidate is None else tuple(id(c) for c in state.job.candidate)
-    return state.frame, poses, candidate, state.job.running, state.overlays, state.drag, state.drag_seqs, _pins(state)
+    drawn = (state.frame, poses, candidate, state.job.running, state.look, state.overlays, state.drag, state.drag_seqs)
+    return (*drawn, _pins(state))
 
 
 def _pins(state: State) -> object:

@@ -49,6 +49,7 @@ class Scene:
         latest.offer(controller.state)
 
     def _show(self, state: State) -> None:
+        state = state.drawn
         poses = tuple(id(p) for p in state.poses)
         is_slow = state.track.running and bool(state.holding_3d)
         if poses == self._shown or state.rests_3d or (is_slow and time.monotonic() < self._shown_at + _SLOW_REST_S):

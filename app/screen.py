@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -49,6 +49,14 @@ class Screen:
     def free(self, person: int) -> NDArray[np.bool_]:
         """The degrees of freedom of a person that may move, (n_dofs,): those that are not locked."""
         return ~np.isin(np.arange(self.models[person].n_dofs), list(self.state.locked[person]))
+
+    def within_locks(self, poses: Sequence[Array]) -> tuple[Array, ...]:
+        """Poses, (n_values,) of each person, with what is locked as it is shown."""
+        steps = [m.difference(new, now) for m, new, now in zip(self.models, poses, self.state.poses, strict=True)]
+        return tuple(
+            model.retract(now, np.where(self.free(i), step, 0.0)) if self.state.locked[i] else new
+            for i, (model, new, now, step) in enumerate(zip(self.models, poses, self.state.poses, steps, strict=True))
+        )
 
     def subscribe(self, view: Callable[[State], None]) -> Callable[[], None]:
         """Tell a view every new state from now on; returns what ends it."""

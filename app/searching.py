@@ -1,14 +1,17 @@
 """The search on the shown frame: step by step or to its end, watched, stopped, saved."""
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from app.jobs import Job
+from app.runs import Run, Runs
 from app.screen import Screen
 from app.state import JobState, Shown, finite_or_none
 from tracker.errors import TrackerError
+from tracker.rigid import Array
 from tracker.search import SearchStep, stages
 from tracker.track import search_frame
 
@@ -19,10 +22,11 @@ _SAVE_S = 0.5
 class Searching:
     """At most one search, which runs or stands on the shown frame."""
 
-    def __init__(self, screen: Screen) -> None:
-        """Search what is on this screen."""
-        self._screen = screen
+    def __init__(self, screen: Screen, runs: Runs) -> None:
+        """Search what is on this screen, and take down in `runs` how it went."""
+        self._screen, self._runs = screen, runs
         self._job: Job[SearchStep] | None = None
+        self._run: Run | None = None
 
     @property
     def running(self) -> bool:
@@ -37,11 +41,40 @@ class Searching:
 
     def run(self) -> None:
         """Search to the end, going on with a search that stands."""
+        self._go(lambda _: False)
+
+    def run_stage(self) -> None:
+        """Search to the end of the stage at hand, which is the next one where a stage has just ended."""
+        self._go(lambda step: step.stage_done)
+
+    def run_again(self, number: int | None) -> None:
+        """Search anew from where a run of this frame began, by the settings of now; None for the newest run.
+
+        Raises:
+            TrackerError: the run is kept no more.
+        """
         with self._screen.lock:
+            runs = self._runs.of_frame(self._screen.state.frame)
+            if number is not None:
+                runs = [r for r in runs if r.number == number]
+                if not runs:
+                    raise TrackerError(f"expected a run of this frame, found run {number}, which is kept no more")
             if not self.running:
-                job = self._standing_job()
-                self._screen.set(job=replace(self._screen.state.job, running=True))
-                job.run()
+                self.forget()
+                self._go(lambda _: False, runs[-1].start if runs else None)
+
+    def pace(self, speed: float | None) -> None:
+        """Watch so many expansions a second, at once; None for as many as there can be.
+
+        Raises:
+            TrackerError: the speed is no positive number.
+        """
+        if speed is not None and not (np.isfinite(speed) and speed > 0):
+            raise TrackerError(f"expected a speed above 0 expansions a second, found {speed:g}; choose another")
+        with self._screen.lock:
+            self._screen.set(look=replace(self._screen.state.look, speed=speed))
+            if self._job is not None:
+                self._job.pace(_rest_s(speed))
 
     def halt(self) -> None:
         """Stop a running search, which then stands; must not be called holding the lock, which its last step takes."""
@@ -52,34 +85,48 @@ class Searching:
     def forget(self) -> None:
         """Let no search stand any more; its steps are taken no notice of."""
         self._job = None
+        if self._run is not None:
+            self._run.over = True
         self._screen.set(job=JobState())
 
-    def _standing_job(self) -> Job[SearchStep]:
-        """The search that stands, or a new one from the poses shown."""
+    def _go(self, until: Callable[[SearchStep], bool], start: tuple[Array, ...] | None = None) -> None:
+        with self._screen.lock:
+            if not self.running:
+                job = self._standing_job(start)
+                self._screen.set(job=replace(self._screen.state.job, running=True))
+                job.run(until)
+
+    def _standing_job(self, start: tuple[Array, ...] | None = None) -> Job[SearchStep]:
+        """The search that stands, or a new one from given poses, else from those shown."""
         screen, state = self._screen, self._screen.state
         if self._job is None or self._job.ended:
-            frame, poses, settings = state.frame, state.poses, state.settings
+            frame, settings = state.frame, state.settings
+            poses = state.poses if start is None else screen.within_locks(start)
             free = [screen.free(person) for person in range(len(screen.models))]
-            standing = stages(screen.models, settings.search, free=free)
-            if not standing:
+            if not stages(screen.models, settings.search, free=free):
                 raise TrackerError(
                     "expected something that a search may move, found everything locked; unlock some of it"
                 )
+            start_px = screen.costs(poses)["cost_px"]
+            known_px = start_px if isinstance(start_px, float) else np.nan
+            run = self._runs.begin(frame, screen.models, poses, known_px, settings, free)
             job: Job[SearchStep] = Job(
                 lambda: search_frame(screen.frames.evidence(frame), screen.models, poses, settings, free=free),
                 lambda step, seconds: self._stepped(job, step, seconds),
                 lambda error: self._ended(job, error),
                 lambda: self._paused(job),
             )
-            self._job, screen.edit_of = job, None
-            screen.set(job=JobState(kind="search", stages=tuple(s.name for s in standing)))
+            job.pace(_rest_s(state.look.speed))
+            self._job, self._run, screen.edit_of = job, run, None
+            screen.set(job=JobState(kind="search", stages=tuple(s.name for s in run.stages)))
         return self._job
 
     def _stepped(self, job: Job[SearchStep], step: SearchStep, seconds: float) -> None:
         screen = self._screen
         with screen.lock:
-            if job is not self._job:
+            if job is not self._job or self._run is None:
                 return
+            self._run.add(step, seconds)
             people = tuple(
                 p if p.source is not None and np.array_equal(p.values, best) else Shown(best, "searched")
                 for p, best in zip(screen.state.people, step.best, strict=True)
@@ -104,8 +151,9 @@ class Searching:
     def _ended(self, job: Job[SearchStep], error: Exception | None) -> None:
         screen = self._screen
         with screen.lock:
-            if job is not self._job:
+            if job is not self._job or self._run is None:
                 return
+            self._run.over = True
             if error is None:
                 message = f"done: {screen.state.job.evaluations} poses scored"
             else:
@@ -117,3 +165,8 @@ class Searching:
     def _save(self, job: Job[SearchStep]) -> None:
         if any(p.source == "searched" for p in self._screen.state.people):
             self._screen.save("search", "searched", job)
+
+
+def _rest_s(speed: float | None) -> float:
+    """Rest after each expansion, seconds; none at full speed."""
+    return 0.0 if speed is None else 1.0 / speed

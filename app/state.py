@@ -1,6 +1,6 @@
 """What the screen shows, as one frozen value. Only the controller makes a new one; the views read it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -53,6 +53,66 @@ class JobState:
     """Pose of each person under test."""
     message: str = ""
     """How the last one ended."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayState:
+    """The recorded step of a search that is shown in place of the true poses."""
+
+    run: int
+    """Number of the run."""
+    step: int
+    """Index among its recorded steps; -1 for its start."""
+    steps: int
+    """How many are recorded."""
+    candidate: tuple[Array, ...] | None
+    """Pose of each person under test; None at the start."""
+    best: tuple[Array, ...]
+    """Best pose of each person by then."""
+    stage: str | None
+    """Name of the stage at work; None at the start."""
+    candidate_px: float | None
+    """Cost of the candidate, px."""
+    best_px: float | None
+    """Cost of the best, px."""
+    best_views_px: tuple[float | None, ...]
+    """The same in each view, px; empty where unknown."""
+    evaluations: int
+    """Poses scored by then."""
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """How searches are watched: what is drawn of those that are over, and how fast one at work goes."""
+
+    speed: float | None = None
+    """Expansions per second; None for as many as there can be."""
+    replay: ReplayState | None = None
+    preview: tuple[Array, ...] | None = None
+    """Poses that the pointer rests on in a list, drawn over the true ones."""
+    compared: tuple[Array, ...] | None = None
+    """Result of another run, drawn over the true poses."""
+    compared_run: int | None = None
+    """Number of that run."""
+
+
+@dataclass(frozen=True, eq=False)
+class Landscape:
+    """The cost over the range of one degree of freedom, everything else as it was."""
+
+    person: int
+    dof: int
+    """Index among the degrees of freedom of the person's body."""
+    current: float
+    """Its value in the pose, rad or metres."""
+    current_px: float
+    """Cost of the pose, px."""
+    values: Array
+    """Where the cost was taken, (N,), ascending, rad or metres."""
+    totals_px: Array
+    """Costs, (N,), px."""
+    views_px: Array
+    """Costs in each view, (N, V), px; NaN for views without edges."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +185,9 @@ class State:
     view_costs_px: tuple[float | None, ...] = ()
     """Cost of each view, px; None for a view without edges."""
     job: JobState = field(default_factory=JobState)
+    look: Look = field(default_factory=Look)
+    landscape: Landscape | None = None
+    """Of the pose shown or one shortly before; None until a page looks at it."""
     track: TrackState = field(default_factory=TrackState)
     follow: bool = True
     """Whether the frame that is being tracked is shown, or the user looks around meanwhile."""
@@ -161,6 +224,18 @@ class State:
     def in_hand(self) -> bool:
         """Whether a gesture is at hand, which changes the state many times a second."""
         return self.drag is not None or self.holds_pin
+
+    @property
+    def drawn(self) -> "State":
+        """What the views draw: this state, or where a search is replayed, the poses and costs of the step replayed."""
+        replayed = self.look.replay
+        if replayed is None:
+            return self
+        people = tuple(Shown(best, "searched") for best in replayed.best)
+        job = replace(self.job, candidate=replayed.candidate)
+        return replace(
+            self, people=people, job=job, cost_px=replayed.best_px, view_costs_px=replayed.best_views_px, drag=None
+        )
 
     @property
     def poses(self) -> tuple[Array, ...]:

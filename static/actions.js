@@ -21,9 +21,21 @@ export class Actions {
     this.#send({ type: "redo" });
   }
 
-  /** @param {"step" | "frame" | "stop"} action */
+  /** @param {"step" | "stage" | "frame" | "stop"} action */
   search(action) {
     this.#send({ type: "search", action });
+  }
+
+  /** Search again from where the run that is looked at began, by the settings of now. */
+  searchAgain() {
+    this.#send({ type: "search", action: "again", run: this.#store.facts.searchRun });
+  }
+
+  /** Show the true pose again, where a search is replayed; whether there was something to leave. */
+  leaveReplay() {
+    if (!this.#store.facts.state?.replay) return false;
+    this.#send({ type: "replay", run: null, step: 0 });
+    return true;
   }
 
   /**

@@ -12,7 +12,7 @@ const STORED_TAB = "quadrille.drawer-tab";
 const STORED_CURVES = "quadrille.drawer-curves";
 const STORED_HEIGHT = "quadrille.drawer-height-";
 /** Height of what lies below the tabs: the usual share of the window, and what it never goes below, CSS pixels. */
-const USUAL_SHARES = { curves: 0.21, search: 0.34 };
+const USUAL_SHARES = { curves: 0.21, search: 0.3 };
 const LEAST_PX = 140;
 /** What the panes keep of the window, CSS pixels. */
 const REST_PX = 340;

@@ -25,6 +25,7 @@ export const TORSO = "torso";
 const LINE_STYLES = {
   model: { width: 1.75, alpha: 1, dash: [], layer: "contours", hasHalo: true },
   candidate: { width: 1.25, alpha: 0.8, dash: [], layer: "contours", hasHalo: true },
+  ghost: { width: 1.5, alpha: 0.95, dash: [5, 4], layer: null, hasHalo: true },
   part_edge: { width: 1, alpha: 0.75, dash: [], layer: "part_edges", hasHalo: true },
   epipolar: { width: 1.25, alpha: 0.9, dash: [6, 4], layer: null, hasHalo: true },
   // Thousands of short lines, which their halos would merge into one.

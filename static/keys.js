@@ -57,12 +57,12 @@ function control(key, shift) {
  */
 export function bindings({ store, actions, navigation, grid, gestures, drawer, showHelp }) {
   const escape = () => {
-    if (gestures.cancel()) return;
+    if (gestures.cancel() || actions.leaveReplay()) return;
     if (hasTrack(store.facts.state)) actions.stopTracking();
     else if (hasSearch(store.facts.state)) actions.search("stop");
     else if (store.facts.filled !== null) grid.toggleFill(store.facts.filled);
   };
-  const search = (/** @type {"step" | "frame"} */ action) => () => {
+  const search = (/** @type {"step" | "stage" | "frame"} */ action) => () => {
     if (store.facts.connected && !store.facts.state?.job.running) actions.search(action);
   };
   const track = (/** @type {"forward" | "backward"} */ way) => () => {
@@ -89,8 +89,10 @@ export function bindings({ store, actions, navigation, grid, gestures, drawer, s
       run: () => actions.redo(),
     },
     { keys: ["S"], label: "Search: one step", matches: plain("s"), run: search("step") },
+    { keys: ["Shift S"], label: "Search: to the end of the stage", matches: plain("s", undefined, true), run: search("stage") },
+    { keys: ["Shift F"], label: "Search: again from the same start", matches: plain("f", undefined, true), run: () => actions.searchAgain() },
     { keys: ["F"], label: "Search: this frame", matches: plain("f"), run: search("frame") },
-    { keys: ["Esc"], label: "Cancel the drag, else stop what is at work", matches: plain("escape"), run: escape },
+    { keys: ["Esc"], label: "Cancel the drag, leave the replay, else stop what is at work", matches: plain("escape"), run: escape },
     { keys: ["T"], label: "Track forward", matches: plain("t"), run: track("forward") },
     { keys: ["Shift T"], label: "Track backward", matches: plain("t", undefined, true), run: track("backward") },
     { keys: ["P"], label: "Pause tracking, or go on", matches: plain("p"), run: () => actions.togglePause() },
@@ -105,6 +107,8 @@ export function bindings({ store, actions, navigation, grid, gestures, drawer, s
     { keys: ["["], label: "A range begins here", matches: plain("[", "BracketLeft"), run: mark("first") },
     { keys: ["]"], label: "The range ends here", matches: plain("]", "BracketRight"), run: mark("last") },
     { keys: ["C"], label: "Curves", matches: plain("c"), run: () => drawer.toggleCurves() },
+    { keys: ["B"], label: "Search: watch it in the drawer", matches: plain("b"), run: () => drawer.toggle("search") },
+    { keys: ["V"], label: "Landscape of the cost", matches: plain("v"), run: () => drawer.toggle("landscape") },
     {
       keys: ["1 – 9"],
       label: "Fill the grid with a camera, and back",

@@ -16,16 +16,31 @@
  *   per_second: number, doubtful: number, lost: number, message: string}} Track
  * @typedef {{type: "state", frame: number, person: number, point: string | null, base: Base, overlays: Overlays,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
- *   parts_px: (number | null)[], job: Job, track: Track, follow: boolean, undo: string | null, redo: string | null,
+ *   parts_px: (number | null)[], job: Job, track: Track,
+ *   replay: {run: number, step: number, steps: number, stage: string | null} | null, follow: boolean, undo: string | null, redo: string | null,
  *   saved: boolean, save_error: string | null}} StateMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
  * @typedef {{source: string, cost_px: number | null, keyframe: boolean, status: Status, remark: string}} Cell
  * @typedef {{type: "timeline", cells: Record<string, Cell | null>, replace: boolean}} TimelineMessage
- * @typedef {SessionMessage | StateMessage | NoticeMessage | TimelineMessage} TextMessage
+ * @typedef {{person: number, name: string, dofs: string[], bound_rad: number | null, step_rad: number | null,
+ *   bound_m: number | null, step_m: number | null, angles: number, lengths: number, own: boolean}} SearchLeaf
+ * @typedef {{type: "search_setup", theta_px: number | null, outliers: "truncated" | "paper", passes: number[],
+ *   patience: number, max_expansions: number, limbs_apart: boolean, bound_rad: number, bound_m: number, step_rad: number,
+ *   step_m: number, speed: number | null, leaves: SearchLeaf[]}} SearchSetupMessage
+ * @typedef {{person: number, name: string, factor: number, evaluations: number, gain_px: number, done: boolean,
+ *   running: boolean}} SearchStage
+ * @typedef {{number: number, state: "running" | "stands" | "over", start_px: number | null, best_px: number | null,
+ *   evaluations: number, seconds: number, steps: number, thinned: number, differs: Record<string, string>,
+ *   stages: SearchStage[]}} SearchRun
+ * @typedef {{run: number, step: number, stage: string | null, candidate_px: number | null, best_px: number | null,
+ *   evaluations: number}} Replay
+ * @typedef {{type: "search_runs", runs: SearchRun[], replay: Replay | null, compared: number | null}} SearchRunsMessage
+ * @typedef {SessionMessage | StateMessage | NoticeMessage | TimelineMessage | SearchSetupMessage |
+ *   SearchRunsMessage} TextMessage
  *
  * @typedef {{type: "image", camera: number, frame: number, base: Base}} ImageHeader
  * @typedef {{camera: number, person: number, color: string, first: number, count: number,
- *   kind: "model" | "candidate" | "part_edge" | "epipolar" | "accepted" | "rejected"}} Path
+ *   kind: "model" | "candidate" | "ghost" | "part_edge" | "epipolar" | "accepted" | "rejected"}} Path
  * @typedef {{camera: number, person: number, point: string, u: number, v: number, visible: boolean}} Handle
  * @typedef {{type: "overlay", frame: number, seq: number, job: boolean, paths: Path[], handles: Handle[]}} OverlayHeader
  * @typedef {OverlayHeader & {segments: Float32Array}} Overlay
@@ -33,14 +48,30 @@
  * @typedef {{title: string, unit: "deg" | "cm" | "px", labels: string[]}} Plot
  * @typedef {{type: "curves", group: CurveGroup, person: number, replace: boolean, count: number,
  *   plots: Plot[]}} CurvesHeader
- * @typedef {ImageHeader | OverlayHeader | CurvesHeader} BinaryHeader
+ * @typedef {{type: "search_steps", run: number, first: number, count: number}} SearchStepsHeader
+ * @typedef {{type: "search_candidates", run: number, costs_px: (number | null)[], points: number[],
+ *   telling: number}} SearchCandidatesHeader
+ * @typedef {{type: "landscape", person: number, dof: number, names: string[], unit: "rad" | "m", current: number,
+ *   current_px: number | null, count: number}} LandscapeHeader
+ * @typedef {ImageHeader | OverlayHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
+ *   LandscapeHeader} BinaryHeader
  *
  * @typedef {{type: "seek", frame: number} |
  *   {type: "select", person: number, point: string | null} |
  *   {type: "drag", phase: "start" | "move" | "end" | "cancel", frame: number, camera: number, person: number,
  *     point: string, u: number, v: number, seq: number} |
  *   {type: "view", base: Base, overlays: Overlays} |
- *   {type: "search", action: "step" | "frame" | "stop"} |
+ *   {type: "search", action: "step" | "stage" | "frame" | "stop"} |
+ *   {type: "search", action: "again", run: number | null} |
+ *   {type: "search_speed", per_second: number | null} |
+ *   {type: "search_settings", changes: Record<string, unknown>} |
+ *   {type: "watch", tab: "search" | "landscape" | null} |
+ *   {type: "replay", run: number | null, step: number} |
+ *   {type: "compare", run: number | null} |
+ *   {type: "preview", run: number, candidate: number | null} |
+ *   {type: "take", run: number, candidate: number | null} |
+ *   {type: "landscape", dof: string} |
+ *   {type: "landscape_set", person: number, dof: number, value: number} |
  *   {type: "track", action: "forward" | "backward", until: number | null} |
  *   {type: "track", action: "pause" | "go_on" | "stop"} |
  *   {type: "follow", follow: boolean} |

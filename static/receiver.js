@@ -1,6 +1,7 @@
 /** Puts the program's messages into the store. */
 
 import { FrameAssembler } from "./frames.js";
+import { mergeCandidates, mergeSteps, takeLandscape, takeRuns } from "./search_facts.js";
 import { mergeCurves } from "./series.js";
 
 const MOST_EARLY = 8;
@@ -38,6 +39,12 @@ export class Receiver {
       case "timeline":
         this.#mergeTimeline(message);
         break;
+      case "search_setup":
+        this.#store.set({ searchSetup: message });
+        break;
+      case "search_runs":
+        this.#store.set(takeRuns(this.#store.facts, message));
+        break;
       case "notice":
         this.#notify(message);
         break;
@@ -58,6 +65,15 @@ export class Receiver {
         break;
       case "curves":
         this.#store.set({ curves: mergeCurves(this.#store.facts.curves, header, payload, this.#frameCount) });
+        break;
+      case "search_steps":
+        this.#store.set({ searchSteps: mergeSteps(this.#store.facts.searchSteps, header, payload) });
+        break;
+      case "search_candidates":
+        this.#store.set({ searchCandidates: mergeCandidates(this.#store.facts.searchCandidates, header, payload) });
+        break;
+      case "landscape":
+        this.#store.set({ landscape: takeLandscape(header, payload) });
         break;
     }
   }

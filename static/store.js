@@ -14,6 +14,12 @@
  * @property {Map<number, import("./protocol.js").Cell>} timeline the known cells by frame
  * @property {import("./series.js").Curves | null} curves the group of curves that came last
  * @property {import("./drawer.js").Tab | null} drawer what the drawer shows; null while it is closed
+ * @property {import("./protocol.js").SearchSetupMessage | null} searchSetup
+ * @property {import("./protocol.js").SearchRunsMessage | null} searchRuns
+ * @property {Map<number, import("./search_facts.js").Steps>} searchSteps recorded steps by run
+ * @property {Map<number, import("./search_facts.js").Candidates>} searchCandidates best poses by run
+ * @property {number | null} searchRun the run that the user looks at; null for the newest
+ * @property {import("./search_facts.js").Landscape | null} landscape
  * @property {{first: number, last: number} | null} range the frames that the user has marked
  * @property {Shown | null} shown the images on the screen
  * @property {import("./protocol.js").Overlay | null} overlay the vectors on the screen
@@ -35,6 +41,12 @@ export class Store {
     timeline: new Map(),
     curves: null,
     drawer: null,
+    searchSetup: null,
+    searchRuns: null,
+    searchSteps: new Map(),
+    searchCandidates: new Map(),
+    searchRun: null,
+    landscape: null,
     range: null,
     shown: null,
     overlay: null,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tracker.body import BodyModel, SearchGroup
 from tracker.chamfer import ChamferCost
+from tracker.errors import TrackerError
 from tracker.rigid import Array
 
 
@@ -44,6 +45,28 @@ class SearchSettings:
     limbs_apart: bool = False
     """Whether the limbs of a group are searched one after the other. Two arms hardly know of each other, and together
     each expansion scores the neighbours of both where one moves. The paper searches them together."""
+
+    def __post_init__(self) -> None:
+        """Refuse what no lattice can be made of.
+
+        Raises:
+            TrackerError: a bound below 0, a step or pass not above 0, or a stage that may not take a single expansion.
+        """
+        for name, bound in {"angles": self.bound_rad, "positions": self.bound_m, **self.bounds}.items():
+            if not (np.isfinite(bound) and bound >= 0):
+                raise TrackerError(f"expected the bound of {name} to be 0 or more, found {bound:g}; enter a larger one")
+        for name, step in {"angles": self.step_rad, "positions": self.step_m, **self.steps}.items():
+            if not (np.isfinite(step) and step > 0):
+                raise TrackerError(f"expected the step of {name} to be above 0, found {step:g}; enter a larger one")
+        if not self.passes or not all(np.isfinite(p) and p > 0 for p in self.passes):
+            raise TrackerError(
+                f"expected passes as factors above 0, such as 1, 0.5, 0.25, found {list(self.passes)}; enter one"
+            )
+        if min(self.patience, self.max_expansions) < 1:
+            raise TrackerError(
+                "expected a stage to take 1 expansion or more, found patience "
+                f"{self.patience} and at most {self.max_expansions}; enter larger ones"
+            )
 
     def lattice(self, model: BodyModel, dofs: Sequence[int]) -> tuple[Array, Array]:
         """Bounds and steps of some degrees of freedom, each (len(dofs),), rad or metres."""

@@ -101,7 +101,7 @@ class FakeEndpoint:
             "type": "state", "frame": 12, "person": 0, "point": None, "base": "image",
             "overlays": {"contours": True, "joints": True, "part_edges": False, "skeleton": True, "segments": False},
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
-            "source": "manual", "status": "", "remark": "", "parts_px": [], "job": self.idle_job(""),
+            "source": "manual", "status": "", "remark": "", "parts_px": [], "job": self.idle_job(""), "replay": None,
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "saved": True, "save_error": None,
         }  # fmt: skip

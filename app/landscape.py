@@ -1,0 +1,162 @@
+"""The cost over the range of one degree of freedom, the others held: how steep, how wide, how many valleys."""
+
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+
+import numpy as np
+
+from app.jobs import Latest
+from app.screen import Screen
+from app.state import Landscape, Shown, State
+from tracker.body import BodyModel
+from tracker.errors import TrackerError
+from tracker.evidence import ViewEvidence
+from tracker.rigid import Array
+from tracker.track import TrackSettings, pose_cost
+
+SAMPLES = 121
+_REACH_M, _REACH_RAD = 0.5, float(np.pi)
+"""How far a degree of freedom without limits is followed to either side, metres and rad."""
+_REST_S = 0.08
+"""Least time between two landscapes: the pose may change much faster."""
+
+
+class Landscapes:
+    """Works out the landscape in the background while a page looks at it; the newest pose wins."""
+
+    def __init__(self, screen: Screen, editing: Callable[[], AbstractContextManager[None]]) -> None:
+        """Follow the screen; nothing is worked out until a page looks.
+
+        Args:
+            screen: holds the state.
+            editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
+        """
+        self._screen, self._editing = screen, editing
+        self._pages: set[int] = set()
+        self._pages_lock = threading.Lock()
+        self._dof: str | None = None
+        self._worked_out: tuple[object, ...] = ()
+        self._latest = Latest(self._work_out, "landscape", _REST_S)
+        screen.subscribe(self._changed)
+
+    def watch(self, page: int, looks: bool) -> None:
+        """Note whether a page looks at the landscape."""
+        with self._pages_lock:
+            (self._pages.add if looks else self._pages.discard)(page)
+        if looks:
+            self._latest.offer(self._screen.state)
+
+    def choose(self, dof: str) -> None:
+        """Look at another degree of freedom of the person worked on, by its name.
+
+        Raises:
+            TrackerError: the person has none of that name.
+        """
+        model = self._screen.models[self._screen.state.person]
+        if dof not in model.dof_names:
+            raise TrackerError(
+                f"expected a degree of freedom such as {model.dof_names[0]}, found '{dof}'; choose one from the list"
+            )
+        self._dof = dof
+        self._latest.offer(self._screen.state)
+
+    def set_value(self, person: int, dof: int, value: float) -> None:
+        """Put a degree of freedom where the landscape was clicked, rad or metres: one edit.
+
+        Raises:
+            TrackerError: there is no such person or degree of freedom, it is locked, or the value is no number.
+        """
+        models = self._screen.models
+        if not (0 <= person < len(models) and 0 <= dof < models[person].n_dofs and np.isfinite(value)):
+            raise TrackerError(
+                "expected a value of one of the body's degrees of freedom, found another; reload the page"
+            )
+        if dof in self._screen.state.locked[person]:
+            raise TrackerError(
+                f"expected a degree of freedom that may move, "
+                f"found {models[person].dof_names[dof]} locked; unlock it first"
+            )
+        with self._editing():
+            model, state = models[person], self._screen.state
+            values = model.clip(along(model, state.poses[person], dof, np.array([value]))[0])
+            people = [*state.people]
+            people[person] = Shown(values, "manual")
+            self._screen.set(people=tuple(people), **self._screen.costs(tuple(p.values for p in people)))
+            self._screen.edit_of = None
+            self._screen.save(f"set {model.dof_names[dof].replace('_', ' ').replace('.', ' ')}", "manual", object())
+            self._screen.edit_of = None
+
+    def close(self) -> None:
+        """End the thread."""
+        self._latest.close()
+
+    def _changed(self, state: State) -> None:
+        if self._pages and not state.job.running:
+            self._latest.offer(state)
+
+    def _work_out(self, state: State) -> None:
+        views = self._screen.frames.evidence_at_hand(state.frame)
+        person, poses = state.person, state.poses
+        model = self._screen.models[person]
+        dof = self._dof_of(model, state)
+        key = (state.frame, person, dof, state.settings, *map(id, poses))
+        if views is None or not self._pages or key == self._worked_out:
+            return
+        found = landscape(views, self._screen.models, poses, state.settings, person, dof)
+        self._worked_out = key
+        self._screen.set(landscape=found)
+
+    def _dof_of(self, model: BodyModel, state: State) -> int:
+        """The degree of freedom chosen; else one of the joint touched last, else one of a limb."""
+        if self._dof in model.dof_names:
+            return model.dof_names.index(self._dof)
+        of_point = [d for d, name in enumerate(model.dof_names) if name.partition(".")[0] == state.point]
+        limbs = [d for d in range(model.n_dofs) if model.dof_joint[d] > 0]
+        return (of_point or limbs or [0])[0]
+
+
+def landscape(
+    views: Sequence[ViewEvidence],
+    models: Sequence[BodyModel],
+    poses: Sequence[Array],
+    settings: TrackSettings,
+    person: int,
+    dof: int,
+) -> Landscape:
+    """Score a person at many values of one degree of freedom within its limits, everything else as it is.
+
+    Args:
+        views: evidence of the frame.
+        models: the body of each person.
+        poses: pose of each person, (n_values,) each.
+        settings: outlier distance and how outliers count.
+        person: whose.
+        dof: which.
+    """
+    model = models[person]
+    current = current_value(model, poses[person], dof)
+    reach = _REACH_M if model.dof_is_length[dof] else _REACH_RAD
+    low, high = model.limits[dof] if _is_plain(model, dof) else (-np.inf, np.inf)
+    low, high = (low if np.isfinite(low) else current - reach), (high if np.isfinite(high) else current + reach)
+    values = np.linspace(min(low, current), max(high, current), SAMPLES)
+    cost = pose_cost(views, models, poses, settings)
+    totals_px, views_px = cost.of_person(person, along(model, poses[person], dof, values), poses)
+    return Landscape(person, dof, current, cost(poses).total_px, values, totals_px, views_px)
+
+
+def current_value(model: BodyModel, pose: Array, dof: int) -> float:
+    """Value of a degree of freedom, rad or metres; of a ball joint 0, as it is followed from where it stands."""
+    return float(pose[model.dof_value[dof]]) if _is_plain(model, dof) else 0.0
+
+
+def along(model: BodyModel, pose: Array, dof: int, values: Array) -> Array:
+    """A pose with one degree of freedom at each of some values, (N,) rad or metres; (N, n_values)."""
+    steps = np.zeros((len(values), model.n_dofs))
+    steps[:, dof] = values - current_value(model, pose, dof)
+    return model.retract(pose, steps)
+
+
+def _is_plain(model: BodyModel, dof: int) -> bool:
+    """Whether a degree of freedom is a value of the pose itself, not a turn of a ball joint."""
+    return model.value_names[model.dof_value[dof]] == model.dof_names[dof]

@@ -1,0 +1,130 @@
+/** A plot with two axes of numbers, for what has no axis of frames. Sizes are CSS pixels. */
+
+import { roundUp } from "./frame_axis.js";
+
+const LEFT = 44;
+const RIGHT = 8;
+const BOTTOM = 16;
+const TOP = 6;
+const TICK_X = 80;
+const TICK_Y = 22;
+
+/** @typedef {{least: number, most: number}} Range */
+
+export class Plot {
+  /**
+   * @param {number} width
+   * @param {number} height
+   * @param {Range} xs
+   * @param {Range} ys
+   * @param {number} top room above the plot
+   */
+  constructor(width, height, xs, ys, top = TOP) {
+    this.xs = xs;
+    this.ys = ys;
+    this.left = LEFT;
+    this.right = Math.max(LEFT + 1, width - RIGHT);
+    this.top = top;
+    this.bottom = Math.max(top + 1, height - BOTTOM);
+  }
+
+  /** @param {number} value */
+  x(value) {
+    return this.left + ((this.right - this.left) * (value - this.xs.least)) / (this.xs.most - this.xs.least);
+  }
+
+  /** @param {number} value */
+  y(value) {
+    return this.bottom - ((this.bottom - this.top) * (value - this.ys.least)) / (this.ys.most - this.ys.least);
+  }
+
+  /**
+   * The value at a place, the nearest end outside.
+   *
+   * @param {number} x
+   */
+  valueAt(x) {
+    const share = Math.max(0, Math.min(1, (x - this.left) / (this.right - this.left)));
+    return this.xs.least + share * (this.xs.most - this.xs.least);
+  }
+
+  /**
+   * Ground, lines at round values, and their numbers.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {CSSStyleDeclaration} style
+   * @param {string} unit of x
+   */
+  drawFrame(context, style, unit) {
+    context.fillStyle = style.getPropertyValue("--plot");
+    context.fillRect(this.left, this.top, this.right - this.left, this.bottom - this.top);
+    context.font = "10.5px system-ui, sans-serif";
+    context.textAlign = "right";
+    context.textBaseline = "middle";
+    for (const value of ticks(this.ys, TICK_Y / (this.bottom - this.top))) {
+      const y = Math.round(this.y(value));
+      context.fillStyle = style.getPropertyValue("--line");
+      context.fillRect(this.left, y, this.right - this.left, 1);
+      context.fillStyle = style.getPropertyValue("--muted");
+      context.fillText(String(Number(value.toPrecision(6))), this.left - 6, y);
+    }
+    context.textAlign = "center";
+    context.textBaseline = "bottom";
+    for (const value of ticks(this.xs, TICK_X / (this.right - this.left))) {
+      const x = this.x(value);
+      context.fillStyle = style.getPropertyValue("--muted");
+      context.fillRect(x - 0.5, this.bottom, 1, 3);
+      context.fillText(`${Number(value.toPrecision(6)).toLocaleString("en")}${unit}`, Math.min(x, this.right - 14), this.bottom + BOTTOM);
+    }
+  }
+
+  /**
+   * A line through points.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {ArrayLike<number>} xs
+   * @param {ArrayLike<number>} ys NaN leaves a gap
+   * @param {boolean} isStepped whether a value holds until the next
+   */
+  drawLine(context, xs, ys, isStepped = false) {
+    const line = new Path2D();
+    let isOpen = false;
+    for (let i = 0; i < xs.length; i += 1) {
+      if (!Number.isFinite(ys[i])) {
+        isOpen = false;
+        continue;
+      }
+      const [x, y] = [this.x(xs[i]), this.y(ys[i])];
+      if (!isOpen) line.moveTo(x, y);
+      else if (isStepped) line.lineTo(x, this.y(ys[i - 1]));
+      if (isOpen) line.lineTo(x, y);
+      isOpen = true;
+    }
+    context.stroke(line);
+  }
+
+  /**
+   * Draw only within the plot.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {() => void} draw
+   */
+  within(context, draw) {
+    context.save();
+    context.beginPath();
+    context.rect(this.left, this.top, this.right - this.left, this.bottom - this.top);
+    context.clip();
+    draw();
+    context.restore();
+  }
+}
+
+/**
+ * @param {Range} range
+ * @param {number} share least distance of two, as a share of the range
+ */
+function ticks({ least, most }, share) {
+  const step = roundUp(Math.max(1e-12, (most - least) * share));
+  const first = Math.ceil(least / step - 1e-9);
+  return Array.from({ length: Math.max(0, Math.floor(most / step + 1e-9) - first + 1) }, (_, i) => (first + i) * step);
+}
