@@ -16,6 +16,7 @@ from app.hand import Hand
 from app.landscape import Landscapes
 from app.locks import Locks
 from app.pinning import Pinning
+from app.pose_edits import PoseEdits
 from app.ranges import Ranges
 from app.replay import Replay
 from app.runs import Runs
@@ -47,6 +48,8 @@ class Controller:
         self._lock, self.models = self._screen.lock, self._screen.models
         self.hand = Hand(self._screen, self.editing)
         """Poses people by hand."""
+        self.pose_edits = PoseEdits(self._screen, self.editing)
+        """Changes poses by numbers, steps and strokes."""
         self.locks = Locks(self._screen, self.editing)
         """Holds degrees of freedom still."""
         self.ranges = Ranges(self._screen, self._tracking, self.editing)

@@ -1,4 +1,4 @@
-"""Posing by hand: a drag from press to release, a slider, each one entry of the history."""
+"""Posing by hand: a drag from press to release is one entry of the history."""
 
 import time
 from collections.abc import Callable
@@ -7,16 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.screen import Screen
-from app.state import DragState, Shown
+from app.screen import Screen, spoken
+from app.state import DragState
 from tracker import posing
-from tracker.errors import TrackerError
-from tracker.rigid import Array
 
 _CHECKPOINT_S = 1.0
 """A long drag is on disk at least this often."""
-_SAME_GESTURE_S = 1.0
-"""Changes of one slider within this time of each other are one entry of the history."""
 
 
 class Hand:
@@ -63,7 +59,7 @@ class Hand:
                 return
             values = posing.drag(self._grab, np.array(pointer_px), self._screen.state.poses[drag.person])
             seqs = (*(s for s in self._screen.state.drag_seqs if s[0] != page), (page, seq))[-16:]
-            self._pose(drag.person, values, drag=replace(drag, pointer_px=pointer_px), drag_seqs=seqs)
+            self._screen.pose(drag.person, values, drag=replace(drag, pointer_px=pointer_px), drag_seqs=seqs)
             if time.monotonic() - self._screen.last_save > _CHECKPOINT_S:
                 self._screen.save(f"drag {spoken(drag.point)}", "manual", self._grab)
 
@@ -95,28 +91,3 @@ class Hand:
             self._screen.save(f"drag {spoken(drag.point)}", "manual", hand)
         self._grab = self._screen.edit_of = None
         self._screen.set(drag=None)
-
-    def set_dof(self, person: int, dof: int, value: float) -> None:
-        """Set one degree of freedom of a revolute joint or of the root, rad or metres."""
-        with self._editing():
-            model, values = self._screen.models[person], self._screen.state.poses[person].copy()
-            if dof in self._screen.state.locked[person]:
-                raise TrackerError(f"{spoken(model.dof_names[dof])} is locked; unlock it to change it")
-            values[model.dof_value[dof]] = value
-            self._pose(person, model.clip(values))
-            gesture = ("dof", person, dof, self._screen.state.frame)
-            if gesture != self._screen.edit_of or time.monotonic() - self._screen.last_save > _SAME_GESTURE_S:
-                self._screen.edit_of = None
-            self._screen.save(f"set {spoken(model.dof_names[dof])}", "manual", gesture)
-
-    def _pose(self, person: int, values: Array, **changes: object) -> None:
-        """Show a new pose of one person."""
-        people = list(self._screen.state.people)
-        people[person] = Shown(values, "manual")
-        poses = tuple(p.values for p in people)
-        self._screen.set(people=tuple(people), **self._screen.costs(poses), **changes)
-
-
-def spoken(name: str) -> str:
-    """`left_shoulder.abduction` as people say it."""
-    return name.replace("_", " ").replace(".", " ")

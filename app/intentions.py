@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from app.controller import Controller
+from app.pose_intentions import pose
 from app.search_intentions import SEARCHING
 
 Message = Mapping[str, Any]
@@ -107,6 +108,7 @@ _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "seek": lambda controller, _, message: controller.seek(int(message["frame"])),
     "select": lambda controller, _, message: controller.select(int(message["person"]), message.get("point")),
     "drag": _drag,
+    "pose": pose,
     "pin": _pin,
     "unpin": _unpin,
     "fit": lambda controller, _, message: controller.pinning.fit(int(message["frame"])),

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from app import overlays, pin_marks
+from app import dofs, overlays, pin_marks
 from app.curves import plots_of, samples
 from app.state import OVERLAYS, JobState, ReplayState, State, TrackState
 from tracker.evidence import ViewEvidence
@@ -47,13 +47,14 @@ def session(session: Session) -> dict[str, Any]:
                 "minor": list(minor_points(p.model)),
                 "bones": [list(b) for b in overlays.bones(p.model)],
                 "parts": [part.name for part in p.model.parts],
+                **dofs.described(p.model),
             }
             for p in session.people
         ],
     }
 
 
-def state(state: State) -> dict[str, Any]:
+def state(session: Session, state: State) -> dict[str, Any]:
     """The texts and figures of the page."""
     shown, drawn = state.people[state.person], state.drawn
     return {
@@ -69,6 +70,8 @@ def state(state: State) -> dict[str, Any]:
         "status": shown.status,
         "remark": shown.remark,
         "parts_px": list(shown.parts_px),
+        "dofs": dofs.shown(session.people[state.person].model, shown.values),
+        "locked": sorted(state.locked[state.person]),
         "job": _job(state.job),
         "replay": _replay(state.look.replay),
         "track": _track(state.track),

@@ -1,5 +1,6 @@
 """State to viser's panels and back: pose sliders."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +12,7 @@ from app.jobs import Latest
 from app.settings_panel import SettingsPanel
 from app.state import State
 from tracker.body import BodyModel
+from tracker.errors import TrackerError
 
 _REACH_M = 6.0
 """How far from the scene's middle the position sliders go, metres."""
@@ -79,7 +81,9 @@ class Panels:
         return slider
 
     def _apply(self, change: _Change) -> None:
-        self._controller.hand.set_dof(change.person, change.dof, change.value)
+        with suppress(TrackerError):  # locked: the slider goes back to the state's value
+            self._controller.pose_edits.set_dof(change.person, change.dof, change.value)
+        self._show(self._controller.state)
 
     def _show(self, state: State) -> None:
         if state.rests_3d:

@@ -160,7 +160,7 @@ class _Page:
 
     async def _send_state(self, state: State) -> None:
         """Send what the page's text shows, if it changed; at a readable rate while a hand drags."""
-        message, loop = messages.state(state), self._loop
+        message, loop = messages.state(self._controller.session, state), self._loop
         if message == self._sent_text:
             return
         wait = self._sent_text_at + _READABLE_S - loop.time()

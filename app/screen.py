@@ -104,6 +104,12 @@ class Screen:
             "view_costs_px": tuple(finite_or_none(c) for c in cost.views_px),
         }
 
+    def pose(self, person: int, values: Array, **changes: object) -> None:
+        """Show a pose that a hand gave one person."""
+        people = list(self.state.people)
+        people[person] = Shown(values, "manual")
+        self.set(people=tuple(people), **self.costs(tuple(p.values for p in people)), **changes)
+
     def save(self, label: str, source: str, gesture: object) -> None:
         """Write the poses shown; calls of one gesture make one entry of the history."""
         amend = self._edit if self.edit_of is gesture or self.edit_of == gesture else None
@@ -136,3 +142,8 @@ class Screen:
         with self.lock:
             if frame == self.state.frame:
                 self.set(**self.costs(self.state.poses))
+
+
+def spoken(name: str) -> str:
+    """`left_shoulder.abduction` as people say it."""
+    return name.replace("_", " ").replace(".", " ")

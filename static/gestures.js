@@ -53,6 +53,9 @@ export class Gestures {
     const surface = pane.surface;
     surface.addEventListener("pointerdown", (event) => this.#down(event, pane, camera));
     surface.addEventListener("pointermove", (event) => this.#move(event, pane, camera));
+    for (const kind of ["pointerenter", "pointerdown"]) {
+      surface.addEventListener(kind, () => this.#store.facts.active !== camera && this.#store.set({ active: camera }));
+    }
     surface.addEventListener("pointerup", (event) => this.#up(event));
     surface.addEventListener("pointercancel", () => this.cancel());
     surface.addEventListener("pointerleave", () => {

@@ -1,6 +1,7 @@
 /** The keys: one table that is both obeyed and shown to whoever asks with `?`. */
 
 import { hasSearch, hasTrack } from "./actions.js";
+import { posingBindings } from "./posing_keys.js";
 
 /**
  * @typedef {object} Binding
@@ -11,7 +12,7 @@ import { hasSearch, hasTrack } from "./actions.js";
  */
 
 /** Keys that belong to viser's camera while the 3-D view has the focus. */
-const VISER_KEYS = new Set(["s", "w", "a", "d", "q", "e"]);
+const VISER_KEYS = new Set(["s", "w", "a", "d", "q", "e", "arrowleft", "arrowright", "arrowup", "arrowdown"]);
 
 /**
  * Match a plain key by its character or, since Shift changes that by keyboard layout, by its place.
@@ -48,6 +49,8 @@ function control(key, shift) {
  * @property {import("./pane_grid.js").PaneGrid} grid
  * @property {import("./gestures.js").Gestures} gestures
  * @property {import("./drawer.js").Drawer} drawer
+ * @property {import("./posing.js").Posing} posing
+ * @property {import("./inspector.js").Inspector} inspector
  * @property {() => void} showHelp
  */
 
@@ -55,7 +58,7 @@ function control(key, shift) {
  * @param {Parts} parts
  * @returns {Binding[]}
  */
-export function bindings({ store, actions, navigation, grid, gestures, drawer, showHelp }) {
+export function bindings({ store, actions, navigation, grid, gestures, drawer, posing, inspector, showHelp }) {
   const escape = () => {
     if (gestures.cancel() || actions.leaveReplay()) return;
     if (hasTrack(store.facts.state)) actions.stopTracking();
@@ -106,6 +109,7 @@ export function bindings({ store, actions, navigation, grid, gestures, drawer, s
     },
     { keys: ["["], label: "A range begins here", matches: plain("[", "BracketLeft"), run: mark("first") },
     { keys: ["]"], label: "The range ends here", matches: plain("]", "BracketRight"), run: mark("last") },
+    ...posingBindings(posing, inspector, plain),
     { keys: ["C"], label: "Curves", matches: plain("c"), run: () => drawer.toggleCurves() },
     { keys: ["B"], label: "Search: watch it in the drawer", matches: plain("b"), run: () => drawer.toggle("search") },
     { keys: ["V"], label: "Landscape of the cost", matches: plain("v"), run: () => drawer.toggle("landscape") },
@@ -153,7 +157,10 @@ function writes(element) {
  * @param {KeyboardEvent} event
  */
 function operates(element, event) {
-  return event.key === " " && !!element?.matches?.("button, input, a, summary, [role=button]");
+  if (event.key.startsWith("Arrow")) {
+    return !!element?.matches?.("[type=radio], [role=slider], [role=separator], [role=menuitem], [role=tab]");
+  }
+  return [" ", "Enter"].includes(event.key) && !!element?.matches?.("button, input, a, summary, [role=button]");
 }
 
 /**

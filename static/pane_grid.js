@@ -38,7 +38,7 @@ export class PaneGrid {
    */
   toggleFill(camera) {
     if (camera >= this.panes.length) return;
-    this.#store.set({ filled: this.#store.facts.filled === camera ? null : camera });
+    this.#store.set({ filled: this.#store.facts.filled === camera ? null : camera, active: camera });
   }
 
   /** Show whole images: in the pane under the pointer, or else in all. */
@@ -65,6 +65,7 @@ export class PaneGrid {
   #update(changed) {
     if (changed.has("session")) this.#build();
     if (changed.has("filled")) this.#layOut();
+    if (changed.has("active") || changed.has("session")) this.#markActive();
     const withImage = changed.has("shown");
     // A new state comes with every move of a drag; only its choice of what to draw concerns the vectors.
     const { person, point, overlays } = this.#store.facts.state ?? {};
@@ -78,6 +79,11 @@ export class PaneGrid {
       this.#element.classList.toggle("is-loading", this.#store.facts.shown?.frame !== this.#store.facts.target);
     }
     if (changed.has("state")) for (const pane of this.panes) pane.showCost();
+  }
+
+  #markActive() {
+    const active = this.#store.facts.active ?? 0;
+    this.panes.forEach((pane, camera) => pane.element.classList.toggle("is-active", camera === active));
   }
 
   #build() {

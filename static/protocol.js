@@ -6,7 +6,9 @@
  *   segments: boolean}} Overlays
  * @typedef {{name: string, width: number, height: number}} CameraInfo
  * @typedef {{name: string, color: string, points: string[], minor: string[], bones: [string, string][],
- *   parts: string[]}} PersonInfo
+ *   parts: string[], dofs: DofInfo[], point_dofs: Record<string, number[]>,
+ *   point_limbs: Record<string, {name: string, dofs: number[]}>}} PersonInfo
+ * @typedef {{joint: string, name: string, unit: "deg" | "cm", low: number | null, high: number | null}} DofInfo
  * @typedef {{type: "session", name: string, fps: number, n_frames: number, cameras: CameraInfo[],
  *   people: PersonInfo[]}} SessionMessage
  * @typedef {{running: boolean, kind: string | null, stage: string | null, stages: string[], evaluations: number,
@@ -16,7 +18,7 @@
  *   per_second: number, doubtful: number, lost: number, message: string}} Track
  * @typedef {{type: "state", frame: number, person: number, point: string | null, base: Base, overlays: Overlays,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
- *   parts_px: (number | null)[], job: Job, track: Track,
+ *   parts_px: (number | null)[], dofs: number[], locked: number[], job: Job, track: Track,
  *   replay: {run: number, step: number, steps: number, stage: string | null} | null, follow: boolean, undo: string | null, redo: string | null,
  *   saved: boolean, save_error: string | null}} StateMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
@@ -56,10 +58,16 @@
  * @typedef {ImageHeader | OverlayHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader} BinaryHeader
  *
+ * @typedef {{type: "pose", frame: number, person: number} & (
+ *   {action: "set", dof: number, value: number} | {action: "turn", dof: number, by: number} |
+ *   {action: "nudge", point: string | null, camera: number, right: number, up: number} |
+ *   {action: "mirror"} | {action: "copy", from: number} | {action: "reset", point: string | null} |
+ *   {action: "lock", dofs: number[], locked: boolean})} PoseEdit
  * @typedef {{type: "seek", frame: number} |
  *   {type: "select", person: number, point: string | null} |
  *   {type: "drag", phase: "start" | "move" | "end" | "cancel", frame: number, camera: number, person: number,
  *     point: string, u: number, v: number, seq: number} |
+ *   PoseEdit |
  *   {type: "view", base: Base, overlays: Overlays} |
  *   {type: "search", action: "step" | "stage" | "frame" | "stop"} |
  *   {type: "search", action: "again", run: number | null} |

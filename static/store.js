@@ -25,6 +25,8 @@
  * @property {import("./protocol.js").Overlay | null} overlay the vectors on the screen
  * @property {Joint | null} hover the joint under the pointer
  * @property {boolean} dragging whether a hand holds a joint
+ * @property {number | null} active the camera whose pane was last pointed at; steps of keys are parallel to its image
+ * @property {number | null} dof the degree of freedom that keys turn, of those that the selected joint means
  * @property {number} target the frame the user asked for last
  * @property {boolean} playing
  * @property {number | null} filled the camera whose pane fills the grid
@@ -52,6 +54,8 @@ export class Store {
     overlay: null,
     hover: null,
     dragging: false,
+    active: null,
+    dof: null,
     target: 0,
     playing: false,
     filled: null,

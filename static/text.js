@@ -7,6 +7,15 @@ export function px(value) {
   return value === null ? "–" : `${value.toFixed(2)} px`;
 }
 
+/**
+ * `left_elbow` as people say it.
+ *
+ * @param {string} name
+ */
+export function spoken(name) {
+  return name.replaceAll("_", " ");
+}
+
 /** @param {number} value */
 export function count(value) {
   return COUNT.format(value);

@@ -109,7 +109,7 @@ def test_a_slider_is_one_entry_however_often_it_moves(opened):
     model = controller.models[0]
     dof = model.dof_names.index("left_shoulder.abduction")
     for value in (0.1, 0.2, 9.0):
-        controller.hand.set_dof(0, dof, value)
+        controller.pose_edits.set_dof(0, dof, value)
     assert controller.state.poses[0][dof] == pytest.approx(model.limits[dof, 1])  # within its limit
     assert controller.state.undo == "set left shoulder abduction, frame 0"
     controller.undo()
@@ -184,7 +184,7 @@ def test_whatever_a_hand_does_stops_a_running_search(opened, interruption):
         "seek": lambda: controller.seek(3),
         "drag": lambda: drag(controller, "left_knee", (3.0, 3.0)),
         "undo": controller.undo,
-        "set": lambda: controller.hand.set_dof(0, 8, 0.3),
+        "set": lambda: controller.pose_edits.set_dof(0, 8, 0.3),
     }[interruption]()
     assert not controller.state.job.running
     values = controller.state.poses[0]
@@ -224,7 +224,7 @@ def test_many_hands_at_once_leave_one_consistent_state(opened):
 
     def nudge(dof):
         for value in np.linspace(0.0, 0.4, 8):
-            controller.hand.set_dof(0, dof, float(value))
+            controller.pose_edits.set_dof(0, dof, float(value))
 
     threads = [threading.Thread(target=nudge, args=(d,)) for d in (6, 7, 10)]
     for t in threads:

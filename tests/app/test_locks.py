@@ -15,7 +15,7 @@ def dofs_of(controller, *joints):
 def test_a_drag_moves_what_is_not_locked(opened):
     controller = opened()
     locked = dofs_of(controller, "left_shoulder")
-    controller.hand.set_dof(0, dofs_of(controller, "left_elbow")[0], 1.0)
+    controller.pose_edits.set_dof(0, dofs_of(controller, "left_elbow")[0], 1.0)
     controller.locks.set(0, locked, True)
     before = controller.state.poses[0]
     drag(controller, "left_wrist", (0.0, -15.0))
@@ -53,7 +53,7 @@ def test_a_locked_number_is_not_set(opened):
     (dof,) = dofs_of(controller, "left_elbow")
     controller.locks.set(0, [dof], True)
     with pytest.raises(TrackerError, match="left elbow extension is locked"):
-        controller.hand.set_dof(0, dof, 0.4)
+        controller.pose_edits.set_dof(0, dof, 0.4)
     assert controller.state.undo is None
 
 

@@ -186,7 +186,7 @@ def test_edits_stop_a_run(placed, tracker, edit):
     end_the_step_soon(tracker)
     {
         "drag": lambda: drag(placed, "left_knee", (3.0, 3.0)),
-        "set": lambda: placed.hand.set_dof(0, 8, 0.3),
+        "set": lambda: placed.pose_edits.set_dof(0, 8, 0.3),
         "search": placed.search_step,
         "undo": placed.undo,
     }[edit]()

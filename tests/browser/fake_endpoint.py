@@ -44,6 +44,9 @@ NO_TRACK = {
 NO_RANGE = {"running": False, "what": "", "done": 0, "total": 0, "message": ""}
 STAGES = ["torso_head", "arms", "legs"]
 PARTS = ["torso", "left_arm", "left_leg", "head", "right_leg", "right_arm", "pelvis"]
+DOFS = [{"joint": "torso", "name": name, "unit": "cm", "low": None, "high": None} for name in ("x", "y", "z")] + [
+    {"joint": "l_elbow", "name": "extension", "unit": "deg", "low": 0.0, "high": 155.0}
+]
 ANGLES = ("abduction", "elevation", "twist", "extension")
 PLOTS = {
     "arms": [("Left arm", "deg", ANGLES), ("Right arm", "deg", ANGLES)],
@@ -103,6 +106,7 @@ class FakeEndpoint:
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
             "source": "manual", "status": "", "remark": "", "parts_px": [], "job": self.idle_job(""), "replay": None,
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
+            "dofs": [1.0, 2.0, 90.0, 30.0], "locked": [],
             "saved": True, "save_error": None,
         }  # fmt: skip
 
@@ -289,6 +293,11 @@ class FakeEndpoint:
                 "minor": ["waist"],
                 "bones": BONES,
                 "parts": PARTS,
+                "dofs": DOFS,
+                "point_dofs": {name: [0, 1, 2] if name == "torso" else [3] for name in REST},
+                "point_limbs": {
+                    name: {"name": "body" if name == "torso" else "left arm", "dofs": [3]} for name in REST
+                },
             }
             for p in range(self.n_people)
         ]

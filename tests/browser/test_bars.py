@@ -128,7 +128,7 @@ async def test_playback_keeps_no_backlog_and_stops_at_the_end(page, endpoint):
     assert len(frames) < 20
 
 
-@pytest.mark.parametrize(("width", "height", "scale"), [(1280, 720, 0.55), (1100, 680, 0.5)])
+@pytest.mark.parametrize(("width", "height", "scale"), [(1280, 720, 0.5), (1100, 680, 0.5)])
 async def test_nothing_is_cut_off_in_small_windows(page, width, height, scale):
     await page.set_viewport_size({"width": width, "height": height})
     help_box = await page.locator("#show-help").bounding_box()

@@ -1,0 +1,144 @@
+"""Posing without a drag: numbers, steps, and whole poses at a stroke. Each is one entry of the history."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+
+import numpy as np
+
+from app.screen import Screen, spoken
+from tracker import confidence, posing
+from tracker.body import BodyModel
+from tracker.errors import TrackerError
+from tracker.pose_edits import limb_of, mirrored, taken_over
+from tracker.rigid import Array
+
+_SAME_GESTURE_S = 1.0
+"""Changes of one slider, or steps of one joint, within this time of each other are one entry of the history."""
+
+
+class PoseEdits:
+    """Changes the pose of a person on the frame that the user saw; what is locked stays."""
+
+    def __init__(self, screen: Screen, editing: Callable[[], AbstractContextManager[None]]) -> None:
+        """Pose who is on this screen.
+
+        Args:
+            screen: holds the state.
+            editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
+        """
+        self._screen, self._editing = screen, editing
+
+    def set_dof(self, person: int, dof: int, value: float, frame: int | None = None) -> None:
+        """Set one degree of freedom, rad or metres; what lies beyond its limits ends there.
+
+        Of a ball joint it is a component of the rotation vector from the neutral pose.
+
+        Args:
+            person: index of whom.
+            dof: index of the degree of freedom.
+            value: rad or metres.
+            frame: the frame that the user saw, which a tracker may have left meanwhile; None for the one shown.
+
+        Raises:
+            TrackerError: it is locked.
+        """
+        with self._on(person, frame) as model:
+            numbers = self._numbers(person)
+            numbers[dof] = value
+            self._set_numbers(person, dof, numbers, f"set {spoken(model.dof_names[dof])}")
+
+    def turn(self, person: int, dof: int, by: float, frame: int | None = None) -> None:
+        """Change one degree of freedom by a step, rad or metres; see `set_dof`."""
+        with self._on(person, frame) as model:
+            numbers = self._numbers(person)
+            numbers[dof] += by
+            self._set_numbers(person, dof, numbers, f"nudge {spoken(model.dof_names[dof])}")
+
+    def nudge(
+        self, person: int, point: str | None, camera: int, right_m: float, up_m: float, frame: int | None = None
+    ) -> None:
+        """Move a point parallel to the image of a view; the chain follows as in a drag.
+
+        Args:
+            person: index of whom.
+            point: name of the point; None for the whole body.
+            camera: index of the view.
+            right_m: to the right as the view shows it, metres.
+            up_m: upwards as the view shows it, metres.
+            frame: as for `set_dof`.
+
+        Raises:
+            TrackerError: the view does not see the point, or whatever moves it is locked.
+        """
+        with self._on(person, frame) as model:
+            view = self._screen.session.cameras[camera].camera.pinhole
+            values = self._screen.state.poses[person]
+            name = model.point_names[0] if point is None else point
+            place = model.points_world(values)[model.point_names.index(name)]
+            step = view.T_world_camera[:3, :3] @ np.array([right_m, -up_m, 0.0])
+            start, end = view.project(np.stack([place, place + step]))
+            if not np.all(np.isfinite([start, end])):
+                raise TrackerError(f"expected {spoken(name)} before {view.name}, found it behind; choose another view")
+            hand = posing.grab(model, values, view, name, start, self._screen.free(person))
+            label = f"nudge {spoken(name)}"
+            self._take(person, posing.drag(hand, end, values), label, ("nudge", name, camera))
+
+    def mirror(self, person: int, frame: int | None = None) -> None:
+        """Exchange left and right in the body's own plane of symmetry."""
+        with self._on(person, frame) as model:
+            values = self._screen.state.poses[person]
+            self._take(person, taken_over(model, values, mirrored(model, values), self._screen.free(person)), "mirror")
+
+    def copy_from(self, person: int, other: int, frame: int | None = None) -> None:
+        """Take over the stored pose of another frame.
+
+        Raises:
+            TrackerError: the person has no pose there.
+        """
+        with self._on(person, frame) as model:
+            stored = self._screen.saver.pose(person, other)
+            if stored is None:
+                name = self._screen.session.people[person].name
+                raise TrackerError(
+                    f"expected a pose of {name} on frame {other} to copy, found none; choose another frame"
+                )
+            values = taken_over(model, self._screen.state.poses[person], stored.values, self._screen.free(person))
+            self._take(person, values, f"copy frame {other}")
+
+    def reset(self, person: int, point: str | None, frame: int | None = None) -> None:
+        """Put the limb of a point back to the neutral pose; without a point, or with the root's, all but the root."""
+        with self._on(person, frame) as model:
+            limb, dofs = limb_of(model, point)
+            dofs = dofs & self._screen.free(person)
+            values = taken_over(model, self._screen.state.poses[person], model.neutral(), dofs)
+            self._take(person, values, f"reset {confidence.spoken(limb)}")
+
+    @contextmanager
+    def _on(self, person: int, frame: int | None) -> Iterator[BodyModel]:
+        """Work on the frame that the user saw; gives the person's model."""
+        with self._editing():
+            if frame is not None and frame != self._screen.state.frame and 0 <= frame < self._screen.session.n_frames:
+                self._screen.show(frame)
+            yield self._screen.models[person]
+
+    def _numbers(self, person: int) -> Array:
+        """The pose as one number for each degree of freedom, (n_dofs,), rad or metres."""
+        model = self._screen.models[person]
+        return model.difference(self._screen.state.poses[person], model.neutral())
+
+    def _set_numbers(self, person: int, dof: int, numbers: Array, label: str) -> None:
+        model, before = self._screen.models[person], self._screen.state.poses[person]
+        if dof in self._screen.state.locked[person]:
+            raise TrackerError(f"{spoken(model.dof_names[dof])} is locked; unlock it to change it")
+        changed = model.clip(model.retract(model.neutral(), numbers))
+        self._take(person, taken_over(model, before, changed, np.arange(model.n_dofs) == dof), label, ("dof", dof))
+
+    def _take(self, person: int, values: Array, label: str, gesture: object = None) -> None:
+        """Show and save a pose; steps of one gesture in quick succession are one entry of the history."""
+        screen = self._screen
+        screen.pose(person, values)
+        gesture = (label, person, screen.state.frame, gesture) if gesture is not None else object()
+        if gesture != screen.edit_of or time.monotonic() - screen.last_save > _SAME_GESTURE_S:
+            screen.edit_of = None
+        screen.save(label, "manual", gesture)

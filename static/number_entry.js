@@ -1,0 +1,76 @@
+/** A field for one number: Enter applies, Esc restores, the arrows step, and what is no number is refused with a sentence. */
+
+/**
+ * @typedef {object} Entry
+ * @property {HTMLInputElement} element
+ * @property {(text: string) => void} show what stands there while nobody types
+ */
+
+/**
+ * @param {object} options
+ * @param {string} options.name for screen readers
+ * @param {(text: string) => string | null} options.take apply what was typed; says why where it cannot
+ * @param {(why: string) => void} options.refuse tell the user why
+ * @param {((factor: number) => void) | null} options.step what the up and down arrows do, null for nothing
+ * @returns {Entry}
+ */
+export function numberEntry({ name, take, refuse, step }) {
+  const element = document.createElement("input");
+  element.type = "text";
+  element.inputMode = "decimal";
+  element.autocomplete = "off";
+  element.spellcheck = false;
+  element.className = "number-entry";
+  element.setAttribute("aria-label", name);
+  let shown = "";
+
+  const restore = () => {
+    element.value = shown;
+    mark(false);
+  };
+  const mark = (/** @type {boolean} */ isWrong) => {
+    element.classList.toggle("is-refused", isWrong);
+    if (isWrong) element.setAttribute("aria-invalid", "true");
+    else element.removeAttribute("aria-invalid");
+  };
+  const apply = () => {
+    if (element.value === shown) return true;
+    const why = take(element.value.trim().replace(",", "."));
+    mark(why !== null);
+    if (why !== null) refuse(why);
+    else shown = element.value;
+    return why === null;
+  };
+
+  element.addEventListener("focus", () => element.select());
+  element.addEventListener("input", () => mark(false));
+  element.addEventListener("blur", () => {
+    if (!apply()) restore();
+  });
+  element.addEventListener("keydown", (event) => {
+    if (event.key === "Enter") {
+      event.preventDefault();
+      if (apply()) element.select();
+    } else if (event.key === "Escape") {
+      // Only this: it would also stop what is at work.
+      event.preventDefault();
+      restore();
+      element.blur();
+    } else if (step && (event.key === "ArrowUp" || event.key === "ArrowDown")) {
+      event.preventDefault();
+      if (apply()) step((event.key === "ArrowUp" ? 1 : -1) * (event.shiftKey ? 10 : event.ctrlKey ? 0.1 : 1));
+    }
+  });
+  return {
+    element,
+    show(text) {
+      const isTyping = document.activeElement === element && element.value !== shown;
+      shown = text;
+      if (!isTyping && element.value !== text) {
+        element.value = text;
+        mark(false);
+        if (document.activeElement === element) element.select();
+      }
+    },
+  };
+}

@@ -1,0 +1,122 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from staging import shaken
+
+from tracker import rigid
+from tracker.body import Axis
+from tracker.formats.model_toml import load_model
+from tracker.orienting import orient
+from tracker.pose_edits import joint_of, limb_of, mirrored, taken_over
+
+M = np.diag([1.0, -1.0, 1.0])
+
+
+def with_balls(model):
+    """The same body with ball joints for shoulders, hips and root."""
+    joints = tuple(
+        replace(j, kind="ball", axes=()) if j.free or j.name.endswith(("shoulder", "hip")) else j for j in model.joints
+    )
+    return replace(model, joints=joints, search_groups=())
+
+
+def with_odd_axes(model):
+    """The same body whose right shoulder turns about other axes, in another order, than the left one."""
+    axes = tuple(Axis(n, d, (-2.8, 2.8)) for n, d in (("z", (0, 0, 1)), ("x", (1, 0, 0)), ("y", (0, 1, 0))))
+    joints = tuple(replace(j, axes=axes) if j.name == "right_shoulder" else j for j in model.joints)
+    return replace(model, joints=joints, search_groups=())
+
+
+MODELS = {
+    "gavrila22": lambda: load_model("gavrila22"),
+    "gavrila31": lambda: load_model("gavrila31"),
+    "balls": lambda: with_balls(load_model("gavrila31")),
+    "odd axes": lambda: with_odd_axes(load_model("gavrila31")),
+}
+
+
+@pytest.fixture(params=MODELS)
+def model(request):
+    return MODELS[request.param]()
+
+
+def any_pose(model, seed):
+    """Somebody in the middle of a movement, somewhere, turned somehow."""
+    return shaken(model, model.neutral(), np.random.default_rng(seed), 0.5, 1.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_joints_are_mirror_images_in_the_frame_of_the_root(model, seed):
+    values = any_pose(model, seed)
+    result = mirrored(model, values)
+    T = model.kinematics(values).Ts_world_part[0]
+    np.testing.assert_allclose(model.kinematics(result).Ts_world_part[0], T, atol=1e-12)
+    before, after = (rigid.apply(rigid.inverse(T), model.points_world(v)) for v in (values, result))
+    for i, name in enumerate(model.point_names):
+        swapped = name.replace("left_", "?").replace("right_", "left_").replace("?", "right_")
+        np.testing.assert_allclose(after[i], M @ before[model.point_names.index(swapped)], atol=1e-5, err_msg=name)
+    assert np.abs(after - before).max() > 0.05
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_mirrored_twice_is_the_same_pose(model, seed):
+    values = any_pose(model, seed)
+    twice = mirrored(model, mirrored(model, values))
+    np.testing.assert_allclose(model.points_world(twice), model.points_world(values), atol=1e-5)
+    np.testing.assert_allclose(np.abs(model.difference(twice, values)).max(), 0, atol=1e-4)
+
+
+def test_what_is_taken_over_is_exact_and_the_rest_untouched(model):
+    a, b = any_pose(model, 1), any_pose(model, 2)
+    dofs = np.isin(model.dof_joint, [0, len(model.joints) // 2])
+    result = taken_over(model, a, b, dofs)
+    np.testing.assert_array_equal(np.abs(model.difference(result, a))[~dofs], 0)
+    np.testing.assert_allclose(np.abs(model.difference(result, b))[dofs], 0, atol=1e-12)
+
+
+def test_points_mean_the_joint_and_limb_that_people_expect(gavrila):
+    def limb(point):
+        name, dofs = limb_of(gavrila, point)
+        return name, sorted({gavrila.joints[j].name for j in gavrila.dof_joint[dofs]})
+
+    assert limb("left_wrist") == limb("left_shoulder") == ("left_forearm", ["left_elbow", "left_shoulder"])
+    assert limb(None)[0] == limb("torso")[0] == limb("head")[0] == "body"
+    assert "torso" not in limb(None)[1]
+    assert gavrila.joints[joint_of(gavrila, "left_wrist")].name == "left_elbow"
+    assert gavrila.joints[joint_of(gavrila, "head")].name == "torso"  # a neck that does not bend
+
+
+def test_a_joint_of_the_trunk_is_reset_alone():
+    model = load_model("gavrila31")
+    name, dofs = limb_of(model, "waist")
+    assert name == "waist"
+    assert {model.joints[j].name for j in model.dof_joint[dofs]} == {"waist"}
+
+
+@pytest.mark.parametrize("name", ["torso", "left_shoulder", "right_hip"])
+def test_a_part_takes_an_orientation_that_its_joint_allows(model, name):
+    start, other = any_pose(model, 5), any_pose(model, 6)
+    part = [j.name for j in model.joints].index(name)
+    goal = taken_over(model, start, other, (model.dof_joint == part) & ~model.dof_is_length)
+    wanted = model.kinematics(goal).Ts_world_part[part, :3, :3]
+    result = orient(model, start, part, wanted)
+    np.testing.assert_allclose(model.kinematics(result).Ts_world_part[part, :3, :3], wanted, atol=1e-5)
+    np.testing.assert_allclose(model.difference(result, start)[model.dof_joint != part], 0, atol=1e-12)
+
+
+def test_a_hinge_turns_as_near_as_it_can(gavrila):
+    start = any_pose(gavrila, 7)
+    elbow = gavrila.dof_names.index("left_elbow.extension")
+    part = int(gavrila.dof_joint[elbow])
+    start[elbow] = 0.8
+    wanted = gavrila.kinematics(start).Ts_world_part[part, :3, :3] @ rigid.so3_exp(np.array([0.4, -0.3, 0.2]))
+    angles = np.linspace(*gavrila.limits[elbow], 2000)
+
+    def apart(angle):
+        values = start.copy()
+        values[elbow] = angle
+        return np.linalg.norm(gavrila.kinematics(values).Ts_world_part[part, :3, :3] - wanted)
+
+    best = angles[np.argmin([apart(a) for a in angles])]
+    assert orient(gavrila, start, part, wanted)[elbow] == pytest.approx(best, abs=2e-3)

@@ -1,0 +1,101 @@
+"""Whole poses changed at a stroke: mirrored, taken over from another frame, put back to neutral."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.body import BodyModel, Joint
+from tracker.confidence import limbs
+from tracker.kinematics import IntArray
+from tracker.orienting import orient
+from tracker.rigid import Array
+
+_MIRROR = np.diag([1.0, -1.0, 1.0])
+"""What swaps the body's left and right: y points to the left in every part's frame."""
+_ALIKE = 1e-6
+
+
+def taken_over(model: BodyModel, values: Array, other: Array, dofs: NDArray[np.bool_]) -> Array:
+    """A pose, (n_values,), with some degrees of freedom of another, (n_dofs,) bool; ball joints go as a whole."""
+    at = model.dof_value[dofs]
+    balls = np.array([model.joints[j].kind == "ball" for j in model.dof_joint[dofs]], dtype=bool)
+    whole = balls & ~model.dof_is_length[dofs]
+    out = np.array(values, dtype=np.float64)
+    for index in np.unique(np.concatenate([at, *(at[whole] + k for k in (1, 2, 3))])):
+        out[index] = other[index]
+    return out
+
+
+def joint_of(model: BodyModel, point: str | None) -> int:
+    """The joint whose degrees of freedom are meant by a point: its own, else that of the nearest part that moves."""
+    part = 0 if point is None else int(model.point_parts[model.point_names.index(point)])
+    while part > 0 and not np.any(model.dof_joint == part):
+        part = model.parents[part]
+    return part
+
+
+def limb_of(model: BodyModel, point: str | None) -> tuple[str, NDArray[np.bool_]]:
+    """What resetting a point's limb means: its name for people, and its degrees of freedom, (n_dofs,).
+
+    A point of a limb means that limb, one of the trunk its joint; the root, or no point, means everything but the root.
+    """
+    joint = joint_of(model, point)
+    if joint == 0:
+        return "body", model.dof_joint != 0
+    limb = next((x for x in limbs(model) if joint in x.parts), None)
+    if limb is None:
+        return model.joints[joint].name, model.dof_joint == joint
+    return limb.name, limb.dofs
+
+
+def mirrored(model: BodyModel, values: Array) -> Array:
+    """Exchange left and right of a pose in the body's own plane of symmetry; the root stays where it is.
+
+    With M = diag(1, -1, 1), a joint takes the rotation M R M of its counterpart, or of itself where it has none. About
+    an axis a that is the rotation by the same angle about -M a.
+
+    Args:
+        model: the body; its joints pair by the names `left_` and `right_`.
+        values: its pose, (n_values,).
+    """
+    out = np.array(values, dtype=np.float64)
+    names = {joint.name: i for i, joint in enumerate(model.joints)}
+    before = model.kinematics(values).Ts_world_part[:, :3, :3]
+    for i, joint in enumerate(model.joints):  # parents first: what is turned in the world stands on its parent
+        other = names.get(_counterpart(joint.name), i)
+        if i == 0 or not np.any(model.dof_joint == i):
+            continue
+        at, at_other = _turns(model, i), _turns(model, other)
+        signs = _signs(joint, model.joints[other])
+        if signs is not None:
+            out[at] = values[at_other] * signs
+        else:
+            R_local = before[model.parents[other]].T @ before[other]
+            R_parent = model.kinematics(out).Ts_world_part[model.parents[i], :3, :3]
+            out = orient(model, out, i, R_parent @ _MIRROR @ R_local @ _MIRROR)
+    return model.clip(out)
+
+
+def _counterpart(name: str) -> str:
+    if name.startswith("left_"):
+        return "right_" + name.removeprefix("left_")
+    if name.startswith("right_"):
+        return "left_" + name.removeprefix("right_")
+    return name
+
+
+def _turns(model: BodyModel, joint: int) -> IntArray:
+    """Indices of the values by which a joint turns."""
+    at = model.dof_value[(model.dof_joint == joint) & ~model.dof_is_length]
+    return at[0] + np.arange(4) if model.joints[joint].kind == "ball" else at
+
+
+def _signs(joint: Joint, other: Joint) -> Array | None:
+    """Factors from the values of the other joint to those of this one; None where the axes do not pair."""
+    if joint.kind != other.kind or len(joint.axes) != len(other.axes):
+        return None
+    if joint.kind == "ball":
+        return np.array([1.0, -1.0, 1.0, -1.0])
+    wanted = -np.array([a.direction for a in other.axes]) @ _MIRROR
+    own = np.array([a.direction for a in joint.axes])
+    signs = np.sign(np.sum(own * wanted, axis=1))
+    return signs if np.allclose(own, signs[:, None] * wanted, atol=_ALIKE) else None
