@@ -23,7 +23,7 @@ from app.runs import Runs
 from app.saving import Saver
 from app.screen import Screen
 from app.searching import Searching
-from app.state import BASES, OVERLAYS, Base, State
+from app.state import State
 from app.tracking import Tracking
 from tracker.records import FrameNumbers
 from tracker.session import Session
@@ -114,12 +114,6 @@ class Controller:
         """Choose whom and what the panels show."""
         if 0 <= person < len(self.models) and (point is None or point in self.models[person].point_names):
             self._screen.set(person=person, point=point)
-
-    def set_view(self, base: str, overlays: dict[str, bool]) -> None:
-        """Choose the layers of all panes."""
-        shown = {name for name in OVERLAYS if overlays.get(name, name in self.state.overlays)}
-        chosen: Base = next((b for b in BASES if b == base), self.state.base)
-        self._screen.set(base=chosen, overlays=frozenset(shown))
 
     def hold_3d(self, page: int, hold: bool) -> None:
         """Let the 3-D view and its panels rest while a point is dragged: a page asks for it that draws them slowly."""

@@ -6,15 +6,10 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Generic, TypeVar
 
-import cv2
-import numpy as np
-
-from app.state import Base
+from app import pictures
 from tracker.evidence import Observer, ViewEvidence
-from tracker.silhouettes import Image
 
 _KEPT_FRAMES = 6
-_JPEG_QUALITY = 85
 
 T = TypeVar("T")
 
@@ -78,34 +73,6 @@ class Frames:
         self._wanted = None
         self._pool.shutdown(wait=True, cancel_futures=True)
 
-    def jpeg(self, frame: int, camera: int, base: Base) -> bytes:
-        """Picture of one view for the page, in undistorted pixels (evidence at the scale of matching)."""
-        if base == "image":
-            image = self._images.get(frame)[camera]
-            if image is None:
-                return _encode(_blank(self.observer.cameras[camera].camera.size, "frame damaged"))
-            return _encode(image)
-        view = self._evidence.get(frame)[camera]
-        if base == "edges":
-            edges = np.where(view.distance == 0, 235, 18).astype(np.uint8)
-            return _encode(np.repeat(edges[..., None], 3, axis=-1))
-        return _encode(_colour_distance(view))
-
-
-def _colour_distance(view: ViewEvidence) -> Image:
-    """Distance image, bright at the edges, dark where the limit is reached."""
-    near = 1.0 - view.distance / max(1e-6, float(view.distance.max()))
-    coloured = cv2.applyColorMap((255 * near).astype(np.uint8), cv2.COLORMAP_INFERNO)
-    return np.asarray(cv2.cvtColor(coloured, cv2.COLOR_BGR2RGB), dtype=np.uint8)
-
-
-def _blank(size: tuple[int, int], text: str) -> Image:
-    image = np.full((size[1], size[0], 3), 24, np.uint8)
-    cv2.putText(image, text, (20, size[1] // 2), cv2.FONT_HERSHEY_SIMPLEX, size[0] / 640, (200, 200, 200), 2)
-    return image
-
-
-def _encode(image: Image) -> bytes:
-    done, data = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
-    assert done
-    return bytes(data)
+    def image(self, frame: int, camera: int, reduction: int = 1) -> bytes:
+        """The undistorted image of one view as JPEG; `reduction` pixels of it, along either side, become one."""
+        return pictures.footage(self._images.get(frame)[camera], self.observer.cameras[camera].camera.size, reduction)

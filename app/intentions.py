@@ -112,7 +112,6 @@ _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "pin": _pin,
     "unpin": _unpin,
     "fit": lambda controller, _, message: controller.pinning.fit(int(message["frame"])),
-    "view": lambda controller, _, message: controller.set_view(str(message["base"]), dict(message["overlays"])),
     "track": _track,
     "follow": lambda controller, _, message: controller.follow(bool(message["follow"])),
     "hold_3d": lambda controller, page, message: controller.hold_3d(page, bool(message["hold"])),

@@ -10,7 +10,8 @@ import numpy as np
 
 from app import dofs, overlays, pin_marks
 from app.curves import plots_of, samples
-from app.state import OVERLAYS, JobState, ReplayState, State, TrackState
+from app.layers import View
+from app.state import JobState, ReplayState, State, TrackState
 from tracker.evidence import ViewEvidence
 from tracker.posing import minor_points
 from tracker.records import SOURCES, STATUSES, FrameNumbers
@@ -62,8 +63,6 @@ def state(session: Session, state: State) -> dict[str, Any]:
         "frame": state.frame,
         "person": state.person,
         "point": state.point,
-        "base": state.base,
-        "overlays": {name: name in state.overlays for name in OVERLAYS},
         "cost_px": drawn.cost_px,
         "view_costs_px": list(drawn.view_costs_px),
         "source": shown.source,
@@ -84,17 +83,18 @@ def state(session: Session, state: State) -> dict[str, Any]:
     }
 
 
-def overlay(session: Session, state: State, page: int, views: Sequence[ViewEvidence] | None) -> bytes:
-    """The vectors over all views.
+def overlay(session: Session, state: State, page: int, view: View, views: Sequence[ViewEvidence] | None) -> bytes:
+    """The vectors over the views that a page shows.
 
     Args:
         session: with its cameras and people.
         state: what to draw.
         page: number of the page, whose drags the message answers.
+        view: what the page shows.
         views: the evidence of the shown frame, where it is at hand.
     """
     segments, rows, first = [], [], 0
-    for path in [*overlays.paths(session, state, views), *pin_marks.pin_lines(session, state)]:
+    for path in [*overlays.paths(session, state, view, views), *pin_marks.pin_lines(session, state)]:
         count = len(path.segments_px)
         rows.append(
             {
@@ -108,8 +108,6 @@ def overlay(session: Session, state: State, page: int, views: Sequence[ViewEvide
         )
         segments.append(path.segments_px)
         first += count
-    # Joints are there to be taken, and a step that is replayed is no pose to be taken.
-    joints = not state.overlays.isdisjoint(("joints", "skeleton")) and state.look.replay is None
     meeting = pin_marks.meeting(session, state)
     header = {
         "type": "overlay",
@@ -117,7 +115,10 @@ def overlay(session: Session, state: State, page: int, views: Sequence[ViewEvide
         "seq": dict(state.drag_seqs).get(page, 0),
         "job": state.job.running,
         "paths": rows,
-        "handles": [h._asdict() for h in overlays.handles(session, state)] if joints else [],
+        # Joints are there to be taken, and a step that is replayed is no pose to be taken.
+        "handles": [h._asdict() for h in overlays.handles(session, state, view.cameras)]
+        if state.look.replay is None
+        else [],
         "pins": [p._asdict() for p in pin_marks.pin_marks(session, state)],
         "meeting": None if meeting is None else meeting._asdict() | {"marks": [m._asdict() for m in meeting.marks]},
     }

@@ -1,19 +1,21 @@
 """What is drawn over the views: contours, candidates, part edges, joints, epipolar lines, segments of edges."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from app.layers import View
 from app.state import State
 from tracker import contours, occlusion
 from tracker.body import Body, BodyModel
 from tracker.cameras import Camera, epipolar_segment
-from tracker.contours import FloatArray
+from tracker.contours import Contour, FloatArray
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.rigid import Array
 from tracker.segments import accept
 from tracker.session import Session
+from tracker.silhouettes import Mask
 
 CANDIDATE_COLOR = "#ffffff"
 COMPARED_COLOR = "#ff9df2"
@@ -32,7 +34,7 @@ class Path(NamedTuple):
     camera: int
     person: int
     kind: str
-    """`model`, `candidate`, `ghost`, `part_edge`, `epipolar`, `accepted` or `rejected`."""
+    """`model`, `hidden`, `candidate`, `ghost`, `part_edge`, `epipolar`, `accepted` or `rejected`."""
     color: str
     segments_px: FloatArray
     """x0, y0, x1, y1, (N, 4), undistorted px."""
@@ -63,44 +65,45 @@ def bones(model: BodyModel) -> list[tuple[str, str]]:
     return pairs
 
 
-def paths(session: Session, state: State, views: Sequence[ViewEvidence] | None) -> list[Path]:
-    """Everything that the state's overlays call for, in all views.
+def paths(session: Session, state: State, view: View, views: Sequence[ViewEvidence] | None) -> list[Path]:
+    """Everything that the layers of a page call for, in the views that it shows.
 
     Args:
         session: with its cameras and people.
         state: what to draw.
+        view: what the page shows.
         views: the evidence of the shown frame; without it there are no segments of edges to draw.
     """
     state = state.drawn
     bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
-    for index, source in enumerate(session.cameras):
-        camera = source.camera.pinhole
-        for ghost, color in ((state.look.compared, COMPARED_COLOR), (state.look.preview, PREVIEW_COLOR)):
+    tried = state.job.candidate if state.job.running or state.look.replay is not None else None
+    ghosts = ((state.look.compared, COMPARED_COLOR), (state.look.preview, PREVIEW_COLOR))
+    for index in sorted(view.cameras):
+        camera = session.cameras[index].camera.pinhole
+        for ghost, color in ghosts:
             if ghost is not None:
-                others = [Body(p.model, v) for p, v in zip(session.people, ghost, strict=True)]
-                out += _contours(session, others, camera, index, "ghost", [color] * len(others))
-        if "contours" in state.overlays:
-            out += _contours(session, bodies, camera, index, "model", [p.color for p in session.people])
-            if state.job.candidate is not None and (state.job.running or state.look.replay is not None):
-                tested = [Body(b.model, v) for b, v in zip(bodies, state.job.candidate, strict=True)]
-                out += _contours(session, tested, camera, index, "candidate", [CANDIDATE_COLOR] * len(tested))
-        if "part_edges" in state.overlays:
+                out += _outlined(session, ghost, camera, index, "ghost", color)
+        if not view.layers.isdisjoint(("contours", "hidden")):
+            out += _model(session, bodies, camera, index, view)
+        if "contours" in view.layers and tried is not None:
+            out += _outlined(session, tried, camera, index, "candidate", CANDIDATE_COLOR)
+        if "part_edges" in view.layers:
             out.append(Path(index, 0, "part_edge", PART_EDGE_COLOR, occlusion.part_edges(bodies, camera)))
-        if "segments" in state.overlays and views is not None:
-            out += _segments(bodies, views[index], index)
-    if state.drag is not None:
-        out += _epipolar_lines(session, state)
+        if views is not None:
+            out += [s for s in _segments(bodies, views[index], index, view) if s.kind in view.layers]
+    if state.drag is not None and "epipolar" in view.layers:
+        out += [line for line in _epipolar_lines(session, state) if line.camera in view.cameras]
     return out
 
 
-def handles(session: Session, state: State) -> list[Handle]:
-    """The joints of everybody in all views; those behind a camera are left out."""
+def handles(session: Session, state: State, cameras: Collection[int]) -> list[Handle]:
+    """The joints of everybody in some views, given by index; those behind a camera are left out."""
     bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     points = [b.model.points_world(b.values) for b in bodies]
     out = []
-    for index, source in enumerate(session.cameras):
-        camera = source.camera.pinhole
+    for index in sorted(cameras):
+        camera = session.cameras[index].camera.pinhole
         hidden = occlusion.points_hidden(bodies, camera, np.concatenate(points))
         first = 0
         for person, body in enumerate(bodies):
@@ -113,22 +116,62 @@ def handles(session: Session, state: State) -> list[Handle]:
     return out
 
 
-def _contours(
-    session: Session, bodies: Sequence[Body], camera: Camera, index: int, kind: str, colors: Sequence[str]
+def part_colors(session: Session) -> list[str]:
+    """Colours of the parts, counted through all people."""
+    return [part.color for person in session.people for part in person.model.parts]
+
+
+def _traced(bodies: Sequence[Body], camera: Camera) -> Contour:
+    return contours.trace(bodies, camera, contours.PIECE_PX * max(1.0, max(camera.size) / 640))
+
+
+def _model(session: Session, bodies: Sequence[Body], camera: Camera, index: int, view: View) -> list[Path]:
+    """The contours of the poses shown: what one sees of them, and what parts hide."""
+    contour = _traced(bodies, camera)
+    out = []
+    for layer, kind, those in (("hidden", "hidden", contour.hidden), ("contours", "model", ~contour.hidden)):
+        if layer in view.layers and view.by_part:
+            out += _by_part(session, bodies, contour, those, index, kind)
+        elif layer in view.layers:
+            out += _by_person(bodies, contour, those, index, kind, [p.color for p in session.people])
+    return out
+
+
+def _outlined(
+    session: Session, poses: Sequence[Array], camera: Camera, index: int, kind: str, color: str
 ) -> list[Path]:
-    piece_px = contours.PIECE_PX * max(1.0, max(camera.size) / 640)
-    contour = contours.trace(bodies, camera, piece_px)
+    """What one would see of other poses of everybody, all in one colour."""
+    bodies = [Body(p.model, v) for p, v in zip(session.people, poses, strict=True)]
+    contour = _traced(bodies, camera)
+    return _by_person(bodies, contour, ~contour.hidden, index, kind, [color] * len(bodies))
+
+
+def _by_person(
+    bodies: Sequence[Body], contour: Contour, those: Mask, index: int, kind: str, colors: Sequence[str]
+) -> list[Path]:
+    """Those pieces of a contour, one path for each person."""
     people = contours.surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
     return [
-        Path(index, person, kind, colors[person], contour.pieces_px[~contour.hidden & (people == person)])
+        Path(index, person, kind, colors[person], contour.pieces_px[those & (people == person)])
         for person in range(len(bodies))
     ]
 
 
-def _segments(bodies: Sequence[Body], view: ViewEvidence, index: int) -> list[Path]:
+def _by_part(
+    session: Session, bodies: Sequence[Body], contour: Contour, those: Mask, index: int, kind: str
+) -> list[Path]:
+    """Those pieces of a contour, one path for each part that has any."""
+    people, colors = contours.surfaces_of(tuple(b.model for b in bodies)).people, part_colors(session)
+    return [
+        Path(index, int(people[part]), kind, colors[part], contour.pieces_px[those & (contour.parts == part)])
+        for part in np.unique(contour.parts[those])
+    ]
+
+
+def _segments(bodies: Sequence[Body], view: ViewEvidence, index: int, shown: View) -> list[Path]:
     """The segments of edges that the poses shown explain, and those that they do not (GD96 Fig. 6)."""
     segments = view.segments
-    if segments is None or len(segments.points_px) == 0:
+    if shown.layers.isdisjoint(("accepted", "rejected")) or segments is None or len(segments.points_px) == 0:
         return []
     contour = contours.trace(bodies, view.camera)
     chosen = accept(segments, contour.pieces_px[~contour.hidden], ACCEPTED_SHARE * view.theta_px)

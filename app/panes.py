@@ -11,11 +11,13 @@ from typing import Any
 import aiohttp
 from aiohttp import web
 
-from app import curves, intentions, messages
+from app import curves, intentions, layers, messages, picture_sets
 from app.controller import Controller
+from app.layers import View
 from app.search_feed import SearchFeed
 from app.state import State
 from tracker.errors import TrackerError
+from tracker.evidence import ViewEvidence
 
 _LOG = logging.getLogger(__name__)
 _READABLE_S = 0.2
@@ -52,7 +54,8 @@ class _Page:
         self._sent_text: dict[str, Any] | None = None
         self._sent_text_at = 0.0
         self._sent_overlay: tuple[object, ...] = ()  # what it was drawn from
-        self._sent_images: tuple[int, str] | None = None
+        self._view: View | None = None  # nothing is drawn for a page that has not said what it shows
+        self._pictures = picture_sets.PictureSets(controller)
         self._curves: str | None = None
         self._sent_curves: tuple[str, int, int] | None = None  # group, person, version of the timeline
         self._feed = SearchFeed()
@@ -122,6 +125,9 @@ class _Page:
             self._feed = SearchFeed(message["tab"])
             self._controller.landscape.watch(self._number, message["tab"] == "landscape")
             self._wake(self._controller.state)
+        elif message["type"] == "view":
+            self._view = layers.view_of(message, len(self._controller.session.cameras))
+            self._wake(self._controller.state)
         else:
             intentions.carry_out(self._controller, self._number, message)
 
@@ -142,8 +148,9 @@ class _Page:
             self._sent, began = state, self._loop.time()
             try:
                 await self._send_state(state)
-                await self._send_overlay(state, sent)
-                await self._send_images(state)
+                if self._view is not None:
+                    await self._send_overlay(state, self._view)
+                    await self._send_pictures(state, self._view)
                 if sent is None or sent.timeline_version != state.timeline_version:
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
                 if sent is None or sent.disagreeing != state.disagreeing:
@@ -170,28 +177,28 @@ class _Page:
         self._sent_text, self._sent_text_at = message, loop.time()
         await self._send(message)
 
-    async def _send_images(self, state: State) -> None:
-        if self._sent_images == (state.frame, state.base):
-            return
-        self._sent_images = (state.frame, state.base)
-        jpeg, cameras = self._controller.frames.jpeg, range(len(self._controller.session.cameras))
-        pictures = await asyncio.gather(*(asyncio.to_thread(jpeg, state.frame, c, state.base) for c in cameras))
-        now = self._controller.state
-        if now.frame != state.frame and not now.track.running:
-            self._sent_images = None
-            return  # the page is elsewhere by now; a tracker always is, and is to be watched
-        for camera, data in zip(cameras, pictures, strict=True):
-            header = {"type": "image", "camera": camera, "frame": state.frame, "base": state.base}
-            await self._socket.send_bytes(messages.binary(header, data))
+    async def _send_pictures(self, state: State, view: View) -> None:
+        """Send what the page shows and does not have: all that a frame needs, or what has changed of it."""
+        for message in await self._pictures.missing(state, view):
+            await self._socket.send_bytes(message)
 
-    async def _send_overlay(self, state: State, sent: State | None) -> None:
-        views = self._controller.frames.evidence_at_hand(state.frame) if "segments" in state.overlays else None
-        drawn = (*_drawn(state), views is None)
-        if sent is not None and drawn == self._sent_overlay:
+    async def _send_overlay(self, state: State, view: View) -> None:
+        views = self._evidence(state, view)
+        drawn = (*_drawn(state), view, views is None)
+        if drawn == self._sent_overlay:
             return
         self._sent_overlay = drawn
-        message = await asyncio.to_thread(messages.overlay, self._controller.session, state, self._number, views)
+        message = await asyncio.to_thread(messages.overlay, self._controller.session, state, self._number, view, views)
         await self._socket.send_bytes(message)
+
+    def _evidence(self, state: State, view: View) -> tuple[ViewEvidence, ...] | None:
+        """The evidence of the shown frame, if the page shows its edges and it is at hand; it is asked for where not."""
+        if view.layers.isdisjoint(("accepted", "rejected")):
+            return None
+        frames, views = self._controller.frames, self._controller.frames.evidence_at_hand(state.frame)
+        if views is None:
+            frames.request(state.frame, lambda _: self._wake(state))
+        return views
 
     async def _send_timeline(self, since: int) -> None:
         message = await asyncio.to_thread(messages.timeline, self._controller.timeline(since), since == 0)
@@ -228,7 +235,7 @@ def _drawn(state: State) -> tuple[object, ...]:
     """What an overlay depends on, to be compared."""
     poses = tuple(id(p.values) for p in state.people)
     candidate = None if state.job.candidate is None else tuple(id(c) for c in state.job.candidate)
-    drawn = (state.frame, poses, candidate, state.job.running, state.look, state.overlays, state.drag, state.drag_seqs)
+    drawn = (state.frame, poses, candidate, state.job.running, state.look, state.drag, state.drag_seqs)
     return (*drawn, _pins(state))
 
 

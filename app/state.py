@@ -1,17 +1,12 @@
 """What the screen shows, as one frozen value. Only the controller makes a new one; the views read it."""
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 import numpy as np
 
 from tracker.pins import ViewPin
 from tracker.rigid import Array
 from tracker.track import TrackSettings
-
-Base = Literal["image", "edges", "distance"]
-BASES: tuple[Base, ...] = ("image", "edges", "distance")
-OVERLAYS = ("contours", "joints", "part_edges", "skeleton", "segments")
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,8 +173,6 @@ class State:
     """Index of the person worked on."""
     point: str | None = None
     """The point last touched."""
-    base: Base = "image"
-    overlays: frozenset[str] = frozenset(("contours", "joints"))
     cost_px: float | None = None
     """Mean over the views, px; None while the frame's evidence is not there yet."""
     view_costs_px: tuple[float | None, ...] = ()

@@ -150,8 +150,6 @@ class Tracking:
             )  # fmt: skip
             if screen.state.follow or screen.state.frame == found.frame:
                 screen.set(track=track, **self._found(run, found))
-                if "segments" in screen.state.overlays:  # else nobody needs it until the run is over
-                    screen.request_evidence()
             else:
                 screen.set(track=track)
             if time.monotonic() - screen.last_save > _SAVE_S:

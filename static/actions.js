@@ -80,33 +80,6 @@ export class Actions {
   selectPerson(person) {
     this.#send({ type: "select", person, point: null });
   }
-
-  /** @param {import("./protocol.js").Base} base */
-  showBase(base) {
-    this.#view({ base });
-  }
-
-  /**
-   * @param {keyof import("./protocol.js").Overlays} layer
-   * @param {boolean} isShown
-   */
-  showOverlay(layer, isShown) {
-    const { state } = this.#store.facts;
-    if (state) this.#view({ overlays: { ...state.overlays, [layer]: isShown } });
-  }
-
-  /**
-   * Show it at once: the program's answer says the same.
-   *
-   * @param {Partial<Pick<import("./protocol.js").StateMessage, "base" | "overlays">>} change
-   */
-  #view(change) {
-    const { state } = this.#store.facts;
-    if (!state) return;
-    const changed = { ...state, ...change };
-    this.#store.set({ state: changed });
-    this.#send({ type: "view", base: changed.base, overlays: changed.overlays });
-  }
 }
 
 /**

@@ -2,6 +2,7 @@
 
 import { prepare } from "./drawing.js";
 import { byId } from "./elements.js";
+import { keyOf } from "./pictures.js";
 import { runLookedAt } from "./search_facts.js";
 
 const WIDTH = 76;
@@ -95,7 +96,7 @@ export class CandidateStrip {
     const scale = Math.min(WIDTH / box.width, HEIGHT / box.height);
     const x0 = WIDTH / 2 - scale * (box.u + box.width / 2);
     const y0 = HEIGHT / 2 - scale * (box.v + box.height / 2);
-    const bitmap = shown?.bitmaps[camera];
+    const bitmap = shown?.pictures.get(keyOf("image", camera))?.bitmap;
     const info = session?.cameras[camera];
     if (bitmap && info && bitmap.width > 0) {
       context.globalAlpha = 0.55;

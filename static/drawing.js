@@ -11,26 +11,27 @@ const HALO = "rgba(0, 0, 0, 0.45)";
 // Joints have their person's colour, as its contours have: bones between them must not look like contours.
 const BONE = "#fff";
 const PIXELS_VISIBLE_FROM = 4;
+const BEHIND_IMAGES = "#000";
 const JOINT_RADIUS = 3.5;
 const TORSO_HALF_SIDE = 5.5;
 export const TORSO = "torso";
 
 /**
- * How each kind of line is drawn, and the layer that shows it; null: always.
+ * How each kind of line is drawn, and the layer that it belongs to; null: always.
  *
- * @typedef {{width: number, alpha: number, dash: number[], layer: keyof import("./protocol.js").Overlays | null,
- *   hasHalo: boolean}} LineStyle
+ * @typedef {{width: number, dash: number[], layer: import("./protocol.js").Layer | null, hasHalo: boolean}} LineStyle
  * @type {Record<import("./protocol.js").Path["kind"], LineStyle>}
  */
 const LINE_STYLES = {
-  model: { width: 1.75, alpha: 1, dash: [], layer: "contours", hasHalo: true },
-  candidate: { width: 1.25, alpha: 0.8, dash: [], layer: "contours", hasHalo: true },
-  ghost: { width: 1.5, alpha: 0.95, dash: [5, 4], layer: null, hasHalo: true },
-  part_edge: { width: 1, alpha: 0.75, dash: [], layer: "part_edges", hasHalo: true },
-  epipolar: { width: 1.25, alpha: 0.9, dash: [6, 4], layer: null, hasHalo: true },
+  model: { width: 1.75, dash: [], layer: "contours", hasHalo: true },
+  hidden: { width: 1.25, dash: [4, 4], layer: "hidden", hasHalo: false },
+  candidate: { width: 1.25, dash: [], layer: "contours", hasHalo: true },
+  ghost: { width: 1.5, dash: [5, 4], layer: null, hasHalo: true },
+  part_edge: { width: 1, dash: [], layer: "part_edges", hasHalo: true },
+  epipolar: { width: 1.25, dash: [6, 4], layer: "epipolar", hasHalo: true },
   // Thousands of short lines, which their halos would merge into one.
-  accepted: { width: 1.5, alpha: 1, dash: [], layer: "segments", hasHalo: false },
-  rejected: { width: 1, alpha: 0.8, dash: [], layer: "segments", hasHalo: false },
+  accepted: { width: 1.5, dash: [], layer: "accepted", hasHalo: false },
+  rejected: { width: 1, dash: [], layer: "rejected", hasHalo: false },
 };
 
 /**
@@ -56,16 +57,33 @@ export function prepare(canvas, width, height, onProcessor) {
 }
 
 /**
+ * Darken the place of the image: layers that let something through must look the same in the dark and the light theme.
+ *
  * @param {CanvasRenderingContext2D} context
  * @param {PaneView} view
- * @param {ImageBitmap} bitmap
  */
-export function drawImage(context, view, bitmap) {
+export function drawBackground(context, view) {
+  const { x, y, width, height } = view.place;
+  context.fillStyle = BEHIND_IMAGES;
+  context.fillRect(x, y, width, height);
+}
+
+/**
+ * Draw a picture, of whatever size, in the place of the whole image.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {PaneView} view
+ * @param {CanvasImageSource & {width: number, height: number}} picture
+ * @param {number} opacity
+ */
+export function drawPicture(context, view, picture, opacity) {
+  const { x, y, width, height } = view.place;
   // Far in, pixels are what one wants to see.
-  context.imageSmoothingEnabled = view.scale < PIXELS_VISIBLE_FROM;
+  context.imageSmoothingEnabled = width / picture.width < PIXELS_VISIBLE_FROM;
   context.imageSmoothingQuality = "medium";
-  const { x, y } = view.toScreen(-0.5, -0.5);
-  context.drawImage(bitmap, x, y, bitmap.width * view.scale, bitmap.height * view.scale);
+  context.globalAlpha = opacity;
+  context.drawImage(picture, x, y, width, height);
+  context.globalAlpha = 1;
 }
 
 /**
@@ -73,15 +91,15 @@ export function drawImage(context, view, bitmap) {
  * @param {PaneView} view
  * @param {Overlay} overlay
  * @param {number} camera
- * @param {import("./protocol.js").Overlays} layers
+ * @param {import("./layers.js").LayerChoice} layers
  */
 export function drawPaths(context, view, overlay, camera, layers) {
   for (const path of overlay.paths) {
     if (path.camera !== camera || path.count === 0) continue;
     const style = LINE_STYLES[path.kind];
-    if (style.layer && !layers[style.layer]) continue;
+    if (style.layer && !layers.shown[style.layer]) continue;
     const line = tracePath(view, overlay.segments, path.first, path.count);
-    context.globalAlpha = style.alpha;
+    context.globalAlpha = style.layer ? layers.opacity[style.layer] : 1;
     context.setLineDash(style.dash);
     stroke(context, line, path.color, style.width, style.hasHalo);
   }
@@ -133,8 +151,9 @@ function stroke(context, line, color, width, hasHalo = true) {
  * @param {CanvasRenderingContext2D} context
  * @param {PlacedHandle[]} placed
  * @param {import("./protocol.js").PersonInfo[]} people
+ * @param {number} opacity
  */
-export function drawSkeleton(context, placed, people) {
+export function drawSkeleton(context, placed, people, opacity) {
   people.forEach((person, index) => {
     const joints = new Map(placed.filter((p) => p.handle.person === index).map((p) => [p.handle.point, p]));
     const line = new Path2D();
@@ -144,7 +163,7 @@ export function drawSkeleton(context, placed, people) {
       line.moveTo(a.x, a.y);
       line.lineTo(b.x, b.y);
     }
-    context.globalAlpha = 0.8;
+    context.globalAlpha = opacity;
     stroke(context, line, BONE, 1.25);
     context.globalAlpha = 1;
   });

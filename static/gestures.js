@@ -81,7 +81,7 @@ export class Gestures {
    * @returns {PlacedHandle | null}
    */
   #hit(pane, at) {
-    if (!this.#store.isSettled || !this.#store.facts.state?.overlays.joints) return null;
+    if (!this.#store.isSettled || !this.#store.facts.layers.shown.joints) return null;
     let nearest = null;
     let reach = GRAB_RADIUS;
     for (const placed of pane.graspableHandles()) {

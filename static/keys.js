@@ -1,6 +1,8 @@
 /** The keys: one table that is both obeyed and shown to whoever asks with `?`. */
 
 import { hasSearch, hasTrack } from "./actions.js";
+import { BY_KEY } from "./layers.js";
+import { closePopover } from "./popovers.js";
 import { posingBindings } from "./posing_keys.js";
 
 /**
@@ -13,6 +15,11 @@ import { posingBindings } from "./posing_keys.js";
 
 /** Keys that belong to viser's camera while the 3-D view has the focus. */
 const VISER_KEYS = new Set(["s", "w", "a", "d", "q", "e", "arrowleft", "arrowright", "arrowup", "arrowdown"]);
+
+/** Keys that move a slider which has the focus. */
+const SLIDER_KEYS = new Set([
+  "ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown",
+]); // prettier-ignore
 
 /**
  * Match a plain key by its character or, since Shift changes that by keyboard layout, by its place.
@@ -51,6 +58,8 @@ function control(key, shift) {
  * @property {import("./drawer.js").Drawer} drawer
  * @property {import("./posing.js").Posing} posing
  * @property {import("./inspector.js").Inspector} inspector
+ * @property {import("./layers.js").Layers} layers
+ * @property {import("./layers_menu.js").LayersMenu} layersMenu
  * @property {() => void} showHelp
  */
 
@@ -58,9 +67,10 @@ function control(key, shift) {
  * @param {Parts} parts
  * @returns {Binding[]}
  */
-export function bindings({ store, actions, navigation, grid, gestures, drawer, posing, inspector, showHelp }) {
+// prettier-ignore
+export function bindings({ store, actions, navigation, grid, gestures, drawer, posing, inspector, layers, layersMenu, showHelp }) {
   const escape = () => {
-    if (gestures.cancel() || actions.leaveReplay()) return;
+    if (gestures.cancel() || closePopover() || actions.leaveReplay()) return;
     if (hasTrack(store.facts.state)) actions.stopTracking();
     else if (hasSearch(store.facts.state)) actions.search("stop");
     else if (store.facts.filled !== null) grid.toggleFill(store.facts.filled);
@@ -113,13 +123,28 @@ export function bindings({ store, actions, navigation, grid, gestures, drawer, p
     { keys: ["C"], label: "Curves", matches: plain("c"), run: () => drawer.toggleCurves() },
     { keys: ["B"], label: "Search: watch it in the drawer", matches: plain("b"), run: () => drawer.toggle("search") },
     { keys: ["V"], label: "Landscape of the cost", matches: plain("v"), run: () => drawer.toggle("landscape") },
+    { keys: ["A"], label: "Layers", matches: plain("a"), run: () => layersMenu.toggle() },
+    {
+      keys: ["Shift 1 – 9"],
+      label: "Show or hide a layer, by its number in the menu",
+      matches: (event) => plain("", event.code, true)(event) && /^Digit[1-9]$/.test(event.code),
+      run: (event) => layers.toggle([BY_KEY[Number(event.code.at(-1)) - 1]]),
+    },
+    { keys: ["I"], label: "Brightness and contrast of a pane", matches: plain("i"), run: () => grid.openLook() },
     {
       keys: ["1 – 9"],
-      label: "Fill the grid with a camera, and back",
+      label: "Fill the grid with a camera, and back; two digits for 10 to 16",
       matches: (event) => plain(event.key.toLowerCase())(event) && /^[1-9]$/.test(event.key),
-      run: (event) => grid.toggleFill(Number(event.key) - 1),
+      run: (event) => grid.typeCamera(Number(event.key)),
     },
-    { keys: ["0"], label: "Show the whole image", matches: plain("0"), run: () => grid.resetViews() },
+    { keys: ["PageDown"], label: "Fill the grid with the next camera", matches: plain("pagedown"), run: () => grid.stepFill(1) },
+    { keys: ["PageUp"], label: "Fill the grid with the camera before", matches: plain("pageup"), run: () => grid.stepFill(-1) },
+    {
+      keys: ["0"],
+      label: "Show the whole image",
+      matches: plain("0"),
+      run: () => grid.typeCamera(0) || grid.resetViews(),
+    },
     { keys: ["?"], label: "This list", matches: (event) => event.key === "?", run: showHelp },
   ];
 }
@@ -147,7 +172,7 @@ export function listen(target, table, { viser, isDragging }) {
 
 /** @param {HTMLElement | null} element */
 function writes(element) {
-  return !!element?.matches?.("input:not([type=radio], [type=checkbox]), textarea, select, [contenteditable=true]");
+  return !!element?.matches?.("input:not([type=radio], [type=checkbox], [type=range]), textarea, select, [contenteditable=true]");
 }
 
 /**
@@ -157,6 +182,7 @@ function writes(element) {
  * @param {KeyboardEvent} event
  */
 function operates(element, event) {
+  if (element?.matches?.("input[type=range]") && SLIDER_KEYS.has(event.key)) return true;
   if (event.key.startsWith("Arrow")) {
     return !!element?.matches?.("[type=radio], [role=slider], [role=separator], [role=menuitem], [role=tab]");
   }

@@ -10,6 +10,10 @@ import { Gestures } from "./gestures.js";
 import { Inspector } from "./inspector.js";
 import * as keys from "./keys.js";
 import { LandscapePanel } from "./landscape.js";
+import { Layers } from "./layers.js";
+import { LayersMenu } from "./layers_menu.js";
+import { LookMenu } from "./look_menu.js";
+import { Looks } from "./looks.js";
 import { Latency } from "./latency.js";
 import { Navigation } from "./navigation.js";
 import { showNotice, watchConnection } from "./notices.js";
@@ -23,6 +27,7 @@ import { Timeline } from "./timeline.js";
 import { TopBar } from "./top_bar.js";
 import { TrackBar } from "./track_bar.js";
 import { Transport } from "./transport.js";
+import { ViewRequest } from "./view_request.js";
 import { drawsInSoftware } from "./webgl.js";
 
 // A token has become a cookie by now, and does not belong into the history or a screenshot.
@@ -39,7 +44,12 @@ const send = (message) => connection.send(message);
 const actions = new Actions(store, send);
 const gestures = new Gestures(store, send, latency);
 const navigation = new Navigation(store, send);
-const grid = new PaneGrid(byId("panes", HTMLElement), store, gestures, latency);
+const layers = new Layers(store);
+const layersMenu = new LayersMenu(store, layers);
+const lookMenu = new LookMenu(store, new Looks(store));
+const openLook = lookMenu.toggle.bind(lookMenu);
+const grid = new PaneGrid(byId("panes", HTMLElement), store, gestures, latency, openLook);
+new ViewRequest(store, send);
 const posing = new Posing(store, send);
 const inspector = new Inspector(byId("inspector", HTMLElement), store, posing, notify);
 new TopBar(store, actions);
@@ -55,7 +65,8 @@ watchConnection(byId("banner", HTMLElement), store);
 makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement));
 
 const help = byId("help", HTMLDialogElement);
-const table = keys.bindings({ store, actions, navigation, grid, gestures, drawer, posing, inspector, showHelp: () => help.showModal() });
+const showHelp = () => help.showModal();
+const table = keys.bindings({ store, actions, navigation, grid, gestures, drawer, posing, inspector, layers, layersMenu, showHelp });
 keys.describe(byId("help-keys", HTMLElement), table);
 button("show-help", () => help.showModal());
 help.addEventListener("click", (event) => event.target === help && help.close());
@@ -76,7 +87,9 @@ Object.assign(window, {
     latencies: latency.latencies,
     toClient: grid.toClient.bind(grid),
     get state() {
-      const { bitmaps: _, ...shown } = store.facts.shown ?? { bitmaps: [] };
+      const { frame, pictures = new Map() } = store.facts.shown ?? {};
+      const sizes = [...pictures].map(([key, { bitmap }]) => [key, [bitmap.width, bitmap.height]]);
+      const shown = { frame, pictures: Object.fromEntries(sizes) };
       const views = grid.panes.map(({ view }) => ({ zoom: view.zoom, scale: view.scale, origin: view.origin }));
       return { ...store.facts, timeline: Object.fromEntries(store.facts.timeline), shown, views };
     },

@@ -1,9 +1,12 @@
-/** One camera's pane: two canvases, its labels, zoom and pan. */
+/** One camera's pane: two canvases, what stands in its corners, zoom and pan. */
 
 import * as drawing from "./drawing.js";
 import { uncrowded } from "./crowding.js";
+import { isPlain } from "./looks.js";
+import { PaneCorner } from "./pane_corner.js";
 import { PaneView } from "./pane_view.js";
-import { px } from "./text.js";
+import { keyOf } from "./pictures.js";
+import { TonedImage } from "./toned.js";
 import { drawsInSoftware } from "./webgl.js";
 
 // Without a graphics card one opaque canvas is laid on the screen sooner than a transparent one over another.
@@ -11,16 +14,23 @@ const IN_SOFTWARE = drawsInSoftware();
 const WHEEL_ZOOM = 0.0015;
 const PINCH_ZOOM = 0.01;
 const LINE_PX = 16;
+/** Below this width words give way to signs. */
+const NARROW_PX = 250;
+/** A picture may have this share of the pixels that its pane could show: nobody sees the difference. */
+const ENOUGH = 0.95;
+const MOST_REDUCED = 8;
 
 export class Pane {
   element = document.createElement("section");
   view;
   #store;
   #camera;
+  #info;
   #image = document.createElement("canvas");
   #overlay = document.createElement("canvas");
-  #cost = document.createElement("output");
-  #reset = document.createElement("button");
+  #corner;
+  #toned = new TonedImage();
+  #onView;
   #size = { width: 0, height: 0 };
   #redrawScheduled = false;
 
@@ -28,41 +38,42 @@ export class Pane {
    * @param {import("./store.js").Store} store
    * @param {number} camera
    * @param {import("./protocol.js").CameraInfo} info
+   * @param {{viewChanged: () => void, openLook: (camera: number, button: HTMLElement) => void}} run
    */
-  constructor(store, camera, info) {
+  constructor(store, camera, info, { viewChanged, openLook }) {
     this.#store = store;
     this.#camera = camera;
+    this.#info = info;
+    this.#onView = viewChanged;
     this.view = new PaneView(info.width, info.height);
     this.element.className = "pane";
     this.element.setAttribute("aria-label", `Camera ${info.name}`);
     this.#overlay.className = "pane-overlay";
-
-    const label = document.createElement("div");
-    label.className = "pane-label";
-    const number = document.createElement("kbd");
-    number.textContent = camera < 9 ? String(camera + 1) : "";
-    number.hidden = camera >= 9;
-    const name = document.createElement("span");
-    name.textContent = info.name;
-    label.append(number, name);
-
-    this.#cost.className = "pane-cost";
-    this.#cost.title = "Chamfer cost of this view, in pixels";
-    this.#reset.className = "pane-reset";
-    this.#reset.type = "button";
-    this.#reset.textContent = "Fit";
-    this.#reset.title = "Show the whole image (0)";
-    this.#reset.setAttribute("aria-label", `Show the whole image of ${info.name}`);
-    this.#reset.addEventListener("click", () => this.reset());
-
+    this.#corner = new PaneCorner(camera, info.name, {
+      reset: () => this.reset(),
+      openLook: (button) => openLook(camera, button),
+    });
     if (!IN_SOFTWARE) this.element.append(this.#image);
-    this.element.append(this.#overlay, label, this.#cost, this.#reset);
-    this.#overlay.addEventListener("wheel", (event) => this.#zoom(event), { passive: false });
+    this.element.append(this.#overlay, ...this.#corner.elements);
+    this.element.addEventListener("wheel", (event) => this.#zoom(event), { passive: false });
   }
 
   /** The element that takes the pointer. */
   get surface() {
     return this.#overlay;
+  }
+
+  get lookButton() {
+    return this.#corner.lookButton;
+  }
+
+  /** How many pixels of the image, along either side, this pane can do with one for; 0 where it is not seen. */
+  get reduction() {
+    if (this.#size.width === 0 || this.#size.height === 0) return 0;
+    let reduction = 1;
+    const perPixel = this.view.scale * devicePixelRatio;
+    while (reduction < MOST_REDUCED && ENOUGH * perPixel * 2 * reduction <= 1) reduction *= 2;
+    return reduction;
   }
 
   /** Show the whole image. */
@@ -105,15 +116,19 @@ export class Pane {
   }
 
   /**
-   * Take over the size that the layout gave; canvases that show nothing keep no memory.
+   * Take over the place that the layout gave; canvases that show nothing keep no memory.
    *
-   * @param {number} width
-   * @param {number} height
+   * @param {import("./grid_layout.js").Box | null} box
    */
-  resize(width, height) {
+  place(box) {
+    const { x, y, width, height } = box ?? { x: 0, y: 0, width: 0, height: 0 };
+    this.element.hidden = box === null;
+    Object.assign(this.element.style, { left: `${x}px`, top: `${y}px`, width: `${width}px`, height: `${height}px` });
+    this.element.classList.toggle("is-narrow", width < NARROW_PX);
     this.#size = { width, height };
     this.view.resize(width, height);
-    this.draw(true);
+    if (box) this.draw(true);
+    else this.#image.width = this.#image.height = this.#overlay.width = this.#overlay.height = 0;
   }
 
   /** Draw once on the next animation frame, however often the view moves before it. */
@@ -123,35 +138,58 @@ export class Pane {
     requestAnimationFrame(() => {
       this.#redrawScheduled = false;
       this.draw(true);
+      this.#onView();
     });
   }
 
   /**
    * Draw now; called within an animation frame.
    *
-   * @param {boolean} withImage whether the image layer changed too
+   * @param {boolean} withPictures whether the pictures under the vectors changed too
    */
-  draw(withImage) {
+  draw(withPictures) {
     const { width, height } = this.#size;
-    const { shown, state, session, overlay } = this.#store.facts;
+    const { state, session, overlay, layers } = this.#store.facts;
     if (width === 0 || height === 0) return;
-    if (withImage) {
-      const context = drawing.prepare(this.#image, width, height, IN_SOFTWARE);
-      const bitmap = shown?.bitmaps[this.#camera];
-      if (bitmap) drawing.drawImage(context, this.view, bitmap);
-      this.#reset.classList.toggle("is-shown", !this.view.isReset);
-      this.#reset.tabIndex = this.view.isReset ? -1 : 0;
-    }
+    if (withPictures) this.#drawPictures();
     const context = drawing.prepare(this.#overlay, width, height, true);
     if (IN_SOFTWARE) context.drawImage(this.#image, 0, 0, width, height);
     if (!state || !session || !overlay) return;
-    drawing.drawPaths(context, this.view, overlay, this.#camera, state.overlays);
+    drawing.drawPaths(context, this.view, overlay, this.#camera, layers);
     this.#drawJoints(context, state, session.people);
+    this.#showJoint(state);
   }
 
   showCost() {
-    const cost = this.#store.facts.state?.view_costs_px[this.#camera] ?? null;
-    this.#cost.textContent = px(cost);
+    this.#corner.showCost(this.#store.facts.state?.view_costs_px[this.#camera] ?? null);
+  }
+
+  #drawPictures() {
+    const { width, height } = this.#size;
+    const { shown, layers, looks } = this.#store.facts;
+    const context = drawing.prepare(this.#image, width, height, IN_SOFTWARE);
+    drawing.drawBackground(context, this.view);
+    /** @type {number | null} */
+    let limitPx = null;
+    for (const layer of /** @type {const} */ (["image", "distance", "silhouette", "parts"])) {
+      const picture = layers.shown[layer] ? shown?.pictures.get(keyOf(layer, this.#camera)) : undefined;
+      if (!picture) continue;
+      const source = layer === "image" ? this.#toned.of(picture.bitmap, looks[this.#camera]) : picture.bitmap;
+      drawing.drawPicture(context, this.view, source, layers.opacity[layer]);
+      limitPx ??= picture.limitPx;
+    }
+    this.#corner.showScale(limitPx, width);
+    this.#corner.showZoom(this.view.isReset);
+    this.#corner.showLook(!isPlain(looks[this.#camera]));
+  }
+
+  /** @param {import("./protocol.js").StateMessage} state */
+  #showJoint({ person, point }) {
+    const { overlay } = this.#store.facts;
+    const handle = overlay?.handles.find((h) => h.camera === this.#camera && h.person === person && h.point === point);
+    const { width, height } = this.#info;
+    const isInside = handle && handle.u >= -0.5 && handle.v >= -0.5 && handle.u < width - 0.5 && handle.v < height - 0.5;
+    this.#corner.showJoint(point, !isInside ? "outside" : handle.visible ? "visible" : "hidden");
   }
 
   /**
@@ -160,11 +198,12 @@ export class Pane {
    * @param {import("./protocol.js").PersonInfo[]} people
    */
   #drawJoints(context, state, people) {
-    if (state.overlays.skeleton) drawing.drawSkeleton(context, this.#placedHandles(), people);
-    if (!state.overlays.joints) return;
-    const { hover } = this.#store.facts;
+    const { hover, layers } = this.#store.facts;
+    if (layers.shown.skeleton) drawing.drawSkeleton(context, this.#placedHandles(), people, layers.opacity.skeleton);
+    if (!layers.shown.joints) return;
     /** @type {drawing.PlacedHandle | null} */
     let named = null;
+    context.globalAlpha = layers.opacity.joints;
     for (const one of this.graspableHandles()) {
       const isHovered = hover?.person === one.handle.person && hover.point === one.handle.point;
       const isSelected = state.person === one.handle.person && state.point === one.handle.point;
@@ -172,6 +211,7 @@ export class Pane {
       const color = people[one.handle.person]?.color ?? "#fff";
       drawing.drawHandle(context, one, color, isHovered ? "hovered" : isSelected ? "selected" : "plain");
     }
+    context.globalAlpha = 1;
     if (named) drawing.drawName(context, named, this.#size.width);
   }
 

@@ -1,8 +1,10 @@
 /** The panes of all cameras: laid out as large as they fit, or one of them filling the grid. */
 
+import { layOut } from "./grid_layout.js";
 import { Pane } from "./pane.js";
 
-const GAP = 2;
+/** Two digits within this time are one number. */
+const SECOND_DIGIT_MS = 700;
 
 export class PaneGrid {
   /** @type {Pane[]} */
@@ -10,7 +12,9 @@ export class PaneGrid {
   #store;
   #gestures;
   #latency;
+  #openLook;
   #element;
+  #digit = { value: 0, at: -Infinity };
   #cameras = "";
   #choice = "";
 
@@ -19,8 +23,10 @@ export class PaneGrid {
    * @param {import("./store.js").Store} store
    * @param {import("./gestures.js").Gestures} gestures
    * @param {import("./latency.js").Latency} latency
+   * @param {(camera: number, button: HTMLElement) => void} openLook opens brightness and contrast of a camera
    */
-  constructor(element, store, gestures, latency) {
+  constructor(element, store, gestures, latency, openLook) {
+    this.#openLook = openLook;
     this.#element = element;
     this.#store = store;
     this.#gestures = gestures;
@@ -39,6 +45,44 @@ export class PaneGrid {
   toggleFill(camera) {
     if (camera >= this.panes.length) return;
     this.#store.set({ filled: this.#store.facts.filled === camera ? null : camera, active: camera });
+  }
+
+  /**
+   * Fill the grid with the camera of a number, counted from 1. Where there are more than nine, a second digit soon after the
+   * first makes the number of both.
+   *
+   * @param {number} digit
+   * @returns whether there is such a camera, or one is meant that a second digit may yet make
+   */
+  typeCamera(digit) {
+    const now = performance.now();
+    const { value, at } = this.#digit;
+    const both = now - at < SECOND_DIGIT_MS ? 10 * value + digit : digit;
+    const number = both <= this.panes.length ? both : digit;
+    this.#digit = { value: digit, at: now };
+    if (number < 1 || number > this.panes.length) return false;
+    if (number > 9) this.#store.set({ filled: number - 1, active: number - 1 });
+    else this.toggleFill(number - 1);
+    return true;
+  }
+
+  /**
+   * Fill the grid with the next camera, or the one before.
+   *
+   * @param {1 | -1} step
+   */
+  stepFill(step) {
+    const { filled } = this.#store.facts;
+    const count = this.panes.length;
+    const next = filled === null ? (step > 0 ? 0 : count - 1) : (filled + step + count) % count;
+    if (count > 0) this.#store.set({ filled: next, active: next });
+  }
+
+  /** Open brightness and contrast of the pane under the pointer, else of the one worked in. */
+  openLook() {
+    const under = this.panes.findIndex((pane) => pane.element.matches(":hover"));
+    const camera = under >= 0 ? under : (this.#store.facts.filled ?? this.#store.facts.active ?? 0);
+    if (camera < this.panes.length) this.#openLook(camera, this.panes[camera].lookButton);
   }
 
   /** Show whole images: in the pane under the pointer, or else in all. */
@@ -66,16 +110,16 @@ export class PaneGrid {
     if (changed.has("session")) this.#build();
     if (changed.has("filled")) this.#layOut();
     if (changed.has("active") || changed.has("session")) this.#markActive();
-    const withImage = changed.has("shown");
+    const withPictures = changed.has("shown") || changed.has("layers") || changed.has("looks");
     // A new state comes with every move of a drag; only its choice of what to draw concerns the vectors.
-    const { person, point, overlays } = this.#store.facts.state ?? {};
-    const choice = JSON.stringify([person, point, overlays]);
-    if (withImage || changed.has("overlay") || choice !== this.#choice || changed.has("hover")) {
+    const { person, point } = this.#store.facts.state ?? {};
+    const choice = JSON.stringify([person, point]);
+    if (withPictures || changed.has("overlay") || choice !== this.#choice || changed.has("hover")) {
       this.#choice = choice;
-      for (const pane of this.panes) pane.draw(withImage);
+      for (const pane of this.panes) pane.draw(withPictures);
     }
     if (changed.has("overlay")) this.#latency.painted(this.#store.facts.overlay?.seq ?? 0);
-    if (changed.has("target") || withImage) {
+    if (changed.has("target") || changed.has("shown")) {
       this.#element.classList.toggle("is-loading", this.#store.facts.shown?.frame !== this.#store.facts.target);
     }
     if (changed.has("state")) for (const pane of this.panes) pane.showCost();
@@ -93,9 +137,14 @@ export class PaneGrid {
     if (described === this.#cameras) return;
     this.#cameras = described;
     this.panes = cameras.map((info, camera) => {
-      const pane = new Pane(this.#store, camera, info);
+      const pane = new Pane(this.#store, camera, info, {
+        viewChanged: () => this.#refine(),
+        openLook: this.#openLook,
+      });
       this.#gestures.watch(pane, camera);
-      pane.surface.addEventListener("dblclick", () => this.toggleFill(camera));
+      pane.element.addEventListener("dblclick", (event) => {
+        if (!(event.target instanceof Element && event.target.closest("button"))) this.toggleFill(camera);
+      });
       return pane;
     });
     this.#element.replaceChildren(...this.panes.map((pane) => pane.element));
@@ -109,34 +158,22 @@ export class PaneGrid {
     const { filled } = this.#store.facts;
     const { clientWidth, clientHeight } = this.#element;
     const shown = filled === null ? cameras : [cameras[filled]];
-    const aspect = Math.max(...shown.map(({ width, height }) => width / height));
-    const columns = bestColumns(shown.length, clientWidth, clientHeight, aspect);
-    const rows = Math.ceil(shown.length / columns);
-    const width = Math.floor((clientWidth - GAP * (columns - 1)) / columns);
-    const height = Math.floor((clientHeight - GAP * (rows - 1)) / rows);
-    this.#element.style.gridTemplateColumns = `repeat(${columns}, minmax(0, 1fr))`;
-    this.#element.style.gridAutoRows = `${height}px`;
+    const boxes = layOut(shown.map(({ width, height }) => width / height), clientWidth, clientHeight); // prettier-ignore
     this.panes.forEach((pane, camera) => {
-      const isShown = filled === null || filled === camera;
-      pane.element.hidden = !isShown;
-      pane.resize(isShown ? width : 0, isShown ? height : 0);
+      if (filled === null) pane.place(boxes[camera]);
+      else pane.place(filled === camera ? boxes[0] : null);
     });
+    this.#ask(this.panes.map((pane) => pane.reduction));
   }
-}
 
-/**
- * The number of columns that gives the largest images.
- *
- * @param {number} count
- * @param {number} width
- * @param {number} height
- * @param {number} aspect of an image, width by height
- */
-function bestColumns(count, width, height, aspect) {
-  let best = { columns: 1, size: 0 };
-  for (let columns = 1; columns <= count; columns += 1) {
-    const size = Math.min(width / columns, (aspect * height) / Math.ceil(count / columns));
-    if (size > best.size) best = { columns, size };
+  /** Ask for finer pictures where one has zoomed in; coarser ones would save nothing before the next frame. */
+  #refine() {
+    const { reductions } = this.#store.facts;
+    this.#ask(this.panes.map((pane, camera) => Math.min(pane.reduction, reductions[camera] ?? pane.reduction)));
   }
-  return best.columns;
+
+  /** @param {number[]} reductions */
+  #ask(reductions) {
+    if (reductions.join() !== this.#store.facts.reductions.join()) this.#store.set({ reductions });
+  }
 }

@@ -42,6 +42,12 @@ export class PaneView {
     };
   }
 
+  /** Where the whole image lies on the screen, in CSS pixels. */
+  get place() {
+    const { x, y } = this.toScreen(-0.5, -0.5);
+    return { x, y, width: this.#image.width * this.scale, height: this.#image.height * this.scale };
+  }
+
   get isReset() {
     const { u, v } = this.#middle();
     return this.zoom === 1 && this.#center.u === u && this.#center.v === v;

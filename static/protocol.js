@@ -1,9 +1,9 @@
 /**
  * The messages of the pane socket (docs/protocol.md). Positions are undistorted pixels, pixel centres at integers.
  *
- * @typedef {"image" | "edges" | "distance"} Base
- * @typedef {{contours: boolean, joints: boolean, part_edges: boolean, skeleton: boolean,
- *   segments: boolean}} Overlays
+ * @typedef {"image" | "silhouette" | "distance" | "parts"} PictureLayer
+ * @typedef {PictureLayer | "accepted" | "rejected" | "contours" | "hidden" | "part_edges" | "skeleton" | "joints" |
+ *   "epipolar"} Layer
  * @typedef {{name: string, width: number, height: number}} CameraInfo
  * @typedef {{name: string, color: string, points: string[], minor: string[], bones: [string, string][],
  *   parts: string[], dofs: DofInfo[], point_dofs: Record<string, number[]>,
@@ -16,7 +16,7 @@
  * @typedef {"" | "good" | "doubtful" | "lost"} Status
  * @typedef {{running: boolean, first: number | null, last: number | null, at: number | null, done: number, total: number,
  *   per_second: number, doubtful: number, lost: number, message: string}} Track
- * @typedef {{type: "state", frame: number, person: number, point: string | null, base: Base, overlays: Overlays,
+ * @typedef {{type: "state", frame: number, person: number, point: string | null,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
  *   parts_px: (number | null)[], dofs: number[], locked: number[], job: Job, track: Track,
  *   replay: {run: number, step: number, steps: number, stage: string | null} | null, follow: boolean, undo: string | null, redo: string | null,
@@ -40,9 +40,10 @@
  * @typedef {SessionMessage | StateMessage | NoticeMessage | TimelineMessage | SearchSetupMessage |
  *   SearchRunsMessage} TextMessage
  *
- * @typedef {{type: "image", camera: number, frame: number, base: Base}} ImageHeader
+ * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number,
+ *   limit_px: number | null}} ImageHeader
  * @typedef {{camera: number, person: number, color: string, first: number, count: number,
- *   kind: "model" | "candidate" | "ghost" | "part_edge" | "epipolar" | "accepted" | "rejected"}} Path
+ *   kind: "model" | "hidden" | "candidate" | "ghost" | "part_edge" | "epipolar" | "accepted" | "rejected"}} Path
  * @typedef {{camera: number, person: number, point: string, u: number, v: number, visible: boolean}} Handle
  * @typedef {{type: "overlay", frame: number, seq: number, job: boolean, paths: Path[], handles: Handle[]}} OverlayHeader
  * @typedef {OverlayHeader & {segments: Float32Array}} Overlay
@@ -68,7 +69,7 @@
  *   {type: "drag", phase: "start" | "move" | "end" | "cancel", frame: number, camera: number, person: number,
  *     point: string, u: number, v: number, seq: number} |
  *   PoseEdit |
- *   {type: "view", base: Base, overlays: Overlays} |
+ *   {type: "view", layers: Layer[], reductions: number[], by_part: boolean} |
  *   {type: "search", action: "step" | "stage" | "frame" | "stop"} |
  *   {type: "search", action: "again", run: number | null} |
  *   {type: "search_speed", per_second: number | null} |

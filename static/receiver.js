@@ -1,6 +1,6 @@
 /** Puts the program's messages into the store. */
 
-import { FrameAssembler } from "./frames.js";
+import { PictureAssembler, keyOf } from "./pictures.js";
 import { mergeCandidates, mergeSteps, takeLandscape, takeRuns } from "./search_facts.js";
 import { mergeCurves } from "./series.js";
 
@@ -9,7 +9,7 @@ const MOST_EARLY = 8;
 export class Receiver {
   #store;
   #notify;
-  #frames = new FrameAssembler(0, () => {});
+  #pictures = new PictureAssembler(() => {});
   /** @type {Map<number, import("./protocol.js").Overlay>} vectors that came before the images of their frame */
   #early = new Map();
 
@@ -20,6 +20,9 @@ export class Receiver {
   constructor(store, notify) {
     this.#store = store;
     this.#notify = notify;
+    store.subscribe((changed) => {
+      if (changed.has("layers")) this.#forgetHidden();
+    });
   }
 
   /** @param {boolean} open */
@@ -58,7 +61,7 @@ export class Receiver {
   onBinary(header, payload) {
     switch (header.type) {
       case "image":
-        this.#frames.receive(header, payload);
+        this.#pictures.receive(header, payload);
         break;
       case "overlay":
         this.#takeOverlay({ ...header, segments: new Float32Array(payload) });
@@ -100,24 +103,46 @@ export class Receiver {
 
   /** @param {import("./protocol.js").SessionMessage} session */
   #begin(session) {
-    this.#frames.close();
-    this.#frames = new FrameAssembler(session.cameras.length, (shown) => this.#show(shown));
+    this.#pictures.close();
+    this.#pictures = new PictureAssembler((frame, pictures) => this.#show(frame, pictures));
     this.#early.clear();
     const former = this.#store.facts.session?.cameras;
     this.#store.set({ session });
     if (JSON.stringify(former) !== JSON.stringify(session.cameras)) this.#store.set({ shown: null, overlay: null });
   }
 
-  /** @param {import("./store.js").Shown} shown */
-  #show(shown) {
-    const former = this.#store.facts.shown;
-    this.#store.set({ shown });
-    const overlay = this.#early.get(shown.frame);
+  /**
+   * Pictures of another frame take the place of all; those of the same frame that of their like.
+   *
+   * @param {number} frame
+   * @param {import("./pictures.js").Pictures} pictures
+   */
+  #show(frame, pictures) {
+    const { shown } = this.#store.facts;
+    const kept = new Map(shown?.frame === frame ? shown.pictures : []);
+    for (const [key, { bitmap }] of shown?.pictures ?? []) {
+      if (kept.has(key) && !pictures.has(key)) continue;
+      bitmap.close();
+    }
+    for (const [key, picture] of pictures) kept.set(key, picture);
+    this.#store.set({ shown: { frame, pictures: kept } });
+    const overlay = this.#early.get(frame);
     if (overlay) {
       this.#store.set({ overlay });
-      this.#early.delete(shown.frame);
+      this.#early.delete(frame);
     }
-    former?.bitmaps.forEach((bitmap) => bitmap.close());
+  }
+
+  /** The program sends a layer anew when it is shown again: until then what is kept may have become wrong. */
+  #forgetHidden() {
+    const { shown, layers, session } = this.#store.facts;
+    for (const layer of /** @type {const} */ (["image", "silhouette", "distance", "parts"])) {
+      if (layers.shown[layer]) continue;
+      for (const camera of session?.cameras.keys() ?? []) {
+        shown?.pictures.get(keyOf(layer, camera))?.bitmap.close();
+        shown?.pictures.delete(keyOf(layer, camera));
+      }
+    }
   }
 
   /** @param {import("./protocol.js").TimelineMessage} message */

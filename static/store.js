@@ -3,9 +3,11 @@
  * messages came in between.
  */
 
+import { usualLayers } from "./layers.js";
+
 /**
  * @typedef {{camera: number, person: number, point: string}} Joint
- * @typedef {{frame: number, base: import("./protocol.js").Base, bitmaps: ImageBitmap[]}} Shown
+ * @typedef {{frame: number, pictures: import("./pictures.js").Pictures}} Shown
  *
  * @typedef {object} Facts
  * @property {boolean} connected
@@ -21,7 +23,7 @@
  * @property {number | null} searchRun the run that the user looks at; null for the newest
  * @property {import("./search_facts.js").Landscape | null} landscape
  * @property {{first: number, last: number} | null} range the frames that the user has marked
- * @property {Shown | null} shown the images on the screen
+ * @property {Shown | null} shown the pictures on the screen
  * @property {import("./protocol.js").Overlay | null} overlay the vectors on the screen
  * @property {Joint | null} hover the joint under the pointer
  * @property {boolean} dragging whether a hand holds a joint
@@ -30,6 +32,9 @@
  * @property {number} target the frame the user asked for last
  * @property {boolean} playing
  * @property {number | null} filled the camera whose pane fills the grid
+ * @property {import("./layers.js").LayerChoice} layers what is drawn in the panes
+ * @property {(import("./looks.js").Look | undefined)[]} looks brightness, contrast and gamma of each camera's image
+ * @property {number[]} reductions how many pixels of each camera's image the page can do with one for; 0: it is not seen
  */
 
 const MOST_ROUNDS = 3;
@@ -59,6 +64,9 @@ export class Store {
     target: 0,
     playing: false,
     filled: null,
+    layers: usualLayers(),
+    looks: [],
+    reductions: [],
   };
   /** @type {((changed: Set<keyof Facts>) => void)[]} */
   #views = [];

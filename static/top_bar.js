@@ -1,4 +1,4 @@
-/** The bar at the top: layers, search, cost, history. */
+/** The bar at the top: search, cost, history. */
 
 import { hasSearch, hasTrack } from "./actions.js";
 import { button, byId } from "./elements.js";
@@ -13,8 +13,6 @@ export class TopBar {
   #stages = byId("search-stages", HTMLElement);
   #figures = byId("search-figures", HTMLElement);
   #saved = byId("saved", HTMLElement);
-  #bases = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll("input[name=base]")]);
-  #overlays = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll("#overlays input")]);
   #step;
   #frame;
   #stop;
@@ -32,13 +30,6 @@ export class TopBar {
     this.#stop = button("search-stop", () => actions.search("stop"));
     this.#undo = button("undo", () => actions.undo());
     this.#redo = button("redo", () => actions.redo());
-    for (const input of this.#bases) {
-      input.addEventListener("change", () => actions.showBase(/** @type {import("./protocol.js").Base} */ (input.value)));
-    }
-    for (const input of this.#overlays) {
-      const layer = /** @type {keyof import("./protocol.js").Overlays} */ (input.value);
-      input.addEventListener("change", () => actions.showOverlay(layer, input.checked));
-    }
     this.#person.addEventListener("change", () => {
       actions.selectPerson(Number(this.#person.value));
       this.#person.blur();
@@ -67,15 +58,10 @@ export class TopBar {
     this.#stop.disabled = !isReady || !hasSearch(state);
     this.#undo.disabled = !isReady || state.undo === null;
     this.#redo.disabled = !isReady || state.redo === null;
-    for (const input of [...this.#bases, ...this.#overlays]) input.disabled = !isReady;
     this.#person.disabled = !isReady;
     if (!state) return;
     this.#undo.title = state.undo === null ? "Nothing to undo" : `Undo ${state.undo} (Ctrl+Z)`;
     this.#redo.title = state.redo === null ? "Nothing to redo" : `Redo ${state.redo} (Ctrl+Shift+Z)`;
-    for (const input of this.#bases) input.checked = input.value === state.base;
-    for (const input of this.#overlays) {
-      input.checked = state.overlays[/** @type {keyof import("./protocol.js").Overlays} */ (input.value)];
-    }
     this.#person.value = String(state.person);
     this.#cost.textContent = state.cost_px === null ? "–" : state.cost_px.toFixed(2);
     if (hasTrack(state) || state.track.message) this.#showTrack(state.track);

@@ -6,6 +6,7 @@ import struct
 from contextlib import asynccontextmanager
 
 import aiohttp
+import cv2
 import numpy as np
 import pytest
 from aiohttp import web
@@ -29,6 +30,10 @@ class Page:
 
     async def send(self, kind, **fields):
         await self._socket.send_str(json.dumps({"type": kind, **fields}))
+
+    async def shows(self, *layers, reductions=(1, 1, 1, 1), by_part=False):
+        """Say what the page shows."""
+        await self.send("view", layers=layers, reductions=reductions, by_part=by_part)
 
     async def hear(self, kind, condition=lambda _: True, timeout_s=10.0):
         """The next message of a kind for which a condition holds; binary ones with their `payload`."""
@@ -65,7 +70,9 @@ async def visiting(controller):
             aiohttp.ClientSession() as session,
             session.ws_connect(f"http://127.0.0.1:{runner.addresses[0][1]}/ws") as socket,
         ):
-            yield Page(socket)
+            page = Page(socket)
+            await page.shows("image", "contours", "joints")
+            yield page
     finally:
         await runner.cleanup()
 
@@ -119,13 +126,13 @@ async def test_images_come_though_the_tracker_is_ahead_by_then(controller, track
     """A tracker that is faster than the pictures must not leave the panes without any."""
     async with visiting(controller) as page:
         await page.hear("timeline")
-        jpeg = controller.frames.jpeg
+        image = controller.frames.image
 
         def overtaken(*args):
             tracker.let_go(1)
-            return jpeg(*args)
+            return image(*args)
 
-        controller.frames.jpeg = overtaken
+        controller.frames.image = overtaken
         await page.send("track", action="forward", until=None)
         tracker.let_go(1)
         frames = [(await page.hear("image"))["frame"] for _ in range(8)]
@@ -242,8 +249,7 @@ async def test_a_drag_means_the_frame_that_the_hand_saw(controller):
 async def test_segments_are_sent_when_the_evidence_has_come(controller):
     async with visiting(controller) as page:
         await page.hear("timeline")
-        shown = {"contours": True, "joints": True, "part_edges": False, "skeleton": False, "segments": True}
-        await page.send("view", base="image", overlays=shown)
+        await page.shows("image", "accepted", "rejected")
         await page.hear("overlay", lambda m: "rejected" in kinds(m))
         await page.send("seek", frame=30)
         message = await page.hear("overlay", lambda m: m["frame"] == 30 and "rejected" in kinds(m))
@@ -298,3 +304,57 @@ async def test_many_cells_travel_as_columns(controller, monkeypatch):
         await page.send("undo")
         gone = await page.hear("cells", lambda m: not m["replace"] and m["count"] == 3)
         assert np.frombuffer(gone["payload"], np.uint8, 3, 8 * 3).tolist() == [255] * 3
+
+
+async def test_pictures_of_a_frame_come_as_one_set_of_the_size_asked_for(controller):
+    async with visiting(controller) as page:
+        await page.hear("timeline")
+        await page.shows("image", "distance", "silhouette", "parts", reductions=(1, 2, 0, 4))
+        await page.send("seek", frame=5)
+        told = [await page.hear("image", lambda m: m["frame"] == 5 and m["of"] == 12)]
+        told += [await page.hear("image") for _ in range(11)]
+        assert len({m["set"] for m in told}) == 1
+        sizes = {(m["layer"], m["camera"]): size_of(m["payload"]) for m in told}
+        assert {key: size for key, size in sizes.items() if key[0] == "image"} == {
+            ("image", 0): (640, 480), ("image", 1): (320, 240), ("image", 3): (160, 120),
+        }  # fmt: skip
+        assert sizes["distance", 3] == sizes["silhouette", 3] == (640, 480)  # as they are matched
+        assert sizes["parts", 1] == (320, 240)
+        limits = {m["layer"]: m["limit_px"] for m in told}
+        assert limits == {"image": None, "silhouette": None, "parts": None, "distance": pytest.approx(2 * 0.03 * 640)}
+
+
+async def test_a_pose_changes_the_part_masks_alone(controller):
+    async with visiting(controller) as page:
+        await page.shows("image", "parts")
+        await page.hear("image", lambda m: m["of"] == 8)
+        count = len(page.told) + 7
+        drag(controller, "left_knee", (4.0, 0.0))
+        await page.hear("image", lambda m: m["of"] == 4)
+        assert {m["layer"] for m in page.told[count:] if m["type"] == "image"} == {"parts"}
+
+
+async def test_what_a_page_sees_anew_is_sent_and_nothing_else(controller):
+    async with visiting(controller) as page:
+        await page.hear("image", lambda m: m["of"] == 4)
+        await page.shows("image", reductions=(0, 1, 0, 0))
+        overlay = await page.hear("overlay", lambda m: {h["camera"] for h in m["handles"]} == {1})
+        assert overlay["paths"] == []
+        count = len(page.told)
+        await page.shows("image", reductions=(1, 1, 0, 0))
+        image = await page.hear("image", lambda m: m["of"] == 1)
+        assert image["camera"] == 0
+        assert len([m for m in page.told[count:] if m["type"] == "image"]) <= 4  # the rest of the first set
+
+
+async def test_a_view_that_is_not_understood_is_a_notice(controller):
+    async with visiting(controller) as page:
+        await page.shows("image", "x-rays")
+        assert "no layers are called x-rays" in (await page.hear("notice"))["text"]
+        await page.shows("image", reductions=(1, 1))
+        assert "for each of 4 cameras" in (await page.hear("notice"))["text"]
+
+
+def size_of(picture):
+    height, width = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_UNCHANGED).shape[:2]
+    return width, height

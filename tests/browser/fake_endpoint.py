@@ -5,6 +5,7 @@ It stands in for the controller in tests of the page alone; `python tests/browse
 
 import asyncio
 import contextlib
+import itertools
 import json
 import struct
 import sys
@@ -37,6 +38,8 @@ BONES = [
     ("l_hip", "l_knee"), ("r_hip", "r_knee"), ("torso", "head"), ("l_shoulder", "r_shoulder"), ("l_hip", "r_hip"),
 ]  # fmt: skip
 SCALE = 150.0
+HIDDEN_LINE = np.column_stack([np.arange(100, 300), np.full(200, 60), np.arange(101, 301), np.full(200, 60)])
+"""What the layer of hidden contours shows: a line of short pieces, px."""
 NO_TRACK = {
     "running": False, "first": None, "last": None, "at": None, "done": 0, "total": 0, "per_second": 0.0, "doubtful": 0,
     "lost": 0, "message": "",
@@ -89,6 +92,10 @@ class FakeEndpoint:
     """Every message of every page, but for what each says when it connects."""
     greetings: list = field(default_factory=list)
     """What the pages said when they connected."""
+    views: list = field(default_factory=list)
+    """What the pages said that they show."""
+    sizes: tuple = ((WIDTH, HEIGHT),)
+    """Of the cameras' images, px; in turn, where there are more cameras."""
     sockets: set = field(default_factory=set)
 
     def __post_init__(self):
@@ -97,12 +104,12 @@ class FakeEndpoint:
         self.seq = 0
         self.epipolar_of = None
         self.jpegs = {}
+        self.set_numbers = itertools.count(1)
         self.search_task = None
         self.track_task = None
         self.curves_group = None
         self.state = {
-            "type": "state", "frame": 12, "person": 0, "point": None, "base": "image",
-            "overlays": {"contours": True, "joints": True, "part_edges": False, "skeleton": True, "segments": False},
+            "type": "state", "frame": 12, "person": 0, "point": None,
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
             "source": "manual", "status": "", "remark": "", "parts_px": [], "job": self.idle_job(""), "replay": None,
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
@@ -128,7 +135,8 @@ class FakeEndpoint:
             async for message in socket:
                 if message.type is WSMsgType.TEXT:
                     told = json.loads(message.data)
-                    (self.greetings if told["type"] == "hold_3d" else self.received).append(told)
+                    kept = {"hold_3d": self.greetings, "view": self.views}.get(told["type"], self.received)
+                    kept.append(told)
                     await self.answer(told)
         finally:
             self.sockets.discard(socket)
@@ -145,11 +153,7 @@ class FakeEndpoint:
                 self.state |= {"person": message["person"], "point": message["point"]}
                 await self.broadcast(self.state)
             case "view":
-                new_base = message["base"] != self.state["base"]
-                self.state |= {"base": message["base"], "overlays": message["overlays"]}
-                await self.broadcast(self.state)
-                if new_base:
-                    await self.send_frame()
+                await self.send_frame()
             case "drag":
                 await self.drag(message)
             case "search":
@@ -282,8 +286,8 @@ class FakeEndpoint:
 
     async def send_all(self, socket):
         cameras = [
-            {"name": CAMERA_NAMES[c % 4] + "2" * (c // 4), "width": WIDTH, "height": HEIGHT}
-            for c in range(self.n_cameras)
+            {"name": CAMERA_NAMES[c % 4] + ("" if c < 4 else str(c // 4 + 1)), "width": width, "height": height}
+            for c, (width, height) in enumerate(self.sizes[c % len(self.sizes)] for c in range(self.n_cameras))
         ]
         people = [
             {
@@ -319,7 +323,8 @@ class FakeEndpoint:
             for k in range(self.n_frames * 100 // N_FRAMES)
         }
         await socket.send_str(json.dumps({"type": "timeline", "cells": cells, "replace": True}))
-        await self.send_frame([socket])
+        if self.views:
+            await self.send_frame([socket])
 
     async def broadcast(self, message):
         for socket in list(self.sockets):
@@ -333,12 +338,25 @@ class FakeEndpoint:
                 await socket.send_bytes(struct.pack("<I", len(text)) + text + payload)
 
     async def send_frame(self, sockets=None):
-        frame, base = self.state["frame"], self.state["base"]
-        for camera in range(self.n_cameras):
+        frame, view = self.state["frame"], self.views[-1]
+        layers = [layer for layer in ("image", "silhouette", "distance", "parts") if layer in view["layers"]]
+        seen = [camera for camera, reduction in enumerate(view["reductions"]) if reduction]
+        wanted = [(layer, camera) for layer in layers for camera in seen]
+        together = {"set": next(self.set_numbers), "of": len(wanted)}
+        for layer, camera in wanted:
             await asyncio.sleep(self.image_delay_s)
-            header = {"type": "image", "camera": camera, "frame": frame, "base": base}
-            await self.send_binary(header, self.jpeg(camera, frame, base), sockets)
+            header = self.header(camera, frame, layer) | together
+            await self.send_binary(header, self.picture(camera, frame, layer), sockets)
         await self.send_overlay(sockets)
+
+    def header(self, camera, frame, layer="image"):
+        """Of a picture that is a set by itself."""
+        limit_px = 38.4 if layer == "distance" else None
+        return {
+            "type": "image", "layer": layer, "camera": camera, "frame": frame,
+            "set": next(self.set_numbers), "of": 1,
+            "limit_px": limit_px,
+        }  # fmt: skip
 
     async def send_overlay(self, sockets=None, candidate=None):
         paths, segments, handles = [], [], []
@@ -353,6 +371,8 @@ class FakeEndpoint:
         for camera in range(self.n_cameras):
             for person in range(self.n_people):
                 add(camera, person, "model", COLORS[person], self.outline(camera, person, 0.0))
+                if "hidden" in self.views[-1]["layers"]:
+                    add(camera, person, "hidden", COLORS[person], HIDDEN_LINE)
                 if candidate is not None:
                     add(camera, person, "candidate", "#ffffff", self.outline(camera, person, candidate))
                 for (p, name), at in self.pose.items():
@@ -387,25 +407,29 @@ class FakeEndpoint:
             lines.append(np.concatenate([ring[:-1], ring[1:]], axis=1))
         return np.concatenate(lines)
 
-    def jpeg(self, camera, frame, base):
-        """A room with a bright figure; each frame shows its number."""
-        key = (camera, frame, base)
+    def picture(self, camera, frame, layer):
+        """The image of a room with a bright figure that shows its number; masks and a distance image of even colour."""
+        size = self.sizes[camera % len(self.sizes)]
+        key = (camera, frame if layer == "image" else 0, layer)
         if key not in self.jpegs:
-            rows = np.linspace(90, 50, HEIGHT)[:, None, None] * np.array([1.0, 0.95, 0.9])
-            image = np.broadcast_to(rows, (HEIGHT, WIDTH, 3)).astype(np.uint8).copy()
-            cv2.rectangle(image, (0, 380), (WIDTH, HEIGHT), (70, 78, 84), -1)
-            for x in range(-40, WIDTH, 90):
-                cv2.rectangle(image, (x + 9 * camera, 60), (x + 50 + 9 * camera, 250), (96, 88, 82), 3)
-            for names in BONES:
-                ends = project(np.array([REST[n] for n in names]), camera).round().astype(int)
-                cv2.line(image, ends[0], ends[1], (150, 160, 190), 24, cv2.LINE_AA)
-            cv2.putText(image, str(frame), (280, 460), cv2.FONT_HERSHEY_SIMPLEX, 1.0, (200, 200, 200), 2, cv2.LINE_AA)
-            if base != "image":
-                image = cv2.Canny(image, 40, 80)
-            if base == "distance":
-                image = np.minimum(3 * cv2.distanceTransform(255 - image, cv2.DIST_L2, 5), 255).astype(np.uint8)
-            self.jpegs[key] = cv2.imencode(".jpg", image)[1].tobytes()
+            color = {"silhouette": (140, 224, 74), "distance": (164, 255, 252), "parts": (30, 30, 250)}.get(layer)
+            image = room(camera, frame) if color is None else np.full((HEIGHT, WIDTH, 3), color, np.uint8)
+            self.jpegs[key] = cv2.imencode(".jpg", cv2.resize(image, size))[1].tobytes()
         return self.jpegs[key]
+
+
+def room(camera, frame):
+    """A room with a bright figure, (HEIGHT, WIDTH, 3)."""
+    rows = np.linspace(90, 50, HEIGHT)[:, None, None] * np.array([1.0, 0.95, 0.9])
+    image = np.broadcast_to(rows, (HEIGHT, WIDTH, 3)).astype(np.uint8).copy()
+    cv2.rectangle(image, (0, 380), (WIDTH, HEIGHT), (70, 78, 84), -1)
+    for x in range(-40, WIDTH, 90):
+        cv2.rectangle(image, (x + 9 * camera, 60), (x + 50 + 9 * camera, 250), (96, 88, 82), 3)
+    for names in BONES:
+        ends = project(np.array([REST[n] for n in names]), camera).round().astype(int)
+        cv2.line(image, ends[0], ends[1], (150, 160, 190), 24, cv2.LINE_AA)
+    cv2.putText(image, str(frame), (280, 460), cv2.FONT_HERSHEY_SIMPLEX, 1.0, (200, 200, 200), 2, cv2.LINE_AA)
+    return image
 
 
 async def main(port):

@@ -78,12 +78,16 @@ async def test_images_of_a_frame_change_together_and_the_latest_wins(page, endpo
           requestAnimationFrame(watch);
         }"""
     )
-    base = {"type": "image", "base": "image"}
-    for camera in range(3):  # a frame that never becomes complete
-        await endpoint.send_binary(base | {"camera": camera, "frame": 40}, endpoint.jpeg(camera, 40, "image"))
+
+    async def send(frame, n_cameras):
+        together = {"set": 1000 + frame, "of": 4}
+        for camera in range(n_cameras):
+            header, picture = endpoint.header(camera, frame), endpoint.picture(camera, frame, "image")
+            await endpoint.send_binary(header | together, picture)
+
+    await send(40, 3)  # never becomes complete
     for frame in (41, 42, 43):
-        for camera in range(4):
-            await endpoint.send_binary(base | {"camera": camera, "frame": frame}, endpoint.jpeg(camera, frame, "image"))
+        await send(frame, 4)
     await shows(page, "quadrille.state.shown.frame === 43")
     seen = await page.evaluate("window.seen")
     assert 40 not in seen
@@ -112,8 +116,6 @@ async def test_vectors_wait_for_the_images_of_their_own_frame(page, endpoint):
     for frame in (41, 42):
         endpoint.state["frame"] = frame
         await endpoint.send_overlay()
-    for camera in range(4):
-        header = {"type": "image", "base": "image", "camera": camera, "frame": 41}
-        await endpoint.send_binary(header, endpoint.jpeg(camera, 41, "image"))
+    await endpoint.send_binary(endpoint.header(0, 41), endpoint.picture(0, 41, "image"))
     await shows(page, "quadrille.state.shown.frame === 41")
     await shows(page, "quadrille.state.overlay.frame === 41")

@@ -15,7 +15,7 @@ PIXEL = """([x, y]) => {
 
 async def test_all_cameras_are_shown_with_names_and_costs(page):
     assert await page.locator(".pane").count() == 4
-    assert await page.locator(".pane-label span").all_inner_texts() == ["FRONT", "RIGHT", "BACK", "LEFT"]
+    assert await page.locator(".pane-name").all_inner_texts() == ["FRONT", "RIGHT", "BACK", "LEFT"]
     assert await page.locator(".pane-cost").all_inner_texts() == ["0.84 px", "1.10 px", "2.31 px", "–"]
     assert await page.locator("#cost").inner_text() == "1.47"
     assert await page.locator("#session-name").inner_text() == "elbow_rotation"
@@ -155,18 +155,15 @@ async def test_zoom_stays_at_the_pointer_and_zero_resets_it(page):
 
 
 async def test_layers_are_asked_for_and_shown_at_once(page, endpoint):
-    await page.get_by_text("Distance", exact=True).click()
-    await shows(page, "quadrille.state.shown.base === 'distance'")
-    await page.get_by_text("Contours", exact=True).click()
-    await until(lambda: len(endpoint.heard("view")) == 2)
-    first, second = endpoint.heard("view")
-    assert first["base"] == second["base"] == "distance"
-    assert second["overlays"] == {
-        "contours": False, "joints": True, "part_edges": False, "skeleton": True, "segments": False,
-    }  # fmt: skip
-    await page.get_by_text("Joints", exact=True).click()
-    await page.get_by_text("Skeleton", exact=True).click()
+    (first,) = endpoint.views
+    assert first["layers"] == ["image", "contours", "joints", "epipolar"]
+    assert first["reductions"] == [1, 1, 1, 1]
+    await page.locator("#quick-layers").get_by_text("Distance").click()
+    await shows(page, "'distance 3' in quadrille.state.shown.pictures")
+    await page.locator("#quick-layers").get_by_text("Contours").click()
+    await page.locator("#quick-layers").get_by_text("Joints").click()
     await shows(page, f"({DRAWN}) === 0")
+    await until(lambda: set(endpoint.views[-1]["layers"]) == {"image", "distance", "epipolar"})
 
 
 DRAWN = """[...document.querySelectorAll(".pane-overlay")].reduce((sum, canvas) => {
@@ -188,12 +185,13 @@ async def test_layers_change_before_the_program_answers(page, endpoint):
         pass
 
     endpoint.answer = silence
-    await page.get_by_text("Contours", exact=True).click()
-    await shows(page, "!quadrille.state.state.overlays.contours")
+    await page.locator("#quick-layers").get_by_text("Contours").click()
+    await page.locator("#quick-layers").get_by_text("Joints").click()
+    await shows(page, f"({DRAWN}) === 0")
 
 
 async def test_hidden_joints_cannot_be_grabbed(page, endpoint):
-    await page.get_by_text("Joints", exact=True).click()
+    await page.locator("#quick-layers").get_by_text("Joints").click()
     async with dragging(page, 0, "head", (10, 10), (20, 20)):
         pass
     assert not endpoint.heard("drag")

@@ -1,0 +1,71 @@
+"""The pictures that a page shows and does not have yet, as sets that it puts on the screen at once."""
+
+import asyncio
+import itertools
+
+from app import messages, overlays, pictures
+from app.controller import Controller
+from app.layers import EVIDENCE, Picture, View
+from app.state import State
+from tracker.body import Body
+
+Key = tuple[Picture, int]
+"""Layer and camera."""
+
+
+class PictureSets:
+    """What one page has been sent."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Begin with nothing."""
+        self._controller = controller
+        self._sent: dict[Key, tuple[object, ...]] = {}
+        self._numbers = itertools.count(1)
+
+    async def missing(self, state: State, view: View) -> list[bytes]:
+        """Make the pictures that the page lacks; they count as sent.
+
+        None where the page is on another frame by the time that they are made. A tracker always is, and is to be
+        watched.
+        """
+        wanted = _wanted(state, view)
+        missing = [key for key, content in wanted.items() if self._sent.get(key) != content]
+        self._sent = wanted
+        made = await asyncio.gather(*(asyncio.to_thread(self._make, key, state, view) for key in missing))
+        now = self._controller.state
+        if now.frame != state.frame and not now.track.running:
+            self._sent = {}
+            return []
+        number = next(self._numbers)
+        common = {"type": "image", "frame": state.frame, "set": number, "of": len(missing)}
+        return [
+            messages.binary(common | {"layer": layer, "camera": camera, "limit_px": limit_px}, data)
+            for (layer, camera), (data, limit_px) in zip(missing, made, strict=True)
+        ]
+
+    def _make(self, key: Key, state: State, view: View) -> tuple[bytes, float | None]:
+        """A picture, and what the darkest colour of a distance image means, px."""
+        layer, camera = key
+        reduction, session, frames = view.reductions[camera], self._controller.session, self._controller.frames
+        if layer == "image":
+            return frames.image(state.frame, camera, reduction), None
+        if layer == "parts":
+            bodies = [Body(p.model, v) for p, v in zip(session.people, state.drawn.poses, strict=True)]
+            pinhole = session.cameras[camera].camera.pinhole
+            return pictures.parts(bodies, pinhole, overlays.part_colors(session), reduction), None
+        evidence = frames.evidence(state.frame)[camera]
+        if layer == "silhouette":
+            return pictures.silhouette(evidence), None
+        return pictures.distance(evidence), pictures.distance_limit_px(evidence)
+
+
+def _wanted(state: State, view: View) -> dict[Key, tuple[object, ...]]:
+    """What the page shows, and what each picture depends on."""
+    wanted: dict[Key, tuple[object, ...]] = {}
+    for layer in view.pictures:
+        for camera in sorted(view.cameras):
+            # Evidence comes at the scale of matching, whatever the pane.
+            content = () if layer in EVIDENCE else (view.reductions[camera],)
+            poses = tuple(id(p) for p in state.drawn.poses) if layer == "parts" else ()
+            wanted[layer, camera] = (state.frame, *content, *poses)
+    return wanted

@@ -1,0 +1,120 @@
+"""Pictures for the page: footage and evidence as JPEG; masks as PNG that is transparent where there is nothing."""
+
+import struct
+import zlib
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.body import Body
+from tracker.cameras import Camera
+from tracker.evidence import ViewEvidence
+from tracker.part_masks import part_labels
+from tracker.silhouettes import Image, Mask
+
+SILHOUETTE_COLOR = "#4ae08c"
+_JPEG_QUALITY = 85
+_FAST = 1
+"""Masks are large even areas: zlib's least effort makes them as small as its best, in a fraction of the time."""
+
+
+def footage(image: Image | None, size: tuple[int, int], reduction: int) -> bytes:
+    """An image of the footage as JPEG.
+
+    Args:
+        image: undistorted, (H, W, 3) RGB; None where the frame is damaged.
+        size: width and height of the image, px.
+        reduction: pixels of the image, along either side, for one of the picture.
+    """
+    if image is None:
+        image = _blank(size, "frame damaged")
+    if reduction > 1:
+        height, width = image.shape[:2]
+        smaller = (max(1, round(width / reduction)), max(1, round(height / reduction)))
+        image = np.asarray(cv2.resize(image, smaller, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    return _jpeg(image)
+
+
+def distance(view: ViewEvidence) -> bytes:
+    """The distance image of a view as JPEG, bright at the edges, dark where its limit is reached."""
+    near = 1.0 - view.distance / max(1e-6, 2 * view.theta_px)
+    coloured = cv2.applyColorMap((255 * near).astype(np.uint8), cv2.COLORMAP_INFERNO)
+    return _jpeg(np.asarray(cv2.cvtColor(coloured, cv2.COLOR_BGR2RGB), dtype=np.uint8))
+
+
+def distance_limit_px(view: ViewEvidence) -> float:
+    """The distance at which the picture of the distance image is darkest, px of the footage."""
+    return 2 * view.theta_px / view.scale
+
+
+def silhouette(view: ViewEvidence) -> bytes:
+    """Everybody's silhouette in a view as PNG of one bit per pixel; empty where nothing tells it."""
+    if view.silhouette is None:
+        return mask(np.zeros((view.camera.height, view.camera.width), np.bool_), SILHOUETTE_COLOR)
+    return mask(view.silhouette.inside, SILHOUETTE_COLOR)
+
+
+def mask(inside: Mask, color: str) -> bytes:
+    """A mask, (H, W), in one colour as PNG of one bit per pixel."""
+    return _png(np.packbits(inside, axis=1), inside.shape[1], 1, [color])
+
+
+def labels(parts: NDArray[np.uint8], colors: Sequence[str]) -> bytes:
+    """Labels, (H, W), as PNG: 0 is transparent, k has the k-th of the colours, counted from 1."""
+    return _png(parts, parts.shape[1], 8, colors)
+
+
+def parts(bodies: Sequence[Body], camera: Camera, colors: Sequence[str], reduction: int) -> bytes:
+    """What the parts of the bodies cover, each in its colour, as PNG.
+
+    Args:
+        bodies: everybody in the scene.
+        camera: the view, without lens distortion.
+        colors: of the parts, counted through all bodies.
+        reduction: pixels of the image, along either side, for one of the picture.
+    """
+    return labels(part_labels(bodies, camera.scaled(1 / reduction)), colors)
+
+
+def _png(rows: NDArray[np.uint8], width: int, depth: int, colors: Sequence[str]) -> bytes:
+    """A PNG with a palette whose first entry is transparent.
+
+    Args:
+        rows: bytes of the rows, (H, bytes).
+        width: of the picture, px.
+        depth: bits per pixel.
+        colors: `#rrggbb` of the entries from the second on.
+    """
+    height = rows.shape[0]
+    unfiltered = np.zeros((height, rows.shape[1] + 1), np.uint8)  # each row begins with the number of its filter
+    unfiltered[:, 1:] = rows
+    palette = bytes(3) + b"".join(bytes.fromhex(color[1:]) for color in colors)
+    indexed = 3
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        _chunk(name, data)
+        for name, data in (
+            (b"IHDR", struct.pack(">IIBBBBB", width, height, depth, indexed, 0, 0, 0)),
+            (b"PLTE", palette),
+            (b"tRNS", b"\0"),
+            (b"IDAT", zlib.compress(unfiltered.data, _FAST)),
+            (b"IEND", b""),
+        )
+    )
+
+
+def _chunk(name: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
+
+def _blank(size: tuple[int, int], text: str) -> Image:
+    image = np.full((size[1], size[0], 3), 24, np.uint8)
+    cv2.putText(image, text, (20, size[1] // 2), cv2.FONT_HERSHEY_SIMPLEX, size[0] / 640, (200, 200, 200), 2)
+    return image
+
+
+def _jpeg(image: Image) -> bytes:
+    done, data = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    assert done
+    return bytes(data)

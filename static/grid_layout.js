@@ -1,0 +1,59 @@
+/** Where the panes of a grid lie. All sizes are CSS pixels. */
+
+/** Between neighbours. */
+const GAP = 2;
+
+/** @typedef {{x: number, y: number, width: number, height: number}} Box */
+
+/**
+ * Lay images out in rows, all at one height, so that they are as large as the space allows. Panes of a row are as wide in
+ * proportion as their images; a row that is not full stands in the middle.
+ *
+ * @param {number[]} aspects width by height of each image
+ * @param {number} width
+ * @param {number} height
+ * @returns {Box[]}
+ */
+export function layOut(aspects, width, height) {
+  let best = { size: -1, rows: /** @type {number[][]} */ ([]) };
+  for (let count = 1; count <= aspects.length; count += 1) {
+    const rows = inRows(aspects, count);
+    const size = Math.min(height / rows.length, width / widest(rows));
+    if (size > best.size) best = { size, rows };
+  }
+  const { rows } = best;
+  const perAspect = Math.min(...rows.map((row) => (width - GAP * (row.length - 1)) / sum(row)));
+  const rowHeight = Math.floor((height - GAP * (rows.length - 1)) / rows.length);
+  return rows.flatMap((row, index) => {
+    const widths = row.map((aspect) => Math.max(1, Math.floor(aspect * perAspect)));
+    let x = Math.max(0, Math.floor((width - sum(widths) - GAP * (row.length - 1)) / 2));
+    return widths.map((paneWidth) => {
+      const box = { x, y: index * (rowHeight + GAP), width: paneWidth, height: Math.max(1, rowHeight) };
+      x += paneWidth + GAP;
+      return box;
+    });
+  });
+}
+
+/**
+ * Fill rows in order, none longer than it must be for their number. Equal images then stand in columns.
+ *
+ * @param {number[]} aspects
+ * @param {number} count
+ */
+function inRows(aspects, count) {
+  const perRow = Math.ceil(aspects.length / count);
+  const rows = [];
+  for (let first = 0; first < aspects.length; first += perRow) rows.push(aspects.slice(first, first + perRow));
+  return rows;
+}
+
+/** @param {number[][]} rows */
+function widest(rows) {
+  return Math.max(...rows.map(sum));
+}
+
+/** @param {number[]} values */
+function sum(values) {
+  return values.reduce((total, value) => total + value, 0);
+}

@@ -1,0 +1,184 @@
+/**
+ * The layers of the panes: which are shown, how strongly, and what remembers it. The choice belongs to whoever looks, so each
+ * browser keeps its own, session by session.
+ */
+
+/**
+ * @typedef {import("./protocol.js").Layer} Layer
+ * @typedef {"person" | "part"} ContourColors
+ * @typedef {{shown: Record<Layer, boolean>, opacity: Record<Layer, number>, colors: ContourColors}} LayerChoice
+ *
+ * @typedef {object} LayerInfo
+ * @property {Layer} id
+ * @property {string} group
+ * @property {string} label
+ * @property {string} title
+ * @property {boolean} shown at first
+ * @property {number} opacity at first
+ */
+
+/** @type {LayerInfo[]} in the order in which they are painted, one over the other */
+export const LAYERS = [
+  { id: "image", group: "Picture", label: "Image", title: "The image, undistorted", shown: true, opacity: 1 },
+  {
+    id: "distance",
+    group: "Evidence",
+    label: "Distance",
+    title: "The distance to the nearest edge: bright at the edges, dark where it no longer counts",
+    shown: false,
+    opacity: 0.7,
+  },
+  {
+    id: "silhouette",
+    group: "Evidence",
+    label: "Silhouette",
+    title: "What masks or the background tell to be people",
+    shown: false,
+    opacity: 0.45,
+  },
+  {
+    id: "rejected",
+    group: "Evidence",
+    label: "Rejected edges",
+    title: "Edges that this pose does not explain",
+    shown: false,
+    opacity: 0.8,
+  },
+  {
+    id: "accepted",
+    group: "Evidence",
+    label: "Accepted edges",
+    title: "Edges that this pose explains",
+    shown: false,
+    opacity: 1,
+  },
+  {
+    id: "parts",
+    group: "Model",
+    label: "Part masks",
+    title: "What each part of the body covers, the nearer before the farther",
+    shown: false,
+    opacity: 0.5,
+  },
+  {
+    id: "part_edges",
+    group: "Model",
+    label: "Part edges",
+    title: "Where parts meet inside the silhouette: shown, never matched",
+    shown: false,
+    opacity: 0.75,
+  },
+  {
+    id: "hidden",
+    group: "Model",
+    label: "Hidden contours",
+    title: "Contours that parts hide, dashed",
+    shown: false,
+    opacity: 0.8,
+  },
+  { id: "contours", group: "Model", label: "Contours", title: "The model's visible contours", shown: true, opacity: 1 },
+  { id: "skeleton", group: "Model", label: "Skeleton", title: "Lines between the joints", shown: false, opacity: 0.8 },
+  { id: "joints", group: "Model", label: "Joints", title: "The joints, to be dragged", shown: true, opacity: 1 },
+  {
+    id: "epipolar",
+    group: "Model",
+    label: "Epipolar lines",
+    title: "The line of sight of a dragged joint, as the other cameras see it",
+    shown: true,
+    opacity: 0.9,
+  },
+];
+
+/** Layers by key: Shift 1 toggles the first, and so on. The menu lists them in this order, group by group. */
+export const BY_KEY = /** @type {Layer[]} */ ([
+  "image", "distance", "silhouette", "accepted", "rejected", "contours", "hidden", "parts", "skeleton",
+]); // prettier-ignore
+
+const STORED = "quadrille.layers.";
+
+/** @returns {LayerChoice} */
+export function usualLayers() {
+  const table = (/** @type {"shown" | "opacity"} */ field) => Object.fromEntries(LAYERS.map((l) => [l.id, l[field]]));
+  return /** @type {LayerChoice} */ ({ shown: table("shown"), opacity: table("opacity"), colors: "person" });
+}
+
+export class Layers {
+  #store;
+  #session = "";
+
+  /** @param {import("./store.js").Store} store */
+  constructor(store) {
+    this.#store = store;
+    store.subscribe((changed) => {
+      if (changed.has("session")) this.#recall();
+    });
+  }
+
+  /**
+   * Show or hide layers; those of one call are one thing to the user.
+   *
+   * @param {Layer[]} ids
+   * @param {boolean} [isShown] by default all are shown, or hidden where they all are shown already
+   */
+  toggle(ids, isShown) {
+    const { layers } = this.#store.facts;
+    const show = isShown ?? !ids.every((id) => layers.shown[id]);
+    const shown = { ...layers.shown };
+    for (const id of ids) shown[id] = show;
+    this.#keep({ ...layers, shown });
+  }
+
+  /**
+   * @param {Layer} id
+   * @param {number} opacity from 0 to 1
+   */
+  setOpacity(id, opacity) {
+    const { layers } = this.#store.facts;
+    this.#keep({ ...layers, opacity: { ...layers.opacity, [id]: opacity } });
+  }
+
+  /** @param {ContourColors} colors */
+  setColors(colors) {
+    this.#keep({ ...this.#store.facts.layers, colors });
+  }
+
+  reset() {
+    this.#keep(usualLayers());
+  }
+
+  /** @param {LayerChoice} layers */
+  #keep(layers) {
+    this.#store.set({ layers });
+    localStorage.setItem(STORED + this.#session, JSON.stringify(layers));
+  }
+
+  #recall() {
+    const name = this.#store.facts.session?.name ?? "";
+    if (name === this.#session) return;
+    this.#session = name;
+    this.#store.set({ layers: known(localStorage.getItem(STORED + name)) });
+  }
+}
+
+/**
+ * What was stored, as far as it is understood: another version may have had other layers.
+ *
+ * @param {string | null} stored
+ */
+function known(stored) {
+  const layers = usualLayers();
+  /** @type {Partial<LayerChoice>} */
+  let found;
+  try {
+    found = JSON.parse(stored ?? "{}") ?? {};
+  } catch {
+    return layers;
+  }
+  for (const { id } of LAYERS) {
+    const [isShown, opacity] = [found.shown?.[id], found.opacity?.[id]];
+    if (typeof isShown === "boolean") layers.shown[id] = isShown;
+    if (typeof opacity === "number" && opacity >= 0 && opacity <= 1) layers.opacity[id] = opacity;
+  }
+  if (found.colors === "part") layers.colors = "part";
+  return layers;
+}

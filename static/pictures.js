@@ -1,0 +1,74 @@
+/** Puts the pictures of a set together, so that the panes change at once. Decoding is the browser's, beside the page's thread. */
+
+/**
+ * @typedef {import("./protocol.js").ImageHeader} ImageHeader
+ * @typedef {{bitmap: ImageBitmap, limitPx: number | null}} Picture
+ * @typedef {Map<string, Picture>} Pictures by layer and camera, see `keyOf`
+ * @typedef {{header: ImageHeader, blob: Blob}} Arrived
+ */
+
+/**
+ * @param {import("./protocol.js").PictureLayer} layer
+ * @param {number} camera
+ */
+export function keyOf(layer, camera) {
+  return `${layer} ${camera}`;
+}
+
+export class PictureAssembler {
+  #onShow;
+  /** @type {Arrived[]} of one set */
+  #arriving = [];
+  /** @type {{frame: number, pictures: Map<string, Arrived>} | null} complete sets of the newest frame that wait for the decoder */
+  #waiting = null;
+  #decoding = false;
+  #closed = false;
+
+  /** @param {(frame: number, pictures: Pictures) => void} onShow takes over the bitmaps */
+  constructor(onShow) {
+    this.#onShow = onShow;
+  }
+
+  /**
+   * Take one picture. A set that was not complete when another begins is dropped.
+   *
+   * @param {ImageHeader} header
+   * @param {ArrayBuffer} payload
+   */
+  receive(header, payload) {
+    if (this.#arriving[0]?.header.set !== header.set) this.#arriving = [];
+    this.#arriving.push({ header, blob: new Blob([payload]) });
+    if (this.#arriving.length < header.of) return;
+    if (this.#waiting?.frame !== header.frame) this.#waiting = { frame: header.frame, pictures: new Map() };
+    for (const one of this.#arriving) this.#waiting.pictures.set(keyOf(one.header.layer, one.header.camera), one);
+    this.#arriving = [];
+    void this.#decode();
+  }
+
+  /** Forget everything on its way. */
+  close() {
+    this.#closed = true;
+  }
+
+  async #decode() {
+    if (this.#decoding) return;
+    this.#decoding = true;
+    while (this.#waiting) {
+      const { frame, pictures } = this.#waiting;
+      this.#waiting = null;
+      try {
+        const decoded = await Promise.all(
+          [...pictures].map(async ([key, { header, blob }]) => {
+            const picture = { bitmap: await createImageBitmap(blob), limitPx: header.limit_px };
+            return /** @type {[string, Picture]} */ ([key, picture]);
+          }),
+        );
+        if (this.#closed) decoded.forEach(([, { bitmap }]) => bitmap.close());
+        else this.#onShow(frame, new Map(decoded));
+      } catch (error) {
+        console.error(`frame ${frame}: a picture could not be decoded`, error);
+      }
+    }
+    this.#decoding = false;
+  }
+}

@@ -1,0 +1,35 @@
+/** Tells the program what this page shows: its layers, and how fine a picture each pane can use. */
+
+export class ViewRequest {
+  #store;
+  #send;
+  #sent = "";
+
+  /**
+   * @param {import("./store.js").Store} store
+   * @param {(message: import("./protocol.js").ClientMessage) => void} send
+   */
+  constructor(store, send) {
+    this.#store = store;
+    this.#send = send;
+    store.subscribe((changed) => {
+      // The session comes first on every connection, and the program of a new one knows nothing of this page.
+      if (changed.has("session")) this.#sent = "";
+      if (changed.has("session") || changed.has("layers") || changed.has("reductions")) this.#ask();
+    });
+  }
+
+  #ask() {
+    const { session, layers, reductions } = this.#store.facts;
+    if (!session || reductions.length !== session.cameras.length) return;
+    const shown = /** @type {import("./protocol.js").Layer[]} */ (Object.keys(layers.shown)).filter(
+      (id) => layers.shown[id],
+    );
+    /** @type {import("./protocol.js").ClientMessage} */
+    const message = { type: "view", layers: shown, reductions, by_part: layers.colors === "part" };
+    const text = JSON.stringify(message);
+    if (text === this.#sent) return;
+    this.#sent = text;
+    this.#send(message);
+  }
+}
