@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from tracker import silhouettes
@@ -26,9 +27,11 @@ from tracker.segments import Segments, accept, link_edges, pixels_of
 from tracker.session import CameraSource
 from tracker.silhouette_contour import Outline, trace_outline, trust_outline
 from tracker.silhouettes import Changes, Image, Mask
-from tracker.thinning import at_intervals, first_in_cells
 
 FloatArray = NDArray[np.float32]
+
+SCENE_SPACING_PX = 3
+"""Scene edges are thinned to one point per cell of this many pixels a side."""
 
 ACCEPTED_SHARE = 0.5
 """Mean distance to the predicted contours up to which a segment of edges is accepted, as a share of theta."""
@@ -208,8 +211,24 @@ def _matched_edges(
             points, normals, found = points[kept], normals[kept], np.zeros_like(found)
             u, v = points.T.astype(np.intp)
             found[v, u] = 1
-    kept = first_in_cells(points, *found.shape) if segments is None else at_intervals(points)
-    return points[kept], normals[kept], found
+    first = _first_in_cells(points, *found.shape)
+    return points[first], normals[first], found
+
+
+@njit(nogil=True, cache=True)
+def _first_in_cells(points: FloatArray, height: int, width: int) -> NDArray[np.int64]:
+    """Index of the first of the points (N, 2) in each cell of the scene spacing, (M,)."""
+    columns = width // SCENE_SPACING_PX + 1
+    taken = np.zeros((height // SCENE_SPACING_PX + 1) * columns, np.bool_)
+    first = np.empty(points.shape[0], np.int64)
+    n = 0
+    for i in range(points.shape[0]):
+        cell = (int(points[i, 1]) // SCENE_SPACING_PX) * columns + int(points[i, 0]) // SCENE_SPACING_PX
+        if not taken[cell]:
+            taken[cell] = True
+            first[n] = i
+            n += 1
+    return first[:n].copy()
 
 
 class _Prepared(NamedTuple):
@@ -375,6 +394,6 @@ class Observer:
 
 def _silhouette(inside: Mask, edges: Edges, limit_px: float) -> Silhouette:
     outline = trace_outline(inside)
-    kept = at_intervals(outline.points_px)
+    first = _first_in_cells(outline.points_px, *inside.shape)
     trust = trust_outline(outline, inside, edges)
-    return Silhouette(inside, outline.points_px[kept], outline.normals[kept], trust, outline, limit_px)
+    return Silhouette(inside, outline.points_px[first], outline.normals[first], trust, outline, limit_px)

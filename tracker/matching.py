@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from tracker import contours
 from tracker.contours import FloatArray
+from tracker.evidence import SCENE_SPACING_PX
 from tracker.kernels import FAST
 from tracker.kinematics import IntArray
 from tracker.nearest import LANES, cells_within
 from tracker.rigid import Array
 from tracker.sampling import bilinear
-from tracker.thinning import SCENE_SPACING_PX
 from tracker.twists import add_twists
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernel's arithmetic into float64

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker import contours
-from tracker.thinning import SCENE_SPACING_PX
+from tracker.evidence import SCENE_SPACING_PX
 
 
 class Matches(NamedTuple):

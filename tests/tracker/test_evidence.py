@@ -11,6 +11,7 @@ from tracker.cameras import Camera
 from tracker.errors import RecordingError
 from tracker.evidence import (
     FOREGROUND_MARGIN,
+    SCENE_SPACING_PX,
     Observer,
     accepted,
     default_theta_px,
@@ -21,7 +22,6 @@ from tracker.matched import MatchedView, match_scale, region_around
 from tracker.recording import Recording
 from tracker.segments import pixels_of
 from tracker.session import CameraSource, load_session
-from tracker.thinning import SCENE_SPACING_PX
 
 
 class Frames:
@@ -117,7 +117,7 @@ def test_distance_image():
     assert (distance_image(np.zeros((4, 5), dtype=bool), 7.0) == 7).all()
 
 
-def test_edges_of_unknown_direction_give_one_point_to_a_cell():
+def test_scene_points_are_edges_one_to_a_cell():
     camera = camera_at("c", (4, 0, 0), size=(90, 60))
     edges = np.zeros((60, 90), dtype=bool)
     edges[10, 5:80] = edges[20:50, 40] = True
@@ -128,27 +128,6 @@ def test_edges_of_unknown_direction_give_one_point_to_a_cell():
     assert len(cells) == len(u)
     all_v, all_u = np.nonzero(edges)
     assert cells == set(zip(all_u // SCENE_SPACING_PX, all_v // SCENE_SPACING_PX, strict=True))
-
-
-def test_linked_edges_give_points_at_even_intervals():
-    """Straight, diagonal or in short pieces: one point in so many pixels of length."""
-    camera = camera_at("c", (4, 0, 0), size=(200, 160))
-    edges = np.zeros((160, 200), np.uint8)
-    edges[10, 5:185] = 255
-    diagonal = np.arange(120)
-    edges[20 + diagonal, 20 + diagonal] = 255
-    edges[30, 170:174] = edges[40, 170:174] = edges[50, 170:174] = edges[60, 170:174] = 255
-    gradients = np.zeros((2, 160, 200), np.int16)
-    gradients[1] = 100
-    view = view_evidence(camera, 1.0, edges, gradients=gradients)
-    u, v = view.points_px.astype(int).T
-    assert edges[v, u].all()
-    straight, diagonal = view.points_px[v == 10], view.points_px[(v > 10) & (u < 170)]
-    for points, length in ((straight, 180.0), (diagonal, 120 * np.sqrt(2))):
-        assert len(points) == pytest.approx(length / SCENE_SPACING_PX, abs=1.5)
-        gaps = np.linalg.norm(np.diff(np.sort(points, axis=0), axis=0), axis=1)
-        assert np.abs(gaps - SCENE_SPACING_PX).max() <= np.sqrt(2)
-    assert np.sum((v > 10) & (u >= 170)) == pytest.approx(16 / SCENE_SPACING_PX, abs=1)
 
 
 def test_a_damaged_frame_has_no_edges():

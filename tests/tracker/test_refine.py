@@ -6,11 +6,10 @@ from match_oracle import MatchOracle, without_ties
 from staging import at, camera_at, cameras_around, edge_map, own_evidence, posed, shaken, solid
 
 from tracker.body import Body
-from tracker.evidence import Silhouette, ViewEvidence, view_evidence
+from tracker.evidence import SCENE_SPACING_PX, Silhouette, ViewEvidence, view_evidence
 from tracker.fit import StayNear, solve
 from tracker.formats.model_toml import PRESETS, load_model
 from tracker.refine import ContourMatch, MatchSettings
-from tracker.thinning import SCENE_SPACING_PX
 
 MODELS = {"box": solid((0.15, 0.2, 0.5), (0.3, 0.6)), "egg": solid((0.15, 0.2, 0.3)), "drop": solid((0.2, 0.2, 0.5))}
 MODELS |= {name: load_model(name) for name in PRESETS}
@@ -302,8 +301,7 @@ def test_regions_of_the_images_change_nothing(gavrila):
     views, body, values = staged(gavrila)
     truth = [Body(gavrila, values)]
     # Corners at multiples of the cells that edge points are thinned by, so that the same ones are left.
-    s = SCENE_SPACING_PX
-    windows = [(0, 0, 640, 480), (9 * s, 8 * s, 600, 480), (8 * s, 0, 640, 472)]
+    windows = [(0, 0, 640, 480), (9 * SCENE_SPACING_PX, 30, 600, 480), (30, 0, 640, 472)]
     regions = [cropped(v, truth, w) for v, w in zip(views, windows, strict=True)]
     assert [r.theta_px for r in regions] == [v.theta_px for v in views]
     whole, part = (normal(ContourMatch(v, [body]), body) for v in (views, regions))
