@@ -25,7 +25,9 @@ from app.screen import Screen
 from app.searching import Searching
 from app.state import State
 from app.tracking import Tracking
+from app.viewing import Viewing
 from tracker.records import FrameNumbers
+from tracker.rigid import Array
 from tracker.session import Session
 from tracker.track import TrackSettings
 
@@ -61,6 +63,8 @@ class Controller:
         """Looks back at searches."""
         self.landscape = Landscapes(self._screen, self.editing)
         """Looks at the cost along one degree of freedom."""
+        self.view_3d = Viewing(self._screen)
+        """What the 3-D view shows."""
 
     # --- views -------------------------------------------------------------------------------------------------
 
@@ -94,6 +98,14 @@ class Controller:
         with self._lock:
             frames = sorted(self._saver.timeline(since)) if since > 0 else self._saver.frames(person)
         return frames, self._saver.numbers(person, frames)
+
+    def poses(self, person: int, frames: range) -> dict[int, Array]:
+        """Stored poses of a person by frame, (n_values,) each, on those of a range of frames that have one."""
+        n_values = len(self.models[person].value_names)
+        with self._lock:
+            listed = self._saver.frames_within(person, frames)
+        rows = self._saver.numbers(person, listed)
+        return {row.frame: row.values for row in rows if len(row.values) == n_values}
 
     # --- looking -----------------------------------------------------------------------------------------------
 

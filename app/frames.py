@@ -8,6 +8,7 @@ from typing import Generic, TypeVar
 
 from app import pictures
 from tracker.evidence import Observer, ViewEvidence
+from tracker.silhouettes import Image
 
 _KEPT_FRAMES = 6
 
@@ -48,6 +49,10 @@ class Frames:
         self._evidence = _Recent(observer.evidence)
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="evidence")
         self._wanted: int | None = None
+
+    def images(self, frame: int) -> tuple[Image | None, ...]:
+        """Undistorted images of all views, as whoever else shows the frame has them too; None for a damaged one."""
+        return self._images.get(frame)
 
     def evidence(self, frame: int) -> tuple[ViewEvidence, ...]:
         """Evidence of a frame; waits for it."""

@@ -104,6 +104,11 @@ def _mark(controller: Controller, _: int, message: Message) -> None:
     {"keyframe": ranges.toggle_keyframe, "reviewed": ranges.toggle_reviewed}[message["toggle"]]()
 
 
+def _snap(controller: Controller, _: int, message: Message) -> None:
+    camera = message["camera"]
+    controller.view_3d.snap(None if camera is None else int(camera))
+
+
 _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "seek": lambda controller, _, message: controller.seek(int(message["frame"])),
     "select": lambda controller, _, message: controller.select(int(message["person"]), message.get("point")),
@@ -118,6 +123,7 @@ _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "range": _range,
     "mark": _mark,
     "stop_range": lambda controller, _, __: controller.ranges.halt(),
+    "snap": _snap,
     "undo": lambda controller, _, __: controller.undo(),
     "redo": lambda controller, _, __: controller.redo(),
     **SEARCHING,

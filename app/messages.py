@@ -76,6 +76,7 @@ def state(session: Session, state: State) -> dict[str, Any]:
         "track": _track(state.track),
         "range": asdict(state.ranges),
         "follow": state.follow,
+        "snapped": state.snapped,
         "undo": state.undo,
         "redo": state.redo,
         "saved": state.save_error is None,

@@ -75,6 +75,11 @@ class Saver:
         """The frames on which a person has a stored pose, ascending."""
         return list(self._frames[person])
 
+    def frames_within(self, person: int, frames: range) -> list[int]:
+        """Those of a range of frames on which a person has a stored pose, ascending."""
+        listed = self._frames[person]
+        return listed[bisect_left(listed, frames.start) : bisect_left(listed, frames.stop)]
+
     def keyframes(self, frames: Collection[int]) -> dict[int, dict[int, Array]]:
         """Poses of the keyframes among some frames, by frame and person."""
         return keyframes_of(self._store, self._session.people, frames)

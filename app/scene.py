@@ -1,25 +1,37 @@
-"""State to viser's 3-D scene: bodies, cameras, floor."""
+"""State to viser's 3-D scene: bodies, the ghost of the prediction, trails, floor, cameras."""
 
 import time
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import viser
 
 from app.controller import Controller
+from app.expected import prediction
+from app.frusta import Frusta
 from app.jobs import Latest
+from app.snap import SnapView
 from app.state import State
+from app.trails import Trails
+from app.view_choice import View3d
+from app.view_panel import ViewPanel
 from tracker import rigid
 from tracker.body import Body
 from tracker.cameras import Camera, viewed_point
 from tracker.contours import part_poses
 from tracker.posing import UP_ROTATIONS
+from tracker.rigid import Array
 from tracker.session import Session
 
-_FRUSTUM_M = 0.25
 _REST_S = 0.08
 """Time between updates: drawing the scene costs the browser more than drawing the panes, which go first."""
 _SLOW_REST_S = 1.0
 """The same while a tracker runs and a page draws the scene without a graphics card."""
+_CELL_RGB, _SECTION_RGB = (112, 116, 122), (140, 145, 152)
+"""Lines of the floor, legible before black, white and an image."""
+_GHOST_RGB = (150, 158, 172)
+_GHOST_OPACITY = 0.35
 
 
 class Scene:
@@ -27,68 +39,172 @@ class Scene:
 
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Build the scene and follow the controller's state."""
-        self._server, self._session = server, controller.session
-        self._shown: tuple[object, ...] = ()
+        self._server, self._controller, self._session = server, controller, controller.session
         self._shown_at = 0.0
-        _add_surroundings(server, self._session)
-        self._parts = [
-            server.scene.add_mesh_simple(
-                f"/people/{person.name}/{part.name}",
-                np.asarray(shape.mesh().vertices) + center,
-                np.asarray(shape.mesh().faces),
-                color=_rgb(part.color),
-                cast_shadow=False,
-            )
-            for person in self._session.people
-            for part, shape, center in zip(
-                person.model.parts, person.model.shapes, person.model.centers_part, strict=True
-            )
-        ]
+        self._posed: tuple[object, ...] = ()
+        self._expected: tuple[object, ...] = ()
+        self._trailed: tuple[object, ...] = ()
+        self._trails_version = controller.state.timeline_version
+        self._look: View3d | None = None
+        self._panel = ViewPanel(server, controller)
+        self._grid = _add_surroundings(server, self._session)
+        self._parts = _Parts(server, "/people", self._session)
+        self._ghost: _Parts | None = None
+        self._trails = [Trails(p.model, partial(controller.poses, i)) for i, p in enumerate(self._session.people)]
+        self._frusta = Frusta(server, controller)
         latest = Latest(self._show, "scene", _REST_S)
         controller.subscribe(latest.offer)
         latest.offer(controller.state)
+        SnapView(server, controller)
 
     def _show(self, state: State) -> None:
         state = state.drawn
-        poses = tuple(id(p) for p in state.poses)
         is_slow = state.track.running and bool(state.holding_3d)
-        if poses == self._shown or state.rests_3d or (is_slow and time.monotonic() < self._shown_at + _SLOW_REST_S):
+        if state.rests_3d or (is_slow and time.monotonic() < self._shown_at + _SLOW_REST_S):
             return
-        self._shown, self._shown_at = poses, time.monotonic()
-        bodies = [Body(p.model, v) for p, v in zip(self._session.people, state.poses, strict=True)]
-        Ts = part_poses(bodies)
-        turns = rigid.quaternion_from_matrix(Ts[:, :3, :3])
+        self._shown_at = time.monotonic()
         with self._server.atomic():
-            for handle, T, wxyz in zip(self._parts, Ts, turns, strict=True):
-                handle.position, handle.wxyz = T[:3, 3], wxyz
+            self._frusta.show(state)
+            self._show_look(state.view_3d)
+            poses = tuple(id(p) for p in state.poses)
+            if poses != self._posed:
+                self._posed = poses
+                self._parts.pose(state.poses)
+            self._show_ghost(state)
+            self._show_trails(state)
+
+    def _show_look(self, view: View3d) -> None:
+        if view == self._look:
+            return
+        self._look = view
+        self._parts.look(view)
+        self._grid.visible = view.floor
+
+    def _show_ghost(self, state: State) -> None:
+        backward = state.track.running and (state.track.last or 0) < (state.track.first or 0)
+        wanted = (state.view_3d.ghost, state.frame, state.timeline_version, state.settings.predict, backward)
+        if wanted == self._expected or (not state.view_3d.ghost and self._ghost is None):
+            return
+        self._expected = wanted
+        if not state.view_3d.ghost:
+            self._panel.say_of_ghost("")
+            assert self._ghost is not None
+            self._ghost.hide()
+            return
+        frame, settings = state.frame, state.settings.predict
+        found = [
+            prediction(p.model, partial(self._controller.poses, i), frame, settings, backward)
+            for i, p in enumerate(self._session.people)
+        ]
+        several = len(found) > 1
+        told = [f"{p.name}: {f.why}" if several else f.why for p, f in zip(self._session.people, found, strict=True)]
+        self._panel.say_of_ghost("; ".join(told))
+        if self._ghost is None:
+            self._ghost = _Parts(self._server, "/prediction", self._session, _GHOST_RGB, _GHOST_OPACITY)
+        self._ghost.pose([f.values for f in found])
+
+    def _show_trails(self, state: State) -> None:
+        view, version = state.view_3d, state.timeline_version
+        wanted = (view.trail_points, view.trail_frames, state.frame, version)
+        if wanted == self._trailed or (not view.trail_points and not self._trailed):
+            return
+        self._trailed = wanted
+        if version != self._trails_version:
+            changed = self._controller.timeline(self._trails_version)
+            self._trails_version = version
+            for trails in self._trails:
+                trails.forget(changed)
+        for person, trails in zip(self._session.people, self._trails, strict=True):
+            points, colors = trails.segments(state.frame, view.trail_frames, view.trail_points, self._session.n_frames)
+            self._server.scene.add_line_segments(
+                f"/trails/{person.name}", points, colors, thickness=2.5, thickness_units="screen"
+            )
 
 
-def _add_surroundings(server: viser.ViserServer, session: Session) -> None:
-    cameras = [c.camera for c in session.cameras]
+class _Parts:
+    """The parts of everybody as meshes."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        root: str,
+        session: Session,
+        color: tuple[int, int, int] | None = None,
+        opacity: float | None = None,
+    ) -> None:
+        """Add the meshes below a node of the scene.
+
+        Args:
+            server: whose scene.
+            root: name of the node.
+            session: with the people.
+            color: of all of them; by part by default.
+            opacity: of all of them; opaque by default.
+        """
+        self._people = session.people
+        self._handles = [
+            [
+                server.scene.add_mesh_simple(
+                    f"{root}/{person.name}/{part.name}",
+                    np.asarray(shape.mesh().vertices) + center,
+                    np.asarray(shape.mesh().faces),
+                    color=color or _rgb(part.color),
+                    opacity=opacity,
+                    cast_shadow=False,
+                    receive_shadow=False,
+                )
+                for part, shape, center in zip(
+                    person.model.parts, person.model.shapes, person.model.centers_part, strict=True
+                )
+            ]
+            for person in self._people
+        ]
+
+    def pose(self, poses: Sequence[Array | None]) -> None:
+        """Put everybody where a pose, (n_values,), says; who has none is hidden."""
+        for person, handles, values in zip(self._people, self._handles, poses, strict=True):
+            if values is not None:
+                Ts = part_poses([Body(person.model, values)])
+                turns = rigid.quaternion_from_matrix(Ts[:, :3, :3])
+                for handle, T, wxyz in zip(handles, Ts, turns, strict=True):
+                    handle.position, handle.wxyz = T[:3, 3], wxyz
+            _set_visible(handles, values is not None)
+
+    def hide(self) -> None:
+        """Hide everybody."""
+        for handles in self._handles:
+            _set_visible(handles, False)
+
+    def look(self, view: View3d) -> None:
+        """Show, colour and make translucent as a view says."""
+        for person, handles in zip(self._people, self._handles, strict=True):
+            for part, handle in zip(person.model.parts, handles, strict=True):
+                handle.color = _rgb(part.color if view.colors == "parts" else person.color)
+                handle.opacity = None if view.opacity >= 1 else view.opacity
+            _set_visible(handles, view.bodies)
+
+
+def _set_visible(handles: Sequence[viser.MeshHandle], visible: bool) -> None:
+    for handle in handles:
+        if handle.visible != visible:
+            handle.visible = visible
+
+
+def _add_surroundings(server: viser.ViserServer, session: Session) -> viser.GridHandle:
     sign = "" if session.up.startswith("-") else "+"
     server.scene.set_up_direction(f"{sign}{session.up}")  # type: ignore[arg-type]
-    server.scene.add_grid(
+    _place_eye(server, [c.camera for c in session.cameras], session.up)
+    return server.scene.add_grid(
         "/floor",
         width=8.0,
         height=8.0,
         cell_size=0.5,
         section_size=1.0,
+        cell_color=_CELL_RGB,
+        section_color=_SECTION_RGB,
         wxyz=rigid.quaternion_from_matrix(UP_ROTATIONS[session.up]),
         shadow_opacity=0.0,  # shadows would double the work of a browser without a graphics card
     )
-    for camera in cameras:
-        T = camera.T_world_camera
-        server.scene.add_camera_frustum(
-            f"/cameras/{camera.name}",
-            fov=2 * float(np.arctan2(camera.height / 2, camera.K[1, 1])),
-            aspect=camera.width / camera.height,
-            scale=_FRUSTUM_M,
-            color=(120, 130, 140),
-            wxyz=rigid.quaternion_from_matrix(T[:3, :3]),
-            position=T[:3, 3],
-        )
-        server.scene.add_label(f"/cameras/{camera.name}/name", camera.name)
-    _place_eye(server, cameras, session.up)
 
 
 def _place_eye(server: viser.ViserServer, cameras: list[Camera], up: str) -> None:

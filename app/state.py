@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from app.view_choice import View3d
 from tracker.pins import ViewPin
 from tracker.rigid import Array
 from tracker.track import TrackSettings
@@ -198,6 +199,9 @@ class State:
     """For each page that drags: its number, and the last of its drag messages that this state takes in."""
     holding_3d: frozenset[int] = frozenset()
     """Numbers of the pages that want the 3-D view to rest during a drag."""
+    view_3d: View3d = field(default_factory=View3d)
+    snapped: int | None = None
+    """The camera through which the 3-D view looks, by index; None where it is free."""
     settings: TrackSettings = field(default_factory=TrackSettings)
     """What searches and trackers are told."""
     undo: str | None = None

@@ -60,6 +60,7 @@ function control(key, shift) {
  * @property {import("./inspector.js").Inspector} inspector
  * @property {import("./layers.js").Layers} layers
  * @property {import("./layers_menu.js").LayersMenu} layersMenu
+ * @property {import("./snap.js").Snap} snap
  * @property {() => void} showHelp
  */
 
@@ -68,7 +69,7 @@ function control(key, shift) {
  * @returns {Binding[]}
  */
 // prettier-ignore
-export function bindings({ store, actions, navigation, grid, gestures, drawer, posing, inspector, layers, layersMenu, showHelp }) {
+export function bindings({ store, actions, navigation, grid, gestures, drawer, posing, inspector, layers, layersMenu, snap, showHelp }) {
   const escape = () => {
     if (gestures.cancel() || closePopover() || actions.leaveReplay()) return;
     if (hasTrack(store.facts.state)) actions.stopTracking();
@@ -145,6 +146,7 @@ export function bindings({ store, actions, navigation, grid, gestures, drawer, p
       matches: plain("0"),
       run: () => grid.typeCamera(0) || grid.resetViews(),
     },
+    { keys: ["Y"], label: "3-D view: look through the camera pointed at, or let go", matches: plain("y"), run: () => snap.toggle() },
     { keys: ["?"], label: "This list", matches: (event) => event.key === "?", run: showHelp },
   ];
 }

@@ -21,6 +21,7 @@ import { PaneGrid } from "./pane_grid.js";
 import { Posing } from "./posing.js";
 import { Receiver } from "./receiver.js";
 import { SearchPanel } from "./search_panel.js";
+import { Snap } from "./snap.js";
 import { makeSplitter } from "./splitter.js";
 import { Store } from "./store.js";
 import { Timeline } from "./timeline.js";
@@ -52,6 +53,7 @@ const grid = new PaneGrid(byId("panes", HTMLElement), store, gestures, latency, 
 new ViewRequest(store, send);
 const posing = new Posing(store, send);
 const inspector = new Inspector(byId("inspector", HTMLElement), store, posing, notify);
+const snap = new Snap(byId("panes", HTMLElement), store, grid, send);
 new TopBar(store, actions);
 new Transport(store, navigation);
 new TrackBar(store, actions, navigation);
@@ -66,7 +68,7 @@ makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement));
 
 const help = byId("help", HTMLDialogElement);
 const showHelp = () => help.showModal();
-const table = keys.bindings({ store, actions, navigation, grid, gestures, drawer, posing, inspector, layers, layersMenu, showHelp });
+const table = keys.bindings({ store, actions, navigation, grid, gestures, drawer, posing, inspector, layers, layersMenu, snap, showHelp });
 keys.describe(byId("help-keys", HTMLElement), table);
 button("show-help", () => help.showModal());
 help.addEventListener("click", (event) => event.target === help && help.close());

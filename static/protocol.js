@@ -19,7 +19,8 @@
  * @typedef {{type: "state", frame: number, person: number, point: string | null,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
  *   parts_px: (number | null)[], dofs: number[], locked: number[], job: Job, track: Track,
- *   replay: {run: number, step: number, steps: number, stage: string | null} | null, follow: boolean, undo: string | null, redo: string | null,
+ *   replay: {run: number, step: number, steps: number, stage: string | null} | null, follow: boolean, snapped: number | null,
+ *   undo: string | null, redo: string | null,
  *   saved: boolean, save_error: string | null}} StateMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
  * @typedef {{source: string, cost_px: number | null, keyframe: boolean, status: Status, remark: string}} Cell
@@ -86,6 +87,7 @@
  *   {type: "follow", follow: boolean} |
  *   {type: "curves", group: CurveGroup | null} |
  *   {type: "hold_3d", hold: boolean} |
+ *   {type: "snap", camera: number | null} |
  *   {type: "undo"} | {type: "redo"}} ClientMessage
  */
 

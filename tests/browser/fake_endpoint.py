@@ -114,6 +114,7 @@ class FakeEndpoint:
             "source": "manual", "status": "", "remark": "", "parts_px": [], "job": self.idle_job(""), "replay": None,
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "dofs": [1.0, 2.0, 90.0, 30.0], "locked": [],
+            "snapped": None,
             "saved": True, "save_error": None,
         }  # fmt: skip
 
@@ -167,6 +168,9 @@ class FakeEndpoint:
                 self.curves_group = message["group"]
                 if self.curves_group:
                     await self.send_curves(np.arange(self.n_frames), replace=True)
+            case "snap":
+                self.state["snapped"] = message["camera"]
+                await self.broadcast(self.state)
             case "undo" | "redo":
                 await self.broadcast(self.state)
 

@@ -1,0 +1,49 @@
+"""The pose that the tracker would expect on a frame, from the stored poses around it."""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from tracker.body import BodyModel
+from tracker.predict import PredictSettings, predict
+from tracker.rigid import Array
+
+
+class Prediction(NamedTuple):
+    """What the tracker would expect on a frame."""
+
+    values: Array | None
+    """The pose, (n_values,); None where nothing can be expected."""
+    why: str
+    """From what it was predicted, or why it was not; for people to read."""
+
+
+def prediction(
+    model: BodyModel,
+    poses: Callable[[range], Mapping[int, Array]],
+    frame: int,
+    settings: PredictSettings,
+    backward: bool,
+) -> Prediction:
+    """Predict the pose of a frame as the tracker does, from the poses before it.
+
+    Args:
+        model: the body.
+        poses: gives its stored poses by frame, on those of a range that have one.
+        frame: the shown one.
+        settings: of the prediction.
+        backward: from the poses after it, as a run backward does.
+    """
+    before = "after" if backward else "before"
+    window = settings.window
+    around = range(frame + 1, frame + 1 + window) if backward else range(max(0, frame - window), frame)
+    known = poses(around)
+    past: list[int] = []
+    for k in around if backward else reversed(around):  # from the nearest on, as far as they follow one another
+        if k not in known:
+            break
+        past.append(k)
+    if not past:
+        return Prediction(None, f"no pose on the frame {before} this one")
+    values = predict(model, [known[k] for k in reversed(past)], settings)
+    first, last = min(past), max(past)
+    return Prediction(values, f"from frame {first}" if first == last else f"from frames {first} to {last}")

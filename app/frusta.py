@@ -1,0 +1,88 @@
+"""The cameras in the 3-D view: frusta with small images of the shown frame. A click looks through the camera."""
+
+import time
+from typing import Any
+
+import numpy as np
+import viser
+
+from app.centred import aspect_around, centred, field_of_view
+from app.controller import Controller
+from app.jobs import Latest
+from app.state import State
+from tracker import rigid
+
+_SCALE_M = 0.25
+_COLOR = (120, 130, 140)
+_WIDTH_PX = 192
+_JPEG_QUALITY = 75
+_REST_S = 0.35
+"""A frame has images after it has been shown for so long: they never keep the panes waiting."""
+
+
+class Frusta:
+    """Draws all cameras of a session."""
+
+    def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
+        """Add the frusta and follow the controller's state."""
+        self._server, self._controller = server, controller
+        self._cameras = [c.camera.pinhole for c in controller.session.cameras]
+        self._shown: int | None = None  # the frame of the images
+        self._handles = [self._add(index) for index in range(len(self._cameras))]
+        self._labels = [server.scene.add_label(f"/cameras/{c.name}/name", c.name) for c in self._cameras]
+        latest = Latest(self._show_images, "frusta")
+        controller.subscribe(latest.offer)
+
+    def show(self, state: State) -> None:
+        """Show or hide the cameras: who looks through one wants to see its image, and nothing before it."""
+        is_shown = state.view_3d.cameras and state.snapped is None
+        for handle, label in zip(self._handles, self._labels, strict=True):
+            if handle.visible != is_shown:
+                handle.visible = label.visible = is_shown
+
+    def _add(self, index: int) -> viser.CameraFrustumHandle:
+        camera = self._cameras[index]
+        aspect = aspect_around(camera)
+        handle = self._server.scene.add_camera_frustum(
+            f"/cameras/{camera.name}",
+            fov=field_of_view(camera, aspect),
+            aspect=aspect,
+            scale=_SCALE_M,
+            thickness=1.5,
+            thickness_units="screen",
+            color=_COLOR,
+            format="jpeg",
+            jpeg_quality=_JPEG_QUALITY,
+            wxyz=rigid.quaternion_from_matrix(camera.T_world_camera[:3, :3]),
+            position=camera.T_world_camera[:3, 3],
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+        @handle.on_click
+        def _(_: Any) -> None:
+            self._controller.view_3d.snap(index)
+
+        return handle
+
+    def _show_images(self, state: State) -> None:
+        """Once a frame rests, put its images into the frusta."""
+        wanted = state.frame if state.view_3d.images and state.view_3d.cameras else None
+        if wanted == self._shown:
+            return
+        if wanted is not None:
+            time.sleep(_REST_S)
+            now = self._controller.state
+            # Without a graphics card the browser has no time for them beside a tracker.
+            is_slow = now.track.running and bool(now.holding_3d)
+            if now.frame != wanted or now.drag is not None or is_slow:
+                return  # the state that follows asks again
+        self._shown = wanted
+        images = [None] * len(self._cameras) if wanted is None else self._controller.frames.images(wanted)
+        small = []
+        for camera, image in zip(self._cameras, images, strict=True):
+            size = (_WIDTH_PX, round(_WIDTH_PX / aspect_around(camera)))
+            small.append(None if image is None else centred(np.asarray(image), camera, size))
+        with self._server.atomic():
+            for handle, picture in zip(self._handles, small, strict=True):
+                handle.image = picture

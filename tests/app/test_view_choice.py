@@ -1,0 +1,40 @@
+"""What is kept of the 3-D view, and what is made of a file that holds something else."""
+
+import json
+from dataclasses import fields, replace
+
+import pytest
+
+from app.view_choice import View3d, kept, restored
+
+OTHER = View3d(
+    bodies=False,
+    colors="people",
+    opacity=0.35,
+    cameras=False,
+    images=False,
+    floor=False,
+    ghost=True,
+    trail_points=frozenset(("left_wrist", "head")),
+    trail_frames=80,
+)
+
+
+def test_every_field_comes_back():
+    assert all(getattr(OTHER, f.name) != getattr(View3d(), f.name) for f in fields(View3d))
+    assert restored(json.loads(json.dumps(kept(OTHER)))) == OTHER
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        None, 3, [], {}, {"colors": "rainbow"}, {"opacity": 0}, {"opacity": "much"}, {"trail_frames": 100_000},
+        {"trail_frames": True}, {"trail_points": "head"}, {"trail_points": [3]}, {"bodies": "yes"}, {"no_such": 1},
+    ],
+)  # fmt: skip
+def test_what_makes_no_sense_is_as_usual(data):
+    assert restored(data) == View3d()
+
+
+def test_one_bad_field_does_not_spoil_the_others():
+    assert restored(kept(OTHER) | {"opacity": -1}) == replace(OTHER, opacity=1.0)
