@@ -75,14 +75,13 @@ export class ReplayBar {
     this.#slider.max = String((run?.steps ?? 0) - 1);
     this.#slider.value = String(replay ? replay.step : (run?.steps ?? 0) - 1);
     if (replay) {
-      const tested = replay.candidate_px === null ? "" : ` · tested ${replay.candidate_px.toFixed(2)}`;
       const best = replay.best_px === null ? "" : ` · best ${replay.best_px.toFixed(2)} px`;
-      const stage = replay.stage ?? "start";
-      this.#text.textContent = `${replay.step + 1} of ${run?.steps ?? 0} · ${stage.replace(", steps x ", " ×")}${tested}${best}`;
+      this.#text.textContent = `${replay.step + 1} of ${run?.steps ?? 0}`;
+      this.#text.title = `${replay.stage ?? "the start"}, ${replay.evaluations} poses scored${best}`;
     } else {
-      this.#text.textContent = run && isReady ? `${run.steps} steps to replay` : "";
+      this.#text.textContent = run && isReady ? `${run.steps} steps` : "";
+      this.#text.title = run?.thinned ? "Steps that can be replayed; of so long a search not all are kept" : "Steps that can be replayed";
     }
-    this.#text.title = this.#text.textContent;
   }
 
   get #at() {
