@@ -77,33 +77,18 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     state = state.drawn
     bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
-<<<<<<< HEAD
     tried = state.job.candidate if state.job.running or state.look.replay is not None else None
     ghosts = ((state.look.compared, COMPARED_COLOR), (state.look.preview, PREVIEW_COLOR))
     for index in sorted(view.cameras):
         camera = session.cameras[index].camera.pinhole
-        for ghost, color in ghosts:
-            if ghost is not None:
-                out += _outlined(session, ghost, camera, index, "ghost", color)
         if not view.layers.isdisjoint(("contours", "hidden")):
             out += _model(session, bodies, camera, index, view)
         if "contours" in view.layers and tried is not None:
             out += _outlined(session, tried, camera, index, "candidate", CANDIDATE_COLOR)
-        if "part_edges" in view.layers:
-=======
-    for index, source in enumerate(session.cameras):
-        camera = source.camera.pinhole
-        if "contours" in state.overlays:
-            out += _contours(session, bodies, camera, index, "model", [p.color for p in session.people])
-            if state.job.candidate is not None and (state.job.running or state.look.replay is not None):
-                tested = [Body(b.model, v) for b, v in zip(bodies, state.job.candidate, strict=True)]
-                out += _contours(session, tested, camera, index, "candidate", [CANDIDATE_COLOR] * len(tested))
-        for ghost, color in ((state.look.compared, COMPARED_COLOR), (state.look.preview, PREVIEW_COLOR)):
+        for ghost, color in ghosts:
             if ghost is not None:
-                others = [Body(p.model, v) for p, v in zip(session.people, ghost, strict=True)]
-                out += _contours(session, others, camera, index, "ghost", [color] * len(others))
-        if "part_edges" in state.overlays:
->>>>>>> 006763a (Browser tests of the search drawer; ghosts lie over the model, the replay's slider has room)
+                out += _outlined(session, ghost, camera, index, "ghost", color)
+        if "part_edges" in view.layers:
             out.append(Path(index, 0, "part_edge", PART_EDGE_COLOR, occlusion.part_edges(bodies, camera)))
         if views is not None:
             out += [s for s in _segments(bodies, views[index], index, view) if s.kind in view.layers]

@@ -48,7 +48,8 @@ async def page(browser, address, request):
 
 async def searched(page):
     await page.keyboard.press("f")
-    await shows(page, f"{OVER} && !quadrille.state.state.job.running", 60)
+    await shows(page, f"{OVER} && quadrille.state.state.job.message.startsWith('done')", 60)
+    await shows(page, "quadrille.state.state.undo?.startsWith('search') && quadrille.state.overlay.job === false", 20)
     number = await page.evaluate(f"{RUNS}.at(-1).number")
     await shows(page, f"quadrille.state.searchSteps.get({number})?.count === {RUNS}.at(-1).steps", 20)
     return number
@@ -110,6 +111,7 @@ async def test_a_search_is_replayed_and_left_as_it_was(page):
     assert await page.locator("#replay-badge").is_visible()
     await page.keyboard.press("Escape")
     await shows(page, "quadrille.state.state.replay === null && quadrille.state.overlay.handles.length > 0", 10)
+    await asyncio.sleep(0.2)
     after = await state_of(page)
     assert {k: after["state"][k] for k in ("cost_px", "undo", "source")} == {
         k: before["state"][k] for k in ("cost_px", "undo", "source")
