@@ -34,6 +34,8 @@ export class Actions {
   /** Show the true pose again, where a search is replayed; whether there was something to leave. */
   leaveReplay() {
     if (!this.#store.facts.state?.replay) return false;
+    // Else its next step would lead back into the replay before the program has answered.
+    this.#store.set({ replaying: false });
     this.#send({ type: "replay", run: null, step: 0 });
     return true;
   }

@@ -107,7 +107,12 @@ export class ReplayBar {
     if (!run) return;
     const at = this.#at;
     this.#goTo(at >= run.steps - 1 ? -1 : at);
+    this.#store.set({ replaying: true });
     this.#timer = setInterval(() => {
+      if (!this.#store.facts.replaying) {
+        this.#pause();
+        return;
+      }
       this.#goTo(this.#asked + 1);
       if (this.#asked >= (runLookedAt(this.#store.facts)?.steps ?? 0) - 1) this.#pause();
     }, 1000 / STEPS_PER_S);
@@ -117,6 +122,7 @@ export class ReplayBar {
   #pause() {
     if (this.#timer === null) return;
     clearInterval(this.#timer);
+    this.#store.set({ replaying: false });
     this.#timer = null;
     this.#play.setAttribute("aria-pressed", "false");
   }

@@ -21,6 +21,7 @@ import { usualLayers } from "./layers.js";
  * @property {Map<number, import("./search_facts.js").Steps>} searchSteps recorded steps by run
  * @property {Map<number, import("./search_facts.js").Candidates>} searchCandidates best poses by run
  * @property {number | null} searchRun the run that the user looks at; null for the newest
+ * @property {boolean} replaying whether a search is being replayed step by step
  * @property {import("./search_facts.js").Landscape | null} landscape
  * @property {{first: number, last: number} | null} range the frames that the user has marked
  * @property {Shown | null} shown the pictures on the screen
@@ -53,6 +54,7 @@ export class Store {
     searchSteps: new Map(),
     searchCandidates: new Map(),
     searchRun: null,
+    replaying: false,
     landscape: null,
     range: null,
     shown: null,

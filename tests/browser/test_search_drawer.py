@@ -34,11 +34,11 @@ async def page(browser, address, request):
     page.on("pageerror", lambda error: errors.append(str(error)))
     await page.route("**/viser/**", lambda route: route.fulfill(body="<body>", content_type="text/html"))
     await page.goto(address)
-    await shows(page, "window.quadrille?.state.overlay", 60)
+    await shows(page, "window.quadrille?.state.overlay", 120)
     frame = 2 * 1 + 3 * list(request.session.items).index(request.node) % 47
     await page.locator("#frame").fill(str(frame))
     await page.keyboard.press("Enter")
-    await shows(page, f"quadrille.state.shown?.frame === {frame} && quadrille.state.state.cost_px", 60)
+    await shows(page, f"quadrille.state.shown?.frame === {frame} && quadrille.state.state.cost_px", 120)
     await page.keyboard.press("b")
     await shows(page, f"quadrille.state.searchSetup && {RUNS}", 20)
     yield page
@@ -92,6 +92,7 @@ async def test_a_search_goes_stage_by_stage_and_the_tree_marks_where_it_is(page)
 async def test_a_search_is_replayed_and_left_as_it_was(page):
     await searched(page)
     before, true = await state_of(page), await drawn(page, "model")
+    assert before["state"]["cost_px"] is not None
     box = await page.locator("#cost-curve").bounding_box()
     await page.mouse.click(box["x"] + 60, box["y"] + 50)
     await shows(page, "quadrille.state.state.replay && quadrille.state.overlay.handles.length === 0", 10)
