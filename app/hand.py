@@ -26,38 +26,74 @@ class Hand:
             editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
         """
         self._screen, self._editing = screen, editing
-        self._grab: posing.Grab | None = None
+        self._grab: posing.Grab | None = None  # as the gesture began
+        self._hold: posing.Grab | None = None  # as its present mode began
         self._grab_page = 0
 
     def begin_drag(
-        self, page: int, camera: int, person: int, point: str, pointer_px: tuple[float, float], frame: int | None = None
+        self,
+        page: int,
+        camera: int,
+        person: int,
+        point: str,
+        pointer_px: tuple[float, float],
+        frame: int | None = None,
+        part: int | None = None,
     ) -> None:
-        """Take hold of a point in a view; pointer in undistorted px.
+        """Take hold of a point in a view, or of a part by its surface.
 
-        The hand means the frame that it saw, which a tracker may have left meanwhile; None for the one shown.
+        Args:
+            page: number of the page.
+            camera: index of the view.
+            person: index of whom.
+            point: name of the point; of no account where a part is given.
+            pointer_px: undistorted px.
+            frame: the frame that the user saw, which a tracker may have left meanwhile; None for the one shown.
+            part: index of the part that is held by its surface.
+
+        Raises:
+            TrackerError: whatever moves it is locked.
         """
         if not (0 <= camera < len(self._screen.session.cameras) and 0 <= person < len(self._screen.models)):
             return
-        if point not in self._screen.models[person].point_names:
+        model = self._screen.models[person]
+        if part is None and point not in model.point_names:
+            return
+        if part is not None and not 0 <= part < len(model.parts):
             return
         with self._editing():
             if frame is not None and frame != self._screen.state.frame and 0 <= frame < self._screen.session.n_frames:
                 self._screen.show(frame)
             values = self._screen.state.poses[person]
-            view = self._screen.session.cameras[camera].camera
-            self._grab = posing.grab(
-                self._screen.models[person], values, view, point, np.array(pointer_px), self._screen.free(person)
-            )
+            view, pointer = self._screen.session.cameras[camera].camera, np.array(pointer_px)
+            free = self._screen.free(person)
+            if part is None:
+                self._grab = posing.grab(model, values, view, point, pointer, free)
+                selected, name = point, point
+            else:
+                self._grab = posing.grab_part(model, values, view, part, pointer, free)
+                selected, name = model.joints[part].name, model.parts[part].name
+            self._hold = self._grab
             self._grab_page, self._screen.last_save = page, time.monotonic()
-            self._screen.set(person=person, point=point, drag=DragState(camera, person, point, pointer_px))
+            x, y, z = (float(c) for c in self._grab.place_part)
+            drag = DragState(camera, person, name, pointer_px, self._grab.part, (x, y, z), part is not None)
+            self._screen.set(person=person, point=selected, drag=drag)
 
-    def move_drag(self, page: int, pointer_px: tuple[float, float], seq: int) -> None:
-        """Let the held point follow the pointer."""
+    def move_drag(self, page: int, pointer_px: tuple[float, float], seq: int, mode: str = "move") -> None:
+        """Let the held point follow the pointer; or turn its part, or push it in depth (see `tracker.posing`).
+
+        Whenever the mode changes the hand takes hold anew, where the pointer was: nothing jumps.
+        """
+        ways = {"move": posing.drag, "turn": posing.turn, "push": posing.push}
         with self._screen.lock:
             drag = self._screen.state.drag
-            if self._grab is None or drag is None or page != self._grab_page:
+            if self._hold is None or drag is None or page != self._grab_page:
                 return
-            values = posing.drag(self._grab, np.array(pointer_px), self._screen.state.poses[drag.person])
+            before = self._screen.state.poses[drag.person]
+            if mode != drag.mode:
+                self._hold = posing.hold_anew(self._hold, before, np.array(drag.pointer_px))
+                drag = replace(drag, mode=mode)
+            values = ways[mode](self._hold, np.array(pointer_px), before)
             seqs = (*(s for s in self._screen.state.drag_seqs if s[0] != page), (page, seq))[-16:]
             self._screen.pose(drag.person, values, drag=replace(drag, pointer_px=pointer_px), drag_seqs=seqs)
             if time.monotonic() - self._screen.last_save > _CHECKPOINT_S:
@@ -76,7 +112,7 @@ class Hand:
             if hand is None or drag is None or page != self._grab_page:
                 return
             checkpointed = self._screen.edit_of is hand
-            self._grab = self._screen.edit_of = None
+            self._grab = self._hold = self._screen.edit_of = None
             if checkpointed:
                 self._screen.saver.undo()
                 self._screen.refresh_saving()
@@ -89,5 +125,5 @@ class Hand:
             return
         if not np.array_equal(hand.values, self._screen.state.poses[drag.person]) or self._screen.edit_of is hand:
             self._screen.save(f"drag {spoken(drag.point)}", "manual", hand)
-        self._grab = self._screen.edit_of = None
+        self._grab = self._hold = self._screen.edit_of = None
         self._screen.set(drag=None)

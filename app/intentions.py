@@ -31,15 +31,19 @@ def carry_out(controller: Controller, page: int, message: Message) -> None:
     _INTENTIONS[message["type"]](controller, page, message)
 
 
+_MODES = {mode: mode for mode in ("move", "turn", "push")}
+
+
 def _drag(controller: Controller, page: int, message: Message) -> None:
     hand, phase, pointer_px = controller.hand, message["phase"], _place(message)
     if phase == "start":
         camera, person, frame = int(message["camera"]), int(message["person"]), int(message["frame"])
-        hand.begin_drag(page, camera, person, message["point"], pointer_px, frame)
+        part = None if message.get("part") is None else int(message["part"])
+        hand.begin_drag(page, camera, person, message["point"], pointer_px, frame, part)
     if phase == "cancel":
         hand.cancel_drag(page)
     else:
-        hand.move_drag(page, pointer_px, int(message["seq"]))
+        hand.move_drag(page, pointer_px, int(message["seq"]), _MODES[message.get("mode", "move")])
     if phase == "end":
         hand.end_drag(page)
 

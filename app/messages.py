@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from app import dofs, overlays, pin_marks
+from app import dofs, graspable, overlays, pin_marks
 from app.curves import plots_of, samples
 from app.layers import View
 from app.state import JobState, ReplayState, State, TrackState
@@ -109,6 +109,13 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         )
         segments.append(path.segments_px)
         first += count
+    parts = []
+    for outline in graspable.outlines(session, state, view):
+        count = len(outline.segments_px)
+        what = {"camera": outline.camera, "person": outline.person, "part": outline.part, "depth": outline.depth}
+        parts.append(what | {"first": first, "count": count})
+        segments.append(outline.segments_px)
+        first += count
     meeting = pin_marks.meeting(session, state)
     header = {
         "type": "overlay",
@@ -116,6 +123,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         "seq": dict(state.drag_seqs).get(page, 0),
         "job": state.job.running,
         "paths": rows,
+        "outlines": parts,
         # Joints are there to be taken, and a step that is replayed is no pose to be taken.
         "handles": [h._asdict() for h in overlays.handles(session, state, view.cameras)]
         if state.look.replay is None

@@ -7,7 +7,7 @@ import numpy as np
 
 from app.layers import View
 from app.state import State
-from tracker import contours, occlusion
+from tracker import contours, occlusion, rigid
 from tracker.body import Body, BodyModel
 from tracker.cameras import Camera, epipolar_segment
 from tracker.contours import Contour, FloatArray
@@ -196,7 +196,8 @@ def _epipolar_lines(session: Session, state: State) -> list[Path]:
     assert drag is not None
     model = session.people[drag.person].model
     source = session.cameras[drag.camera].camera.pinhole
-    place: Array = model.points_world(state.poses[drag.person])[model.point_names.index(drag.point)]
+    T_world_part = model.kinematics(state.poses[drag.person]).Ts_world_part[drag.part]
+    place: Array = rigid.apply(T_world_part, np.array(drag.place_part))
     out = []
     for index, target in enumerate(session.cameras):
         if index != drag.camera:

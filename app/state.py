@@ -160,8 +160,17 @@ class DragState:
     camera: int
     person: int
     point: str
+    """Name of the point, or of the part where that is held by its surface."""
     pointer_px: tuple[float, float]
     """Undistorted px."""
+    part: int
+    """Index of the part that carries the held place."""
+    place_part: tuple[float, float, float]
+    """The held place in the frame of its part, metres."""
+    by_surface: bool = False
+    """Whether the part is held by its surface, not by a point."""
+    mode: str = "move"
+    """`move`, `turn` or `push`, see `tracker.posing`."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -148,6 +148,24 @@ function stroke(context, line, color, width, hasHalo = true) {
 }
 
 /**
+ * Mark the part that a press would take.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {PaneView} view
+ * @param {Overlay} overlay
+ * @param {import("./protocol.js").Outline} outline
+ * @param {string} color
+ */
+export function drawPart(context, view, overlay, outline, color) {
+  const shape = tracePath(view, overlay.segments, outline.first, outline.count);
+  context.globalAlpha = 0.28;
+  context.fillStyle = color;
+  context.fill(shape);
+  context.globalAlpha = 1;
+  stroke(context, shape, "#fff", 1.25);
+}
+
+/**
  * @param {CanvasRenderingContext2D} context
  * @param {PlacedHandle[]} placed
  * @param {import("./protocol.js").PersonInfo[]} people

@@ -8,11 +8,13 @@
 const DRAG_THRESHOLD = 3;
 
 import { GRAB_RADIUS } from "./crowding.js";
+import { DragHint, modeOf } from "./drag_hint.js";
+import { partAt } from "./part_hit.js";
 
 /**
  * @typedef {import("./drawing.js").PlacedHandle} PlacedHandle
  * @typedef {{pane: import("./pane.js").Pane, frame: number, camera: number, pointer: number, person: number, point: string,
- *   start: {x: number, y: number}, grabbed: {u: number, v: number}, at: {u: number, v: number},
+ *   part: number | null, mode: import("./protocol.js").DragMode, start: {x: number, y: number}, grabbed: {u: number, v: number}, at: {u: number, v: number},
  *   offset: {u: number, v: number}, begun: boolean}} Drag
  */
 
@@ -24,6 +26,7 @@ export class Gestures {
   #drag = null;
   /** @type {{pane: import("./pane.js").Pane, pointer: number, x: number, y: number} | null} */
   #pan = null;
+  #hint = new DragHint();
   #seq = 0;
   #moveScheduled = false;
 
@@ -59,7 +62,7 @@ export class Gestures {
     surface.addEventListener("pointerup", (event) => this.#up(event));
     surface.addEventListener("pointercancel", () => this.cancel());
     surface.addEventListener("pointerleave", () => {
-      if (!this.#drag && this.#store.facts.hover) this.#store.set({ hover: null });
+      if (!this.#drag && (this.#store.facts.hover || this.#store.facts.hoverPart)) this.#store.set({ hover: null, hoverPart: null });
     });
     // The middle button would scroll, and paste on some systems.
     surface.addEventListener("mousedown", (event) => event.button === 1 && event.preventDefault());
@@ -92,6 +95,24 @@ export class Gestures {
   }
 
   /**
+   * The part under a pointer, with what a drag needs to know of it: the place that is taken is the pointer's own.
+   *
+   * @param {import("./pane.js").Pane} pane
+   * @param {number} camera
+   * @param {{x: number, y: number}} at
+   */
+  #hitPart(pane, camera, at) {
+    const { layers, overlay } = this.#store.facts;
+    if (!this.#store.isSettled || !overlay || !layers.shown.joints) return null;
+    const place = pane.view.toImage(at.x, at.y);
+    const found = partAt(overlay, camera, place);
+    if (!found) return null;
+    // Joint i moves part i, and is what a part that is touched selects.
+    const point = this.#store.facts.session?.people[found.person]?.points[found.part] ?? "";
+    return { camera, person: found.person, part: found.part, point, ...place };
+  }
+
+  /**
    * @param {PointerEvent} event
    * @param {import("./pane.js").Pane} pane
    * @param {number} camera
@@ -99,14 +120,14 @@ export class Gestures {
   #down(event, pane, camera) {
     if (this.#drag || this.#pan || event.button > 1) return;
     const at = pane.locate(event);
-    const hit = event.button === 0 ? this.#hit(pane, at) : null;
+    const hit = event.button === 0 ? (this.#hit(pane, at) ?? this.#hitPart(pane, camera, at)) : null;
     pane.surface.setPointerCapture(event.pointerId);
     if (!hit) {
       this.#pan = { pane, pointer: event.pointerId, x: event.clientX, y: event.clientY };
       pane.surface.classList.add("is-panning");
       return;
     }
-    const { person, point, u, v } = hit.handle;
+    const { person, point, u, v, part } = "handle" in hit ? { ...hit.handle, part: null } : hit;
     const pointer = pane.view.toImage(at.x, at.y);
     this.#drag = {
       pane,
@@ -115,6 +136,8 @@ export class Gestures {
       pointer: event.pointerId,
       person,
       point,
+      part,
+      mode: modeOf(event),
       start: at,
       grabbed: { u, v },
       at: { u, v },
@@ -122,7 +145,8 @@ export class Gestures {
       begun: false,
     };
     pane.surface.classList.add("is-dragging");
-    this.#store.set({ dragging: true, hover: { camera, person, point } });
+    const held = part === null ? { hover: { camera, person, point } } : { hoverPart: { camera, person, part } };
+    this.#store.set({ dragging: true, hover: null, hoverPart: null, ...held });
     this.#send({ type: "select", person, point });
   }
 
@@ -136,7 +160,9 @@ export class Gestures {
       this.#pan.pane.panBy(event.clientX - this.#pan.x, event.clientY - this.#pan.y);
       [this.#pan.x, this.#pan.y] = [event.clientX, event.clientY];
     } else if (this.#drag?.pointer === event.pointerId) {
+      this.#drag.mode = modeOf(event);
       this.#dragTo(this.#drag, pane.locate(event));
+      if (this.#drag.begun) this.#hint.show(this.#drag.mode, event);
     } else if (!this.#drag && !this.#pan) {
       this.#hoverAt(pane, camera, pane.locate(event));
     }
@@ -179,8 +205,13 @@ export class Gestures {
    */
   #hoverAt(pane, camera, at) {
     const hit = this.#hit(pane, at);
-    const { hover } = this.#store.facts;
+    const { hover, hoverPart } = this.#store.facts;
+    const part = hit ? null : this.#hitPart(pane, camera, at);
     pane.surface.classList.toggle("is-over-joint", hit !== null);
+    pane.surface.classList.toggle("is-over-part", part !== null);
+    if (hoverPart?.camera !== part?.camera || hoverPart?.person !== part?.person || hoverPart?.part !== part?.part) {
+      this.#store.set({ hoverPart: part && { camera, person: part.person, part: part.part } });
+    }
     if (!hit) {
       if (hover) this.#store.set({ hover: null });
     } else if (hover?.camera !== camera || hover.person !== hit.handle.person || hover.point !== hit.handle.point) {
@@ -194,15 +225,16 @@ export class Gestures {
    * @returns the message's number
    */
   #message(phase, { u, v }) {
-    const { frame, camera, person, point } = /** @type {Drag} */ (this.#drag);
+    const { frame, camera, person, point, part, mode } = /** @type {Drag} */ (this.#drag);
     this.#seq += 1;
-    this.#send({ type: "drag", phase, frame, camera, person, point, u, v, seq: this.#seq });
+    this.#send({ type: "drag", phase, frame, camera, person, point, part, mode, u, v, seq: this.#seq });
     return this.#seq;
   }
 
   #release() {
     const surface = (this.#drag ?? this.#pan)?.pane.surface;
     surface?.classList.remove("is-dragging", "is-panning");
+    this.#hint.hide();
     this.#drag = null;
     this.#pan = null;
     if (this.#store.facts.dragging) this.#store.set({ dragging: false });

@@ -201,6 +201,7 @@ export class Pane {
     const { hover, layers } = this.#store.facts;
     if (layers.shown.skeleton) drawing.drawSkeleton(context, this.#placedHandles(), people, layers.opacity.skeleton);
     if (!layers.shown.joints) return;
+    this.#drawHoveredPart(context, people);
     /** @type {drawing.PlacedHandle | null} */
     let named = null;
     context.globalAlpha = layers.opacity.joints;
@@ -213,6 +214,19 @@ export class Pane {
     }
     context.globalAlpha = 1;
     if (named) drawing.drawName(context, named, this.#size.width);
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {import("./protocol.js").PersonInfo[]} people
+   */
+  #drawHoveredPart(context, people) {
+    const { hoverPart, overlay } = this.#store.facts;
+    if (!overlay || hoverPart?.camera !== this.#camera) return;
+    const outline = overlay.outlines.find(
+      ({ camera, person, part }) => camera === this.#camera && person === hoverPart.person && part === hoverPart.part,
+    );
+    if (outline) drawing.drawPart(context, this.view, overlay, outline, people[outline.person]?.color ?? "#fff");
   }
 
   /** @param {WheelEvent} event */

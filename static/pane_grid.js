@@ -114,7 +114,7 @@ export class PaneGrid {
     // A new state comes with every move of a drag; only its choice of what to draw concerns the vectors.
     const { person, point } = this.#store.facts.state ?? {};
     const choice = JSON.stringify([person, point]);
-    if (withPictures || changed.has("overlay") || choice !== this.#choice || changed.has("hover")) {
+    if (withPictures || changed.has("overlay") || choice !== this.#choice || changed.has("hover") || changed.has("hoverPart")) {
       this.#choice = choice;
       for (const pane of this.panes) pane.draw(withPictures);
     }

@@ -45,8 +45,9 @@
  *   limit_px: number | null}} ImageHeader
  * @typedef {{camera: number, person: number, color: string, first: number, count: number,
  *   kind: "model" | "hidden" | "candidate" | "ghost" | "part_edge" | "epipolar" | "accepted" | "rejected"}} Path
+ * @typedef {{camera: number, person: number, part: number, depth: number, first: number, count: number}} Outline
  * @typedef {{camera: number, person: number, point: string, u: number, v: number, visible: boolean}} Handle
- * @typedef {{type: "overlay", frame: number, seq: number, job: boolean, paths: Path[], handles: Handle[]}} OverlayHeader
+ * @typedef {{type: "overlay", frame: number, seq: number, job: boolean, paths: Path[], outlines: Outline[], handles: Handle[]}} OverlayHeader
  * @typedef {OverlayHeader & {segments: Float32Array}} Overlay
  * @typedef {"arms" | "torso" | "legs" | "cost"} CurveGroup
  * @typedef {{title: string, unit: "deg" | "cm" | "px", labels: string[]}} Plot
@@ -60,6 +61,7 @@
  * @typedef {ImageHeader | OverlayHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader} BinaryHeader
  *
+ * @typedef {"move" | "turn" | "push"} DragMode
  * @typedef {{type: "pose", frame: number, person: number} & (
  *   {action: "set", dof: number, value: number} | {action: "turn", dof: number, by: number} |
  *   {action: "nudge", point: string | null, camera: number, right: number, up: number} |
@@ -68,7 +70,7 @@
  * @typedef {{type: "seek", frame: number} |
  *   {type: "select", person: number, point: string | null} |
  *   {type: "drag", phase: "start" | "move" | "end" | "cancel", frame: number, camera: number, person: number,
- *     point: string, u: number, v: number, seq: number} |
+ *     point: string, part: number | null, mode: DragMode, u: number, v: number, seq: number} |
  *   PoseEdit |
  *   {type: "view", layers: Layer[], reductions: number[], by_part: boolean} |
  *   {type: "search", action: "step" | "stage" | "frame" | "stop"} |

@@ -27,6 +27,7 @@ import { usualLayers } from "./layers.js";
  * @property {Shown | null} shown the pictures on the screen
  * @property {import("./protocol.js").Overlay | null} overlay the vectors on the screen
  * @property {Joint | null} hover the joint under the pointer
+ * @property {{camera: number, person: number, part: number} | null} hoverPart the part under the pointer, where no joint is
  * @property {boolean} dragging whether a hand holds a joint
  * @property {number | null} active the camera whose pane was last pointed at; steps of keys are parallel to its image
  * @property {number | null} dof the degree of freedom that keys turn, of those that the selected joint means
@@ -60,6 +61,7 @@ export class Store {
     shown: null,
     overlay: null,
     hover: null,
+    hoverPart: null,
     dragging: false,
     active: null,
     dof: null,

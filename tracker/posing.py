@@ -1,18 +1,20 @@
 """Posing a body by hand: a point of it follows a place in an image, the rest of the chain gives way."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker import rigid
-from tracker.body import BodyModel
+from tracker.body import Body, BodyModel
 from tracker.cameras import Camera, viewed_point
 from tracker.errors import TrackerError
 from tracker.fit import Block, Normal, StayNear, fit_to_points, normal_of, solve
 from tracker.kinematics import Kinematics
+from tracker.orienting import orient
+from tracker.picking import place_on_part
 from tracker.rigid import Array
 
 
@@ -31,6 +33,17 @@ _DEPTH_WEIGHT = 0.1
 of the two, the point goes where the hand sees it go."""
 _NEAREST_M = 0.05
 """Depths below this count as this: a point is not dragged through the camera."""
+
+_ON_JOINT_PX = 8.0
+"""A point grabbed this near to the joint that it turns about does not go round it."""
+_KNOB_M = 0.3
+"""A pointer on the joint turns it by one radian where it goes this far to the right, at the joint's distance."""
+_PUSH_GAIN = 2.0
+"""How far a pushed point goes in depth, in ways of the pointer at its distance."""
+_PUSH_DEPTH_WEIGHT = 0.5
+"""Weight of a pushed point's depth, against 1 for staying where the view shows it."""
+_NEAREST_PUSH_M = 0.3
+"""A point is not pulled nearer to the camera than this."""
 
 _REACHED_M = 0.002
 """A point this near to where it should be has followed the pointer."""
@@ -58,21 +71,28 @@ class Grab:
     model: BodyModel
     camera: Camera
     """The view in which it is dragged; positions are in its undistorted pixels."""
-    point: int
-    """Index of the point into `BodyModel.point_names`."""
+    part: int
+    """Index of the part that carries the point."""
+    place_part: Array
+    """Where the point is in the frame of that part, (3,), metres."""
     values: Array
     """Pose when it was grabbed, (n_values,)."""
+    pointer_px: Array
+    """Where the pointer was when it was grabbed, (2,), px."""
     depth_m: float
     """Distance of the point along the optical axis, kept during the drag, metres."""
     offset_px: Array
     """From the pointer to the point when it was grabbed, (2,), px; kept, so that nothing jumps."""
     free: NDArray[np.bool_]
     """Degrees of freedom that give way, (n_dofs,)."""
+    unlocked: NDArray[np.bool_]
+    """Degrees of freedom that may move at all, (n_dofs,)."""
+    moves_body: bool
+    """Whether the whole body moves parallel to the image."""
 
-    @property
-    def moves_body(self) -> bool:
-        """Whether the whole body moves parallel to the image."""
-        return self.point == 0
+    def place_world(self, values: Array) -> Array:
+        """Where the point is in a pose, (3,), metres."""
+        return rigid.apply(self.model.kinematics(values).Ts_world_part[self.part], self.place_part)
 
 
 def minor_points(model: BodyModel) -> tuple[str, ...]:
@@ -109,43 +129,92 @@ def grab(
         TrackerError: whatever moves the point is locked.
     """
     index = model.point_names.index(point)
-    place = model.points_world(values)[index]
     moving = model.moves[:, model.point_parts[index]].copy()
     if index < len(model.joints):
         moving &= model.dof_joint != index  # a joint turns about itself: that does not move it
+    part = int(model.point_parts[index])
+    return _take_hold(
+        model, values, camera, part, model.points_part[index], pointer_px, free, moving, index == 0, point
+    )
+
+
+def grab_part(
+    model: BodyModel,
+    values: Array,
+    camera: Camera,
+    part: int,
+    pointer_px: Array,
+    free: NDArray[np.bool_] | None = None,
+) -> Grab:
+    """Take hold of a part of a body where a pointer touches its surface.
+
+    The root part moves the whole body; any other part follows by that place, as a point of its does.
+
+    Args:
+        model: the body.
+        values: its pose, (n_values,).
+        camera: the view.
+        part: index of the part.
+        pointer_px: where the pointer is, undistorted px, (2,).
+        free: which degrees of freedom may give way, (n_dofs,); all by default.
+
+    Raises:
+        TrackerError: whatever moves the part is locked.
+    """
+    place = place_on_part(Body(model, values), camera, part, pointer_px)
+    name, moving = model.parts[part].name, model.moves[:, part]
+    return _take_hold(model, values, camera, part, place, pointer_px, free, moving, part == 0, name)
+
+
+def _take_hold(
+    model: BodyModel,
+    values: Array,
+    camera: Camera,
+    part: int,
+    place_part: Array,
+    pointer_px: Array,
+    free: NDArray[np.bool_] | None,
+    moving: NDArray[np.bool_],
+    moves_body: bool,
+    name: str,
+) -> Grab:
+    """Decide what gives way where a place of a part is held, which some degrees of freedom move."""
+    place = rigid.apply(model.kinematics(values).Ts_world_part[part], place_part)
+    unlocked = np.ones(model.n_dofs, dtype=bool) if free is None else free
     of_root = model.dof_joint == 0
     own = moving & ~of_root
-    carries_others = model.point_parts[index] in model.parents
-    if index == 0:
+    carries_others = part in model.parents
+    if moves_body:
         gives = of_root & model.dof_is_length
     elif np.any(own & ~np.isfinite(model.spreads)) or (np.any(own) and not carries_others):
         gives = own
     else:
         gives = moving & ~model.dof_is_length
-    if free is not None:
-        gives &= free
-        # Where the limb is locked as a whole nothing else is moved in its place: a lock is meant to hold the hand too.
-        if not np.any(gives):
-            raise TrackerError(
-                f"expected a point that something moves, found {point} with all of that locked; unlock it"
-            )
-    offset = camera.pinhole.project(place) - pointer_px
-    return Grab(model, camera.pinhole, index, np.array(values), float(camera.depths(place)), offset, gives)
+    gives = gives & unlocked
+    # Where the limb is locked as a whole nothing else is moved in its place: a lock is meant to hold the hand too.
+    if not np.any(gives):
+        raise TrackerError(f"expected a point that something moves, found {name} with all of that locked; unlock it")
+    pointer_px = np.asarray(pointer_px, dtype=np.float64)
+    return Grab(
+        model, camera.pinhole, part, place_part, np.array(values), pointer_px, float(camera.depths(place)),
+        camera.pinhole.project(place) - pointer_px, gives, unlocked, moves_body,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class _UnderPointer:
-    """A `Block` that draws the grabbed point to a line of sight and, more weakly, to its depth at the grab."""
+    """A `Block` that draws the grabbed point to a line of sight and, more weakly, to a depth."""
 
     hand: Grab
     target_world: Array
     """Where the point should be, (3,), metres: under the pointer, at the depth."""
+    depth_weight: float = _DEPTH_WEIGHT
 
     def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `Block`."""
         hand, T_camera_world = self.hand, self.hand.camera.T_camera_world
-        parts = model.point_parts[[hand.point]]
-        point_world = rigid.apply(kinematics.Ts_world_part[parts[0]], model.points_part[hand.point])
+        parts = np.array([hand.part])
+        point_world = rigid.apply(kinematics.Ts_world_part[hand.part], hand.place_part)
         x = rigid.apply(T_camera_world, point_world)
         target = rigid.apply(T_camera_world, self.target_world)
         J = T_camera_world[:3, :3] @ model.point_jacobian(kinematics, parts, point_world[None])[0]  # (3, n_dofs)
@@ -153,8 +222,8 @@ class _UnderPointer:
         # Angles times depth, so that both are in metres.
         across = hand.depth_m * (x[:2] / z - target[:2] / target[2])
         J_across = hand.depth_m / z * (J[:2] - np.outer(x[:2] / z, J[2]))  # (2, n_dofs)
-        r = np.append(across, _DEPTH_WEIGHT * (x[2] - hand.depth_m))
-        return normal_of(r, np.concatenate([J_across, _DEPTH_WEIGHT * J[2:]]))
+        r = np.append(across, self.depth_weight * (x[2] - target[2]))
+        return normal_of(r, np.concatenate([J_across, self.depth_weight * J[2:]]))
 
 
 def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
@@ -172,15 +241,15 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
     target = hand.camera.back_project(np.asarray(pointer_px) + hand.offset_px, hand.depth_m)
     if hand.moves_body:
         step = np.zeros(model.n_dofs)
-        step[:3] = target - model.points_world(hand.values)[0]
+        step[:3] = target - hand.place_world(hand.values)
         return model.retract(hand.values, np.where(hand.free, step, 0.0))
     blocks: list[Block] = [
         _UnderPointer(hand, target),
-        StayNear(hand.values, np.where(np.isfinite(model.spreads), _STIFF_WEIGHT, _REST_WEIGHT)),
+        _rest(hand),
     ]
     fit = solve(model, values, blocks, free=hand.free, **_QUICK)
     joint, first = model.dof_joint[hand.free][[-1, 0]]
-    if joint == first or np.linalg.norm(model.points_world(fit.values)[hand.point] - target) < _REACHED_M:
+    if joint == first or np.linalg.norm(hand.place_world(fit.values) - target) < _REACHED_M:
         return fit.values
     # A straight limb cannot see that bending would bring the point nearer: begin with its joint bent, either way.
     for bend in (_BEND_RAD, -_BEND_RAD):
@@ -188,6 +257,73 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
         bent = solve(model, start, blocks, free=hand.free, **_QUICK)
         fit = bent if bent.cost < fit.cost else fit
     return fit.values
+
+
+def hold_anew(hand: Grab, values: Array, pointer_px: Array) -> Grab:
+    """The same hand on the same place, taken anew in another pose, (n_values,), with the pointer elsewhere, (2,)."""
+    place = hand.place_world(values)
+    return replace(
+        hand,
+        values=np.array(values),
+        pointer_px=np.asarray(pointer_px, dtype=np.float64),
+        depth_m=float(hand.camera.depths(place)),
+        offset_px=hand.camera.project(place) - pointer_px,
+    )
+
+
+def turn(hand: Grab, pointer_px: Array, values: Array) -> Array:
+    """Turn the grabbed part about the line of sight through its joint, as far as the pointer goes round the joint.
+
+    Of the joints that give way it is the one next to the grabbed point; where the whole body is held, the body turns.
+    Where the pointer is on the joint itself it turns as a knob does, by the way to the right. A joint that cannot turn
+    about the line of sight turns so that the point comes near to its place there.
+
+    Args:
+        hand: from `grab` or `grab_part`.
+        pointer_px: where the pointer is now, undistorted px, (2,).
+        values: the pose of the last call, from which to go on, (n_values,).
+    """
+    model, camera = hand.model, hand.camera
+    part = 0 if hand.moves_body else int(model.dof_joint[np.flatnonzero(hand.free & ~model.dof_is_length)[-1]])
+    T_world_part = model.kinematics(hand.values).Ts_world_part[part]
+    pivot_px = camera.project(T_world_part[:3, 3])
+    start, now = hand.pointer_px + hand.offset_px - pivot_px, np.asarray(pointer_px) + hand.offset_px - pivot_px
+    if np.linalg.norm(start) < _ON_JOINT_PX:
+        angle = float(now[0] - start[0]) * hand.depth_m / camera.K[0, 0] / _KNOB_M
+    else:
+        angle = float(np.arctan2(start[0] * now[1] - start[1] * now[0], start @ now))
+    sight = T_world_part[:3, 3] - camera.center_world
+    R_turn = rigid.so3_exp(angle * sight / np.linalg.norm(sight))
+    own = (model.dof_joint == part) & ~model.dof_is_length & hand.unlocked
+    if model.joints[part].kind == "ball" or np.count_nonzero(own) >= 3:
+        return orient(model, values, part, R_turn @ T_world_part[:3, :3], hand.unlocked)
+    target = T_world_part[:3, 3] + R_turn @ (hand.place_world(hand.values) - T_world_part[:3, 3])
+    return solve(model, values, [_UnderPointer(hand, target)], free=own, **_QUICK).values
+
+
+def push(hand: Grab, pointer_px: Array, values: Array) -> Array:
+    """Move the grabbed point away from the camera, as the pointer goes up, or towards it; in the view it stays.
+
+    Args:
+        hand: from `grab` or `grab_part`.
+        pointer_px: where the pointer is now, undistorted px, (2,).
+        values: the pose of the last call, from which to go on, (n_values,).
+    """
+    model, camera = hand.model, hand.camera
+    up_m = float(hand.pointer_px[1] - np.asarray(pointer_px)[1]) * hand.depth_m / camera.K[1, 1]
+    depth = max(_NEAREST_PUSH_M, hand.depth_m + _PUSH_GAIN * up_m)
+    target = camera.back_project(hand.pointer_px + hand.offset_px, depth)
+    if hand.moves_body:
+        step = np.zeros(model.n_dofs)
+        step[:3] = target - hand.place_world(hand.values)
+        return model.retract(hand.values, np.where(hand.free, step, 0.0))
+    blocks: list[Block] = [_UnderPointer(hand, target, _PUSH_DEPTH_WEIGHT), _rest(hand)]
+    return solve(model, values, blocks, free=hand.free, **_QUICK).values
+
+
+def _rest(hand: Grab) -> StayNear:
+    """What keeps the chain near its pose at the grab."""
+    return StayNear(hand.values, np.where(np.isfinite(hand.model.spreads), _STIFF_WEIGHT, _REST_WEIGHT))
 
 
 def standing_pose(model: BodyModel, cameras: Sequence[Camera], up: str = "z") -> Array:

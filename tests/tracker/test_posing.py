@@ -5,8 +5,10 @@ import pytest
 from staging import camera_at, cameras_around, shaken
 
 from tracker import rigid
+from tracker.body import Body
 from tracker.formats.model_toml import load_model
-from tracker.posing import UP_ROTATIONS, drag, grab, minor_points, standing_pose
+from tracker.picking import part_outlines
+from tracker.posing import UP_ROTATIONS, drag, grab, grab_part, hold_anew, minor_points, push, standing_pose, turn
 
 SIDE = camera_at("side", (3.0, 2.5, 1.0))
 
@@ -230,3 +232,94 @@ def test_a_head_nods_where_the_neck_bends_and_else_turns_the_body(gavrila):
         np.testing.assert_allclose(SIDE.project(place(model, nodded, "head")), target, atol=0.5)
         moved = place(model, nodded, "left_ankle") - place(model, values, "left_ankle")
         assert (np.linalg.norm(moved) < 1e-9) == stays
+
+
+def held_place(hand, values):
+    return SIDE.project(hand.place_world(values))
+
+
+@pytest.mark.parametrize("part", ["left_forearm", "left_upper_arm", "right_thigh", "right_calf"])
+def test_a_part_follows_by_the_place_that_was_touched(gavrila, pose, part):
+    index = gavrila.part_index[part]
+    outline = next(o for o in part_outlines([Body(gavrila, pose)], SIDE) if o.part == index)
+    start = outline.polygon_px.mean(axis=0) + 2.0
+    hand = grab_part(gavrila, pose, SIDE, index, start)
+    np.testing.assert_allclose(held_place(hand, pose), start, atol=0.1)
+    for way in (np.array([4.0, -3.0]), np.array([-3.0, -2.0])):
+        values = drag(hand, start + way, pose)
+        assert np.linalg.norm(held_place(hand, values) - start - way) < 1
+        np.testing.assert_array_equal(values[:3], pose[:3])
+
+
+def test_the_torso_is_taken_by_its_surface_to_move_the_body(gavrila, pose):
+    start = SIDE.project(place(gavrila, pose, "torso")) + 3.0
+    hand = grab_part(gavrila, pose, SIDE, 0, start)
+    values = drag(hand, start + np.array([20, -10]), pose)
+    np.testing.assert_allclose(held_place(hand, values), start + np.array([20, -10]), atol=0.01)
+    np.testing.assert_array_equal(values[3:], pose[3:])
+
+
+def test_turning_the_body_about_the_line_of_sight(gavrila, pose):
+    center = SIDE.project(place(gavrila, pose, "torso"))
+    start = center + np.array([0.0, -40.0])
+    hand = replace(grab(gavrila, pose, SIDE, "torso", start), offset_px=np.zeros(2))
+    values = turn(hand, center + np.array([40.0, 0.0]), pose)  # a quarter clockwise, as the view shows it
+    np.testing.assert_allclose(values[:3], pose[:3], atol=1e-9)
+    before, after = (gavrila.kinematics(v).Ts_world_part[0, :3, :3] for v in (pose, values))
+    sight = SIDE.T_world_camera[:3, :3].T @ (place(gavrila, pose, "torso") - SIDE.center_world)
+    turned = rigid.so3_log(SIDE.T_world_camera[:3, :3].T @ after @ before.T @ SIDE.T_world_camera[:3, :3])
+    np.testing.assert_allclose(turned, np.pi / 2 * sight / np.linalg.norm(sight), atol=1e-3)
+
+
+def test_on_the_joint_itself_a_turn_goes_as_a_knob(gavrila, pose):
+    start = SIDE.project(place(gavrila, pose, "torso"))
+    hand = grab(gavrila, pose, SIDE, "torso", start)
+    turned = turn(hand, start + np.array([30, 0]), pose)
+    before, after = (gavrila.kinematics(v).Ts_world_part[0, :3, :3] for v in (pose, turned))
+    angle = np.linalg.norm(rigid.so3_log(after @ before.T))
+    assert angle == pytest.approx(30 * hand.depth_m / SIDE.K[0, 0] / 0.3, rel=1e-3)
+
+
+@pytest.mark.parametrize(("point", "pivot"), [("left_elbow", "left_shoulder"), ("left_knee", "left_hip")])
+def test_a_limb_turns_about_its_joint_as_the_view_shows_it(gavrila, pose, point, pivot):
+    start = SIDE.project(place(gavrila, pose, point))
+    center = SIDE.project(place(gavrila, pose, pivot))
+    hand = grab(gavrila, pose, SIDE, point, start)
+    c, s = np.cos(0.3), np.sin(0.3)
+    for way in (np.array([[c, -s], [s, c]]), np.array([[c, s], [-s, c]])):
+        goal = center + way @ (start - center)
+        values = turn(hand, goal, pose)
+        end = SIDE.project(place(gavrila, values, point)) - center
+        wanted = goal - center
+        assert np.degrees(np.arccos(end @ wanted / np.linalg.norm(end) / np.linalg.norm(wanted))) < 3
+        own = gavrila.dof_joint == [j.name for j in gavrila.joints].index(pivot)
+        np.testing.assert_array_equal(values[~own], pose[~own])
+
+
+@pytest.mark.parametrize("point", ["left_wrist", "right_ankle"])
+def test_a_push_moves_a_point_in_depth_and_leaves_it_in_the_view(gavrila, pose, point):
+    start = SIDE.project(place(gavrila, pose, point))
+    hand = grab(gavrila, pose, SIDE, point, start)
+    for up in (4.0, -4.0):
+        end = place(gavrila, push(hand, start - (0.0, up), pose), point)
+        wanted = 2 * up * hand.depth_m / SIDE.K[1, 1]
+        assert SIDE.depths(end) - hand.depth_m == pytest.approx(wanted, abs=0.35 * abs(wanted))
+        assert np.linalg.norm(SIDE.project(end) - start) < 1
+
+
+def test_the_body_is_pushed_along_the_line_of_sight(gavrila, pose):
+    start = SIDE.project(place(gavrila, pose, "torso"))
+    hand = grab(gavrila, pose, SIDE, "torso", start)
+    values = push(hand, start - np.array([0.0, 20.0]), pose)
+    np.testing.assert_allclose(SIDE.project(place(gavrila, values, "torso")), start, atol=1e-6)
+    assert SIDE.depths(place(gavrila, values, "torso")) == pytest.approx(hand.depth_m * (1 + 40 / SIDE.K[1, 1]))
+    near = push(hand, start + np.array([0.0, 1e5]), pose)
+    assert SIDE.depths(place(gavrila, near, "torso")) == pytest.approx(0.3)
+
+
+def test_after_a_turn_the_hand_goes_on_where_it_is(gavrila, pose):
+    start = SIDE.project(place(gavrila, pose, "left_wrist"))
+    hand = grab(gavrila, pose, SIDE, "left_wrist", start)
+    turned = turn(hand, start + np.array([0, -12]), pose)
+    again = hold_anew(hand, turned, start + np.array([0, -12]))
+    np.testing.assert_allclose(drag(again, start + np.array([0, -12]), turned), turned, atol=5e-3)

@@ -1,0 +1,45 @@
+"""The parts of bodies that a pointer can take by their surface, as outlines in each view."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from app.layers import View
+from app.state import State
+from tracker import picking
+from tracker.body import Body
+from tracker.contours import FloatArray
+from tracker.session import Session
+
+
+class Outline(NamedTuple):
+    """Where a view shows a part, to be pointed at."""
+
+    camera: int
+    person: int
+    part: int
+    depth: float
+    """Distance of the part, metres: of parts that overlap the nearest is meant."""
+    segments_px: FloatArray
+    """The closed convex outline as x0, y0, x1, y1, (N, 4), undistorted px."""
+
+
+def outlines(session: Session, state: State, view: View) -> list[Outline]:
+    """The parts that a pointer can take in the views that a page shows: all of everybody.
+
+    There are none while a hand holds a point, and of a part that is held by its surface there is that one alone: what
+    the hand does not need would only make it wait. A step that is replayed is no pose to be taken.
+    """
+    drag = state.drag
+    if "joints" not in view.layers or state.look.replay is not None or (drag is not None and not drag.by_surface):
+        return []
+    bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
+    out = []
+    for index, source in enumerate(session.cameras):
+        if index not in view.cameras:
+            continue
+        for one in picking.part_outlines(bodies, source.camera.pinhole):
+            if drag is None or (one.body, one.part) == (drag.person, drag.part):
+                ends = np.hstack([one.polygon_px, np.roll(one.polygon_px, -1, axis=0)]).astype(np.float32)
+                out.append(Outline(index, one.body, one.part, one.depth_m, ends))
+    return out

@@ -1,0 +1,63 @@
+import cv2
+import numpy as np
+import pytest
+from staging import POSTURE_DEG, camera_at
+
+from tracker import rigid
+from tracker.body import Body
+from tracker.picking import part_outlines, place_on_part
+
+SIDE = camera_at("side", (3.0, 2.5, 1.0))
+
+
+@pytest.fixture(scope="module")
+def body(gavrila):
+    values = gavrila.neutral()
+    for name, angle in POSTURE_DEG.items():
+        values[gavrila.value_names.index(name)] = np.radians(angle)
+    return Body(gavrila, values)
+
+
+def test_outlines_hold_the_images_of_their_parts(body):
+    """Against meshes finer than the outlines are made of: none stands out by more than half a pixel."""
+    Ts = body.model.kinematics(body.values).Ts_world_part
+    found = part_outlines([body], SIDE)
+    assert [o.part for o in found] == list(range(len(body.model.parts)))
+    for outline in found:
+        mesh = body.model.shapes[outline.part].mesh(40, 60)
+        points = rigid.apply(Ts[outline.part], np.asarray(mesh.vertices) + body.model.centers_part[outline.part])
+        polygon = outline.polygon_px.astype(np.float32)
+        inside = [cv2.pointPolygonTest(polygon, tuple(map(float, p)), True) for p in SIDE.project(points)]
+        assert min(inside) > -0.5
+        assert min(inside) < 0.5  # and it fits as closely
+        assert cv2.isContourConvex(polygon)
+
+
+def test_parts_behind_the_camera_have_no_outline(body):
+    turned = camera_at("turned", (0.0, 0.0, 0.2))
+    assert len(part_outlines([body], turned)) < len(body.model.parts)
+
+
+@pytest.mark.parametrize("part", range(10))
+def test_the_place_touched_is_on_the_surface_and_under_the_pointer(body, part):
+    outline = next(o for o in part_outlines([body], SIDE) if o.part == part)
+    T = body.model.kinematics(body.values).Ts_world_part[part]
+    for toward in (0.0, 0.5, 0.9):
+        pointer = outline.polygon_px.mean(axis=0) * (1 - toward) + toward * outline.polygon_px[0]
+        place = place_on_part(body, SIDE, part, pointer)
+        np.testing.assert_allclose(SIDE.project(rigid.apply(T, place)), pointer, atol=0.05)
+        shape, center = body.model.shapes[part], body.model.centers_part[part]
+        assert float(shape.inside_outside(place - center)) == pytest.approx(1, abs=0.1)
+        # Of the two places on the line of sight it is the one that the camera sees: behind it the solid begins.
+        sight = place - rigid.apply(rigid.inverse(T), SIDE.center_world)
+        before, behind = (place + way * sight / np.linalg.norm(sight) - center for way in (-0.006, 0.006))
+        assert shape.inside_outside(before) > shape.inside_outside(behind)
+
+
+def test_a_pointer_that_just_misses_takes_the_outline(body):
+    outline = part_outlines([body], SIDE)[0]
+    middle = outline.polygon_px.mean(axis=0)
+    outside = middle + 1.02 * (outline.polygon_px[3] - middle)
+    T = body.model.kinematics(body.values).Ts_world_part[0]
+    place = place_on_part(body, SIDE, 0, outside)
+    assert np.linalg.norm(SIDE.project(rigid.apply(T, place)) - outside) < 6

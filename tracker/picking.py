@@ -1,0 +1,95 @@
+"""Parts of bodies under a pointer: their outlines in a view, and the place on their surface that it touches."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from tracker import rigid
+from tracker.body import Body
+from tracker.cameras import Camera
+from tracker.rigid import Array
+from tracker.shapes import Shape
+
+_NEAREST_M = 0.05
+"""A part that reaches nearer to the camera than this has no outline."""
+_RINGS, _SECTORS = 10, 20
+"""Fineness of an outline: it is within some 1% of the part's girth."""
+
+
+class PartOutline(NamedTuple):
+    """Where a view shows a part, whatever hides it."""
+
+    body: int
+    """Index of the body."""
+    part: int
+    """Index of the part."""
+    depth_m: float
+    """Distance of the part's centre along the optical axis: of parts that overlap the nearest is meant."""
+    polygon_px: Array
+    """Convex outline, (n, 2), undistorted px."""
+
+
+def part_outlines(bodies: Sequence[Body], camera: Camera) -> list[PartOutline]:
+    """Outlines of all parts in a view; those too near to the camera, or behind it, are left out.
+
+    All kinds of parts are convex, or so nearly that nobody sees it: the hull of the surface is the outline.
+    """
+    out = []
+    for b, body in enumerate(bodies):
+        Ts = body.model.kinematics(body.values).Ts_world_part
+        for p, (shape, center) in enumerate(zip(body.model.shapes, body.model.centers_part, strict=True)):
+            points = rigid.apply(Ts[p], _surface(shape) + center)
+            if camera.depths(points).min() < _NEAREST_M:
+                continue
+            hull = cv2.convexHull(camera.project(points).astype(np.float32)).reshape(-1, 2)
+            out.append(PartOutline(b, p, float(camera.depths(rigid.apply(Ts[p], center))), hull.astype(np.float64)))
+    return out
+
+
+def place_on_part(body: Body, camera: Camera, part: int, pointer_px: Array) -> Array:
+    """The place on a part that a pointer touches, (3,), in the part's frame, metres.
+
+    Where the line of sight just misses the part, as it may along its outline, it is the place nearest to the line.
+
+    Args:
+        body: with its pose.
+        camera: the view.
+        part: index of the part.
+        pointer_px: undistorted px, (2,).
+    """
+    T_part_world = rigid.inverse(body.model.kinematics(body.values).Ts_world_part[part])
+    start = rigid.apply(T_part_world, camera.center_world)
+    ray = rigid.apply(T_part_world, camera.pinhole.back_project(np.asarray(pointer_px, dtype=np.float64), 1.0)) - start
+    ray /= np.linalg.norm(ray)
+    corners = _triangles(body.model.shapes[part]) + body.model.centers_part[part]  # (n, 3 corners, 3)
+    # Where the line meets each triangle's plane, in the triangle's own coordinates (Moeller & Trumbore 1997).
+    ab, ac = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    across = np.cross(ray, ac)
+    det = np.einsum("ij,ij->i", ab, across)
+    det = np.where(np.abs(det) < 1e-15, np.inf, det)
+    from_a = start - corners[:, 0]
+    turned = np.cross(from_a, ab)
+    s, t = np.einsum("ij,ij->i", from_a, across) / det, turned @ ray / det
+    far = np.einsum("ij,ij->i", ac, turned) / det
+    hit = (s >= -1e-9) & (t >= -1e-9) & (s + t <= 1 + 1e-9) & (far > 0) & np.isfinite(det)
+    if np.any(hit):
+        return np.asarray(start + far[hit].min() * ray)
+    points = corners[:, 0]
+    along = (points - start) @ ray
+    return np.asarray(points[np.argmin(np.linalg.norm(points - start - along[:, None] * ray, axis=1))])
+
+
+@lru_cache(maxsize=256)
+def _surface(shape: Shape) -> Array:
+    """Points on a shape, (n, 3), in its frame, metres."""
+    return np.asarray(shape.mesh(_RINGS, _SECTORS).vertices, dtype=np.float64)
+
+
+@lru_cache(maxsize=256)
+def _triangles(shape: Shape) -> Array:
+    """Corners of a shape's triangles, (n, 3, 3), in its frame, metres."""
+    mesh = shape.mesh()
+    return np.asarray(mesh.vertices, dtype=np.float64)[np.asarray(mesh.faces)]
