@@ -95,7 +95,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         views: the evidence of the shown frame, where it is at hand.
     """
     segments, rows, first = [], [], 0
-    for path in [*overlays.paths(session, state, view, views), *pin_marks.pin_lines(session, state)]:
+    for path in [*overlays.paths(session, state, view, views), *pin_marks.pin_lines(session, state, view)]:
         count = len(path.segments_px)
         rows.append(
             {

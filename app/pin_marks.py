@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from app.layers import View
 from app.overlays import EPIPOLAR_COLOR, Path
 from app.state import State, finite_or_none
 from tracker.cameras import epipolar_segment
@@ -81,14 +82,16 @@ def meeting(session: Session, state: State) -> Meeting | None:
     return Meeting(state.person, state.point, len(pins), rms, "", tuple(marks))
 
 
-def pin_lines(session: Session, state: State) -> list[Path]:
+def pin_lines(session: Session, state: State, view: View) -> list[Path]:
     """The lines of sight of the pins of the joint worked on, as the other views see them."""
-    out = []
+    out: list[Path] = []
+    if "epipolar" not in view.layers:
+        return out
     for _, camera, place_px in _of_joint(state):
         source = session.cameras[camera].camera.pinhole
         for index, target in enumerate(session.cameras):
             segment = None
-            if index != camera:
+            if index != camera and index in view.cameras:
                 segment = epipolar_segment(source, target.camera.pinhole, np.array(place_px))
             if segment is not None:
                 row = segment.reshape(1, 4).astype(np.float32)

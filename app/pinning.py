@@ -94,6 +94,8 @@ class Pinning:
                 return
             place_px = _within(place_px, self._screen.session.cameras[held.camera].camera.size)
             pins = _with(self._screen.state.pins, held.person, ViewPin(held.point, held.camera, place_px))
+            if pins == self._screen.state.pins:
+                return  # a click only sets it
             if held.live:
                 self._show_fit([held.person], held.people, pins)
             else:

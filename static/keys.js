@@ -61,6 +61,7 @@ function control(key, shift) {
  * @property {import("./layers.js").Layers} layers
  * @property {import("./layers_menu.js").LayersMenu} layersMenu
  * @property {import("./snap.js").Snap} snap
+ * @property {import("./pinning.js").Pinning} pinning
  * @property {() => void} showHelp
  */
 
@@ -69,9 +70,9 @@ function control(key, shift) {
  * @returns {Binding[]}
  */
 // prettier-ignore
-export function bindings({ store, actions, navigation, grid, gestures, drawer, posing, inspector, layers, layersMenu, snap, showHelp }) {
+export function bindings({ store, actions, navigation, grid, gestures, drawer, posing, pinning, inspector, layers, layersMenu, snap, showHelp }) {
   const escape = () => {
-    if (gestures.cancel() || closePopover() || actions.leaveReplay()) return;
+    if (gestures.cancel() || closePopover() || pinning.cancel() || actions.leaveReplay()) return;
     if (hasTrack(store.facts.state)) actions.stopTracking();
     else if (hasSearch(store.facts.state)) actions.search("stop");
     else if (store.facts.filled !== null) grid.toggleFill(store.facts.filled);
@@ -121,6 +122,26 @@ export function bindings({ store, actions, navigation, grid, gestures, drawer, p
     { keys: ["["], label: "A range begins here", matches: plain("[", "BracketLeft"), run: mark("first") },
     { keys: ["]"], label: "The range ends here", matches: plain("]", "BracketRight"), run: mark("last") },
     ...posingBindings(posing, inspector, plain),
+    { keys: ["X"], label: "Pin the selected joint by clicks, or no more", matches: plain("x"), run: () => pinning.toggle() },
+    { keys: ["G"], label: "Fit to pins and edges", matches: plain("g"), run: () => pinning.fit() },
+    {
+      keys: ["Shift G"],
+      label: "The body follows pins that are dragged, or not",
+      matches: plain("g", undefined, true),
+      run: () => pinning.toggleLive(),
+    },
+    {
+      keys: ["Delete"],
+      label: "Remove the pin under the pointer, else those of the joint",
+      matches: plain("delete"),
+      run: () => pinning.remove(),
+    },
+    {
+      keys: ["Shift Delete"],
+      label: "Remove all pins of the person on this frame",
+      matches: plain("delete", undefined, true),
+      run: () => pinning.clear(),
+    },
     { keys: ["C"], label: "Curves", matches: plain("c"), run: () => drawer.toggleCurves() },
     { keys: ["B"], label: "Search: watch it in the drawer", matches: plain("b"), run: () => drawer.toggle("search") },
     { keys: ["V"], label: "Landscape of the cost", matches: plain("v"), run: () => drawer.toggle("landscape") },

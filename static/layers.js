@@ -83,7 +83,7 @@ export const LAYERS = [
     id: "epipolar",
     group: "Model",
     label: "Epipolar lines",
-    title: "The line of sight of a dragged joint, as the other cameras see it",
+    title: "The line of sight of a dragged joint, and of the pins of the selected one, as the other cameras see it",
     shown: true,
     opacity: 0.9,
   },

@@ -18,6 +18,8 @@ import { Latency } from "./latency.js";
 import { Navigation } from "./navigation.js";
 import { showNotice, watchConnection } from "./notices.js";
 import { PaneGrid } from "./pane_grid.js";
+import { PinBar } from "./pin_bar.js";
+import { Pinning } from "./pinning.js";
 import { Posing } from "./posing.js";
 import { Receiver } from "./receiver.js";
 import { SearchPanel } from "./search_panel.js";
@@ -49,7 +51,15 @@ const layers = new Layers(store);
 const layersMenu = new LayersMenu(store, layers);
 const lookMenu = new LookMenu(store, new Looks(store));
 const openLook = lookMenu.toggle.bind(lookMenu);
-const grid = new PaneGrid(byId("panes", HTMLElement), store, gestures, latency, openLook);
+const pinning = new Pinning(store, send, notify);
+// Who watches first has the pointer first: a pin's head may lie over a joint.
+const pointers = {
+  watch: (/** @type {import("./pane.js").Pane} */ pane, /** @type {number} */ camera) => {
+    pinning.watch(pane, camera);
+    gestures.watch(pane, camera);
+  },
+};
+const grid = new PaneGrid(byId("panes", HTMLElement), store, pointers, latency, openLook);
 new ViewRequest(store, send);
 const posing = new Posing(store, send);
 const inspector = new Inspector(byId("inspector", HTMLElement), store, posing, notify);
@@ -58,6 +68,7 @@ new TopBar(store, actions);
 new Transport(store, navigation);
 new TrackBar(store, actions, navigation);
 new FrameCard(store);
+new PinBar(store, pinning);
 const drawer = new Drawer(store);
 new Curves(store, navigation, actions);
 new SearchPanel(store, actions, send);
@@ -68,7 +79,7 @@ makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement));
 
 const help = byId("help", HTMLDialogElement);
 const showHelp = () => help.showModal();
-const table = keys.bindings({ store, actions, navigation, grid, gestures, drawer, posing, inspector, layers, layersMenu, snap, showHelp });
+const table = keys.bindings({ store, actions, navigation, grid, gestures, drawer, posing, pinning, inspector, layers, layersMenu, snap, showHelp });
 keys.describe(byId("help-keys", HTMLElement), table);
 button("show-help", () => help.showModal());
 help.addEventListener("click", (event) => event.target === help && help.close());

@@ -1,6 +1,7 @@
 /** One camera's pane: two canvases, what stands in its corners, zoom and pan. */
 
 import * as drawing from "./drawing.js";
+import { drawPins } from "./pin_drawing.js";
 import { uncrowded } from "./crowding.js";
 import { isPlain } from "./looks.js";
 import { PaneCorner } from "./pane_corner.js";
@@ -158,6 +159,7 @@ export class Pane {
     drawing.drawPaths(context, this.view, overlay, this.#camera, layers);
     this.#drawJoints(context, state, session.people);
     this.#showJoint(state);
+    drawPins(context, this.view, this.#store.facts, this.#camera, width);
   }
 
   showCost() {

@@ -5,6 +5,8 @@ import { Pane } from "./pane.js";
 
 /** Two digits within this time are one number. */
 const SECOND_DIGIT_MS = 700;
+/** What is drawn otherwise under the pointer. @type {(keyof import("./store.js").Facts)[]} */
+const HOVERED = ["hover", "hoverPart", "pinHover", "heldPin"];
 
 export class PaneGrid {
   /** @type {Pane[]} */
@@ -21,7 +23,7 @@ export class PaneGrid {
   /**
    * @param {HTMLElement} element
    * @param {import("./store.js").Store} store
-   * @param {import("./gestures.js").Gestures} gestures
+   * @param {{watch: (pane: Pane, camera: number) => void}} gestures whoever takes the pointer in a pane
    * @param {import("./latency.js").Latency} latency
    * @param {(camera: number, button: HTMLElement) => void} openLook opens brightness and contrast of a camera
    */
@@ -114,7 +116,8 @@ export class PaneGrid {
     // A new state comes with every move of a drag; only its choice of what to draw concerns the vectors.
     const { person, point } = this.#store.facts.state ?? {};
     const choice = JSON.stringify([person, point]);
-    if (withPictures || changed.has("overlay") || choice !== this.#choice || changed.has("hover") || changed.has("hoverPart")) {
+    const hovered = HOVERED.some((fact) => changed.has(fact));
+    if (withPictures || changed.has("overlay") || choice !== this.#choice || hovered) {
       this.#choice = choice;
       for (const pane of this.panes) pane.draw(withPictures);
     }

@@ -47,7 +47,12 @@
  *   kind: "model" | "hidden" | "candidate" | "ghost" | "part_edge" | "epipolar" | "accepted" | "rejected"}} Path
  * @typedef {{camera: number, person: number, part: number, depth: number, first: number, count: number}} Outline
  * @typedef {{camera: number, person: number, point: string, u: number, v: number, visible: boolean}} Handle
- * @typedef {{type: "overlay", frame: number, seq: number, job: boolean, paths: Path[], outlines: Outline[], handles: Handle[]}} OverlayHeader
+ * @typedef {{camera: number, person: number, point: string, u: number, v: number, model_u: number | null,
+ *   model_v: number | null}} PinMark
+ * @typedef {{person: number, point: string, pins: number, error_px: number | null, why: string,
+ *   marks: {camera: number, u: number, v: number, error_px: number | null}[]}} Meeting
+ * @typedef {{type: "overlay", frame: number, seq: number, job: boolean, paths: Path[], outlines: Outline[],
+ *   handles: Handle[], pins: PinMark[], meeting: Meeting | null}} OverlayHeader
  * @typedef {OverlayHeader & {segments: Float32Array}} Overlay
  * @typedef {"arms" | "torso" | "legs" | "cost"} CurveGroup
  * @typedef {{title: string, unit: "deg" | "cm" | "px", labels: string[]}} Plot
@@ -84,6 +89,10 @@
  *   {type: "take", run: number, candidate: number | null} |
  *   {type: "landscape", dof: string} |
  *   {type: "landscape_set", person: number, dof: number, value: number} |
+ *   {type: "pin", phase: "start" | "move" | "end" | "cancel", frame: number, camera: number, person: number,
+ *     point: string, u: number, v: number, live: boolean} |
+ *   {type: "unpin", frame: number, person: number, point: string | null, camera: number | null} |
+ *   {type: "fit", frame: number} |
  *   {type: "track", action: "forward" | "backward", until: number | null} |
  *   {type: "track", action: "pause" | "go_on" | "stop"} |
  *   {type: "follow", follow: boolean} |

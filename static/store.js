@@ -31,6 +31,10 @@ import { usualLayers } from "./layers.js";
  * @property {boolean} dragging whether a hand holds a joint
  * @property {number | null} active the camera whose pane was last pointed at; steps of keys are parallel to its image
  * @property {number | null} dof the degree of freedom that keys turn, of those that the selected joint means
+ * @property {boolean} pinning whether each click sets a pin of the selected joint
+ * @property {boolean} livePins whether the body follows while a pin is dragged
+ * @property {Joint | null} pinHover the pin under the pointer
+ * @property {import("./protocol.js").PinMark | null} heldPin the pin in the hand, or just let go
  * @property {number} target the frame the user asked for last
  * @property {boolean} playing
  * @property {number | null} filled the camera whose pane fills the grid
@@ -65,6 +69,10 @@ export class Store {
     dragging: false,
     active: null,
     dof: null,
+    pinning: false,
+    livePins: true,
+    pinHover: null,
+    heldPin: null,
     target: 0,
     playing: false,
     filled: null,
