@@ -20,7 +20,21 @@ export function takeRuns(facts, message) {
   const isKept = message.runs.some(({ number }) => number === facts.searchRun);
   // A run that begins is what one wants to see.
   const searchRun = newest > known || !isKept ? null : facts.searchRun;
-  return { searchRuns: message, searchRun };
+  const searchSteps = keptOf(facts.searchSteps, message);
+  const searchCandidates = keptOf(facts.searchCandidates, message);
+  return { searchRuns: message, searchRun, searchSteps, searchCandidates };
+}
+
+/**
+ * What is known of runs that are still listed: a page that is open for days must not grow.
+ *
+ * @template T
+ * @param {Map<number, T>} known by run
+ * @param {import("./protocol.js").SearchRunsMessage} message
+ */
+function keptOf(known, { runs }) {
+  const kept = [...known].filter(([run]) => runs.some(({ number }) => number === run));
+  return kept.length === known.size ? known : new Map(kept);
 }
 
 /**
