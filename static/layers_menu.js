@@ -77,7 +77,7 @@ export class LayersMenu {
   /** @param {import("./layers.js").LayerInfo} info */
   #row({ id, label, title }) {
     const { element, input } = checkbox(label, title);
-    element.className = "menu-check";
+    element.className = "popover-check";
     input.dataset.layer = id;
     input.addEventListener("change", () => this.#layers.toggle([id], input.checked));
     const key = document.createElement("kbd");
@@ -106,7 +106,7 @@ export class LayersMenu {
 
   #colors() {
     const choice = document.createElement("fieldset");
-    choice.className = "segmented menu-choice";
+    choice.className = "segmented popover-choice";
     choice.setAttribute("aria-label", "Colours of the contours");
     for (const [value, label, title] of /** @type {const} */ ([
       ["person", "by person", "Contours in the colour of their person"],
@@ -123,7 +123,7 @@ export class LayersMenu {
 
   #buildFoot() {
     const foot = document.createElement("div");
-    foot.className = "menu-foot";
+    foot.className = "popover-foot";
     const hint = document.createElement("span");
     hint.textContent = "Kept in this browser for this session";
     const reset = document.createElement("button");

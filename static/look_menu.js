@@ -91,7 +91,7 @@ export class LookMenu {
 
   #buildFoot() {
     const foot = document.createElement("div");
-    foot.className = "menu-foot";
+    foot.className = "popover-foot";
     const all = document.createElement("button");
     all.type = "button";
     all.textContent = "All cameras";
