@@ -44,3 +44,14 @@ def test_what_a_fresh_panel_shows_is_what_is_set(opened):
         assert SettingsPanel(server, controller).read() == controller.state.settings
     finally:
         server.stop()
+
+
+def test_what_is_changed_elsewhere_is_shown(opened):
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        panel = SettingsPanel(server, opened())
+        changed = settings_of(SHOWN, TrackSettings())
+        panel.show(changed)
+        assert panel.read() == changed
+    finally:
+        server.stop()
