@@ -122,6 +122,31 @@ def info(session: SessionArg, /, json: bool = False) -> None:
 
 
 @_app.command
+def index(session: SessionArg, /, json: bool = False) -> None:
+    """Make pictures of all frames of the videos, so that the page shows any of them at once.
+
+    They go into the session's folder, some 50 KB for each frame of 640x480 pixels. Stopped with Ctrl+C, the same call
+    goes on where it was. Searching and tracking go on to use the videos.
+
+    Args:
+        session: session folder.
+        json: print one JSON object.
+    """
+    from app.indexing import index as make
+    from tracker.session import load_session
+
+    found = make(load_session(session), Reporter(silent=json))
+    if json:
+        print(commands.as_json(found))
+    else:
+        frames = ", ".join(f"{name} {n}" for name, n in found["frames"].items())
+        print(f"{found['folder']}: {frames} frames, {found['bytes'] / 1e6:.0f} MB" if frames else "no videos to index")
+    if found["stopped"]:
+        print("stopped; the same call goes on from here", file=sys.stderr)
+        sys.exit(1)
+
+
+@_app.command
 def init(
     session: SessionArg,
     /,

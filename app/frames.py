@@ -2,12 +2,13 @@
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Generic, TypeVar
 
 from app import pictures
 from tracker.evidence import Observer, ViewEvidence
+from tracker.proxy import Proxy
 from tracker.silhouettes import Image
 
 _KEPT_FRAMES = 6
@@ -42,10 +43,16 @@ class _Recent(Generic[T]):
 class Frames:
     """What the page needs of a recording. Safe to use from several threads."""
 
-    def __init__(self, observer: Observer) -> None:
-        """Wrap an observer; nothing is read yet."""
-        self.observer = observer
-        self._images = _Recent(observer.images)
+    def __init__(self, observer: Observer, proxies: Sequence[Proxy | None] = ()) -> None:
+        """Wrap an observer; nothing is read yet.
+
+        Args:
+            observer: gives images and evidence.
+            proxies: of each camera's footage, where there is one; what is looked at comes from them, all else from the
+                footage.
+        """
+        self.observer, self._proxies = observer, proxies
+        self._images = _Recent(self._look)
         self._evidence = _Recent(observer.evidence)
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="evidence")
         self._wanted: int | None = None
@@ -77,6 +84,16 @@ class Frames:
         """Give up what is still requested."""
         self._wanted = None
         self._pool.shutdown(wait=True, cancel_futures=True)
+
+    def _look(self, frame: int) -> tuple[Image | None, ...]:
+        """Undistorted images of a frame, from the proxies where all cameras have one that goes so far."""
+        sources, proxies = self.observer.cameras, [p for p in self._proxies if p is not None]
+        if len(proxies) < len(sources) or any(
+            frame + s.offset >= p.n_frames for s, p in zip(sources, proxies, strict=True)
+        ):
+            return self.observer.images(frame)
+        images = (p.read(frame + s.offset) for s, p in zip(sources, proxies, strict=True))
+        return tuple(None if i is None else s.camera.undistort_image(i) for s, i in zip(sources, images, strict=True))
 
     def image(self, frame: int, camera: int, reduction: int = 1) -> bytes:
         """The undistorted image of one view as JPEG; `reduction` pixels of it, along either side, become one."""

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from platformdirs import user_data_path
+from platformdirs import user_cache_path, user_data_path
 
+from app import indexing
 from app.access import access_for
 from app.controller import Controller
 from app.frames import Frames
@@ -55,9 +56,11 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
     session = load_session(folder)
     access = access_for(serving.host, serving.allow_hosts)
     static = static_folder()
-    with SessionLock(session.folder), Recording([c for c in session.cameras]) as recording:
+    with SessionLock(session.folder), Recording(session.cameras, indices=_indices()) as recording:
         store = AnnotationStore(session.annotations_path)
-        controller = Controller(session, Saver(session, store), Frames(Observer(session.cameras, recording)))
+        controller = Controller(
+            session, Saver(session, store), Frames(Observer(session.cameras, recording), indexing.proxies(session))
+        )
         viser_server = start_viser()
         try:
             Scene(viser_server, controller)
@@ -65,6 +68,8 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
             app = create_app(Panes(controller), viser_server.get_port(), access, static)
 
             def ready(address: str) -> None:
+                for name in indexing.stale(session):
+                    say(f"the proxy of camera {name} is of other footage: run quadrille index {session.folder} again")
                 say(f"{session.name}: {address}")
                 if serving.browser:
                     threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
@@ -74,6 +79,11 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
             controller.close()
             viser_server.stop()
             store.close()
+
+
+def _indices() -> Path:
+    """Where the lists of frames of videos are kept between openings."""
+    return user_cache_path("quadrille", appauthor=False) / "footage"
 
 
 async def _until_interrupted(serving: Coroutine[Any, Any, None]) -> None:

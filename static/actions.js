@@ -63,6 +63,37 @@ export class Actions {
     this.#send({ type: "track", action: "stop" });
   }
 
+  /**
+   * Work on the marked range.
+   *
+   * @param {import("./protocol.js").RangeAction} action
+   * @param {number | null} person null for everybody
+   */
+  onRange(action, person) {
+    const { range } = this.#store.facts;
+    if (range) this.#send({ type: "range", action, first: range.first, last: range.last, person });
+  }
+
+  stopRange() {
+    this.#send({ type: "stop_range" });
+  }
+
+  /**
+   * Mark the shown pose of the person worked on, or take the mark back.
+   *
+   * @param {"keyframe" | "reviewed"} toggle
+   */
+  toggleMark(toggle) {
+    if (this.#store.facts.connected) this.#send({ type: "mark", toggle });
+  }
+
+  /** Take the marks of the shown pose of the person worked on away. */
+  unmark() {
+    const { connected, state, target, timeline } = this.#store.facts;
+    if (!connected || !state || !timeline.has(target)) return;
+    this.#send({ type: "range", action: "none", first: target, last: target, person: state.person });
+  }
+
   /** @param {boolean} follow */
   follow(follow) {
     this.#send({ type: "follow", follow });

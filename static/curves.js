@@ -8,7 +8,8 @@ import { CURVE_GROUPS } from "./drawer.js";
 import { prepare } from "./drawing.js";
 import { byId } from "./elements.js";
 import { FrameAxis } from "./frame_axis.js";
-import { keyframesOf } from "./timeline_drawing.js";
+import { zoomByWheel } from "./frame_window.js";
+import { keyframesOf } from "./cells.js";
 
 /**
  * @typedef {import("./protocol.js").CurveGroup} CurveGroup
@@ -22,6 +23,7 @@ export class Curves {
   #store;
   #navigation;
   #actions;
+  #frameWindow;
   #stage = byId("curves", HTMLElement);
   #legend = byId("curves-legend", HTMLElement);
   #lines = document.createElement("canvas");
@@ -38,11 +40,13 @@ export class Curves {
    * @param {import("./store.js").Store} store
    * @param {import("./navigation.js").Navigation} navigation
    * @param {import("./actions.js").Actions} actions
+   * @param {import("./frame_window.js").FrameWindow} frameWindow
    */
-  constructor(store, navigation, actions) {
+  constructor(store, navigation, actions, frameWindow) {
     this.#store = store;
     this.#navigation = navigation;
     this.#actions = actions;
+    this.#frameWindow = frameWindow;
     this.#stage.append(this.#lines, this.#cursor);
     store.subscribe((changed) => this.#update(changed));
     new ResizeObserver(() => this.#drawAll()).observe(this.#stage);
@@ -58,7 +62,8 @@ export class Curves {
   }
 
   get #axis() {
-    return new FrameAxis(this.#stage.clientWidth, this.#store.facts.session?.n_frames ?? 1);
+    const { session, visible } = this.#store.facts;
+    return new FrameAxis(this.#stage.clientWidth, session?.n_frames ?? 1, visible);
   }
 
   /** @param {Set<keyof import("./store.js").Facts>} changed */
@@ -67,8 +72,9 @@ export class Curves {
     if (this.#group === null) return;
     if (changed.has("connected") && this.#store.facts.connected) this.#actions.openCurves(this.#group);
     if (changed.has("curves")) this.#describe();
-    if (changed.has("curves") || changed.has("session") || changed.has("timeline")) this.#drawLines();
-    if (changed.has("curves") || changed.has("session") || changed.has("target")) this.#drawCursor();
+    const moved = changed.has("curves") || changed.has("session") || changed.has("visible");
+    if (moved || changed.has("timeline")) this.#drawLines();
+    if (moved || changed.has("target")) this.#drawCursor();
   }
 
   /** Ask for the group that the drawer calls for, or for no more. */
@@ -95,6 +101,7 @@ export class Curves {
       if (stage.hasPointerCapture(event.pointerId)) this.#navigation.goTo(frame);
       if (frame !== this.#hovered) this.#hover(frame);
     });
+    zoomByWheel(stage, this.#frameWindow, () => this.#axis);
     stage.addEventListener("pointerleave", () => this.#hover(null));
   }
 
@@ -166,7 +173,7 @@ export class Curves {
     const axis = this.#axis;
     const { target } = this.#store.facts;
     context.fillStyle = style.getPropertyValue("--text");
-    context.fillRect(axis.middle(target) - 0.5, 0, 1, clientHeight);
+    if (axis.shows(target)) context.fillRect(axis.middle(target) - 0.5, 0, 1, clientHeight);
     if (this.#hovered !== null) {
       context.globalAlpha = 0.5;
       context.fillRect(axis.middle(this.#hovered) - 0.5, 0, 1, clientHeight);

@@ -4,17 +4,26 @@
 export const GUTTER = 52;
 const PADDING = 8;
 
+/** @typedef {{start: number, end: number}} Span a part of the recording, in frames and their parts, `end` not included */
+
 export class FrameAxis {
   /**
    * @param {number} width of the element, CSS pixels
    * @param {number} frames how many there are
+   * @param {Span | null} visible the part that is shown; null for all of it
    */
-  constructor(width, frames) {
+  constructor(width, frames, visible) {
     this.frames = frames;
     this.left = GUTTER;
     this.right = Math.max(GUTTER + 1, width - PADDING);
+    const { start, end } = visible ?? { start: 0, end: frames };
+    /** Where the axis begins, in frames. */
+    this.origin = start;
     /** Width of a frame, CSS pixels; below 1 where several share a pixel. */
-    this.pitch = (this.right - this.left) / frames;
+    this.pitch = (this.right - this.left) / (end - start);
+    /** First and last frame of which something shows. */
+    this.first = Math.max(0, Math.floor(start));
+    this.last = Math.min(frames, Math.ceil(end)) - 1;
   }
 
   /**
@@ -23,7 +32,7 @@ export class FrameAxis {
    * @param {number} frame
    */
   start(frame) {
-    return this.left + frame * this.pitch;
+    return this.left + (frame - this.origin) * this.pitch;
   }
 
   /**
@@ -32,7 +41,16 @@ export class FrameAxis {
    * @param {number} frame
    */
   middle(frame) {
-    return this.left + (frame + 0.5) * this.pitch;
+    return this.left + (frame + 0.5 - this.origin) * this.pitch;
+  }
+
+  /**
+   * Whether a frame lies within what is shown.
+   *
+   * @param {number} frame
+   */
+  shows(frame) {
+    return frame >= this.first && frame <= this.last;
   }
 
   /**
@@ -41,7 +59,16 @@ export class FrameAxis {
    * @param {number} x
    */
   frameAt(x) {
-    return Math.max(0, Math.min(this.frames - 1, Math.floor((x - this.left) / this.pitch)));
+    return Math.max(0, Math.min(this.frames - 1, Math.floor(this.placeAt(x))));
+  }
+
+  /**
+   * The place on the axis, in frames and their parts.
+   *
+   * @param {number} x
+   */
+  placeAt(x) {
+    return this.origin + (x - this.left) / this.pitch;
   }
 
   /**
@@ -61,7 +88,8 @@ export class FrameAxis {
    */
   ticks(gap) {
     const step = roundUp(Math.max(1, gap / this.pitch));
-    return Array.from({ length: Math.ceil(this.frames / step) }, (_, i) => i * step);
+    const begin = Math.ceil(this.first / step);
+    return Array.from({ length: Math.max(0, Math.floor(this.last / step) - begin + 1) }, (_, i) => (begin + i) * step);
   }
 }
 

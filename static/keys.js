@@ -4,6 +4,8 @@ import { hasSearch, hasTrack } from "./actions.js";
 import { BY_KEY } from "./layers.js";
 import { closePopover } from "./popovers.js";
 import { posingBindings } from "./posing_keys.js";
+import { control, plain } from "./key_matching.js";
+import { timelineKeys } from "./timeline_keys.js";
 
 /**
  * @typedef {object} Binding
@@ -22,37 +24,13 @@ const SLIDER_KEYS = new Set([
 ]); // prettier-ignore
 
 /**
- * Match a plain key by its character or, since Shift changes that by keyboard layout, by its place.
- *
- * @param {string} key
- * @param {string} [code]
- * @param {boolean} [shift]
- * @returns {(event: KeyboardEvent) => boolean}
- */
-function plain(key, code, shift = false) {
-  return (event) =>
-    !event.ctrlKey &&
-    !event.metaKey &&
-    !event.altKey &&
-    event.shiftKey === shift &&
-    (event.key.toLowerCase() === key || (code !== undefined && event.code === code));
-}
-
-/**
- * @param {string} key
- * @param {boolean} shift
- * @returns {(event: KeyboardEvent) => boolean}
- */
-function control(key, shift) {
-  return (event) =>
-    (event.ctrlKey || event.metaKey) && !event.altKey && event.shiftKey === shift && event.key.toLowerCase() === key;
-}
-
-/**
  * @typedef {object} Parts
  * @property {import("./store.js").Store} store
  * @property {import("./actions.js").Actions} actions
  * @property {import("./navigation.js").Navigation} navigation
+ * @property {import("./playback.js").Playback} playback
+ * @property {import("./jumps.js").Jumps} jumps
+ * @property {import("./frame_window.js").FrameWindow} frameWindow
  * @property {import("./pane_grid.js").PaneGrid} grid
  * @property {import("./gestures.js").Gestures} gestures
  * @property {import("./drawer.js").Drawer} drawer
@@ -70,11 +48,16 @@ function control(key, shift) {
  * @returns {Binding[]}
  */
 // prettier-ignore
-export function bindings({ store, actions, navigation, grid, gestures, drawer, posing, pinning, inspector, layers, layersMenu, snap, showHelp }) {
+export function bindings({
+  store, actions, navigation, playback, jumps, frameWindow, grid, gestures, drawer, posing, pinning, inspector, layers,
+  layersMenu, snap, showHelp,
+}) {
   const escape = () => {
     if (gestures.cancel() || closePopover() || pinning.cancel() || actions.leaveReplay()) return;
     if (hasTrack(store.facts.state)) actions.stopTracking();
+    else if (store.facts.state?.range.running) actions.stopRange();
     else if (hasSearch(store.facts.state)) actions.search("stop");
+    else if (store.facts.range) store.set({ range: null });
     else if (store.facts.filled !== null) grid.toggleFill(store.facts.filled);
   };
   const search = (/** @type {"step" | "stage" | "frame"} */ action) => () => {
@@ -95,7 +78,7 @@ export function bindings({ store, actions, navigation, grid, gestures, drawer, p
     { keys: ["Shift ."], label: "Ten frames on", matches: plain(">", "Period", true), run: () => navigation.step(10) },
     { keys: ["Home"], label: "First frame", matches: plain("home"), run: () => navigation.first() },
     { keys: ["End"], label: "Last frame", matches: plain("end"), run: () => navigation.last() },
-    { keys: ["Space"], label: "Play or pause", matches: plain(" "), run: () => navigation.togglePlay() },
+    { keys: ["Space"], label: "Play or pause", matches: plain(" "), run: () => playback.toggle() },
     { keys: ["Ctrl Z"], label: "Undo", matches: control("z", false), run: () => actions.undo() },
     {
       keys: ["Ctrl Shift Z", "Ctrl Y"],
@@ -107,18 +90,17 @@ export function bindings({ store, actions, navigation, grid, gestures, drawer, p
     { keys: ["Shift S"], label: "Search: to the end of the stage", matches: plain("s", undefined, true), run: search("stage") },
     { keys: ["Shift F"], label: "Search: again from the same start", matches: plain("f", undefined, true), run: () => actions.searchAgain() },
     { keys: ["F"], label: "Search: this frame", matches: plain("f"), run: search("frame") },
-    { keys: ["Esc"], label: "Cancel the drag, leave the replay, else stop what is at work", matches: plain("escape"), run: escape },
+    {
+      keys: ["Esc"],
+      label: "Cancel the drag, leave the replay, else stop what is at work, else put the marked range away",
+      matches: plain("escape"),
+      run: escape,
+    },
     { keys: ["T"], label: "Track forward", matches: plain("t"), run: track("forward") },
     { keys: ["Shift T"], label: "Track backward", matches: plain("t", undefined, true), run: track("backward") },
     { keys: ["P"], label: "Pause tracking, or go on", matches: plain("p"), run: () => actions.togglePause() },
     { keys: ["L"], label: "Follow the tracker, or not", matches: plain("l"), run: () => actions.toggleFollow() },
-    { keys: ["N"], label: "Next doubtful or lost frame", matches: plain("n"), run: () => navigation.toDoubt(1) },
-    {
-      keys: ["Shift N"],
-      label: "Former doubtful or lost frame",
-      matches: plain("n", undefined, true),
-      run: () => navigation.toDoubt(-1),
-    },
+    ...timelineKeys({ store, actions, playback, jumps, frameWindow }),
     { keys: ["["], label: "A range begins here", matches: plain("[", "BracketLeft"), run: mark("first") },
     { keys: ["]"], label: "The range ends here", matches: plain("]", "BracketRight"), run: mark("last") },
     ...posingBindings(posing, inspector, plain),

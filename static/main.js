@@ -6,8 +6,11 @@ import { Curves } from "./curves.js";
 import { Drawer } from "./drawer.js";
 import { button, byId } from "./elements.js";
 import { FrameCard } from "./frame_card.js";
+import { FrameWindow } from "./frame_window.js";
 import { Gestures } from "./gestures.js";
 import { Inspector } from "./inspector.js";
+import { JumpMenu } from "./jump_menu.js";
+import { Jumps } from "./jumps.js";
 import * as keys from "./keys.js";
 import { LandscapePanel } from "./landscape.js";
 import { Layers } from "./layers.js";
@@ -21,6 +24,8 @@ import { PaneGrid } from "./pane_grid.js";
 import { PinBar } from "./pin_bar.js";
 import { Pinning } from "./pinning.js";
 import { Posing } from "./posing.js";
+import { Playback } from "./playback.js";
+import { RangeBar } from "./range_bar.js";
 import { Receiver } from "./receiver.js";
 import { SearchPanel } from "./search_panel.js";
 import { Snap } from "./snap.js";
@@ -65,21 +70,29 @@ const posing = new Posing(store, send);
 const inspector = new Inspector(byId("inspector", HTMLElement), store, posing, notify);
 const snap = new Snap(byId("panes", HTMLElement), store, grid, send);
 new TopBar(store, actions);
-new Transport(store, navigation);
-new TrackBar(store, actions, navigation);
+const playback = new Playback(store, navigation);
+const jumps = new Jumps(store, navigation);
+const frameWindow = new FrameWindow(store);
+new Transport(store, navigation, playback, actions);
+new TrackBar(store, actions);
+new JumpMenu(store, jumps);
+new RangeBar(store, actions);
 new FrameCard(store);
 new PinBar(store, pinning);
 const drawer = new Drawer(store);
-new Curves(store, navigation, actions);
 new SearchPanel(store, actions, send);
 new LandscapePanel(store, send);
-new Timeline(byId("timeline", HTMLElement), store, navigation);
+new Curves(store, navigation, actions, frameWindow);
+new Timeline(byId("timeline", HTMLElement), { store, navigation, jumps, frameWindow });
 watchConnection(byId("banner", HTMLElement), store);
 makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement));
 
 const help = byId("help", HTMLDialogElement);
 const showHelp = () => help.showModal();
-const table = keys.bindings({ store, actions, navigation, grid, gestures, drawer, posing, pinning, inspector, layers, layersMenu, snap, showHelp });
+const table = keys.bindings({
+  store, actions, navigation, playback, jumps, frameWindow, grid, gestures, drawer, posing, pinning, inspector, layers,
+  layersMenu, snap, showHelp,
+}); // prettier-ignore
 keys.describe(byId("help-keys", HTMLElement), table);
 button("show-help", () => help.showModal());
 help.addEventListener("click", (event) => event.target === help && help.close());

@@ -3,10 +3,7 @@
  * scrubs or a clip plays, the program is never more than one frame behind.
  */
 
-import { isDoubt } from "./protocol.js";
-
 const GIVE_UP_MS = 2000;
-const GAP_MS = 500;
 
 export class Navigation {
   #store;
@@ -15,8 +12,6 @@ export class Navigation {
   #underWay = null;
   /** @type {number | null} */
   #wish = null;
-  /** Where playback counts from. */
-  #anchor = { frame: 0, time: 0, tick: 0 };
 
   /**
    * @param {import("./store.js").Store} store
@@ -42,31 +37,13 @@ export class Navigation {
    */
   goTo(frame) {
     if (!this.#store.facts.session || !this.#store.facts.connected) return;
-    const target = Math.max(0, Math.min(this.#last, Math.round(frame)));
-    this.#anchor = { frame: target, time: performance.now(), tick: performance.now() };
-    this.#request(target);
+    this.request(Math.max(0, Math.min(this.#last, Math.round(frame))));
   }
 
   /** @param {number} count frames forward, or backward where negative */
   step(count) {
     this.pause();
     this.goTo(this.#store.facts.target + count);
-  }
-
-  /**
-   * Go to the nearest frame in one direction that the tracker calls doubtful or lost.
-   *
-   * @param {1 | -1} way
-   */
-  toDoubt(way) {
-    const { timeline, target } = this.#store.facts;
-    let nearest = null;
-    for (const [frame, { status }] of timeline) {
-      const isAhead = way * (frame - target) > 0;
-      if (isAhead && isDoubt(status) && (nearest === null || way * (frame - nearest) < 0)) nearest = frame;
-    }
-    this.pause();
-    if (nearest !== null) this.goTo(nearest);
   }
 
   first() {
@@ -81,35 +58,17 @@ export class Navigation {
     if (this.#store.facts.playing) this.#store.set({ playing: false });
   }
 
-  togglePlay() {
-    const { playing, target, session, connected } = this.#store.facts;
-    if (playing || !session || !connected) return this.pause();
-    this.#store.set({ playing: true });
-    this.goTo(target >= this.#last ? 0 : target);
-    requestAnimationFrame((now) => this.#tick(now));
+  /** Whether a frame is on its way. */
+  get isUnderWay() {
+    return this.#underWay !== null;
   }
 
-  /** @param {number} now */
-  #tick(now) {
-    const { playing, session } = this.#store.facts;
-    if (!playing || !session) return;
-    if (now - this.#anchor.tick > GAP_MS) {
-      // A hidden tab draws nothing: go on from where it stood instead of jumping.
-      this.#anchor = { frame: this.#store.facts.target, time: now, tick: now };
-    }
-    this.#anchor.tick = now;
-    const due = this.#anchor.frame + Math.floor(((now - this.#anchor.time) * session.fps) / 1000);
-    if (due >= this.#last) {
-      this.pause();
-      this.#request(this.#last);
-      return;
-    }
-    if (!this.#underWay && due > this.#store.facts.target) this.#request(due);
-    requestAnimationFrame((then) => this.#tick(then));
-  }
-
-  /** @param {number} frame */
-  #request(frame) {
+  /**
+   * Ask for a frame of the recording.
+   *
+   * @param {number} frame
+   */
+  request(frame) {
     this.#store.set({ target: frame });
     this.#wish = frame;
     if (!this.#underWay) this.#sendWish();

@@ -16,14 +16,18 @@
  * @typedef {"" | "good" | "doubtful" | "lost"} Status
  * @typedef {{running: boolean, first: number | null, last: number | null, at: number | null, done: number, total: number,
  *   per_second: number, doubtful: number, lost: number, message: string}} Track
+ * @typedef {{running: boolean, what: string, done: number, total: number, message: string}} RangeWork
+ * @typedef {"track_forward" | "track_backward" | "interpolate" | "clear" | "keyframe" | "reviewed" | "unreviewed" |
+ *   "none"} RangeAction
  * @typedef {{type: "state", frame: number, person: number, point: string | null,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
- *   parts_px: (number | null)[], dofs: number[], locked: number[], job: Job, track: Track,
+ *   parts_px: (number | null)[], dofs: number[], locked: number[], job: Job, track: Track, range: RangeWork,
  *   replay: {run: number, step: number, steps: number, stage: string | null} | null, follow: boolean, snapped: number | null,
  *   undo: string | null, redo: string | null,
  *   saved: boolean, save_error: string | null}} StateMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
- * @typedef {{source: string, cost_px: number | null, keyframe: boolean, status: Status, remark: string}} Cell
+ * @typedef {{source: string, cost_px: number | null, keyframe: boolean, status: Status, remark: string,
+ *   reviewed: boolean}} Cell
  * @typedef {{type: "timeline", cells: Record<string, Cell | null>, replace: boolean}} TimelineMessage
  * @typedef {{person: number, name: string, dofs: string[], bound_rad: number | null, step_rad: number | null,
  *   bound_m: number | null, step_m: number | null, angles: number, lengths: number, own: boolean}} SearchLeaf
@@ -39,7 +43,8 @@
  *   evaluations: number}} Replay
  * @typedef {{type: "search_runs", runs: SearchRun[], replay: Replay | null, compared: number | null}} SearchRunsMessage
  * @typedef {SessionMessage | StateMessage | NoticeMessage | TimelineMessage | SearchSetupMessage |
- *   SearchRunsMessage} TextMessage
+ *   SearchRunsMessage | DisagreeingMessage} TextMessage
+ * @typedef {{type: "disagreeing", frames: number[]}} DisagreeingMessage
  *
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number,
  *   limit_px: number | null}} ImageHeader
@@ -64,7 +69,9 @@
  * @typedef {{type: "landscape", person: number, dof: number, names: string[], unit: "rad" | "m", current: number,
  *   current_px: number | null, count: number}} LandscapeHeader
  * @typedef {ImageHeader | OverlayHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
- *   LandscapeHeader} BinaryHeader
+ *   LandscapeHeader | CellsHeader} BinaryHeader
+ * @typedef {{type: "cells", replace: boolean, count: number, sources: string[], statuses: Status[],
+ *   remarks: Record<string, string>}} CellsHeader
  *
  * @typedef {"move" | "turn" | "push"} DragMode
  * @typedef {{type: "pose", frame: number, person: number} & (
@@ -95,6 +102,9 @@
  *   {type: "fit", frame: number} |
  *   {type: "track", action: "forward" | "backward", until: number | null} |
  *   {type: "track", action: "pause" | "go_on" | "stop"} |
+ *   {type: "range", action: RangeAction, first: number, last: number, person: number | null} |
+ *   {type: "stop_range"} |
+ *   {type: "mark", toggle: "keyframe" | "reviewed"} |
  *   {type: "follow", follow: boolean} |
  *   {type: "curves", group: CurveGroup | null} |
  *   {type: "hold_3d", hold: boolean} |
@@ -114,13 +124,4 @@ export function decodeBinary(buffer) {
   const headerLength = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(decoder.decode(new Uint8Array(buffer, 4, headerLength)));
   return { header, payload: buffer.slice(4 + headerLength) };
-}
-
-/**
- * Whether a frame of this status should be looked at.
- *
- * @param {Status} status
- */
-export function isDoubt(status) {
-  return status === "doubtful" || status === "lost";
 }

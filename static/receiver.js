@@ -1,5 +1,6 @@
 /** Puts the program's messages into the store. */
 
+import { Cells } from "./cells.js";
 import { PictureAssembler, keyOf } from "./pictures.js";
 import { mergeCandidates, mergeSteps, takeLandscape, takeRuns } from "./search_facts.js";
 import { mergeCurves } from "./series.js";
@@ -48,6 +49,9 @@ export class Receiver {
       case "search_runs":
         this.#store.set(takeRuns(this.#store.facts, message));
         break;
+      case "disagreeing":
+        this.#store.set({ disagreeing: message.frames });
+        break;
       case "notice":
         this.#notify(message);
         break;
@@ -65,6 +69,9 @@ export class Receiver {
         break;
       case "overlay":
         this.#takeOverlay({ ...header, segments: new Float32Array(payload) });
+        break;
+      case "cells":
+        this.#cells(header.replace).take(header, payload);
         break;
       case "curves":
         this.#store.set({ curves: mergeCurves(this.#store.facts.curves, header, payload, this.#frameCount) });
@@ -147,12 +154,18 @@ export class Receiver {
 
   /** @param {import("./protocol.js").TimelineMessage} message */
   #mergeTimeline({ cells, replace }) {
-    // Changed in place: a long recording has a hundred thousand cells, and a tracker changes some twice a second.
-    const timeline = replace ? new Map() : this.#store.facts.timeline;
-    for (const [frame, cell] of Object.entries(cells)) {
-      if (cell) timeline.set(Number(frame), cell);
-      else timeline.delete(Number(frame));
-    }
+    const timeline = this.#cells(replace);
+    for (const [frame, cell] of Object.entries(cells)) timeline.set(Number(frame), cell);
+  }
+
+  /**
+   * The cells to change in place: a long recording has a hundred thousand, and a tracker changes some twice a second.
+   *
+   * @param {boolean} replace whether to begin with none
+   */
+  #cells(replace) {
+    const timeline = replace ? new Cells(this.#frameCount) : this.#store.facts.timeline;
     this.#store.set({ timeline });
+    return timeline;
   }
 }

@@ -82,7 +82,10 @@ export function extent(curves) {
 export function trace(path, values, axis, toY) {
   const stride = Math.max(1, Math.floor(1 / axis.pitch));
   let isOpen = false;
-  for (let first = 0; first < values.length; first += stride) {
+  // One more on either side, so that the line runs out of the picture.
+  const begin = Math.max(0, Math.floor(axis.first / stride) - 1) * stride;
+  const end = Math.min(values.length, axis.last + 2 * stride + 1);
+  for (let first = begin; first < end; first += stride) {
     const points = summary(values, first, Math.min(first + stride, values.length));
     if (points.length === 0) {
       isOpen = false;

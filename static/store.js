@@ -3,6 +3,7 @@
  * messages came in between.
  */
 
+import { Cells } from "./cells.js";
 import { usualLayers } from "./layers.js";
 
 /**
@@ -13,7 +14,9 @@ import { usualLayers } from "./layers.js";
  * @property {boolean} connected
  * @property {import("./protocol.js").SessionMessage | null} session
  * @property {import("./protocol.js").StateMessage | null} state
- * @property {Map<number, import("./protocol.js").Cell>} timeline the known cells by frame
+ * @property {import("./cells.js").Cells} timeline the known cells by frame
+ * @property {number[]} disagreeing frames whose pose does not go together with those around it, ascending
+ * @property {import("./frame_axis.js").Span | null} visible the part of the recording that timeline and curves show; null: all
  * @property {import("./series.js").Curves | null} curves the group of curves that came last
  * @property {import("./drawer.js").Tab | null} drawer what the drawer shows; null while it is closed
  * @property {import("./protocol.js").SearchSetupMessage | null} searchSetup
@@ -37,6 +40,9 @@ import { usualLayers } from "./layers.js";
  * @property {import("./protocol.js").PinMark | null} heldPin the pin in the hand, or just let go
  * @property {number} target the frame the user asked for last
  * @property {boolean} playing
+ * @property {number} rate at which a clip plays, 1 for real time
+ * @property {boolean} loops whether playing begins anew at the end, of the marked range where there is one
+ * @property {boolean} everyFrame whether playing waits for every frame instead of skipping those that come late
  * @property {number | null} filled the camera whose pane fills the grid
  * @property {import("./layers.js").LayerChoice} layers what is drawn in the panes
  * @property {(import("./looks.js").Look | undefined)[]} looks brightness, contrast and gamma of each camera's image
@@ -51,7 +57,9 @@ export class Store {
     connected: false,
     session: null,
     state: null,
-    timeline: new Map(),
+    timeline: new Cells(0),
+    disagreeing: [],
+    visible: null,
     curves: null,
     drawer: null,
     searchSetup: null,
@@ -75,6 +83,9 @@ export class Store {
     heldPin: null,
     target: 0,
     playing: false,
+    rate: 1,
+    loops: false,
+    everyFrame: false,
     filled: null,
     layers: usualLayers(),
     looks: [],

@@ -1,50 +1,54 @@
 /**
- * One cell per frame, coloured by who set it, with its status and cost above it. A click or a drag goes there; with Shift it
- * marks a range of frames.
+ * One cell per frame, coloured by who set it, with its status and cost above it and what has been reviewed below. A click or a
+ * drag goes there; with Shift it marks a range of frames. It can be zoomed; the strip at the bottom is the whole recording.
  */
 
+import { keyframesOf } from "./cells.js";
 import { prepare } from "./drawing.js";
 import { FrameAxis } from "./frame_axis.js";
+import { zoomByWheel } from "./frame_window.js";
 import { px } from "./text.js";
 import * as drawing from "./timeline_drawing.js";
 
-/** The sources of a pose, in the order of the legend; their colours are in style.css. */
-export const SOURCES = [
-  "manual",
-  "pinned",
-  "searched",
-  "fitted",
-  "tracked",
-  "interpolated",
-  "smoothed",
-  "imported",
-];
+/** The strip of the whole recording takes the pointer a little beyond its edge. */
+const REACH = 1;
+const MIDDLE_BUTTON = 1;
+
+/** @typedef {"scrub" | "mark" | "pan" | "overview"} Gesture what the pointer does while it is down */
 
 export class Timeline {
   #element;
   #store;
   #navigation;
+  #jumps;
+  #frameWindow;
   #cells = document.createElement("canvas");
   #cursor = document.createElement("canvas");
   #hovered = /** @type {number | null} */ (null);
+  #gesture = /** @type {Gesture | null} */ (null);
   /** Where a range began that is being marked. */
-  #marked = /** @type {number | null} */ (null);
+  #marked = 0;
+  /** The place under the pointer that pans, which stays under it. */
+  #held = 0;
 
   /**
    * @param {HTMLElement} element
-   * @param {import("./store.js").Store} store
-   * @param {import("./navigation.js").Navigation} navigation
+   * @param {{store: import("./store.js").Store, navigation: import("./navigation.js").Navigation,
+   *   jumps: import("./jumps.js").Jumps, frameWindow: import("./frame_window.js").FrameWindow}} parts
    */
-  constructor(element, store, navigation) {
+  constructor(element, { store, navigation, jumps, frameWindow }) {
     this.#element = element;
     this.#store = store;
     this.#navigation = navigation;
+    this.#jumps = jumps;
+    this.#frameWindow = frameWindow;
     element.style.height = `${drawing.HEIGHT}px`;
     element.append(this.#cells, this.#cursor);
     store.subscribe((changed) => {
-      if (changed.has("timeline") || changed.has("session")) this.#drawCells();
-      if (["target", "session", "range"].some((fact) => changed.has(/** @type {"target"} */ (fact)))) this.#drawCursor();
-      if (changed.has("target") || changed.has("timeline") || changed.has("session")) this.#describe();
+      const has = (/** @type {(keyof import("./store.js").Facts)[]} */ ...facts) => facts.some((f) => changed.has(f));
+      if (has("timeline", "session", "visible")) this.#drawCells();
+      if (has("target", "session", "range", "visible")) this.#drawCursor();
+      if (has("target", "timeline", "session")) this.#describe();
     });
     new ResizeObserver(() => this.#drawAll()).observe(element);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#drawAll());
@@ -52,49 +56,97 @@ export class Timeline {
   }
 
   get #axis() {
-    return new FrameAxis(this.#element.clientWidth, this.#store.facts.session?.n_frames ?? 1);
+    return new FrameAxis(this.#element.clientWidth, this.#store.facts.session?.n_frames ?? 1, this.#store.facts.visible);
+  }
+
+  /** The axis of the strip at the bottom. */
+  get #whole() {
+    return new FrameAxis(this.#element.clientWidth, this.#store.facts.session?.n_frames ?? 1, null);
   }
 
   #listen() {
     const element = this.#element;
-    element.addEventListener("pointerdown", (event) => {
-      if (event.button !== 0) return;
-      element.setPointerCapture(event.pointerId);
-      const frame = this.#axis.frameUnder(event, element);
-      this.#marked = event.shiftKey ? frame : null;
-      if (event.shiftKey) {
-        this.#store.set({ range: null });
-        return;
-      }
-      this.#navigation.pause();
-      this.#navigation.goTo(frame);
-    });
+    element.addEventListener("pointerdown", (event) => this.#press(event));
     element.addEventListener("pointermove", (event) => {
-      const frame = this.#axis.frameUnder(event, element);
-      if (element.hasPointerCapture(event.pointerId)) this.#dragTo(frame);
+      if (this.#gesture) this.#drag(event);
+      const frame = this.#isOverview(event) ? null : this.#axis.frameUnder(event, element);
       if (frame === this.#hovered) return;
       this.#hovered = frame;
-      element.title = this.#describeFrame(frame);
+      element.title = frame === null ? "The whole recording: drag to move what is shown" : this.#describeFrame(frame);
       requestAnimationFrame(() => this.#drawCursor());
     });
+    for (const end of /** @type {const} */ (["pointerup", "pointercancel"])) {
+      element.addEventListener(end, () => {
+        this.#gesture = null;
+        element.classList.remove("is-panning");
+      });
+    }
     element.addEventListener("pointerleave", () => {
       this.#hovered = null;
       requestAnimationFrame(() => this.#drawCursor());
     });
+    element.addEventListener("dblclick", (event) => {
+      if (this.#isOverview(event)) this.#frameWindow.zoom(0, 0);
+      else this.#store.set({ range: this.#jumps.stretchAround(this.#axis.frameUnder(event, element)) });
+    });
+    zoomByWheel(element, this.#frameWindow, () => this.#axis);
     element.addEventListener("keydown", (event) => {
       const step = { ArrowLeft: -1, ArrowRight: 1, PageDown: -10, PageUp: 10 }[event.key];
-      if (step === undefined) return;
+      if (step === undefined || event.ctrlKey || event.altKey || event.metaKey) return;
       event.preventDefault();
       this.#navigation.step(step);
     });
   }
 
-  /** @param {number} frame */
-  #dragTo(frame) {
-    if (this.#marked === null) this.#navigation.goTo(frame);
+  /** @param {PointerEvent} event */
+  #press(event) {
+    const element = this.#element;
+    if (event.button !== 0 && event.button !== MIDDLE_BUTTON) return;
+    event.preventDefault();
+    element.setPointerCapture(event.pointerId);
+    const frame = this.#axis.frameUnder(event, element);
+    if (event.button === MIDDLE_BUTTON) {
+      this.#gesture = "pan";
+      this.#held = this.#placeUnder(event);
+      element.classList.add("is-panning");
+    } else if (this.#store.facts.visible && this.#isOverview(event)) {
+      this.#gesture = "overview";
+      this.#drag(event);
+    } else if (event.shiftKey) {
+      this.#gesture = "mark";
+      this.#marked = frame;
+      this.#store.set({ range: null });
+    } else {
+      this.#gesture = "scrub";
+      this.#navigation.pause();
+      this.#navigation.goTo(frame);
+    }
+  }
+
+  /** @param {PointerEvent} event */
+  #drag(event) {
+    const frame = this.#axis.frameUnder(event, this.#element);
+    if (this.#gesture === "scrub") this.#navigation.goTo(frame);
+    else if (this.#gesture === "pan") this.#frameWindow.move(this.#held - this.#placeUnder(event));
+    else if (this.#gesture === "overview") this.#frameWindow.centre(this.#whole.placeAt(this.#x(event)));
     else if (frame !== this.#marked || this.#store.facts.range) {
       this.#store.set({ range: { first: Math.min(frame, this.#marked), last: Math.max(frame, this.#marked) } });
     }
+  }
+
+  /** @param {MouseEvent} event */
+  #x(event) {
+    return event.clientX - this.#element.getBoundingClientRect().left;
+  }
+
+  /** @param {MouseEvent} event */
+  #placeUnder(event) {
+    return this.#axis.placeAt(this.#x(event));
+  }
+
+  /** @param {MouseEvent} event */
+  #isOverview(event) {
+    return event.clientY - this.#element.getBoundingClientRect().top >= drawing.OVERVIEW.top - REACH;
   }
 
   #drawAll() {
@@ -110,16 +162,23 @@ export class Timeline {
     const style = getComputedStyle(this.#element);
     const axis = this.#axis;
     drawing.drawLabels(context, axis, style);
+    context.save();
+    context.beginPath();
+    context.rect(axis.left, 0, axis.right - axis.left + 2, drawing.OVERVIEW.top);
+    context.clip();
     drawing.drawSources(context, axis, timeline, style);
-    drawing.drawKeyframes(context, axis, drawing.keyframesOf(timeline));
+    drawing.drawKeyframes(context, axis, keyframesOf(timeline));
+    drawing.drawReviewed(context, axis, timeline, style);
     drawing.drawStatuses(context, axis, timeline, style);
     drawing.drawCosts(context, axis, timeline, style);
+    context.restore();
+    drawing.drawOverview(context, this.#whole, timeline, style);
   }
 
   #drawCursor() {
     const { clientWidth, clientHeight } = this.#element;
     const context = prepare(this.#cursor, clientWidth, clientHeight, true);
-    const { session, target, range } = this.#store.facts;
+    const { session, target, range, visible } = this.#store.facts;
     if (!session) return;
     const style = getComputedStyle(this.#element);
     const axis = this.#axis;
@@ -127,9 +186,11 @@ export class Timeline {
     if (this.#hovered !== null) {
       context.fillStyle = style.getPropertyValue("--muted");
       context.globalAlpha = 0.5;
-      context.fillRect(axis.middle(this.#hovered) - 0.5, 0, 1, clientHeight);
+      context.fillRect(axis.middle(this.#hovered) - 0.5, 0, 1, drawing.OVERVIEW.top - REACH);
       context.globalAlpha = 1;
     }
+    drawing.drawWindow(context, this.#whole, visible, target, style);
+    if (!axis.shows(target)) return;
     const width = Math.max(2, axis.pitch);
     const [top, bottom] = [drawing.CELL.top - 2, drawing.CELL.bottom + 2];
     context.fillStyle = context.strokeStyle = style.getPropertyValue("--text");
@@ -142,9 +203,11 @@ export class Timeline {
   #describeFrame(frame) {
     const cell = this.#store.facts.timeline.get(frame);
     if (!cell) return `Frame ${frame}: no pose`;
-    const { source, keyframe, status, remark, cost_px } = cell;
-    const parts = [source, keyframe && "keyframe", status, px(cost_px)].filter(Boolean).join(", ");
-    return `Frame ${frame}: ${parts}${remark && `\n${remark}`}`;
+    const { source, keyframe, status, remark, cost_px, reviewed } = cell;
+    const seen = keyframe ? "keyframe" : reviewed && "reviewed";
+    const parts = [source, seen, status, px(cost_px)].filter(Boolean).join(", ");
+    const jumps = this.#store.facts.disagreeing.includes(frame) ? "\ndisagrees with the frames beside it" : "";
+    return `Frame ${frame}: ${parts}${remark && `\n${remark}`}${jumps}`;
   }
 
   #describe() {

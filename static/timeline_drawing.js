@@ -1,17 +1,23 @@
-/** Draws the timeline: cost curve, strip of statuses, cells by source, keyframes, marked range. Sizes are CSS pixels. */
+/**
+ * Draws the timeline: cost curve, strip of statuses, cells by source with their keyframes, what has been reviewed, the marked
+ * range, and the whole recording small. Sizes are CSS pixels.
+ */
 
+import { NO_POSE, REVIEWED, SOURCES, STATUSES as ALL, keyframesOf } from "./cells.js";
 import { trace } from "./series.js";
 
 /**
  * @typedef {import("./frame_axis.js").FrameAxis} FrameAxis
- * @typedef {Map<number, import("./protocol.js").Cell>} Cells
+ * @typedef {import("./cells.js").Cells} Cells
  */
 
-export const HEIGHT = 70;
-const COST = { top: 6, bottom: 30 };
-const STATUS = { top: 34, bottom: 46 };
+export const HEIGHT = 72;
+const COST = { top: 4, bottom: 24 };
+const STATUS = { top: 28, bottom: 40 };
 const KEYFRAME_GAP = 5;
-export const CELL = { top: 50, bottom: 62 };
+export const CELL = { top: 44, bottom: 56 };
+const REVIEW = { top: 58, bottom: 60 };
+export const OVERVIEW = { top: 64, bottom: 70 };
 
 /** Statuses that are drawn, the worst last and on top: each has a height of its own besides its colour. */
 export const STATUSES = /** @type {const} */ (["good", "doubtful", "lost"]);
@@ -33,6 +39,30 @@ export function drawLabels(context, axis, style) {
 }
 
 /**
+ * Runs of neighbouring frames that look the same, each as one rectangle: where frames share a pixel the next one begins where
+ * the run ends, so that a long recording costs as many rectangles as it has changes, or pixels.
+ *
+ * @param {FrameAxis} axis
+ * @param {(frame: number) => number} look of a frame; below 0 for nothing to draw
+ * @param {number} gap between frames, pixels
+ * @param {(look: number, x: number, width: number) => void} draw
+ */
+function eachRun(axis, look, gap, draw) {
+  for (let frame = axis.first; frame <= axis.last; ) {
+    const found = look(frame);
+    let next = frame + 1;
+    if (gap === 0) while (next <= axis.last && look(next) === found) next += 1;
+    if (found >= 0) draw(found, axis.start(frame), Math.max(1, (next - frame) * axis.pitch - gap));
+    frame = next;
+  }
+}
+
+/** @param {FrameAxis} axis */
+function gapOf(axis) {
+  return axis.pitch >= 5 ? 1 : 0;
+}
+
+/**
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
  * @param {Cells} cells
@@ -42,21 +72,12 @@ export function drawSources(context, axis, cells, style) {
   const height = CELL.bottom - CELL.top;
   context.fillStyle = style.getPropertyValue("--track");
   context.fillRect(axis.left, CELL.top, axis.right - axis.left, height);
-  const colors = new Map();
-  const gap = axis.pitch >= 5 ? 1 : 0;
-  /** @type {Map<number, string>} the source that each pixel shows, where frames share one */
-  const drawn = new Map();
-  for (const [frame, { source }] of cells) {
-    const x = axis.start(frame);
-    // The next frame of the same colour on the same pixel changes nothing.
-    if (axis.pitch < 1 && drawn.get(Math.floor(x)) === source) continue;
-    drawn.set(Math.floor(x), source);
-    if (!colors.has(source)) {
-      colors.set(source, style.getPropertyValue(`--source-${source}`) || style.getPropertyValue("--muted"));
-    }
-    context.fillStyle = colors.get(source);
-    context.fillRect(x, CELL.top, Math.max(1, axis.pitch - gap), height);
-  }
+  const colors = SOURCES.map((source) => style.getPropertyValue(`--source-${source}`));
+  const { sources } = cells;
+  eachRun(axis, (frame) => (sources[frame] === NO_POSE ? -1 : sources[frame]), gapOf(axis), (source, x, width) => {
+    context.fillStyle = colors[source];
+    context.fillRect(x, CELL.top, width, height);
+  });
 }
 
 /**
@@ -70,20 +91,33 @@ export function drawKeyframes(context, axis, keyframes) {
 }
 
 /**
- * Where keyframes are marked: of those that would cover each other only one.
+ * Where keyframes are marked: of those that would cover each other only one, and none out of sight.
  *
  * @param {Iterable<number>} frames
  * @param {FrameAxis} axis
  */
 export function placesOf(frames, axis) {
   const places = new Map();
-  for (const frame of frames) places.set(Math.floor(axis.middle(frame) / KEYFRAME_GAP), axis.middle(frame));
+  for (const frame of frames) {
+    if (axis.shows(frame)) places.set(Math.floor(axis.middle(frame) / KEYFRAME_GAP), axis.middle(frame));
+  }
   return [...places.values()];
 }
 
-/** @param {Cells} cells */
-export function keyframesOf(cells) {
-  return [...cells].filter(([, { keyframe }]) => keyframe).map(([frame]) => frame);
+/**
+ * A line under the frames that a person has vouched for or looked at.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {Cells} cells
+ * @param {CSSStyleDeclaration} style
+ */
+export function drawReviewed(context, axis, cells, style) {
+  context.fillStyle = style.getPropertyValue("--good");
+  const { marks } = cells;
+  eachRun(axis, (frame) => (marks[frame] & REVIEWED ? 0 : -1), 0, (_, x, width) => {
+    context.fillRect(x, REVIEW.top, width, REVIEW.bottom - REVIEW.top);
+  });
 }
 
 /**
@@ -95,20 +129,17 @@ export function keyframesOf(cells) {
  * @param {CSSStyleDeclaration} style
  */
 export function drawStatuses(context, axis, cells, style) {
-  const columns = STATUSES.map(() => new Set());
-  const gap = axis.pitch >= 5 ? 1 : 0;
-  for (const [frame, { status }] of cells) {
-    const rank = STATUSES.indexOf(/** @type {typeof STATUSES[number]} */ (status));
-    if (rank >= 0) columns[rank].add(axis.pitch < 1 ? Math.floor(axis.start(frame)) : axis.start(frame));
-  }
-  columns.forEach((xs, rank) => {
-    const status = STATUSES[rank];
-    // What is seldom must still be seen: a single bad frame among thousands is two pixels wide.
-    const width = Math.max(status === "good" ? 1 : 2, axis.pitch - gap);
-    context.fillStyle = style.getPropertyValue(`--status-${status}`);
+  const { statuses } = cells;
+  for (const status of STATUSES) {
+    const index = ALL.indexOf(status);
     const height = STATUS_HEIGHTS[status];
-    for (const x of xs) context.fillRect(x, STATUS.bottom - height, width, height);
-  });
+    // What is seldom must still be seen: a single bad frame among thousands is two pixels wide.
+    const least = status === "good" ? 1 : 2;
+    context.fillStyle = style.getPropertyValue(`--status-${status}`);
+    eachRun(axis, (frame) => (statuses[frame] === index ? index : -1), gapOf(axis), (_, x, width) => {
+      context.fillRect(x, STATUS.bottom - height, Math.max(least, width), height);
+    });
+  }
 }
 
 /**
@@ -120,19 +151,74 @@ export function drawStatuses(context, axis, cells, style) {
  * @param {CSSStyleDeclaration} style
  */
 export function drawCosts(context, axis, cells, style) {
-  const values = new Float32Array(axis.frames).fill(NaN);
-  for (const [frame, { cost_px }] of cells) if (cost_px !== null) values[frame] = cost_px;
-  const ordered = values.filter((value) => value === value).sort();
+  const ordered = cells.costs.filter((value) => value === value).sort();
   if (ordered.length === 0) return;
   const most = Math.max(1e-6, ordered[Math.floor(0.98 * (ordered.length - 1))]);
   const path = new Path2D();
-  trace(path, values, axis, (value) => COST.bottom - (COST.bottom - COST.top) * Math.min(1, value / most));
+  trace(path, cells.costs, axis, (value) => COST.bottom - (COST.bottom - COST.top) * Math.min(1, value / most));
+  context.save();
+  context.beginPath();
+  context.rect(axis.left, 0, axis.right - axis.left, STATUS.top);
+  context.clip();
   context.strokeStyle = style.getPropertyValue("--text");
   context.globalAlpha = 0.75;
   context.lineWidth = 1.25;
   context.lineJoin = "round";
   context.stroke(path);
+  context.restore();
+}
+
+/**
+ * The whole recording small: what has been reviewed, keyframes, what is doubtful or lost.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} whole axis of all frames
+ * @param {Cells} cells
+ * @param {CSSStyleDeclaration} style
+ */
+export function drawOverview(context, whole, cells, style) {
+  const height = OVERVIEW.bottom - OVERVIEW.top;
+  context.fillStyle = style.getPropertyValue("--track");
+  context.fillRect(whole.left, OVERVIEW.top, whole.right - whole.left, height);
+  const { statuses, marks, sources } = cells;
+  /** @type {[(frame: number) => boolean, string, number, number][]} what, colour, share of the height, least width */
+  const layers = [
+    [(frame) => sources[frame] !== NO_POSE, "--faint", 0.5, 1],
+    [(frame) => (marks[frame] & REVIEWED) !== 0, "--good", 0.5, 1],
+    [(frame) => STATUSES[statuses[frame] - 1] === "doubtful", "--status-doubtful", 1, 1],
+    [(frame) => STATUSES[statuses[frame] - 1] === "lost", "--status-lost", 1, 1],
+  ];
+  for (const [is, color, share, least] of layers) {
+    context.fillStyle = style.getPropertyValue(color);
+    eachRun(whole, (frame) => (is(frame) ? 0 : -1), 0, (_, x, width) => {
+      context.fillRect(x, OVERVIEW.bottom - share * height, Math.max(least, width), share * height);
+    });
+  }
+  context.fillStyle = style.getPropertyValue("--text");
+  for (const x of placesOf(keyframesOf(cells), whole)) context.fillRect(x - 0.5, OVERVIEW.top, 1, 3);
+}
+
+/**
+ * The frame round the part of the overview that is shown, and where in it the shown frame lies.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} whole axis of all frames
+ * @param {import("./frame_axis.js").Span | null} visible
+ * @param {number} target
+ * @param {CSSStyleDeclaration} style
+ */
+export function drawWindow(context, whole, visible, target, style) {
+  context.fillStyle = style.getPropertyValue("--text");
+  context.fillRect(whole.middle(target) - 0.5, OVERVIEW.top - 1, 1, OVERVIEW.bottom - OVERVIEW.top + 2);
+  if (!visible) return;
+  const [left, right] = [whole.start(visible.start), whole.start(visible.end)];
+  const width = Math.max(6, right - left);
+  context.fillStyle = context.strokeStyle = style.getPropertyValue("--accent");
+  context.globalAlpha = 0.25;
+  context.fillRect(left, OVERVIEW.top - 2, width, OVERVIEW.bottom - OVERVIEW.top + 4);
   context.globalAlpha = 1;
+  context.lineWidth = 1.5;
+  context.strokeRect(left, OVERVIEW.top - 2, width, OVERVIEW.bottom - OVERVIEW.top + 4);
 }
 
 /**
@@ -144,14 +230,16 @@ export function drawCosts(context, axis, cells, style) {
  * @param {CSSStyleDeclaration} style
  */
 export function drawRange(context, axis, { first, last }, style) {
-  const [left, right] = [axis.start(first), axis.start(last + 1)];
+  const left = Math.max(axis.left, axis.start(first));
+  const right = Math.min(axis.right, axis.start(last + 1));
+  if (right <= axis.left || left >= axis.right) return;
   context.fillStyle = style.getPropertyValue("--accent");
   context.globalAlpha = 0.14;
-  context.fillRect(left, 0, right - left, HEIGHT);
+  context.fillRect(left, 0, right - left, OVERVIEW.top - 3);
   context.globalAlpha = 1;
   context.fillRect(left, 0, Math.max(2, right - left), 2);
-  context.fillRect(left, 0, 2, 7);
-  context.fillRect(Math.max(left, right - 2), 0, 2, 7);
+  if (axis.shows(first)) context.fillRect(left, 0, 2, 7);
+  if (axis.shows(last)) context.fillRect(Math.max(left, right - 2), 0, 2, 7);
 }
 
 /**

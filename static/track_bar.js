@@ -1,8 +1,7 @@
-/** The buttons that track, and those that lead from one frame to be looked at to the next. */
+/** The buttons that track. */
 
 import { hasTrack } from "./actions.js";
 import { button, byId } from "./elements.js";
-import { isDoubt } from "./protocol.js";
 
 export class TrackBar {
   #store;
@@ -11,29 +10,23 @@ export class TrackBar {
   #pause;
   #stop;
   #follow = byId("follow", HTMLInputElement);
-  #former;
-  #next;
 
   /**
    * @param {import("./store.js").Store} store
    * @param {import("./actions.js").Actions} actions
-   * @param {import("./navigation.js").Navigation} navigation
    */
-  constructor(store, actions, navigation) {
+  constructor(store, actions) {
     this.#store = store;
     this.#back = button("track-backward", () => actions.track("backward"));
     this.#forward = button("track-forward", () => actions.track("forward"));
     this.#pause = button("track-pause", () => actions.togglePause());
     this.#stop = button("track-stop", () => actions.stopTracking());
-    this.#former = button("former-doubt", () => navigation.toDoubt(-1));
-    this.#next = button("next-doubt", () => navigation.toDoubt(1));
     this.#follow.addEventListener("change", () => {
       actions.follow(this.#follow.checked);
       this.#follow.blur();
     });
     store.subscribe((changed) => {
       if (changed.has("state") || changed.has("connected") || changed.has("range")) this.#showRun();
-      if (changed.has("timeline") || changed.has("connected")) this.#showDoubts();
     });
   }
 
@@ -50,11 +43,5 @@ export class TrackBar {
     this.#pause.title = stands && !isRunning ? "Go on tracking (P)" : "Pause tracking (P)";
     this.#pause.setAttribute("aria-label", stands && !isRunning ? "Go on tracking" : "Pause tracking");
     this.#follow.checked = state?.follow ?? true;
-  }
-
-  #showDoubts() {
-    const { timeline, connected } = this.#store.facts;
-    const some = [...timeline.values()].some(({ status }) => isDoubt(status));
-    this.#former.disabled = this.#next.disabled = !connected || !some;
   }
 }

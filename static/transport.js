@@ -2,12 +2,17 @@
 
 import { button, byId } from "./elements.js";
 import { clock } from "./text.js";
-import { SOURCES } from "./timeline.js";
+import { SOURCES, STATUSES as CELL_STATUSES } from "./cells.js";
 import { STATUSES } from "./timeline_drawing.js";
 
 export class Transport {
   #store;
   #play;
+  #loop;
+  #every;
+  #keyframe;
+  #reviewed;
+  #rate = byId("rate", HTMLSelectElement);
   #frame = byId("frame", HTMLInputElement);
   #total = byId("frame-total", HTMLElement);
   #clock = byId("clock", HTMLElement);
@@ -17,14 +22,24 @@ export class Transport {
   /**
    * @param {import("./store.js").Store} store
    * @param {import("./navigation.js").Navigation} navigation
+   * @param {import("./playback.js").Playback} playback
+   * @param {import("./actions.js").Actions} actions
    */
-  constructor(store, navigation) {
+  constructor(store, navigation, playback, actions) {
     this.#store = store;
     button("first-frame", () => navigation.first());
     button("previous-frame", () => navigation.step(-1));
-    this.#play = button("play", () => navigation.togglePlay());
+    this.#play = button("play", () => playback.toggle());
     button("next-frame", () => navigation.step(1));
     button("last-frame", () => navigation.last());
+    this.#loop = button("loop", () => playback.toggleLoop());
+    this.#every = button("every-frame", () => playback.toggleEveryFrame());
+    this.#keyframe = button("toggle-keyframe", () => actions.toggleMark("keyframe"));
+    this.#reviewed = button("toggle-reviewed", () => actions.toggleMark("reviewed"));
+    this.#rate.addEventListener("change", () => {
+      playback.setRate(Number(this.#rate.value));
+      this.#rate.blur();
+    });
     this.#frame.addEventListener("focus", () => this.#frame.select());
     this.#frame.addEventListener("change", () => {
       const wanted = this.#frame.valueAsNumber;
@@ -39,7 +54,10 @@ export class Transport {
       if (changed.has("session")) this.#showSession();
       if (changed.has("target") || changed.has("session")) this.#showFrame();
       if (changed.has("playing")) this.#showPlaying();
-      if (changed.has("state")) this.#showSource();
+      if (changed.has("rate") || changed.has("loops") || changed.has("everyFrame")) this.#showHow();
+      if (["state", "timeline", "target", "connected"].some((f) => changed.has(/** @type {"state"} */ (f)))) {
+        this.#showSource();
+      }
       if (changed.has("timeline")) this.#showLegend();
     });
   }
@@ -63,15 +81,28 @@ export class Transport {
     this.#play.classList.toggle("is-playing", playing);
   }
 
+  #showHow() {
+    const { rate, loops, everyFrame } = this.#store.facts;
+    this.#rate.value = String(rate);
+    this.#loop.setAttribute("aria-pressed", String(loops));
+    this.#every.setAttribute("aria-pressed", String(everyFrame));
+  }
+
   #showSource() {
     const source = this.#store.facts.state?.source ?? null;
     this.#source.textContent = source === null ? "No pose yet" : `Pose: ${source}`;
+    const { timeline, target, connected, state } = this.#store.facts;
+    const cell = timeline.get(target);
+    this.#keyframe.disabled = !connected || !state;
+    this.#reviewed.disabled = !connected || !cell || cell.keyframe;
+    this.#keyframe.setAttribute("aria-pressed", String(!!cell?.keyframe));
+    this.#reviewed.setAttribute("aria-pressed", String(!!cell?.reviewed));
   }
 
   #showLegend() {
-    const cells = [...this.#store.facts.timeline.values()];
-    const sources = new Set(cells.map(({ source }) => source));
-    const statuses = new Set(cells.map(({ status }) => status));
+    const { timeline } = this.#store.facts;
+    const sources = new Set(SOURCES.filter((_, index) => timeline.sources.includes(index)));
+    const statuses = new Set(CELL_STATUSES.filter((_, index) => timeline.statuses.includes(index)));
     const rows = [
       STATUSES.filter((status) => statuses.has(status)).map((status) => swatch(status, `--status-${status}`, status)),
       SOURCES.filter((source) => sources.has(source)).map((source) => swatch(source, `--source-${source}`, "")),

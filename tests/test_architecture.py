@@ -18,6 +18,7 @@ ORDER = [
         "tracker.rigid",
         "tracker.silhouettes",
         "tracker.store_schema",
+        "tracker.footage_index",
     ],
     [
         "tracker.cameras",
@@ -49,7 +50,7 @@ ORDER = [
     ["tracker.occlusion", "tracker.pins", "tracker.posing", "tracker.sizes", "tracker.evaluate"],
     # The session keeps its cameras and models in files of these formats, so it reads and writes by them; a format
     # knows cameras, bodies and tables, never a session.
-    ["tracker.session"],
+    ["tracker.session", "tracker.proxy"],
     ["tracker.recording", "tracker.references"],
     ["tracker.assemble", "tracker.evidence", "tracker.simulate"],
     ["tracker.matching"],
@@ -75,7 +76,7 @@ ORDER = [
     ["app.bench_rows", "app.dofs", "app.graspable", "app.pin_marks", "app.runs", "app.screen"],
     ["app.hand", "app.locks", "app.pose_edits", "app.searching", "app.tracking", "app.disagreements", "app.viewing"],
     ["app.landscape", "app.pinning", "app.ranges", "app.replay", "app.search_settings"],
-    ["app.controller", "app.messages", "app.headless"],
+    ["app.controller", "app.messages", "app.headless", "app.indexing"],
     [
         "app.frusta",
         "app.pose_intentions",

@@ -10,7 +10,6 @@ import threading
 from collections.abc import Generator, Iterable
 from itertools import chain
 from pathlib import Path
-from typing import NamedTuple
 
 import av
 import cv2
@@ -19,7 +18,9 @@ from av.packet import Packet
 from av.video.frame import VideoFrame
 from numpy.typing import NDArray
 
+from tracker import footage_index
 from tracker.errors import RecordingError
+from tracker.footage_index import Index
 
 Image = NDArray[np.uint8]
 
@@ -29,17 +30,6 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 _CHECKED_FRAMES = 16
 # Intervals between frames that differ by more than this part of the usual one make the rate variable.
 _RATE_JITTER = 0.2
-
-
-class _Index(NamedTuple):
-    """What the packets of a video say, without decoding them."""
-
-    pts: NDArray[np.int64]
-    """Presentation time stamps of the frames that are shown, ascending, (n_frames,)."""
-    position: dict[int, int]
-    """Index in the file of the packet with each presentation time stamp."""
-    key_pts: NDArray[np.int64]
-    """Presentation time stamps of the frames at which decoding can start, ascending."""
 
 
 class VideoFile:
@@ -54,12 +44,13 @@ class VideoFile:
     has_constant_rate: bool
     """Whether all frames follow each other at the same interval."""
 
-    def __init__(self, path: Path, camera: str) -> None:
+    def __init__(self, path: Path, camera: str, indices: Path | None = None) -> None:
         """Open and index a video.
 
         Args:
             path: the file.
             camera: name of its camera, for messages.
+            indices: folder in which indices of videos are kept between openings; None for nowhere.
 
         Raises:
             RecordingError: the file is missing, unreadable, truncated, or has no usable time stamps.
@@ -71,8 +62,13 @@ class VideoFile:
             raise RecordingError(f"{self._where} not found; check the path")
         try:
             self._open()
-            self._index = self._read_index()
-            self._open()
+            kept = footage_index.load(path, indices)
+            if kept is None:
+                self._index = self._read_index()
+                self._open()
+                footage_index.save(path, indices, self._index)
+            else:
+                self._index = kept
             first = self._check_order()
         except av.FFmpegError as error:
             raise RecordingError(
@@ -144,7 +140,7 @@ class VideoFile:
             except av.InvalidDataError:
                 continue
 
-    def _read_index(self) -> _Index:
+    def _read_index(self) -> Index:
         """List the frames from the packets alone, which takes a hundredth of the time of decoding."""
         every: list[int] = []
         shown: list[int] = []
@@ -176,7 +172,7 @@ class VideoFile:
                 f"{self._where} is truncated: its header promises more than the {len(pts)} frames that it holds; "
                 "copy or convert it again"
             )
-        return _Index(pts, {p: i for i, p in enumerate(every)}, np.array(sorted(keys)))
+        return Index(pts, {p: i for i, p in enumerate(every)}, np.array(sorted(keys)))
 
     def _promises_more(self, end: int) -> bool:
         """Whether the header speaks of frames that the file does not hold; `end` is where the last one ends, ticks."""
@@ -306,13 +302,13 @@ class ImageFolder:
 Footage = VideoFile | ImageFolder
 
 
-def open_footage(path: Path, camera: str) -> Footage:
-    """Open a video file or a folder of images.
+def open_footage(path: Path, camera: str, indices: Path | None = None) -> Footage:
+    """Open a video file or a folder of images; `indices` as for `VideoFile`.
 
     Raises:
         RecordingError: it is missing, unreadable, truncated or empty.
     """
-    return ImageFolder(path, camera) if path.is_dir() else VideoFile(path, camera)
+    return ImageFolder(path, camera) if path.is_dir() else VideoFile(path, camera, indices)
 
 
 def read_image(path: Path, where: str) -> Image:

@@ -26,19 +26,22 @@ class Recording:
     fps: float | None
     """Frame rate of the videos, 1/s; None where all cameras are folders of images."""
 
-    def __init__(self, cameras: Sequence[CameraSource], cache_bytes: int = DEFAULT_CACHE_BYTES) -> None:
+    def __init__(
+        self, cameras: Sequence[CameraSource], cache_bytes: int = DEFAULT_CACHE_BYTES, indices: Path | None = None
+    ) -> None:
         """Open the footage of all cameras, which lists the frames of every video.
 
         Args:
             cameras: where each camera's footage lies, and what its offset is.
             cache_bytes: how much memory decoded frames may keep; the frames in use come on top.
+            indices: folder in which the lists of frames are kept between openings; None for nowhere.
 
         Raises:
             RecordingError: footage is missing, unreadable, truncated or empty, or its size is not the camera's.
         """
         self._cameras = tuple(cameras)
         self._pool = ThreadPoolExecutor(max(1, len(self._cameras)), thread_name_prefix="decode")
-        self._footage = list(self._pool.map(lambda c: open_footage(c.footage, c.camera.name), self._cameras))
+        self._footage = list(self._pool.map(lambda c: open_footage(c.footage, c.camera.name, indices), self._cameras))
         for source, footage in zip(self._cameras, self._footage, strict=True):
             check_size(source.camera.name, footage.path, footage.size, source.camera.size)
         self.n_frames = min(f.n_frames - c.offset for c, f in zip(self._cameras, self._footage, strict=True))

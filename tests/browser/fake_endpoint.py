@@ -9,6 +9,7 @@ import itertools
 import json
 import struct
 import sys
+import time
 from dataclasses import dataclass, field
 
 import cv2
@@ -44,6 +45,7 @@ NO_TRACK = {
     "running": False, "first": None, "last": None, "at": None, "done": 0, "total": 0, "per_second": 0.0, "doubtful": 0,
     "lost": 0, "message": "",
 }  # fmt: skip
+DISAGREEING = [44, 45]
 NO_RANGE = {"running": False, "what": "", "done": 0, "total": 0, "message": ""}
 STAGES = ["torso_head", "arms", "legs"]
 PARTS = ["torso", "left_arm", "left_leg", "head", "right_leg", "right_arm", "pelvis"]
@@ -90,6 +92,8 @@ class FakeEndpoint:
     n_frames: int = N_FRAMES
     received: list = field(default_factory=list)
     """Every message of every page, but for what each says when it connects."""
+    seek_times: list = field(default_factory=list)
+    """When each seek came, s."""
     greetings: list = field(default_factory=list)
     """What the pages said when they connected."""
     views: list = field(default_factory=list)
@@ -138,6 +142,8 @@ class FakeEndpoint:
                     told = json.loads(message.data)
                     kept = {"hold_3d": self.greetings, "view": self.views}.get(told["type"], self.received)
                     kept.append(told)
+                    if told["type"] == "seek":
+                        self.seek_times.append(time.monotonic())
                     await self.answer(told)
         finally:
             self.sockets.discard(socket)
@@ -327,6 +333,7 @@ class FakeEndpoint:
             for k in range(self.n_frames * 100 // N_FRAMES)
         }
         await socket.send_str(json.dumps({"type": "timeline", "cells": cells, "replace": True}))
+        await socket.send_str(json.dumps({"type": "disagreeing", "frames": DISAGREEING}))
         if self.views:
             await self.send_frame([socket])
 

@@ -10,7 +10,7 @@ STRIP = """(frame) => {
   const x = Math.round((52 + (frame + 0.5) * (canvas.clientWidth - 60) / count) * devicePixelRatio);
   const style = getComputedStyle(canvas);
   const context = document.createElement("canvas").getContext("2d");
-  const column = canvas.getContext("2d").getImageData(x, 34 * devicePixelRatio, 1, 12 * devicePixelRatio).data;
+  const column = canvas.getContext("2d").getImageData(x, 28 * devicePixelRatio, 1, 12 * devicePixelRatio).data;
   for (const status of ["good", "doubtful", "lost"]) {
     context.fillStyle = style.getPropertyValue(`--status-${status}`);
     context.fillRect(0, 0, 1, 1);

@@ -1,0 +1,64 @@
+"""`quadrille index`: an intra-frame proxy of a session's videos, so that any frame is on the screen at once."""
+
+from contextlib import closing
+from typing import Any
+
+from app.commands import Reporter
+from tracker.footage import ImageFolder, open_footage
+from tracker.proxy import FOLDER, Proxy
+from tracker.session import CameraSource, Session
+from tracker.session_lock import SessionLock
+
+
+def index(session: Session, progress: Reporter) -> dict[str, Any]:
+    """Make the proxies that are missing, half made, or made of other footage.
+
+    Interrupted, it keeps what is done, and the same call again goes on from there.
+
+    Returns:
+        Frames of each camera's proxy, bytes of all, and whether it was stopped.
+
+    Raises:
+        RecordingError: footage cannot be read, or a proxy not be written.
+        SessionError: another program is making them.
+    """
+    folder = session.folder / FOLDER
+    folder.mkdir(exist_ok=True)
+    made: dict[str, int] = {}
+    stopped = False
+    with SessionLock(folder):
+        for source in session.cameras:
+            name = source.camera.name
+            if source.footage.is_dir():  # its frames are pictures of their own
+                continue
+            with closing(open_footage(source.footage, name)) as footage:
+                assert not isinstance(footage, ImageFolder)
+                proxy = Proxy(folder, name)
+                there = proxy.n_frames if proxy.fits(source.footage) else 0
+                try:
+                    with progress.over(footage.n_frames - there, f"{name}: frames") as tick:
+                        for made[name] in proxy.make(source.footage, footage):
+                            if made[name] > there:
+                                tick()
+                except KeyboardInterrupt:
+                    stopped = True
+            if stopped:
+                break
+    size = sum(path.stat().st_size for path in folder.glob("*.mjpeg"))
+    return {"folder": str(folder), "frames": made, "bytes": size, "stopped": stopped}
+
+
+def proxies(session: Session) -> list[Proxy | None]:
+    """The proxy of each camera; None where there is none of the footage as it is now."""
+    found = [Proxy(session.folder / FOLDER, c.camera.name) for c in session.cameras]
+    return [p if _fits(p, c) else None for p, c in zip(found, session.cameras, strict=True)]
+
+
+def stale(session: Session) -> list[str]:
+    """Names of the cameras whose proxy was made of other footage."""
+    found = [(Proxy(session.folder / FOLDER, c.camera.name), c) for c in session.cameras]
+    return [c.camera.name for p, c in found if p.exists() and not _fits(p, c)]
+
+
+def _fits(proxy: Proxy, source: CameraSource) -> bool:
+    return source.footage.is_file() and proxy.fits(source.footage)

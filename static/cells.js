@@ -1,0 +1,138 @@
+/** The cells of the timeline, a column each: a long recording has a hundred thousand, and all are drawn twice a second. */
+
+/**
+ * @typedef {import("./protocol.js").Cell} Cell
+ * @typedef {import("./protocol.js").Status} Status
+ */
+
+/** The sources of a pose, in the order of the legend; their colours are in style.css. */
+export const SOURCES = [
+  "manual",
+  "pinned",
+  "searched",
+  "fitted",
+  "tracked",
+  "interpolated",
+  "smoothed",
+  "imported",
+];
+/** Statuses of a pose, the worst last. */
+export const STATUSES = /** @type {const} */ (["", "good", "doubtful", "lost"]);
+/** In place of a source: the frame has no pose. */
+export const NO_POSE = 255;
+export const KEYFRAME = 1;
+export const REVIEWED = 2;
+
+export class Cells {
+  /** How many frames have a pose. */
+  size = 0;
+  /** @type {Map<number, string>} */
+  #remarks = new Map();
+
+  /** @param {number} frames of the recording */
+  constructor(frames) {
+    /** Index into `SOURCES`, or `NO_POSE`. */
+    this.sources = new Uint8Array(frames).fill(NO_POSE);
+    /** Index into `STATUSES`. */
+    this.statuses = new Uint8Array(frames);
+    /** `KEYFRAME` plus `REVIEWED`. */
+    this.marks = new Uint8Array(frames);
+    /** Pixels; NaN where unknown. */
+    this.costs = new Float32Array(frames).fill(NaN);
+  }
+
+  /** How many frames the recording has. */
+  get frames() {
+    return this.sources.length;
+  }
+
+  /** @param {number} frame */
+  has(frame) {
+    return frame < this.frames && this.sources[frame] !== NO_POSE;
+  }
+
+  /**
+   * @param {number} frame
+   * @returns {Cell | undefined}
+   */
+  get(frame) {
+    if (!this.has(frame)) return undefined;
+    const cost = this.costs[frame];
+    return {
+      source: SOURCES[this.sources[frame]],
+      cost_px: cost === cost ? cost : null,
+      keyframe: (this.marks[frame] & KEYFRAME) !== 0,
+      status: STATUSES[this.statuses[frame]],
+      remark: this.#remarks.get(frame) ?? "",
+      reviewed: (this.marks[frame] & REVIEWED) !== 0,
+    };
+  }
+
+  /**
+   * @param {number} frame
+   * @param {Cell | null} cell null: the frame has no pose any more
+   */
+  set(frame, cell) {
+    if (frame >= this.frames) return;
+    this.#put(
+      frame,
+      cell ? Math.max(0, SOURCES.indexOf(cell.source)) : NO_POSE,
+      cell ? STATUSES.indexOf(cell.status) : 0,
+      cell ? (cell.keyframe ? KEYFRAME : 0) | (cell.reviewed ? REVIEWED : 0) : 0,
+      cell?.cost_px ?? NaN,
+      cell?.remark ?? "",
+    );
+  }
+
+  /**
+   * Take over many cells that came as columns.
+   *
+   * @param {import("./protocol.js").CellsHeader} header
+   * @param {ArrayBuffer} payload
+   */
+  take({ count, sources, statuses, remarks }, payload) {
+    const frames = new Uint32Array(payload, 0, count);
+    const costs = new Float32Array(payload, 4 * count, count);
+    const [source, status, marks] = [0, 1, 2].map((kind) => new Uint8Array(payload, (8 + kind) * count, count));
+    const ownSource = sources.map((name) => Math.max(0, SOURCES.indexOf(name)));
+    const ownStatus = statuses.map((name) => STATUSES.indexOf(name));
+    for (let i = 0; i < count; i += 1) {
+      if (frames[i] >= this.frames) continue;
+      const of = source[i] === NO_POSE ? NO_POSE : ownSource[source[i]];
+      this.#put(frames[i], of, ownStatus[status[i]], marks[i], costs[i], remarks[frames[i]] ?? "");
+    }
+  }
+
+  /** Frames that have a pose, with their cells. */
+  *[Symbol.iterator]() {
+    for (let frame = 0; frame < this.frames; frame += 1) {
+      const cell = this.get(frame);
+      if (cell) yield /** @type {[number, Cell]} */ ([frame, cell]);
+    }
+  }
+
+  /**
+   * @param {number} frame
+   * @param {number} source
+   * @param {number} status
+   * @param {number} marks
+   * @param {number} cost
+   * @param {string} remark
+   */
+  #put(frame, source, status, marks, cost, remark) {
+    this.size += Number(source !== NO_POSE) - Number(this.sources[frame] !== NO_POSE);
+    this.sources[frame] = source;
+    this.statuses[frame] = status;
+    this.marks[frame] = marks;
+    this.costs[frame] = cost;
+    if (remark) this.#remarks.set(frame, remark);
+    else this.#remarks.delete(frame);
+  }
+}
+
+/** @param {Cells} cells */
+export function keyframesOf(cells) {
+  const found = [];
+  for (let frame = 0; frame < cells.frames; frame += 1) if (cells.marks[frame] & KEYFRAME) found.push(frame);
+  return found;
+}

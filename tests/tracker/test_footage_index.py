@@ -1,0 +1,71 @@
+"""The list of a video's frames, kept between openings."""
+
+import os
+
+import numpy as np
+import pytest
+from clips import N, encode, number
+
+from tracker.footage import VideoFile
+
+
+@pytest.fixture
+def clip(tmp_path):
+    return encode(tmp_path / "cam.mp4", gop=12, bframes=3)
+
+
+@pytest.fixture
+def listed(monkeypatch):
+    """How often the packets of a video have been listed."""
+    calls = []
+    real = VideoFile._read_index
+    monkeypatch.setattr(VideoFile, "_read_index", lambda self: calls.append(self.path) or real(self))
+    return calls
+
+
+def frames(path, folder):
+    video = VideoFile(path, "cam", folder)
+    try:
+        return [video.read(k) for k in (0, 31, 5, N - 1)]
+    finally:
+        video.close()
+
+
+def test_a_video_is_listed_once_and_its_frames_stay_the_same(clip, tmp_path, listed):
+    first = frames(clip, tmp_path / "kept")
+    again = frames(clip, tmp_path / "kept")
+    assert len(listed) == 1
+    assert [number(i) for i in again] == [0, 31, 5, N - 1]
+    for a, b in zip(first, again, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_nothing_is_kept_unless_asked_for(clip, tmp_path, listed):
+    frames(clip, None)
+    frames(clip, None)
+    assert len(listed) == 2
+    assert [p.name for p in tmp_path.iterdir()] == ["cam.mp4"]
+
+
+def test_a_video_that_was_changed_is_listed_anew(clip, tmp_path, listed):
+    frames(clip, tmp_path / "kept")
+    encode(clip, n=N, gop=5, bframes=0)
+    assert [number(i) for i in frames(clip, tmp_path / "kept")] == [0, 31, 5, N - 1]
+    stat = clip.stat()
+    os.utime(clip, ns=(stat.st_atime_ns, stat.st_mtime_ns + 10**9))  # the same size, another time
+    frames(clip, tmp_path / "kept")
+    assert len(listed) == 3
+
+
+@pytest.mark.parametrize("damage", [b"", b"PK\x03\x04 half a file", b"nothing of the kind"])
+def test_a_damaged_list_is_made_anew(clip, tmp_path, listed, damage):
+    frames(clip, tmp_path / "kept")
+    (kept,) = (tmp_path / "kept").iterdir()
+    kept.write_bytes(damage)
+    assert [number(i) for i in frames(clip, tmp_path / "kept")] == [0, 31, 5, N - 1]
+    assert len(listed) == 2
+
+
+def test_a_folder_that_cannot_be_written_does_no_harm(clip, tmp_path, listed):
+    (tmp_path / "kept").write_text("a file in its place")
+    assert [number(i) for i in frames(clip, tmp_path / "kept")] == [0, 31, 5, N - 1]

@@ -1,0 +1,73 @@
+"""Where the frames of a video are, and keeping that between openings: listing a long video's packets takes seconds."""
+
+import hashlib
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+VERSION = 1
+
+
+class Index(NamedTuple):
+    """What the packets of a video say, without decoding them."""
+
+    pts: NDArray[np.int64]
+    """Presentation time stamps of the frames that are shown, ascending, (n_frames,)."""
+    position: dict[int, int]
+    """Index in the file of the packet with each presentation time stamp."""
+    key_pts: NDArray[np.int64]
+    """Presentation time stamps of the frames at which decoding can start, ascending."""
+
+
+def stamp_of(path: Path) -> str:
+    """What tells a file from another, and from itself once it is changed: its path, size and time of change."""
+    stat = path.stat()
+    return f"{path.resolve()}|{stat.st_size}|{stat.st_mtime_ns}"
+
+
+def load(video: Path, folder: Path | None) -> Index | None:
+    """The index of a video as it was kept; None where there is none, or the video is another by now.
+
+    Args:
+        video: the file.
+        folder: where indices are kept; None for nowhere.
+    """
+    if folder is None:
+        return None
+    try:
+        with np.load(_place(video, folder)) as kept:
+            if str(kept["stamp"]) != stamp_of(video) or int(kept["version"]) != VERSION:
+                return None
+            every = kept["every"].tolist()
+            return Index(kept["pts"], {pts: i for i, pts in enumerate(every)}, kept["key_pts"])
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # none, or half of one: list the packets again
+        return None
+
+
+def save(video: Path, folder: Path | None, index: Index) -> None:
+    """Keep the index of a video; where that is not possible it is listed again the next time."""
+    if folder is None:
+        return
+    place = _place(video, folder)
+    unfinished = place.with_name(f".{place.name}.{os.getpid()}.unfinished")
+    every = np.array(sorted(index.position, key=index.position.__getitem__), dtype=np.int64)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with unfinished.open("wb") as file:
+            np.savez_compressed(
+                file, version=VERSION, stamp=stamp_of(video), pts=index.pts, every=every, key_pts=index.key_pts
+            )
+        unfinished.replace(place)
+    except OSError:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
+
+
+def _place(video: Path, folder: Path) -> Path:
+    name = hashlib.sha256(str(video.resolve()).encode()).hexdigest()[:24]
+    return folder / f"{name}.npz"

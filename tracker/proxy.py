@@ -1,0 +1,154 @@
+"""Intra-frame proxies of footage: every frame a picture of its own, so that any of them is at hand at once.
+
+A proxy serves eyes alone: what is matched always comes from the footage. It is a folder with, for each camera,
+
+    NAME.mjpeg   the frames as JPEG, one after the other
+    NAME.index   where each ends, uint64 little-endian; a frame that is damaged in the footage ends where it begins
+    NAME.json    what it was made of: path, size and time of change of the footage, and how many frames it has
+
+The index is written after the picture that it speaks of, so whatever a program that died has left is consistent: what
+lies beyond the last end is cut off, and the work goes on from there.
+"""
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from tracker.errors import RecordingError
+from tracker.files import write_text_whole
+from tracker.footage import Footage, Image
+from tracker.footage_index import stamp_of
+
+FOLDER = "proxies"
+VERSION = 1
+_QUALITY = 88
+_FLUSH_FRAMES = 100
+_END = np.dtype("<u8")
+
+
+class Proxy:
+    """The proxy of one camera, whole or as far as it goes. Safe to use from several threads."""
+
+    def __init__(self, folder: Path, camera: str) -> None:
+        """Name a proxy; nothing is read yet."""
+        self._pictures, self._index = folder / f"{camera}.mjpeg", folder / f"{camera}.index"
+        self._about, self._camera = folder / f"{camera}.json", camera
+        self._ends = np.empty(0, _END)
+
+    def fits(self, footage: Path) -> bool:
+        """Whether it was made of this footage as it is now."""
+        about = self._read_about()
+        return about is not None and about.get("version") == VERSION and about.get("stamp") == stamp_of(footage)
+
+    def exists(self) -> bool:
+        """Whether there is one, of whatever footage."""
+        return self._about.is_file()
+
+    @property
+    def n_frames(self) -> int:
+        """How many frames it has so far."""
+        try:
+            return self._index.stat().st_size // _END.itemsize
+        except OSError:
+            return 0
+
+    def read(self, k: int) -> Image | None:
+        """Frame k of the footage, (H, W, 3) RGB; None where it is damaged.
+
+        Raises:
+            RecordingError: there is no such frame, or the proxy cannot be read.
+        """
+        if k >= len(self._ends):
+            self._ends = self._read_ends()
+        if not 0 <= k < len(self._ends):
+            raise RecordingError(f"camera '{self._camera}': the proxy has {len(self._ends)} frames, not frame {k}")
+        begin, end = int(self._ends[k - 1]) if k else 0, int(self._ends[k])
+        if begin == end:
+            return None
+        try:
+            with self._pictures.open("rb") as file:
+                file.seek(begin)
+                data = np.frombuffer(file.read(end - begin), np.uint8)
+        except OSError as error:
+            raise RecordingError(f"cannot read {self._pictures}: {error.strerror}; delete it") from error
+        image = cv2.imdecode(data, cv2.IMREAD_COLOR_RGB) if data.size else None
+        if image is None:
+            raise RecordingError(f"{self._pictures} is damaged at frame {k}; delete it and run quadrille index again")
+        return np.asarray(image, dtype=np.uint8)
+
+    def make(self, path: Path, footage: Footage) -> Iterator[int]:
+        """Write the frames that are missing, from the first one on; what was made of other footage is thrown away.
+
+        Args:
+            path: of the footage.
+            footage: gives its frames.
+
+        Yields:
+            The number of frames that there are, after each. May be closed at any time.
+
+        Raises:
+            RecordingError: the proxy cannot be written, or the footage not be read.
+        """
+        try:
+            self._about.parent.mkdir(parents=True, exist_ok=True)
+            if not self.fits(path):
+                self.remove()
+                about = {"version": VERSION, "stamp": stamp_of(path), "n_frames": footage.n_frames}
+                write_text_whole(self._about, json.dumps(about))
+            ends = self._read_ends()
+            done, at = len(ends), int(ends[-1]) if len(ends) else 0
+            yield done
+            with ExitStack() as files:
+                pictures = files.enter_context(self._pictures.open("ab"))
+                index = files.enter_context(self._index.open("ab"))
+                pictures.truncate(at)
+                index.truncate(done * _END.itemsize)
+                for k in range(done, footage.n_frames):
+                    image = footage.read(k)
+                    data = b"" if image is None else _encoded(image)
+                    pictures.write(data)
+                    at += len(data)
+                    if k % _FLUSH_FRAMES == 0:
+                        pictures.flush()
+                        os.fsync(pictures.fileno())
+                    else:
+                        pictures.flush()  # before the index speaks of it
+                    index.write(np.array(at, _END).tobytes())
+                    index.flush()
+                    yield k + 1
+        except OSError as error:
+            raise RecordingError(
+                f"cannot write the proxy {self._pictures}: {error.strerror}; make room, or make the folder writable"
+            ) from error
+
+    def remove(self) -> None:
+        """Delete it."""
+        for path in (self._about, self._index, self._pictures):
+            path.unlink(missing_ok=True)
+
+    def _read_about(self) -> dict[str, Any] | None:
+        try:
+            about = json.loads(self._about.read_text("utf-8"))
+        except (OSError, ValueError):
+            return None
+        return about if isinstance(about, dict) else None
+
+    def _read_ends(self) -> Any:
+        """Where the frames end that are there whole."""
+        try:
+            ends = np.frombuffer(self._index.read_bytes()[: self.n_frames * _END.itemsize], _END)
+            return ends[: int(np.searchsorted(ends, self._pictures.stat().st_size, side="right"))]
+        except OSError:
+            return np.empty(0, _END)
+
+
+def _encoded(image: Image) -> bytes:
+    done, data = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+    assert done
+    return bytes(data)
