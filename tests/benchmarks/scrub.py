@@ -1,9 +1,9 @@
-"""How soon a frame is on the screen, how soon a long session opens, and whether memory stays flat while it is scrubbed.
+"""How soon a frame is on the screen, how soon a long session opens, and whether memory stays flat while scrubbing.
 
 Run by hand, on a quiet machine: `python tests/benchmarks/scrub.py`. Footage is made up: a square that wanders over
-noise, 640x480, the same for four cameras, as H.264 at the length of group that is said. Seek latency is from the wish in
-Chromium to all panes painted, over random frames; memory is the resident memory of the server (Linux) and the JavaScript
-heap of the page.
+noise, 640x480, the same for four cameras, as H.264 at the length of group that is said. Seek latency is from the wish
+in Chromium to all panes painted, over random frames; memory is the resident memory of the server (Linux) and the
+JavaScript heap of the page.
 """
 
 import argparse
