@@ -10,11 +10,15 @@ from app.screen import Screen, spoken
 from tracker import confidence, posing
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
+from tracker.orienting import orient
 from tracker.pose_edits import limb_of, mirrored, taken_over
 from tracker.rigid import Array
 
 _SAME_GESTURE_S = 1.0
 """Changes of one slider, or steps of one joint, within this time of each other are one entry of the history."""
+
+_TURNED = 1e-6
+"""A frame whose axes differ by less has not been turned."""
 
 
 class PoseEdits:
@@ -84,6 +88,27 @@ class PoseEdits:
             label = f"nudge {spoken(name)}"
             self._take(person, posing.drag(hand, end, values), label, ("nudge", name, camera))
 
+    def place_part(self, person: int, part: int, R_world: Array, position_world: Array | None, gesture: object) -> None:
+        """Turn a part as near to an orientation as its joint allows; the root also goes to a position.
+
+        Args:
+            person: index of whom.
+            part: index of the part, and of the joint that moves it.
+            R_world: orientation of the part's frame, (3, 3).
+            position_world: where the root is to be, (3,), metres; None leaves it.
+            gesture: what is done with the same one is one entry of the history.
+        """
+        with self._on(person, None) as model:
+            values, free = self._screen.state.poses[person], self._screen.free(person)
+            T = model.kinematics(values).Ts_world_part[part]
+            if position_world is not None:
+                step = np.zeros(model.n_dofs)
+                step[:3] = position_world - T[:3, 3]
+                values = model.retract(values, np.where(free, step, 0.0))
+            if np.abs(R_world - T[:3, :3]).max() > _TURNED:
+                values = orient(model, values, part, R_world, free)
+            self._take(person, values, f"place {spoken(model.joints[part].name)}", gesture, lasting=True)
+
     def mirror(self, person: int, frame: int | None = None) -> None:
         """Exchange left and right in the body's own plane of symmetry."""
         with self._on(person, frame) as model:
@@ -134,11 +159,11 @@ class PoseEdits:
         changed = model.clip(model.retract(model.neutral(), numbers))
         self._take(person, taken_over(model, before, changed, np.arange(model.n_dofs) == dof), label, ("dof", dof))
 
-    def _take(self, person: int, values: Array, label: str, gesture: object = None) -> None:
-        """Show and save a pose; steps of one gesture in quick succession are one entry of the history."""
+    def _take(self, person: int, values: Array, label: str, gesture: object = None, lasting: bool = False) -> None:
+        """Show and save a pose; steps of one gesture in quick succession, or of a lasting one, are one entry."""
         screen = self._screen
         screen.pose(person, values)
         gesture = (label, person, screen.state.frame, gesture) if gesture is not None else object()
-        if gesture != screen.edit_of or time.monotonic() - screen.last_save > _SAME_GESTURE_S:
+        if gesture != screen.edit_of or (not lasting and time.monotonic() - screen.last_save > _SAME_GESTURE_S):
             screen.edit_of = None
         screen.save(label, "manual", gesture)

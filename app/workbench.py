@@ -16,6 +16,7 @@ from app import indexing
 from app.access import access_for
 from app.controller import Controller
 from app.frames import Frames
+from app.gizmos import Gizmos
 from app.panels import Panels
 from app.panes import Panes
 from app.saving import Saver
@@ -64,6 +65,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
         viser_server = start_viser()
         try:
             Scene(viser_server, controller)
+            Gizmos(viser_server, controller)
             Panels(viser_server, controller)
             app = create_app(Panes(controller), viser_server.get_port(), access, static)
 

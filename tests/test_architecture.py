@@ -79,6 +79,7 @@ ORDER = [
     ["app.controller", "app.messages", "app.headless", "app.indexing"],
     [
         "app.frusta",
+        "app.gizmos",
         "app.pose_intentions",
         "app.snap",
         "app.view_panel",

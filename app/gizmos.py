@@ -1,0 +1,99 @@
+"""Gizmos in viser's 3-D view: the root of the person worked on is moved and turned, the selected joint is turned."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import viser
+
+from app.controller import Controller
+from app.jobs import Latest
+from app.state import State
+from tracker import rigid
+from tracker.pose_edits import joint_of
+from tracker.rigid import Array
+
+_ROOT_SCALE, _JOINT_SCALE = 0.3, 0.2
+_REST_S = 0.1
+"""Time between updates of where the gizmos stand."""
+
+_Which = Literal["root", "joint"]
+
+
+@dataclass(frozen=True, eq=False)
+class _Pull:
+    """Where a gizmo was pulled to."""
+
+    which: _Which
+    drag: int
+    """Number of the drag, from press to release."""
+    person: int
+    part: int
+    position_world: Array
+    """(3,), metres."""
+    R_world: Array
+    """(3, 3)."""
+    ended: bool
+
+
+class Gizmos:
+    """Keeps no facts but which gizmo is held: where they stand is the state's, what they are pulled to goes there."""
+
+    def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
+        """Add the gizmos and follow the controller's state."""
+        self._server, self._controller = server, controller
+        self._held: _Which | None = None
+        self._drags = 0
+        self._about: dict[_Which, tuple[int, int]] = {"root": (0, 0), "joint": (0, 0)}  # person, part
+        add = server.scene.add_transform_controls
+        self._handles: dict[_Which, viser.TransformControlsHandle] = {
+            "root": add("/gizmos/root", _ROOT_SCALE, disable_sliders=True, depth_test=False, visible=False),
+            "joint": add(
+                "/gizmos/joint", _JOINT_SCALE, disable_axes=True, disable_sliders=True, depth_test=False, visible=False
+            ),
+        }
+        self._pulls = Latest(self._apply, "gizmos")
+        for which, handle in self._handles.items():
+            self._listen(which, handle)
+        latest = Latest(self._show, "gizmo places", _REST_S)
+        controller.subscribe(latest.offer)
+        latest.offer(controller.state)
+
+    def _listen(self, which: _Which, handle: viser.TransformControlsHandle) -> None:
+        @handle.on_update
+        async def _(event: Any) -> None:
+            if event.phase == "start":
+                self._held, self._drags = which, self._drags + 1
+                return
+            R = rigid.matrix_from_quaternion(np.array(event.target.wxyz))
+            person, part = self._about[which]
+            place = np.array(event.target.position, dtype=np.float64)
+            # The end has a key of its own: a newer pull must not take its place.
+            ended = event.phase == "end"
+            self._pulls.offer(_Pull(which, self._drags, person, part, place, R, ended), (which, ended))
+
+    def _apply(self, pull: _Pull) -> None:
+        position = pull.position_world if pull.which == "root" else None
+        self._controller.pose_edits.place_part(pull.person, pull.part, pull.R_world, position, ("gizmo", pull.drag))
+        if pull.ended:
+            self._held = None
+            self._show(self._controller.state)  # a joint may not have been able to follow
+
+    def _show(self, state: State) -> None:
+        if state.rests_3d:
+            return
+        model, values = self._controller.models[state.person], state.poses[state.person]
+        joint = joint_of(model, state.point)
+        places = model.kinematics(values).Ts_world_part
+        shown = not state.track.running and not state.job.running and state.look.replay is None
+        with self._server.atomic():
+            for which, part in (("root", 0), ("joint", joint)):
+                handle = self._handles[which]  # type: ignore[index]
+                visible = shown and (which == "root" or joint != 0)
+                if handle.visible != visible:
+                    handle.visible = visible
+                if which == self._held or not visible:
+                    continue
+                self._about[which] = state.person, part  # type: ignore[index]
+                handle.position = places[part, :3, 3]
+                handle.wxyz = rigid.quaternion_from_matrix(places[part, :3, :3])
