@@ -123,7 +123,7 @@ export class Inspector {
   #field(info, dof, isShort, point) {
     const name = info.joint === point ? info.name : `${spoken(info.joint)} ${info.name}`;
     const row = document.createElement("div");
-    row.className = "dof";
+    row.className = isShort ? "dof is-short" : "dof";
     row.title = `${spoken(info.joint)} ${info.name}, ${range(info)}. U selects the next, + and - turn the selected one.`;
     const label = document.createElement("span");
     label.className = "dof-name";
