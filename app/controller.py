@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.disagreements import Disagreements
+from app.flooring import Flooring
 from app.frames import Frames
 from app.hand import Hand
 from app.landscape import Landscapes
@@ -63,6 +64,8 @@ class Controller:
         """Looks back at searches."""
         self.landscape = Landscapes(self._screen, self.editing)
         """Looks at the cost along one degree of freedom."""
+        self.flooring = Flooring(self._screen, self.editing)
+        """Sets the floor."""
         self.view_3d = Viewing(self._screen)
         """What the 3-D view shows."""
 

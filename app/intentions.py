@@ -113,6 +113,25 @@ def _snap(controller: Controller, _: int, message: Message) -> None:
     controller.view_3d.snap(None if camera is None else int(camera))
 
 
+def _floor(controller: Controller, _: int, message: Message) -> None:
+    flooring, action = controller.flooring, message["action"]
+    if action == "mark":
+        place_px = (float(message["u"]), float(message["v"]))
+        if not np.all(np.isfinite(place_px)):
+            raise ValueError("a position that is not a number")
+        flooring.mark(int(message["camera"]), place_px)
+        return
+    actions = {
+        "begin": flooring.begin,
+        "next": flooring.go_on,
+        "take_back": flooring.take_back,
+        "apply": flooring.apply,
+        "cancel": flooring.cancel,
+        "revert": flooring.revert,
+    }
+    actions[action]()
+
+
 _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "seek": lambda controller, _, message: controller.seek(int(message["frame"])),
     "select": lambda controller, _, message: controller.select(int(message["person"]), message.get("point")),
@@ -128,6 +147,7 @@ _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "mark": _mark,
     "stop_range": lambda controller, _, __: controller.ranges.halt(),
     "snap": _snap,
+    "floor": _floor,
     "undo": lambda controller, _, __: controller.undo(),
     "redo": lambda controller, _, __: controller.redo(),
     **SEARCHING,

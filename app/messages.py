@@ -10,6 +10,8 @@ import numpy as np
 
 from app import dofs, graspable, overlays, pin_marks
 from app.curves import plots_of, samples
+from app.floor_lines import floor_lines
+from app.floor_picks import Picking
 from app.layers import View
 from app.state import JobState, ReplayState, State, TrackState
 from tracker.evidence import ViewEvidence
@@ -77,6 +79,7 @@ def state(session: Session, state: State) -> dict[str, Any]:
         "range": asdict(state.ranges),
         "follow": state.follow,
         "snapped": state.snapped,
+        "floor": _floor(state.floor.picking),
         "undo": state.undo,
         "redo": state.redo,
         "saved": state.save_error is None,
@@ -95,7 +98,11 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         views: the evidence of the shown frame, where it is at hand.
     """
     segments, rows, first = [], [], 0
-    for path in [*overlays.paths(session, state, view, views), *pin_marks.pin_lines(session, state, view)]:
+    for path in [
+        *overlays.paths(session, state, view, views),
+        *pin_marks.pin_lines(session, state, view),
+        *floor_lines(session, state),
+    ]:
         count = len(path.segments_px)
         rows.append(
             {
@@ -202,6 +209,22 @@ def binary(header: dict[str, Any], payload: bytes) -> bytes:
     """`[uint32 LE length of the header][header: JSON, UTF-8][payload]`."""
     head = json.dumps(header).encode()
     return struct.pack("<I", len(head)) + head + payload
+
+
+def _floor(picking: Picking | None) -> dict[str, Any] | None:
+    """How far the clicking of the floor's points has come."""
+    if picking is None:
+        return None
+    last = picking.picks[-1]
+    return {
+        "point": len(picking.picks),
+        "views": len(last.marks),
+        "marked": any(p.marks for p in picking.picks),
+        "known": last.point_world is not None,
+        "error_px": last.error_px,
+        "ready": picking.plane is not None,
+        "why": picking.why or last.why,
+    }
 
 
 def _job(job: JobState) -> dict[str, Any]:

@@ -236,7 +236,7 @@ def _drawn(state: State) -> tuple[object, ...]:
     poses = tuple(id(p.values) for p in state.people)
     candidate = None if state.job.candidate is None else tuple(id(c) for c in state.job.candidate)
     drawn = (state.frame, poses, candidate, state.job.running, state.look, state.drag, state.drag_seqs)
-    return (*drawn, _pins(state))
+    return (*drawn, _pins(state), state.floor.picking)
 
 
 def _pins(state: State) -> object:

@@ -9,6 +9,7 @@ import viser
 
 from app.controller import Controller
 from app.expected import prediction
+from app.floor_picks import FloorState
 from app.frusta import Frusta
 from app.jobs import Latest
 from app.snap import SnapView
@@ -20,7 +21,7 @@ from tracker import rigid
 from tracker.body import Body
 from tracker.cameras import Camera, viewed_point
 from tracker.contours import part_poses
-from tracker.posing import UP_ROTATIONS
+from tracker.posing import up_rotation
 from tracker.rigid import Array
 from tracker.session import Session
 
@@ -46,6 +47,7 @@ class Scene:
         self._trailed: tuple[object, ...] = ()
         self._trails_version = controller.state.timeline_version
         self._look: View3d | None = None
+        self._laid: tuple[object, ...] = ()
         self._panel = ViewPanel(server, controller)
         self._grid = _add_surroundings(server, self._session)
         self._parts = _Parts(server, "/people", self._session)
@@ -66,6 +68,7 @@ class Scene:
         with self._server.atomic():
             self._frusta.show(state)
             self._show_look(state.view_3d)
+            self._show_floor(state.floor)
             poses = tuple(id(p) for p in state.poses)
             if poses != self._posed:
                 self._posed = poses
@@ -79,6 +82,20 @@ class Scene:
         self._look = view
         self._parts.look(view)
         self._grid.visible = view.floor
+
+    def _show_floor(self, floor: FloorState) -> None:
+        """Lay the grid on the floor, or on the plane that is previewed."""
+        picking = floor.picking
+        plane = floor.plane if picking is None or picking.plane is None else picking.plane
+        laid = (floor.up, plane)
+        if laid == self._laid:
+            return
+        R = up_rotation(floor.up, plane)
+        self._laid = laid
+        self._grid.wxyz = rigid.quaternion_from_matrix(R)
+        self._grid.position = np.zeros(3) if plane is None else plane.origin_world
+        if picking is None:  # a preview turns nobody's view
+            self._server.scene.set_up_direction(R[:, 2])
 
     def _show_ghost(self, state: State) -> None:
         backward = state.track.running and (state.track.last or 0) < (state.track.first or 0)
@@ -191,9 +208,9 @@ def _set_visible(handles: Sequence[viser.MeshHandle], visible: bool) -> None:
 
 
 def _add_surroundings(server: viser.ViserServer, session: Session) -> viser.GridHandle:
-    sign = "" if session.up.startswith("-") else "+"
-    server.scene.set_up_direction(f"{sign}{session.up}")  # type: ignore[arg-type]
-    _place_eye(server, [c.camera for c in session.cameras], session.up)
+    up = up_rotation(session.up, session.floor)[:, 2]
+    server.scene.set_up_direction(up)
+    _place_eye(server, [c.camera for c in session.cameras], up)
     return server.scene.add_grid(
         "/floor",
         width=8.0,
@@ -202,18 +219,17 @@ def _add_surroundings(server: viser.ViserServer, session: Session) -> viser.Grid
         section_size=1.0,
         cell_color=_CELL_RGB,
         section_color=_SECTION_RGB,
-        wxyz=rigid.quaternion_from_matrix(UP_ROTATIONS[session.up]),
         shadow_opacity=0.0,  # shadows would double the work of a browser without a graphics card
     )
 
 
-def _place_eye(server: viser.ViserServer, cameras: list[Camera], up: str) -> None:
+def _place_eye(server: viser.ViserServer, cameras: list[Camera], up: Array) -> None:
     """Look at the middle of what the cameras see, from beside and above the first."""
     middle = viewed_point(cameras)
-    to_first = rigid.so3_exp(UP_ROTATIONS[up][:, 2] * np.radians(25)) @ (cameras[0].center_world - middle)
+    to_first = rigid.so3_exp(up * np.radians(25)) @ (cameras[0].center_world - middle)
     server.initial_camera.look_at = tuple(middle)
     server.initial_camera.position = tuple(middle + 0.9 * to_first)
-    server.initial_camera.up = tuple(UP_ROTATIONS[up][:, 2])
+    server.initial_camera.up = tuple(up)
 
 
 def _rgb(color: str) -> tuple[int, int, int]:

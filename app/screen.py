@@ -32,9 +32,7 @@ class Screen:
         self.session, self.saver, self.frames = session, saver, frames
         self.models = tuple(p.model for p in session.people)
         self.lock = threading.RLock()
-        self._standing = tuple(
-            posing.standing_pose(m, [c.camera for c in session.cameras], session.up) for m in self.models
-        )
+        self.stand(posing.up_rotation(session.up, session.floor))
         self._subscribers: list[Callable[[State], None]] = []
         self._edit: int | None = None  # the entry of the history that the gesture at hand amends
         self.edit_of: object = None
@@ -57,6 +55,11 @@ class Screen:
             model.retract(now, np.where(self.free(i), step, 0.0)) if self.state.locked[i] else new
             for i, (model, new, now, step) in enumerate(zip(self.models, poses, self.state.poses, steps, strict=True))
         )
+
+    def stand(self, R_world_up: Array) -> None:
+        """Let whom nobody has placed stand upright, by a rotation whose z axis points up, (3, 3)."""
+        cameras = [c.camera for c in self.session.cameras]
+        self._standing = tuple(posing.standing_pose(m, cameras, R_world_up) for m in self.models)
 
     def subscribe(self, view: Callable[[State], None]) -> Callable[[], None]:
         """Tell a view every new state from now on; returns what ends it."""

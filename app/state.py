@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from app.floor_picks import FloorState
 from app.view_choice import View3d
 from tracker.pins import ViewPin
 from tracker.rigid import Array
@@ -209,6 +210,7 @@ class State:
     holding_3d: frozenset[int] = frozenset()
     """Numbers of the pages that want the 3-D view to rest during a drag."""
     view_3d: View3d = field(default_factory=View3d)
+    floor: FloorState = field(default_factory=FloorState)
     snapped: int | None = None
     """The camera through which the 3-D view looks, by index; None where it is free."""
     settings: TrackSettings = field(default_factory=TrackSettings)

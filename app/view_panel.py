@@ -3,9 +3,11 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import viser
 
 from app.controller import Controller
+from app.floor_picks import FloorState
 from app.jobs import Latest
 from app.state import State
 from app.view_choice import MOST_TRAIL_FRAMES
@@ -54,6 +56,11 @@ class ViewPanel:
                     hint="Draw in grey the pose that the tracker expects here, from the poses before",
                 ),
             }  # fmt: skip
+            self._floor = gui.add_markdown("")
+            self._set_floor = gui.add_button(
+                "Set the floor", hint="Click three points of the floor in the views (Shift+Y)"
+            )
+            self._former_floor = gui.add_button("Former floor", hint="Go back to the floor before the last change")
             self._ghost = gui.add_markdown("")
             self._ghost.visible = False
             self._points = self._add_trails()
@@ -101,6 +108,14 @@ class ViewPanel:
             index = options.index(self._camera.value) - 1
             self._offer(event, lambda: view_3d.snap(None if index < 0 else index), "camera")
 
+        @self._set_floor.on_click
+        async def _(event: viser.GuiEvent[Any]) -> None:
+            self._offer(event, self._controller.flooring.begin, "floor")
+
+        @self._former_floor.on_click
+        async def _(event: viser.GuiEvent[Any]) -> None:
+            self._offer(event, self._controller.flooring.revert, "floor")
+
         def watch(field: str, control: Any) -> None:
             @control.on_update
             async def _(event: viser.GuiEvent[Any]) -> None:
@@ -133,11 +148,27 @@ class ViewPanel:
         view = state.view_3d
         with self._server.atomic():
             _set(self._camera, self._camera.options[0 if state.snapped is None else state.snapped + 1])
+            _set_text(self._floor, _described(state.floor))
+            self._former_floor.disabled = not state.floor.former
             for field, control in self._controls.items():
                 value = getattr(view, field)
                 _set(control, _COLORS[value] if field == "colors" else value)
             for name, box in self._points.items():
                 _set(box, name in view.trail_points)
+
+
+def _described(floor: FloorState) -> str:
+    """The floor in words."""
+    if floor.plane is None:
+        return f"*floor of the calibration, up is {floor.up}*"
+    cosine = np.clip(np.abs(floor.plane.normal).max(), -1, 1)
+    tilt, height = np.degrees(np.arccos(cosine)), 100 * floor.plane.offset_m
+    return f"*floor set by hand: {tilt:.1f}° off {floor.up}, at {height:.1f} cm*"
+
+
+def _set_text(markdown: viser.GuiMarkdownHandle, text: str) -> None:
+    if markdown.content != text:
+        markdown.content = text
 
 
 def _set(control: Any, value: object) -> None:

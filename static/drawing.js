@@ -31,6 +31,7 @@ const LINE_STYLES = {
   epipolar: { width: 1.25, dash: [6, 4], layer: "epipolar", hasHalo: true },
   // Thousands of short lines, which their halos would merge into one.
   accepted: { width: 1.5, dash: [], layer: "accepted", hasHalo: false },
+  floor: { width: 1.25, dash: [], layer: null, hasHalo: true },
   rejected: { width: 1, dash: [], layer: "rejected", hasHalo: false },
 };
 

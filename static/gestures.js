@@ -84,7 +84,8 @@ export class Gestures {
    * @returns {PlacedHandle | null}
    */
   #hit(pane, at) {
-    if (!this.#store.isSettled || !this.#store.facts.layers.shown.joints) return null;
+    const { layers, state } = this.#store.facts;
+    if (!this.#store.isSettled || !layers.shown.joints || state?.floor) return null;
     let nearest = null;
     let reach = GRAB_RADIUS;
     for (const placed of pane.graspableHandles()) {
@@ -102,8 +103,8 @@ export class Gestures {
    * @param {{x: number, y: number}} at
    */
   #hitPart(pane, camera, at) {
-    const { layers, overlay } = this.#store.facts;
-    if (!this.#store.isSettled || !overlay || !layers.shown.joints) return null;
+    const { layers, overlay, state } = this.#store.facts;
+    if (!this.#store.isSettled || !overlay || !layers.shown.joints || state?.floor) return null;
     const place = pane.view.toImage(at.x, at.y);
     const found = partAt(overlay, camera, place);
     if (!found) return null;

@@ -6,6 +6,7 @@ import { closePopover } from "./popovers.js";
 import { posingBindings } from "./posing_keys.js";
 import { control, plain } from "./key_matching.js";
 import { timelineKeys } from "./timeline_keys.js";
+import { sceneBindings } from "./scene_keys.js";
 
 /**
  * @typedef {object} Binding
@@ -40,6 +41,7 @@ const SLIDER_KEYS = new Set([
  * @property {import("./layers_menu.js").LayersMenu} layersMenu
  * @property {import("./snap.js").Snap} snap
  * @property {import("./pinning.js").Pinning} pinning
+ * @property {import("./floor.js").Floor} floor
  * @property {() => void} showHelp
  */
 
@@ -50,10 +52,10 @@ const SLIDER_KEYS = new Set([
 // prettier-ignore
 export function bindings({
   store, actions, navigation, playback, jumps, frameWindow, grid, gestures, drawer, posing, pinning, inspector, layers,
-  layersMenu, snap, showHelp,
+  layersMenu, snap, floor, showHelp,
 }) {
   const escape = () => {
-    if (gestures.cancel() || closePopover() || pinning.cancel() || actions.leaveReplay()) return;
+    if (gestures.cancel() || closePopover() || floor.cancel() || pinning.cancel() || actions.leaveReplay()) return;
     if (hasTrack(store.facts.state)) actions.stopTracking();
     else if (store.facts.state?.range.running) actions.stopRange();
     else if (hasSearch(store.facts.state)) actions.search("stop");
@@ -103,6 +105,8 @@ export function bindings({
     ...timelineKeys({ store, actions, playback, jumps, frameWindow }),
     { keys: ["["], label: "A range begins here", matches: plain("[", "BracketLeft"), run: mark("first") },
     { keys: ["]"], label: "The range ends here", matches: plain("]", "BracketRight"), run: mark("last") },
+    // Before the keys of posing: Enter means the floor while it is being set.
+    ...sceneBindings(snap, floor, plain),
     ...posingBindings(posing, inspector, plain),
     { keys: ["X"], label: "Pin the selected joint by clicks, or no more", matches: plain("x"), run: () => pinning.toggle() },
     { keys: ["G"], label: "Fit to pins and edges", matches: plain("g"), run: () => pinning.fit() },
@@ -149,7 +153,6 @@ export function bindings({
       matches: plain("0"),
       run: () => grid.typeCamera(0) || grid.resetViews(),
     },
-    { keys: ["Y"], label: "3-D view: look through the camera pointed at, or let go", matches: plain("y"), run: () => snap.toggle() },
     { keys: ["?"], label: "This list", matches: (event) => event.key === "?", run: showHelp },
   ];
 }

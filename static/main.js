@@ -5,6 +5,7 @@ import { Connection } from "./connection.js";
 import { Curves } from "./curves.js";
 import { Drawer } from "./drawer.js";
 import { button, byId } from "./elements.js";
+import { Floor } from "./floor.js";
 import { FrameCard } from "./frame_card.js";
 import { FrameWindow } from "./frame_window.js";
 import { Gestures } from "./gestures.js";
@@ -68,7 +69,8 @@ const grid = new PaneGrid(byId("panes", HTMLElement), store, pointers, latency, 
 new ViewRequest(store, send);
 const posing = new Posing(store, send);
 const inspector = new Inspector(byId("inspector", HTMLElement), store, posing, notify);
-const snap = new Snap(byId("panes", HTMLElement), store, grid, send);
+const floor = new Floor(byId("panes", HTMLElement), store, grid, send);
+const snap = new Snap(store, grid, send);
 new TopBar(store, actions);
 const playback = new Playback(store, navigation);
 const jumps = new Jumps(store, navigation);
@@ -91,7 +93,7 @@ const help = byId("help", HTMLDialogElement);
 const showHelp = () => help.showModal();
 const table = keys.bindings({
   store, actions, navigation, playback, jumps, frameWindow, grid, gestures, drawer, posing, pinning, inspector, layers,
-  layersMenu, snap, showHelp,
+  layersMenu, snap, floor, showHelp,
 }); // prettier-ignore
 keys.describe(byId("help-keys", HTMLElement), table);
 button("show-help", () => help.showModal());

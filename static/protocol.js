@@ -19,10 +19,13 @@
  * @typedef {{running: boolean, what: string, done: number, total: number, message: string}} RangeWork
  * @typedef {"track_forward" | "track_backward" | "interpolate" | "clear" | "keyframe" | "reviewed" | "unreviewed" |
  *   "none"} RangeAction
+ * @typedef {{point: number, views: number, marked: boolean, known: boolean, error_px: number | null, ready: boolean,
+ *   why: string}} FloorPicking
  * @typedef {{type: "state", frame: number, person: number, point: string | null,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
  *   parts_px: (number | null)[], dofs: number[], locked: number[], job: Job, track: Track, range: RangeWork,
  *   replay: {run: number, step: number, steps: number, stage: string | null} | null, follow: boolean, snapped: number | null,
+ *   floor: FloorPicking | null,
  *   undo: string | null, redo: string | null,
  *   saved: boolean, save_error: string | null}} StateMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
@@ -49,7 +52,8 @@
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number,
  *   limit_px: number | null}} ImageHeader
  * @typedef {{camera: number, person: number, color: string, first: number, count: number,
- *   kind: "model" | "hidden" | "candidate" | "ghost" | "part_edge" | "epipolar" | "accepted" | "rejected"}} Path
+ *   kind: "model" | "hidden" | "candidate" | "ghost" | "part_edge" | "epipolar" | "accepted" | "rejected" |
+ *   "floor"}} Path
  * @typedef {{camera: number, person: number, part: number, depth: number, first: number, count: number}} Outline
  * @typedef {{camera: number, person: number, point: string, u: number, v: number, visible: boolean}} Handle
  * @typedef {{camera: number, person: number, point: string, u: number, v: number, model_u: number | null,
@@ -109,6 +113,8 @@
  *   {type: "curves", group: CurveGroup | null} |
  *   {type: "hold_3d", hold: boolean} |
  *   {type: "snap", camera: number | null} |
+ *   {type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "revert"} |
+ *   {type: "floor", action: "mark", camera: number, u: number, v: number} |
  *   {type: "undo"} | {type: "redo"}} ClientMessage
  */
 

@@ -22,6 +22,7 @@ ORDER = [
     ],
     [
         "tracker.cameras",
+        "tracker.floor",
         "tracker.shapes",
         "tracker.kinematics",
         "tracker.probes",
@@ -70,11 +71,12 @@ ORDER = [
         "app.pictures",
         "app.tracked",
     ],
-    ["app.centred", "app.expected", "app.trails", "app.view_choice"],
+    ["app.centred", "app.expected", "app.floor_picks", "app.trails", "app.view_choice"],
     ["app.state"],
     ["app.bench_scenes", "app.commands", "app.curves", "app.frames", "app.overlays", "app.saving", "app.server"],
-    ["app.bench_rows", "app.dofs", "app.graspable", "app.pin_marks", "app.runs", "app.screen"],
-    ["app.hand", "app.locks", "app.pose_edits", "app.searching", "app.tracking", "app.disagreements", "app.viewing"],
+    ["app.bench_rows", "app.dofs", "app.floor_lines", "app.graspable", "app.pin_marks", "app.runs", "app.screen"],
+    ["app.hand", "app.locks", "app.pose_edits", "app.searching", "app.tracking", "app.disagreements"],
+    ["app.flooring", "app.viewing"],
     ["app.landscape", "app.pinning", "app.ranges", "app.replay", "app.search_settings"],
     ["app.controller", "app.messages", "app.headless", "app.indexing"],
     [

@@ -12,6 +12,7 @@ from tracker.body import Body, BodyModel
 from tracker.cameras import Camera, viewed_point
 from tracker.errors import TrackerError
 from tracker.fit import Block, Normal, StayNear, fit_to_points, normal_of, solve
+from tracker.floor import Floor
 from tracker.kinematics import Kinematics
 from tracker.orienting import orient
 from tracker.picking import place_on_part
@@ -62,6 +63,16 @@ UP_ROTATIONS = {
     "-x": np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]]),
 }
 """Rotations that turn the body's z axis to the world axis that points up."""
+
+
+def up_rotation(up: str, floor: Floor | None) -> Array:
+    """Rotation whose z axis points up from the floor, (3, 3).
+
+    Args:
+        up: world axis that points up, or is nearest to it.
+        floor: as a person has set it; None for the plane through the world's origin.
+    """
+    return UP_ROTATIONS[up] if floor is None else floor.turned(UP_ROTATIONS[up])
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,13 +337,14 @@ def _rest(hand: Grab) -> StayNear:
     return StayNear(hand.values, np.where(np.isfinite(hand.model.spreads), _STIFF_WEIGHT, _REST_WEIGHT))
 
 
-def standing_pose(model: BodyModel, cameras: Sequence[Camera], up: str = "z") -> Array:
+def standing_pose(model: BodyModel, cameras: Sequence[Camera], R_world_up: Array | None = None) -> Array:
     """Upright pose where the cameras look: where a model stands before anybody has placed it.
 
     Args:
         model: the body.
         cameras: the views.
-        up: world axis that points up.
+        R_world_up: rotation whose z axis points up, (3, 3); by default the world's z does.
     """
-    points = model.points_world(model.neutral()) @ UP_ROTATIONS[up].T + viewed_point(cameras)
+    R = np.eye(3) if R_world_up is None else R_world_up
+    points = model.points_world(model.neutral()) @ R.T + viewed_point(cameras)
     return fit_to_points(model, dict(zip(model.point_names, points, strict=True))).values

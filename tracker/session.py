@@ -1,7 +1,7 @@
 """What a session is: calibrated cameras with their footage, people with their body models, in one folder.
 
     my_session/
-      session.toml         version, name, fps, n_frames, up, per camera its footage, the people
+      session.toml         version, name, fps, n_frames, up, floor, per camera its footage, the people
       calibration.toml     anipose / Pose2Sim layout, metres
       models/NAME.toml     a person's body model
       annotations.sqlite   poses (see `tracker.annotations`)
@@ -19,17 +19,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomli_w
 
 from tracker.body import BodyModel
 from tracker.cameras import Camera
 from tracker.errors import SessionError
 from tracker.files import read_toml, write_text_whole
+from tracker.floor import Floor
 from tracker.footage import open_footage
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model, load_model
 
-VERSION = 1
+VERSION = 2
+_VERSION_WITHOUT_FLOOR = 1
+"""What a session is written as whose floor nobody has set, so that older programs can read it."""
 SESSION_FILE = "session.toml"
 CALIBRATION_FILE = "calibration.toml"
 ANNOTATIONS_FILE = "annotations.sqlite"
@@ -37,7 +41,8 @@ UPS = ("x", "-x", "y", "-y", "z", "-z")
 PALETTE = ("#f2a33a", "#4cc3d9", "#c678dd", "#98c379", "#e06c75", "#61afef", "#d19a66", "#56b6c2")
 
 _NAME = re.compile(r"\w[\w .-]*")
-_KEYS = {"version", "name", "fps", "n_frames", "up", "calibration", "cameras", "people"}
+_KEYS = {"version", "name", "fps", "n_frames", "up", "floor", "calibration", "cameras", "people"}
+_FLOOR_KEYS = {"normal", "offset_m"}
 _CAMERA_KEYS = {"name", "footage", "background", "masks", "offset"}
 _PERSON_KEYS = {"name", "model", "color"}
 
@@ -83,6 +88,8 @@ class Session:
     people: tuple[Person, ...]
     up: str = "z"
     """World axis that points up: x, y or z, with a minus sign where it points down."""
+    floor: Floor | None = None
+    """The floor as a person has set it; None where it is the plane through the world's origin across `up`."""
 
     @property
     def annotations_path(self) -> Path:
@@ -182,6 +189,7 @@ def load_session(folder: str | Path) -> Session:
             _load_cameras(data, folder),
             tuple(_load_person(p, folder) for p in data["people"]),
             str(data["up"]),
+            _load_floor(data.get("floor"), str(path)),
         )
     except KeyError as error:
         raise SessionError(f"session {path}: the key {error} is missing; add it or make the session anew") from error
@@ -220,12 +228,55 @@ def _load_person(row: dict[str, Any], folder: Path) -> Person:
     return Person(str(row["name"]), load_model(_resolve(row["model"], folder)), str(row["color"]))
 
 
+def save_floor(session: Session, up: str, floor: Floor | None) -> Session:
+    """Write another floor into a session's session.toml, which is otherwise left as it is.
+
+    Args:
+        session: as it was loaded.
+        up: world axis that points up, or is nearest to it.
+        floor: None for the plane through the world's origin.
+
+    Returns:
+        The session with that floor.
+
+    Raises:
+        SessionError: the folder cannot be written.
+    """
+    changed = replace(session, up=up, floor=floor)
+    _check(changed)
+    try:
+        _write_session(changed, session.folder)
+    except OSError as error:
+        raise SessionError(
+            f"cannot write {session.folder / SESSION_FILE}: {error}; see that you may write to the folder"
+        ) from error
+    return changed
+
+
+def _load_floor(row: dict[str, Any] | None, where: str) -> Floor | None:
+    if row is None:
+        return None
+    _check_keys(row, _FLOOR_KEYS, where)
+    normal, offset_m = np.array(row["normal"], dtype=np.float64), float(row["offset_m"])
+    length = float(np.linalg.norm(normal))
+    if normal.shape != (3,) or not np.isfinite(length) or length < 1e-6 or not np.isfinite(offset_m):
+        raise SessionError(
+            f"session {where}: expected three numbers as the 'normal' of the floor and one as its 'offset_m', found "
+            f"{row['normal']} and {row['offset_m']}; correct them or take the floor out"
+        )
+    return Floor(normal / length, offset_m)
+
+
 def _write(session: Session, into: Path) -> None:
     """Write the files of a session into a folder that will be, or is, `session.folder`."""
     (into / "models").mkdir(exist_ok=True)
     write_calibration(into / CALIBRATION_FILE, [c.camera for c in session.cameras])
     for person in session.people:
         write_text_whole(into / "models" / f"{person.name}.toml", format_model(person.model))
+    _write_session(session, into)
+
+
+def _write_session(session: Session, into: Path) -> None:
     cameras = []
     for c in session.cameras:
         row: dict[str, Any] = {"name": c.camera.name, "footage": _relative(c.footage, session.folder)}
@@ -234,8 +285,8 @@ def _write(session: Session, into: Path) -> None:
         if c.masks is not None:
             row["masks"] = _relative(c.masks, session.folder)
         cameras.append(row | {"offset": c.offset})
-    data = {
-        "version": VERSION,
+    data: dict[str, Any] = {
+        "version": _VERSION_WITHOUT_FLOOR if session.floor is None else VERSION,
         "name": session.name,
         "fps": session.fps,
         "n_frames": session.n_frames,
@@ -244,6 +295,8 @@ def _write(session: Session, into: Path) -> None:
         "cameras": cameras,
         "people": [{"name": p.name, "model": f"models/{p.name}.toml", "color": p.color} for p in session.people],
     }
+    if session.floor is not None:
+        data["floor"] = {"normal": session.floor.normal.tolist(), "offset_m": session.floor.offset_m}
     write_text_whole(into / SESSION_FILE, tomli_w.dumps(data))
 
 

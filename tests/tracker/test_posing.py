@@ -176,7 +176,7 @@ def test_standing_pose(gavrila, up):
         camera_at(c.name, c.center_world, (0, 0, 0)) for c in cameras_around(3)
     ]  # they look at the origin of a world whose up is z
     turned = [_moved(c, T) for c in cameras]
-    values = standing_pose(gavrila, turned, up)
+    values = standing_pose(gavrila, turned, UP_ROTATIONS[up])
     np.testing.assert_allclose(place(gavrila, values, "torso"), center, atol=0.02)
     axis = np.array([{"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}[up[-1]]])[0] * (-1 if up[0] == "-" else 1)
     points = dict(zip(gavrila.point_names, gavrila.points_world(values) @ axis, strict=True))

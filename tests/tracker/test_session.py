@@ -155,7 +155,7 @@ def edit(folder, old, new):
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("version = 1", "version = 2", "version 2, this program reads up to 1; upgrade"),
+        ("version = 1", "version = 3", "version 3, this program reads up to 2; upgrade"),
         ("version = 1", "version = 'x'", "whole number as 'version'"),
         ("fps = 50.0", "", "'fps' is missing"),
         ("fps = 50.0", "fps = 'fast'", "malformed"),
@@ -165,6 +165,12 @@ def edit(folder, old, new):
         ('name = "left"', 'name = "right"', "left, right"),
         ("fps = 50.0", "fps = = 50.0", "line 3"),
         ("n_frames = 9", "n_frames = 0", "above 0"),
+        ("n_frames = 9", "n_frames = 9\nfloor = {normal = [0, 0, 0], offset_m = 1}", "three numbers"),
+        ("n_frames = 9", "n_frames = 9\nfloor = {normal = [0, 1], offset_m = 1}", "three numbers"),
+        ("n_frames = 9", "n_frames = 9\nfloor = {normal = [0, 0, 1], offset_m = nan}", "three numbers"),
+        ("n_frames = 9", "n_frames = 9\nfloor = {normal = [0, 0, 1]}", "offset_m"),
+        ("n_frames = 9", "n_frames = 9\nfloor = {normal = [0, 0, 1], offset_m = 1, tilt = 3}", "tilt"),
+        ("n_frames = 9", "n_frames = 9\nfloor = 3", "malformed"),
     ],
 )
 def test_malformed_session_file(tmp_path, cameras, old, new, expected):

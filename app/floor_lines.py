@@ -1,0 +1,84 @@
+"""What the views show while the floor is being set: the marks, their lines of sight, and the plane as a grid."""
+
+import numpy as np
+
+from app.floor_picks import Picking
+from app.overlays import EPIPOLAR_COLOR, Path
+from app.state import State
+from tracker.cameras import Camera, epipolar_segment
+from tracker.floor import Floor
+from tracker.posing import up_rotation
+from tracker.rigid import Array
+from tracker.session import Session
+
+FLOOR_COLOR = "#7ee08a"
+_MARK_PX = 7.0
+"""Half the size of a mark in an image 640 px wide."""
+_HALF_WIDTH_M = 2.0
+_STEP_M = 0.5
+_PIECE_M = 0.1
+"""Lines of the grid are drawn in pieces: of one that passes behind a camera the visible part remains."""
+
+
+def floor_lines(session: Session, state: State) -> list[Path]:
+    """The marks, epipolar lines and the previewed plane in all views; nothing while nobody sets the floor."""
+    picking = state.floor.picking
+    if picking is None:
+        return []
+    views = [c.camera.pinhole for c in session.cameras]
+    out = []
+    for index, view in enumerate(views):
+        if picking.plane is not None:
+            grid = _grid(picking.plane, up_rotation(state.floor.up, picking.plane), _middle(picking))
+            out.append(Path(index, 0, "floor", FLOOR_COLOR, _seen(view, grid)))
+        out.append(Path(index, 0, "floor", FLOOR_COLOR, _marks(picking, index, view)))
+        lines = _lines_of_sight(picking, index, views)
+        if lines:
+            # Its kind is always drawn, whatever layers are: it says where to click.
+            out.append(Path(index, 0, "ghost", EPIPOLAR_COLOR, np.array(lines, dtype=np.float32).reshape(-1, 4)))
+    return out
+
+
+def _middle(picking: Picking) -> Array:
+    return np.mean([p.point_world for p in picking.picks if p.point_world is not None], axis=0)
+
+
+def _grid(plane: Floor, R: Array, middle: Array) -> Array:
+    """Pieces of the lines of a square grid in a plane, (N, 2, 3), metres."""
+    along = np.arange(-_HALF_WIDTH_M, _HALF_WIDTH_M + 1e-9, _PIECE_M)
+    across = np.arange(-_HALF_WIDTH_M, _HALF_WIDTH_M + 1e-9, _STEP_M)
+    x, y = np.meshgrid(along, across)
+    origin = middle - (plane.normal @ middle - plane.offset_m) * plane.normal
+    lines = np.concatenate([np.stack([x, y], -1), np.stack([y, x], -1)])  # (lines, pieces, 2)
+    points = origin + lines @ R[:, :2].T
+    return np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 3)
+
+
+def _seen(view: Camera, pieces: Array) -> np.ndarray:
+    """Pieces of lines as a view sees them, x0, y0, x1, y1, (N, 4), undistorted px."""
+    ends = view.project(pieces).reshape(-1, 4)
+    inside = np.all(np.isfinite(ends) & (np.abs(ends) < 4 * max(view.size)), axis=1)
+    return ends[inside].astype(np.float32)
+
+
+def _marks(picking: Picking, index: int, view: Camera) -> np.ndarray:
+    """A cross for each click in a view, and a smaller one where the point is that all views agree on."""
+    size, rows = _MARK_PX * max(view.size) / 640, []
+    for pick in picking.picks:
+        places = [(m[1], m[2], size) for m in pick.marks if m[0] == index]
+        if pick.point_world is not None:
+            u, v = view.project(pick.point_world)
+            if np.isfinite(u):
+                places.append((u, v, size / 2))
+        for u, v, s in places:
+            rows += [(u - s, v - s, u + s, v + s), (u - s, v + s, u + s, v - s)]
+    return np.array(rows, dtype=np.float32).reshape(-1, 4)
+
+
+def _lines_of_sight(picking: Picking, index: int, views: list[Camera]) -> list[Array]:
+    """Where the point at hand must lie in a view in which it has not been clicked."""
+    marks = picking.picks[-1].marks
+    if any(m[0] == index for m in marks):
+        return []
+    lines = (epipolar_segment(views[m[0]], views[index], np.array(m[1:])) for m in marks)
+    return [line for line in lines if line is not None]

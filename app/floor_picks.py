@@ -1,0 +1,95 @@
+"""The floor on the screen: the plane that is set, and the three points that are being clicked for another."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tracker.cameras import Camera
+from tracker.errors import TrackerError
+from tracker.floor import Floor, floor_through
+from tracker.pins import triangulate
+from tracker.rigid import Array
+
+N_POINTS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Pick:
+    """One point of the floor, as it is clicked view by view."""
+
+    marks: tuple[tuple[int, float, float], ...] = ()
+    """Camera by index, and where it was clicked, undistorted px; each camera at most once, in the order of clicking."""
+    point_world: Array | None = None
+    """Where the lines of sight meet, (3,), metres; None where they do not."""
+    error_px: float | None = None
+    """Largest distance of a click from the image of that point, px."""
+    why: str = "click it in a second view"
+    """Why there is no point."""
+
+
+@dataclass(frozen=True, eq=False)
+class Picking:
+    """Points that are being clicked."""
+
+    picks: tuple[Pick, ...] = (Pick(),)
+    """Up to `N_POINTS`; the last is at hand."""
+    plane: Floor | None = None
+    """The plane through three points."""
+    why: str = ""
+    """Why three points give none."""
+
+
+@dataclass(frozen=True, eq=False)
+class FloorState:
+    """The floor of the session."""
+
+    up: str = "z"
+    """World axis that points up, or is nearest to it."""
+    plane: Floor | None = None
+    """As a person has set it; None for the plane through the world's origin."""
+    picking: Picking | None = None
+    """None while nobody sets another."""
+    former: bool = False
+    """Whether there is a former floor to go back to."""
+
+
+def with_mark(picking: Picking, cameras: Sequence[Camera], camera: int, u: float, v: float) -> Picking:
+    """Mark the point at hand in a view, in place of its mark there if it has one; undistorted px."""
+    marks = (*(m for m in picking.picks[-1].marks if m[0] != camera), (camera, u, v))
+    return _solved(replace(picking, picks=(*picking.picks[:-1], _met(marks, cameras))), cameras)
+
+
+def with_next(picking: Picking) -> Picking:
+    """Go on to the next point, where the one at hand is known and there is one."""
+    if picking.picks[-1].point_world is None or len(picking.picks) == N_POINTS:
+        return picking
+    return replace(picking, picks=(*picking.picks, Pick()))
+
+
+def without_last(picking: Picking, cameras: Sequence[Camera]) -> Picking:
+    """Take the last mark back, of the point before where the one at hand has none."""
+    picks = picking.picks
+    if not picks[-1].marks and len(picks) > 1:
+        picks = picks[:-1]
+    return _solved(replace(picking, picks=(*picks[:-1], _met(picks[-1].marks[:-1], cameras))), cameras)
+
+
+def _met(marks: tuple[tuple[int, float, float], ...], cameras: Sequence[Camera]) -> Pick:
+    if len(marks) < 2:
+        return Pick(marks)
+    found = triangulate([cameras[m[0]] for m in marks], np.array([m[1:] for m in marks]))
+    if found.point_world is None:
+        return Pick(marks, why="these lines of sight hardly cross; click it in a view from another side")
+    return Pick(marks, found.point_world, float(found.errors_px.max()), "")
+
+
+def _solved(picking: Picking, cameras: Sequence[Camera]) -> Picking:
+    points = [p.point_world for p in picking.picks if p.point_world is not None]
+    if len(points) < N_POINTS:
+        return replace(picking, plane=None, why="")
+    try:
+        plane = floor_through(np.array(points), np.array([c.center_world for c in cameras]))
+    except TrackerError as error:
+        return replace(picking, plane=None, why=str(error))
+    return replace(picking, plane=plane, why="")

@@ -1,0 +1,120 @@
+"""Setting the floor from three clicked points; kept in session.toml, with the former one to go back to."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from app.floor_picks import FloorState, Picking, with_mark, with_next, without_last
+from app.screen import Screen
+from tracker.errors import TrackerError
+from tracker.floor import Floor, nearest_axis
+from tracker.posing import up_rotation
+from tracker.session import UPS, save_floor
+
+_KEY = "former_floor"
+"""Setting of the session: the floor before the one that is set."""
+
+
+class Flooring:
+    """The floor of the session, and the hand that sets another."""
+
+    def __init__(self, screen: Screen, editing: Callable[[], AbstractContextManager[None]]) -> None:
+        """Show the session's floor.
+
+        Args:
+            screen: holds the state.
+            editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
+        """
+        self._screen, self._editing = screen, editing
+        self._cameras = [c.camera for c in screen.session.cameras]
+        floor = FloorState(screen.session.up, screen.session.floor, former=self._former() is not None)
+        screen.set(floor=floor)
+
+    def begin(self) -> None:
+        """Begin to click points; what was clicked before is forgotten."""
+        self._pick(Picking())
+
+    def cancel(self) -> None:
+        """Click no more points; the floor stays as it is."""
+        self._pick(None)
+
+    def mark(self, camera: int, place_px: tuple[float, float]) -> None:
+        """Mark the point at hand in a view, undistorted px."""
+        with self._screen.lock:
+            picking = self._screen.state.floor.picking
+            if picking is not None and 0 <= camera < len(self._cameras):
+                self._pick(with_mark(picking, self._cameras, camera, *place_px))
+
+    def go_on(self) -> None:
+        """Go on to the next point.
+
+        Raises:
+            TrackerError: the point at hand is not known yet.
+        """
+        with self._screen.lock:
+            picking = self._screen.state.floor.picking
+            if picking is None:
+                return
+            if picking.picks[-1].point_world is None:
+                raise TrackerError(f"this point of the floor is not known yet: {picking.picks[-1].why}")
+            self._pick(with_next(picking))
+
+    def take_back(self) -> None:
+        """Take the last mark back."""
+        with self._screen.lock:
+            picking = self._screen.state.floor.picking
+            if picking is not None:
+                self._pick(without_last(picking, self._cameras))
+
+    def apply(self) -> None:
+        """Make the plane through the points the session's floor; on disk when this returns.
+
+        Raises:
+            TrackerError: there is no plane, or it cannot be written.
+        """
+        with self._editing():
+            picking = self._screen.state.floor.picking
+            if picking is None:
+                return
+            if picking.plane is None:
+                raise TrackerError(picking.why or "expected three points of the floor; click each in two views or more")
+            self._change(nearest_axis(picking.plane.normal), picking.plane)
+
+    def revert(self) -> None:
+        """Go back to the floor before the last change; done twice, nothing has changed.
+
+        Raises:
+            TrackerError: there is none, or it cannot be written.
+        """
+        with self._editing():
+            former = self._former()
+            if former is None:
+                raise TrackerError("there is no former floor to go back to: this one is the calibration's")
+            self._change(*former)
+
+    def _change(self, up: str, plane: Floor | None) -> None:
+        before = self._screen.state.floor
+        save_floor(self._screen.session, up, plane)
+        self._screen.saver.keep_setting(_KEY, _kept(before.up, before.plane))
+        self._screen.stand(up_rotation(up, plane))
+        self._screen.set(floor=FloorState(up, plane, former=True))
+
+    def _pick(self, picking: Picking | None) -> None:
+        with self._screen.lock:
+            self._screen.set(floor=replace(self._screen.state.floor, picking=picking))
+
+    def _former(self) -> tuple[str, Floor | None] | None:
+        data = self._screen.saver.setting(_KEY)
+        if not isinstance(data, dict) or data.get("up") not in UPS:
+            return None
+        normal = data.get("normal")
+        return data["up"], None if normal is None else Floor(np.array(normal), float(data["offset_m"]))
+
+
+def _kept(up: str, plane: Floor | None) -> dict[str, Any]:
+    if plane is None:
+        return {"up": up}
+    return {"up": up, "normal": plane.normal.tolist(), "offset_m": plane.offset_m}

@@ -1,0 +1,65 @@
+"""The floor: a plane in the calibration's world, and the direction that points up from it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracker.errors import TrackerError
+from tracker.rigid import Array, so3_exp
+
+_LEAST_HEIGHT_M = 0.2
+"""Three points whose triangle is flatter than this do not say how a floor lies: a click a few cm off would tilt it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Floor:
+    """A plane: the points x with `normal . x = offset_m`."""
+
+    normal: Array
+    """Unit vector that points up, (3,), world."""
+    offset_m: float
+    """Distance of the plane from the world's origin along the normal, metres."""
+
+    @property
+    def origin_world(self) -> Array:
+        """The point of the plane nearest to the world's origin, (3,), metres."""
+        return self.offset_m * self.normal
+
+    def turned(self, R_world_up: Array) -> Array:
+        """Turn a rotation whose z axis points roughly up, (3, 3), by the least angle that lets it point up."""
+        axis = np.cross(R_world_up[:, 2], self.normal)
+        sine, cosine = float(np.linalg.norm(axis)), float(R_world_up[:, 2] @ self.normal)
+        # Upside down there is no least turn: any axis across will do.
+        direction = axis / sine if sine > 1e-9 else R_world_up[:, 0]
+        return np.asarray(so3_exp(np.arctan2(sine, cosine) * direction) @ R_world_up)
+
+
+def floor_through(points_world: Array, centers_world: Array) -> Floor:
+    """The plane through three points, its upper side towards the cameras.
+
+    Args:
+        points_world: (3, 3), metres.
+        centers_world: centres of the cameras, (N, 3), metres; on the whole they stand above the floor.
+
+    Raises:
+        TrackerError: the points lie almost on a line.
+    """
+    a, b, c = points_world
+    sides = np.linalg.norm([b - a, c - b, a - c], axis=1)
+    across = np.cross(b - a, c - a)
+    height_m = float(np.linalg.norm(across) / max(sides.max(), 1e-9))
+    if height_m < _LEAST_HEIGHT_M:
+        raise TrackerError(
+            f"expected three points of the floor that span a wide triangle, found them within {100 * height_m:.0f} cm "
+            "of a line; choose one farther to the side"
+        )
+    normal = across / np.linalg.norm(across)
+    if np.mean(centers_world @ normal) < float(normal @ a):
+        normal = -normal
+    return Floor(normal, float(normal @ np.mean(points_world, axis=0)))
+
+
+def nearest_axis(normal: Array) -> str:
+    """The world axis nearest to a direction: x, y or z, with a minus sign where it points the other way."""
+    index = int(np.argmax(np.abs(normal)))
+    return ("-" if normal[index] < 0 else "") + "xyz"[index]
