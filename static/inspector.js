@@ -3,11 +3,14 @@
 import { CopyMenu } from "./copy_menu.js";
 import { button, byId } from "./elements.js";
 import { numberEntry } from "./number_entry.js";
+import { makeScrubber } from "./scrub.js";
 import { spoken } from "./text.js";
 
 const LOCK = '<path d="M4 7.5h8v5.5H4zM5.5 7.5V5.2a2.5 2.5 0 0 1 5 0v2.3" />';
 const UNLOCKED = '<path d="M4 7.5h8v5.5H4zM5.5 7.5V4.2a2.5 2.5 0 0 1 4.7-1.2" />';
 const UNITS = { deg: "°", cm: "cm" };
+/** How far a number goes for a CSS pixel that its name is drawn sideways. */
+const PER_PIXEL = { deg: 0.5, cm: 0.2 };
 /** More degrees of freedom than these are named in short. */
 const MOST_IN_FULL = 3;
 
@@ -124,10 +127,15 @@ export class Inspector {
     const name = info.joint === point ? info.name : `${spoken(info.joint)} ${info.name}`;
     const row = document.createElement("div");
     row.className = isShort ? "dof is-short" : "dof";
-    row.title = `${spoken(info.joint)} ${info.name}, ${range(info)}. U selects the next, + and - turn the selected one.`;
+    row.title = `${spoken(info.joint)} ${info.name}, ${range(info)}. Draw its name sideways (Shift: finely), or U selects the next, + and - turn the selected one.`;
     const label = document.createElement("span");
     label.className = "dof-name";
     label.textContent = isShort ? info.name.slice(0, 3) : name;
+    makeScrubber(label, {
+      begin: () => (this.#posing.isLocked([dof]) ? null : (this.#store.facts.state?.dofs[dof] ?? null)),
+      perPixel: PER_PIXEL[info.unit],
+      change: (value) => this.#posing.slide(dof, within(value, info)),
+    });
     const entry = numberEntry({
       name: `${spoken(info.joint)} ${info.name}, ${UNITS[info.unit]}`,
       take: (text) => this.#take(info, dof, text),
@@ -184,6 +192,14 @@ export class Inspector {
     }
     showLock(lock, isLocked, `${spoken(info.joint)} ${info.name}`);
   }
+}
+
+/**
+ * @param {number} value
+ * @param {import("./protocol.js").DofInfo} info
+ */
+function within(value, { low, high }) {
+  return Math.max(low ?? -Infinity, Math.min(high ?? Infinity, value));
 }
 
 /** @param {import("./protocol.js").DofInfo} info */

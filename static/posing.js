@@ -143,6 +143,16 @@ export class Posing {
     this.#edit({ ...this.#head(), action: "set", dof, value });
   }
 
+  /**
+   * Set it again and again, as a slider does: of what waits to be sent the newest counts.
+   *
+   * @param {number} dof
+   * @param {number} value in degrees or centimetres
+   */
+  slide(dof, value) {
+    this.#gather(`set ${dof}`, { ...this.#head(), action: "set", dof, value });
+  }
+
   mirror() {
     this.#edit({ ...this.#head(), action: "mirror" });
   }
@@ -199,7 +209,7 @@ export class Posing {
    * Add a step to those that wait: a key held down asks for more steps than are worth drawing.
    *
    * @param {string} what
-   * @param {import("./protocol.js").PoseEdit & {action: "nudge" | "turn"}} step
+   * @param {import("./protocol.js").PoseEdit & {action: "nudge" | "turn" | "set"}} step
    */
   #gather(what, step) {
     if (!this.#store.facts.connected) return;
@@ -210,6 +220,8 @@ export class Posing {
       waits.up += step.up;
     } else if (waits?.action === "turn" && step.action === "turn") {
       waits.by += step.by;
+    } else if (waits?.action === "set" && step.action === "set") {
+      waits.value = step.value;
     } else {
       if (this.#waiting.size === 0) setTimeout(() => this.#flush(), this.#sentAt + SEND_MS - performance.now());
       this.#waiting.set(key, step);
