@@ -67,8 +67,11 @@ class Tracking:
             way, settings, poses = "backward" if backward else "forward", state.settings, state.poses
             run = _Run(f"track {way} from frame {frames[0]}", people, settings, saver.keyframes(frames))
             fixed = {frame: dict(held) for frame, held in run.fixed.items()}
+            free = [screen.free(person) for person in range(len(screen.models))]
             run.job = Job(
-                lambda: track_chamfer(screen.frames.observer, screen.models, poses, frames, settings, fixed, people),
+                lambda: track_chamfer(
+                    screen.frames.observer, screen.models, poses, frames, settings, fixed, people, free
+                ),
                 lambda found, seconds: self._tracked(run, found, seconds),
                 lambda error: self._ended(run, error),
                 lambda: self._paused(run),

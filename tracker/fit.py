@@ -130,7 +130,8 @@ def solve(
             residuals are rough at their bottom, where steps are refused over and over.
     """
     may_move = np.ones(model.n_dofs, dtype=bool) if free is None else free
-    values = model.clip(values)
+    start = values  # what may not move stays as it is there, even outside of the limits
+    values = held(model, model.clip(start), start, free)
     here = _sum(model, values, blocks)
     damping, iterations = 1e-3, 0
     while iterations < max_iterations:
@@ -146,7 +147,7 @@ def solve(
             worth = -(g + 0.5 * H @ step) @ step > gain
             change = np.zeros(model.n_dofs)
             change[moving] = step
-            trial = model.clip(model.retract(values, change))
+            trial = held(model, model.clip(model.retract(values, change)), start, free)
             moved = float(np.abs(model.difference(trial, values)).max())
             there = _sum(model, trial, blocks) if worth else here
             if there.cost < here.cost or not worth or moved < tolerance or damping > _MOST_DAMPING:
@@ -160,6 +161,22 @@ def solve(
         if moved < tolerance or gained < gain:
             break
     return Fit(values, here.cost, iterations, here.hessian)
+
+
+def held(model: BodyModel, values: Array, still: Array, free: NDArray[np.bool_] | None) -> Array:
+    """A pose, (n_values,), but for what is not `free`, (n_dofs,), to move: that is as in another pose."""
+    return values if free is None else np.where(of_values(model, ~free), still, values)
+
+
+def of_values(model: BodyModel, of_dofs: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """What is said of degrees of freedom, (n_dofs,), said of the values; of a quaternion where any turn of it is."""
+    out = np.zeros(len(model.value_names), dtype=bool)
+    np.logical_or.at(out, model.dof_value, of_dofs)
+    for i, joint in enumerate(model.joints):
+        if joint.kind == "ball":
+            first = model.dof_value[np.flatnonzero(model.dof_joint == i)[-1]]
+            out[first : first + 4] = out[first]
+    return out
 
 
 def damped_step(H: Array, g: Array, damping: Array) -> Array:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tracker.body import Body, BodyModel
 from tracker.cameras import Camera
 from tracker.evidence import ViewEvidence
-from tracker.fit import Block, solve
+from tracker.fit import Block, of_values, solve
 from tracker.pins import PinBlock, ViewPin, pin_block
 from tracker.refine import ContourMatch
 from tracker.rigid import Array
@@ -96,21 +96,7 @@ def _fit_one(
     """Fit one person from a pose that is trusted so far; returns the pose and which of its values pins determine."""
     blocks = [*evidence, *prior_blocks(model, values, sigmas), *([pins] if pins is not None else [])]
     fit = solve(model, values, blocks, mask, _ITERATIONS, _TOLERANCE)
-    if mask is not None:  # the solver's start is put within the limits: what is locked stays even outside of them
-        held = ~_of_values(model, mask)
-        fit = fit._replace(values=np.where(held, values, fit.values))
     if pins is None:
         return fit.values, np.zeros(len(model.value_names), dtype=bool)
     by_pins = np.diag(pins.normal(model, fit.values, model.kinematics(fit.values)).hessian)
-    return fit.values, _of_values(model, by_pins > 0.5 * np.diag(fit.hessian))
-
-
-def _of_values(model: BodyModel, of_dofs: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """What is said of degrees of freedom, (n_dofs,), said of the values; of a quaternion where any turn of it is."""
-    out = np.zeros(len(model.value_names), dtype=bool)
-    np.logical_or.at(out, model.dof_value, of_dofs)
-    for i, joint in enumerate(model.joints):
-        if joint.kind == "ball":
-            first = model.dof_value[np.flatnonzero(model.dof_joint == i)[-1]]
-            out[first : first + 4] = out[first]
-    return out
+    return fit.values, of_values(model, by_pins > 0.5 * np.diag(fit.hessian))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm, qmc
 
 from tracker.appearance import Colors, PartColors
@@ -65,6 +66,8 @@ class Judge:
     known: PartColors | None
     """Colours of the parts; None where nobody has shown them."""
     settings: RecoverSettings
+    free: NDArray[np.bool_] | None = None
+    """The degrees of freedom that may move, (n_dofs,); None: all. Limbs are given without the others."""
 
     def cost(self, fit: Fit) -> float:
         """Cost of a refined pose with its colours."""
@@ -116,7 +119,7 @@ def _search_limb(
         for candidate in _candidates(model, limb, away, here, others, judge)
     ]
     return [
-        solve(model, start.values, blocks, max_iterations=iterations, tolerance=1e-3)
+        solve(model, start.values, blocks, judge.free, iterations, tolerance=1e-3)
         for start in _distinct(model, alone, judge, settings.finished)
     ]
 

@@ -21,7 +21,7 @@ from tracker.chamfer import ChamferCost, Outliers
 from tracker.confidence import Limb, Quality, Status
 from tracker.contours import FloatArray
 from tracker.evidence import ACCEPTED_SHARE, Observer, ViewEvidence, unfiltered
-from tracker.fit import Block, Fit, StayNear, covariance, solve
+from tracker.fit import Block, Fit, StayNear, covariance, held, solve
 from tracker.matched import region_around
 from tracker.predict import PredictSettings, predict
 from tracker.recover import Judge, RecoverSettings, search_limbs
@@ -140,6 +140,7 @@ def track_chamfer(
     settings: TrackSettings,
     fixed: Mapping[int, Mapping[int, Array]] | None = None,
     people: Sequence[int] | None = None,
+    free: Sequence[NDArray[np.bool_]] | None = None,
 ) -> Iterator[PoseEstimate]:
     """Track all people frame by frame.
 
@@ -152,28 +153,31 @@ def track_chamfer(
         settings: of the tracker.
         fixed: poses that stay as they are (keyframes), by frame and person; tracking goes on from them.
         people: whom to track; everybody by default. The others stand as they are in `start` or `fixed`.
+        free: of each person the degrees of freedom that may move, (n_dofs,); all by default. The others stay as they
+            are in `start`, or in the last of `fixed`.
 
     Yields:
         The poses of each frame.
     """
     everybody = tuple(range(len(models))) if people is None else tuple(people)
-    tracks = [_Track(m, s) for m, s in zip(models, start, strict=True)]
+    masks = [None] * len(models) if free is None else list(free)
+    tracks = [_Track(m, s, mask) for m, s, mask in zip(models, start, masks, strict=True)]
     scenery = [Scenery(c.size) for c in observer.matched_cameras] if settings.segments else None
     for i, frame in enumerate(frames):
         for ahead in frames[i : i + 2]:
             observer.prefetch(ahead)
-        held = (fixed or {}).get(frame, {})
-        poses = [held.get(p, t.expected(settings) if p in everybody else t.past[-1]) for p, t in enumerate(tracks)]
+        given = (fixed or {}).get(frame, {})
+        poses = [given.get(p, t.expected(settings) if p in everybody else t.past[-1]) for p, t in enumerate(tracks)]
         regions, bodies = _regions(observer, models, poses), [Body(m, p) for m, p in zip(models, poses, strict=True)]
         outlines = [_outline(bodies, c) for c in observer.matched_cameras] if settings.segments else None
         views = observer.evidence(frame, regions, outlines, scenery)
         scene = _Scene(views, list(models), poses, settings)
         found = [
-            scene.held(p, tracks[p]) if p in held or p not in everybody else scene.estimate(p, tracks[p])
+            scene.held(p, tracks[p]) if p in given or p not in everybody else scene.estimate(p, tracks[p])
             for p in range(len(models))
         ]
         for p, (track, pose) in enumerate(zip(tracks, found, strict=True)):
-            track.update(scene, p, pose, given=p in held)
+            track.update(scene, p, pose, given=p in given)
         if scenery is not None:
             scene.teach(scenery)
         cost = pose_cost(views, models, scene.poses, settings)(scene.poses)
@@ -198,9 +202,11 @@ class _Found(NamedTuple):
 class _Track:
     """What is remembered of one person from frame to frame."""
 
-    def __init__(self, model: BodyModel, start: Array | Sequence[Array]) -> None:
-        self.model = model
-        self.limbs = confidence.limbs(model)
+    def __init__(self, model: BodyModel, start: Array | Sequence[Array], free: NDArray[np.bool_] | None = None) -> None:
+        self.model, self.free = model, free
+        moving = np.ones(model.n_dofs, dtype=bool) if free is None else free
+        limbs = [limb._replace(dofs=limb.dofs & moving) for limb in confidence.limbs(model)]
+        self.limbs = [limb for limb in limbs if limb.dofs.any()]  # those that may be searched, by what may move
         self.past = list(np.atleast_2d(np.array(start)))
         self.last_good = self.past[-1]
         self.known: PartColors | None = None
@@ -209,7 +215,7 @@ class _Track:
 
     def expected(self, settings: TrackSettings) -> Array:
         """The predicted pose of the next frame."""
-        return predict(self.model, self.past, settings.predict)
+        return held(self.model, predict(self.model, self.past, settings.predict), self.past[-1], self.free)
 
     def may_search(self, limb: Limb) -> bool:
         """Whether a limb is due: one that was searched in vain waits longer each time."""
@@ -265,12 +271,12 @@ class _Scene:
         match = ContourMatch(self.views, self._bodies(), person, settings.match, settings.theta_px)
         blocks: list[Block] = [match, *self._priors(model, predicted, [])]
         if settings.estimate == "search":
-            evaluations = self._search(person, settings.search)
-            fit = solve(model, self.poses[person], blocks, max_iterations=0)
+            evaluations = self._search(person, track, settings.search)
+            fit = solve(model, self.poses[person], blocks, track.free, max_iterations=0)
             costs = match.part_costs(fit.values)
             found = self._quality(person, track, costs, fit)
             return self._take(person, costs, fit, found, evaluations, [])
-        fit = solve(model, predicted, blocks, max_iterations=_ITERATIONS, tolerance=_TOLERANCE)
+        fit = solve(model, predicted, blocks, track.free, _ITERATIONS, _TOLERANCE)
         costs = match.part_costs(fit.values)
         found = self._quality(person, track, costs, fit)
         blind = not any(len(v.points_px) for v in self.views)  # then there is nothing to search in
@@ -282,14 +288,12 @@ class _Scene:
         """Search what the refinement alone did not find, among all edges: the prediction may refuse the right ones."""
         model, settings = track.model, self.settings
         assert settings.recover is not None
-        suspects = [x for name in found.suspects for x in track.limbs if x.name == name]
+        suspects = [x for name in found.suspects for x in track.limbs if x.name == name]  # not those that are locked
         priors = self._priors(model, predicted, suspects)
         self.views = [unfiltered(v) for v in self.views]
         match = ContourMatch(self.views, self._bodies(), person, settings.match, settings.theta_px, everywhere=True)
-        judge = Judge(match, priors, self.colors(person), track.known, settings.recover)
-        fit = solve(
-            model, fit.values, [match, *priors], max_iterations=_ITERATIONS, tolerance=_TOLERANCE, gain=WORTH_A_STEP
-        )
+        judge = Judge(match, priors, self.colors(person), track.known, settings.recover, track.free)
+        fit = solve(model, fit.values, [match, *priors], track.free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
         remarks: list[str] = []
         evaluations = 0
         if found.body_lost:
@@ -330,21 +334,23 @@ class _Scene:
         """Best-first search from the prediction and from the last good pose; the best of what refines from there."""
         predicted, best, evaluations = self.poses[person], fit, 0
         for start in (predicted, track.last_good):
-            self.poses[person] = start
-            evaluations += self._search(person, BEFORE_REFINEMENT)
-            blocks = [judge.match, *judge.priors]
-            refined = solve(track.model, self.poses[person], blocks, None, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
+            self.poses[person] = held(track.model, start, predicted, track.free)
+            evaluations += self._search(person, track, BEFORE_REFINEMENT)
+            blocks, here = [judge.match, *judge.priors], self.poses[person]
+            refined = solve(track.model, here, blocks, track.free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
             if judge.cost(refined) < judge.cost(best):
                 best = refined
         self.poses[person] = best.values
         return evaluations, best
 
-    def _search(self, person: int, how: SearchSettings) -> int:
+    def _search(self, person: int, track: _Track, how: SearchSettings) -> int:
         """Best-first search of one person from where it stands; returns how many poses were scored."""
-        evaluations = 0
+        evaluations, start = 0, self.poses[person]
         settings = replace(self.settings, search=how)
-        for step in search_frame(self.views, self.models, self.poses, settings, [person]):
+        free = None if track.free is None else [track.free] * len(self.models)  # only that of the person counts
+        for step in search_frame(self.views, self.models, self.poses, settings, [person], free):
             self.poses, evaluations = list(step.best), step.evaluations
+        self.poses[person] = held(track.model, self.poses[person], start, track.free)
         return evaluations
 
     def _quality(self, person: int, track: _Track, costs: PartCosts, fit: Fit) -> Quality:

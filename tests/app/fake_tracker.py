@@ -39,8 +39,8 @@ class FakeTracker:
         for _ in range(frames):
             self.steps.release()
 
-    def track(self, observer, models, start, frames, settings, fixed=None, people=None):
-        self.told = {"frames": frames, "fixed": fixed, "people": people, "settings": settings}
+    def track(self, observer, models, start, frames, settings, fixed=None, people=None, free=None):
+        self.told = {"frames": frames, "fixed": fixed, "people": people, "settings": settings, "free": free}
         poses = list(start)
         for frame in frames:
             end = time.monotonic() + 20.0

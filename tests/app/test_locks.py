@@ -72,6 +72,16 @@ def test_a_search_leaves_locked_degrees_of_freedom_alone(opened):
     assert not np.array_equal(after, before)
 
 
+def test_a_tracking_run_is_told_what_is_locked(placed, tracker):
+    locked = dofs_of(placed, "left_shoulder")
+    placed.locks.set(0, locked, True)
+    placed.track(backward=False, until=4)
+    tracker.let_go(2)
+    wait_for(lambda: placed.state.track.message)
+    (free,) = tracker.told["free"]
+    assert set(np.flatnonzero(~free)) == set(locked)
+
+
 def test_with_all_locked_a_search_says_so(opened):
     controller = opened()
     controller.locks.set(0, range(controller.models[0].n_dofs), True)

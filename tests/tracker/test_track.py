@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from staging import SUIT, at, cameras_around, dressed, own_evidence, painted, posed, shaken, solid
@@ -190,6 +192,44 @@ class Film:
 def filmed(model, truth):
     cameras = cameras_around(4)
     return Observer([CameraSource(c, footage=None) for c in cameras], Film(model, truth, cameras))
+
+
+def test_what_is_locked_is_neither_refined_nor_searched(gavrila, monkeypatch):
+    """The arm that jumps is locked: it stays to the last bit, is not searched, and everything else is followed."""
+    truth = dancing(gavrila, 4, jump_at=2)
+    views = [dressed([Body(gavrila, v)], cameras_around(4), SUIT) for v in truth]
+    searched = []
+    monkeypatch.setattr("tracker.track.search_limbs", lambda m, due, fit, *_: searched.extend(due) or fit)
+    free = ~np.array([name.startswith(("left_shoulder", "left_elbow")) for name in gavrila.dof_names])
+    start = truth[0].copy()
+    outside = gavrila.dof_names.index("left_elbow.extension")
+    start[gavrila.dof_value[outside]] = gavrila.limits[outside, 1] + 0.1  # as an import may bring it
+    found = list(track_chamfer(Shown(views), [gavrila], [start], range(4), TrackSettings(), free=[free]))
+    still, moving = gavrila.dof_value[~free], gavrila.dof_value[free]
+    for estimate in found:
+        np.testing.assert_array_equal(estimate.poses[0][still], start[still])
+    assert not np.array_equal(found[-1].poses[0][moving], start[moving])
+    assert {limb.name for limb in searched}.isdisjoint({"left_forearm"})
+    assert all(not np.any(limb.dofs & ~free) for limb in searched)
+
+
+@pytest.mark.parametrize("estimate", ["search", "refine"])
+def test_of_two_people_each_has_own_locks(balls, estimate):
+    model, values, views = balls
+    free = [np.array([True] + [False] * 5), np.ones(6, dtype=bool)]
+    settings = replace(COARSE, estimate=estimate)
+    found = list(track_chamfer(Shown(views), [model, model], values[0], range(3), settings, free=free))
+    for k, found_ in enumerate(found):
+        np.testing.assert_array_equal(found_.poses[0][1:], values[0, 0, 1:])
+        np.testing.assert_allclose(found_.poses[1][:3], values[k, 1, :3], atol=0.02)
+
+
+def test_a_keyframe_moves_what_is_locked_from_there_on(balls):
+    _, values, _ = balls
+    keyframe = values[2, 0] + (0, 0, 0.2, 0, 0, 0)
+    free = [np.array([True, True, False] + [False] * 3), np.ones(6, dtype=bool)]
+    found = run(balls, range(5), values[0], fixed={2: {0: keyframe}}, free=free)
+    assert [f.poses[0][2] for f in found] == [0, 0, 0.2, 0.2, 0.2]
 
 
 def test_what_the_prediction_refused_is_looked_at_again(gavrila):
