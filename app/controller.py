@@ -14,6 +14,7 @@ from app.disagreements import Disagreements
 from app.flooring import Flooring
 from app.frames import Frames
 from app.hand import Hand
+from app.history import History
 from app.landscape import Landscapes
 from app.locks import Locks
 from app.pinning import Pinning
@@ -62,6 +63,8 @@ class Controller:
         """Sets pins, and fits people to them."""
         self.replay = Replay(self._screen, runs, self.editing)
         """Looks back at searches."""
+        self.history = History(self._screen, self.editing)
+        """Moves along the history."""
         self.landscape = Landscapes(self._screen, self.editing)
         """Looks at the cost along one degree of freedom."""
         self.flooring = Flooring(self._screen, self.editing)
@@ -210,16 +213,16 @@ class Controller:
 
     def undo(self) -> None:
         """Take back the last entry of the history, after stopping what stands on it."""
-        self._through_history(self._saver.undo)
+        self.history.undo()
 
     def redo(self) -> None:
         """Do again what was taken back last."""
-        self._through_history(self._saver.redo)
+        self.history.redo()
 
     def close(self) -> None:
         """Stop and save what is at hand; the controller is done."""
         with self.editing():
-            pass
+            self._saver.retry()
         self._disagreements.close()
         self.landscape.close()
         self.frames.close()
@@ -258,10 +261,3 @@ class Controller:
     def _stop_tracking(self) -> None:
         self._tracking.halt(stay=True)
         self._tracking.forget()
-
-    def _through_history(self, move: Callable[[], list[int]]) -> None:
-        with self.editing():
-            here = self.state.frame
-            changed = move()
-            self._screen.refresh_saving()
-            self._screen.show(min(changed, key=lambda frame: abs(frame - here), default=here))

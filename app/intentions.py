@@ -132,6 +132,10 @@ def _floor(controller: Controller, _: int, message: Message) -> None:
     actions[action]()
 
 
+def _edit(edit: Any) -> int | None:
+    return None if edit is None else int(edit)
+
+
 _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "seek": lambda controller, _, message: controller.seek(int(message["frame"])),
     "select": lambda controller, _, message: controller.select(int(message["person"]), message.get("point")),
@@ -150,5 +154,7 @@ _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "floor": _floor,
     "undo": lambda controller, _, __: controller.undo(),
     "redo": lambda controller, _, __: controller.redo(),
+    "go_to": lambda controller, _, message: controller.history.go_to(_edit(message["edit"])),
+    "save": lambda controller, _, __: controller.history.save(),
     **SEARCHING,
 }

@@ -16,7 +16,7 @@ from app.layers import View
 from app.state import JobState, ReplayState, State, TrackState
 from tracker.evidence import ViewEvidence
 from tracker.posing import minor_points
-from tracker.records import SOURCES, STATUSES, FrameNumbers
+from tracker.records import SOURCES, STATUSES, FrameNumbers, HistoryEntry
 from tracker.session import Session
 
 _FEW_CELLS = 2000
@@ -171,6 +171,22 @@ def timeline(cells: Mapping[int, dict[str, Any] | None], replace: bool) -> dict[
         dtype=np.uint8,
     )
     return binary(header, np.array(frames, dtype="<u4").tobytes() + costs.tobytes() + columns.tobytes())
+
+
+def history(entries: Sequence[HistoryEntry], limit: int) -> dict[str, Any]:
+    """The history, latest entry first.
+
+    Args:
+        entries: that redo and undo can reach, at most `limit` and one more of each.
+        limit: how many of each the page shows.
+    """
+    undone, done = [e for e in entries if e.undone], [e for e in entries if not e.undone]
+    return {
+        "type": "history",
+        "entries": [e._asdict() for e in [*undone[-limit:], *done[:limit]]],
+        "later": len(undone) > limit,
+        "earlier": len(done) > limit,
+    }
 
 
 def disagreeing(frames: Sequence[int]) -> dict[str, Any]:

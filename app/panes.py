@@ -24,6 +24,8 @@ _READABLE_S = 0.2
 """Time between updates of the page's numbers during a drag."""
 _WATCHABLE_S = 1 / 30
 """Time between two looks at a search at work: more nobody sees, and the search needs the processor too."""
+_MOST_HISTORY = 2000
+"""Entries of the history, each way, that a page may ask for."""
 _COALESCED = ("seek", "view", "replay", "preview", "search_speed")
 """Of these only the newest that waits is carried out."""
 
@@ -59,6 +61,8 @@ class _Page:
         self._curves: str | None = None
         self._sent_curves: tuple[str, int, int] | None = None  # group, person, version of the timeline
         self._feed = SearchFeed()
+        self._history_limit = 0  # of entries each way; 0: the page does not show them
+        self._sent_history: dict[str, Any] | None = None
         self._loop = asyncio.get_running_loop()
 
     async def serve(self) -> None:
@@ -125,6 +129,10 @@ class _Page:
             self._feed = SearchFeed(message["tab"])
             self._controller.landscape.watch(self._number, message["tab"] == "landscape")
             self._wake(self._controller.state)
+        elif message["type"] == "history":
+            self._history_limit = min(max(0, int(message["limit"])), _MOST_HISTORY)
+            self._sent_history = None
+            self._wake(self._controller.state)
         elif message["type"] == "view":
             self._view = layers.view_of(message, len(self._controller.session.cameras))
             self._wake(self._controller.state)
@@ -156,6 +164,7 @@ class _Page:
                 if sent is None or sent.disagreeing != state.disagreeing:
                     await self._send(messages.disagreeing(state.disagreeing))
                 await self._send_curves(state)
+                await self._send_history()
                 for news in await asyncio.to_thread(self._feed.news, self._controller, state):
                     await (self._socket.send_bytes(news) if isinstance(news, bytes) else self._send(news))
                 if state.track.failed and (sent is None or sent.track is not state.track):
@@ -223,6 +232,16 @@ class _Page:
             messages.curves, self._controller.session, person, group, frames, rows, since == 0
         )
         await self._socket.send_bytes(message)
+
+    async def _send_history(self) -> None:
+        """Send the history to a page that shows it, where it has changed."""
+        if (limit := self._history_limit) == 0:
+            return
+        entries = await asyncio.to_thread(self._controller.history.entries, limit + 1)
+        message = messages.history(entries, limit)
+        if message != self._sent_history:
+            self._sent_history = message
+            await self._send(message)
 
     async def _notice(self, text: str) -> None:
         await self._send({"type": "notice", "level": "error", "text": text})

@@ -185,8 +185,6 @@ class Ranges:
             if run is not self._run:
                 return
             run.edit = screen.saver.write(run.label, piece, run.edit, run.by_program)
-            if screen.saver.error is not None:
-                raise TrackerError(screen.saver.error)
             done = screen.state.ranges
             screen.set(ranges=replace(done, done=done.done + len(piece)))
             screen.refresh_saving()

@@ -1,7 +1,7 @@
 """Poses of the screen to the store and back."""
 
 from bisect import bisect_left
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from itertools import takewhile
 from typing import Any
@@ -10,11 +10,12 @@ import numpy as np
 
 from app.state import Shown, State
 from app.tracked import keyframes_of, tracked_changes
+from app.writing import Writing
 from tracker.annotations import AnnotationStore
-from tracker.errors import TrackerError
+from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model
 from tracker.pins import ViewPin
-from tracker.records import SOURCES, Change, FrameNumbers, FrameRow, HistoryEntry, PinChange, PoseChange, PoseRecord
+from tracker.records import SOURCES, Change, FrameNumbers, FrameRow, HistoryEntry, Pin, PinChange, PoseChange, PoseRecord
 from tracker.rigid import Array
 from tracker.session import Session
 from tracker.track import PoseEstimate, TrackSettings
@@ -31,18 +32,27 @@ _READ_FRAMES = 2000
 class Saver:
     """Keeps the poses of one open session. Not locked by itself: the controller calls it under its lock."""
 
-    def __init__(self, session: Session, store: AnnotationStore) -> None:
-        """List the frames that have poses, and keep the models of the session as revisions."""
-        self._session, self._store = session, store
+    def __init__(self, session: Session, store: AnnotationStore, author: str = "") -> None:
+        """List the frames that have poses, and keep the models of the session as revisions.
+
+        Args:
+            session: what is open.
+            store: its annotations.
+            author: who makes the edits, for the history.
+        """
+        self._session, self._store, self._writing = session, store, Writing(store, author)
         self._revisions = [store.add_model_revision(p.name, format_model(p.model)) for p in session.people]
         self._cells: dict[int, dict] = {}
         self._frames: list[list[int]] = [[] for _ in session.people]
         self._changed: dict[int, int] = {}  # frame -> version of the timeline it changed in last, latest last
         self.timeline_version = 1
         """Rises with every change of stored poses."""
-        self.error: str | None = None
-        """Why the last edit is not on disk; None where it is."""
         self._reload()
+
+    @property
+    def error(self) -> str | None:
+        """Why an edit is not on disk; None where all are."""
+        return self._writing.error
 
     def setting(self, key: str, default: Any = None) -> Any:
         """A setting that is kept with the session: anything that JSON holds."""
@@ -54,7 +64,7 @@ class Saver:
 
     def pose(self, person: int, frame: int) -> Shown | None:
         """The stored pose of a person on a frame."""
-        record = self._store.pose(self._session.people[person].name, frame)
+        record = self._record(self._session.people[person].name, frame)
         if record is None or len(record.values) != len(self._session.people[person].model.value_names):
             return None
         return Shown(record.values, _summary(record.sources), record.status, record.remark, record.parts_px)
@@ -63,8 +73,10 @@ class Saver:
         """The stored pins of a person on a frame, undistorted px; those of other cameras and bodies are passed over."""
         info, cameras = self._session.people[person], self._session.cameras
         index = {c.camera.name: i for i, c in enumerate(cameras)}
+        stored = {(p.point, p.camera): p.position_px for p in self._store.pins(info.name, frame)}
+        stored |= {(c.point, c.camera): c.position_px for c in self._writing.pins(info.name, frame)}
         found = []
-        for pin in self._store.pins(info.name, frame):
+        for pin in [Pin(*key, place) for key, place in sorted(stored.items()) if place is not None]:
             if pin.camera in index and pin.point in info.model.point_names:
                 camera = index[pin.camera]
                 u, v = cameras[camera].camera.undistort_points(np.array(pin.position_px))
@@ -112,12 +124,12 @@ class Saver:
             amend: the entry of the history to add to; None makes a new one.
 
         Returns:
-            Id of the entry; None where nothing was written. Where writing fails, `error` says why.
+            What later calls add to; None where there was nothing to write. Where writing fails, `error` says why.
         """
         changes: list[Change] = self._pin_changes(state)
         for person, (shown, revision) in enumerate(zip(state.people, self._revisions, strict=True)):
             name = self._session.people[person].name
-            stored = self._store.pose(name, state.frame)
+            stored = self._record(name, state.frame)
             if shown.source is None or (stored is not None and np.array_equal(stored.values, shown.values)):
                 continue
             known = stored is not None and len(stored.values) == len(shown.values)
@@ -174,7 +186,7 @@ class Saver:
             amend: the entry of the history to add to; None makes a new one.
 
         Returns:
-            Id of the entry; None where nothing was written. Where writing fails, `error` says why.
+            What later calls add to; None where there was nothing to write. Where writing fails, `error` says why.
         """
         names = [p.name for p in self._session.people]
         changes = tracked_changes(estimates, names, people, self._revisions, fixed, settings)
@@ -182,19 +194,30 @@ class Saver:
 
     def undo(self) -> list[int]:
         """Take back the last entry of the history; returns the frames it is about, ascending."""
+        self._write_all()
         entry = self._next_undo()
         if entry is None:
             return []
         self._store.undo()
-        return self._moved(entry)
+        return self._moved([entry.edit])
 
     def redo(self) -> list[int]:
         """Do again what was taken back last; returns the frames it is about, ascending."""
+        self._write_all()
         entry = self._next_redo()
         if entry is None:
             return []
         self._store.redo()
-        return self._moved(entry)
+        return self._moved([entry.edit])
+
+    def go_to(self, edit: int | None) -> list[int]:
+        """Undo or redo until an entry is the last one done, None for none; returns the frames it changes, ascending."""
+        self._write_all()
+        return self._moved(self._store.go_to(edit))
+
+    def history(self, limit: int) -> list[HistoryEntry]:
+        """Entries that redo and undo can reach, latest first; at most `limit` of each."""
+        return self._store.history(limit)
 
     def undo_label(self) -> str | None:
         """What undo would take back."""
@@ -219,10 +242,9 @@ class Saver:
     def _next_redo(self) -> HistoryEntry | None:
         return next((e for e in self._store.history(1) if e.undone), None)
 
-    def _moved(self, entry: HistoryEntry) -> list[int]:
-        frames = self._store.frames_of(entry.edit)
-        if frames:
-            self._note(frames)
+    def _moved(self, edits: Iterable[int]) -> list[int]:
+        frames = sorted({frame for edit in edits for frame in self._store.frames_of(edit)})
+        self._note(frames)
         return frames
 
     def rows(self, person: int, frames: range) -> list[FrameRow]:
@@ -243,21 +265,32 @@ class Saver:
             by_program: leave keyframes as they are.
 
         Returns:
-            Id of the entry; None where nothing was written. Where writing fails, `error` says why.
+            What later calls add to; None where there was nothing to write. What cannot be written waits, and `error` says why.
         """
         if not changes:
             return amend
-        try:
-            if amend is None:
-                amend = self._store.commit(label, changes, by_program=by_program).edit
-            else:
-                self._store.amend(amend, changes, by_program)
-            self.error = None
-        except TrackerError as error:
-            self.error = str(error)
-            return None
-        self._note(sorted({change.frame for change in changes}))
-        return amend
+        edit, written = self._writing.write(label, changes, amend, by_program)
+        self._note(written)
+        return edit
+
+    def retry(self) -> None:
+        """Try again to write what waits; where that fails, `error` says why."""
+        self._note(self._writing.retry())
+
+    def _write_all(self) -> None:
+        """Write what waits before the history moves.
+
+        Raises:
+            SessionError: it still cannot be written.
+        """
+        self.retry()
+        if self.error is not None:
+            raise SessionError(f"the history stands still while an edit is not saved: {self.error}")
+
+    def _record(self, name: str, frame: int) -> PoseRecord | None:
+        """The pose of a person on a frame: what waits to be written, else what is stored."""
+        waiting = self._writing.pose(name, frame)
+        return self._store.pose(name, frame) if waiting is None else waiting.pose
 
     def _reload(self) -> None:
         """List all frames anew."""
@@ -271,6 +304,8 @@ class Saver:
 
     def _note(self, frames: Sequence[int]) -> None:
         """Bring the cells of some frames, ascending, up to date."""
+        if not frames:
+            return
         changed = set(frames)
         rows: dict[int, dict[str, FrameRow]] = {}
         for person, info in enumerate(self._session.people):

@@ -179,15 +179,13 @@ class Tracking:
         }
 
     def _save(self, run: _Run) -> None:
-        """Write what waits. Where writing fails it waits on, and the state says why."""
+        """Write what waits. Where writing fails the state says why, and it is tried again."""
         if not run.waiting:
             return
         screen = self._screen
-        edit = screen.saver.save_tracked(run.waiting, run.people, run.fixed, run.settings, run.label, run.edit)
+        run.edit = screen.saver.save_tracked(run.waiting, run.people, run.fixed, run.settings, run.label, run.edit)
         screen.last_save = time.monotonic()
-        if screen.saver.error is None:
-            run.edit = edit
-            run.waiting.clear()
+        run.waiting.clear()
         screen.refresh_saving()
 
     def _paused(self, run: _Run) -> None:

@@ -1,6 +1,7 @@
 """Opens a session in the page: everything from the lock to the web server, wired together."""
 
 import asyncio
+import getpass
 import shutil
 import signal
 import threading
@@ -59,9 +60,8 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
     static = static_folder()
     with SessionLock(session.folder), Recording(session.cameras, indices=_indices()) as recording:
         store = AnnotationStore(session.annotations_path)
-        controller = Controller(
-            session, Saver(session, store), Frames(Observer(session.cameras, recording), indexing.proxies(session))
-        )
+        frames = Frames(Observer(session.cameras, recording), indexing.proxies(session))
+        controller = Controller(session, Saver(session, store, _author()), frames)
         viser_server = start_viser()
         try:
             Scene(viser_server, controller)
@@ -98,6 +98,14 @@ async def _until_interrupted(serving: Coroutine[Any, Any, None]) -> None:
     except asyncio.CancelledError:
         if not task.cancelled():
             raise
+
+
+def _author() -> str:
+    """Who edits, for the history: the user of this machine, nobody where it does not say."""
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):  # a container's user may have a number and no name
+        return ""
 
 
 def sample_copy(name: str = DEFAULT_SAMPLE, afresh: bool = False) -> Path:

@@ -26,3 +26,22 @@ export function button(id, run) {
   });
   return element;
 }
+
+/**
+ * Keys as they are printed on a keyboard.
+ *
+ * @param {string[]} keys alternatives, each of keys pressed together
+ */
+export function keyCaps(keys) {
+  const caps = document.createElement("span");
+  caps.className = "keys";
+  keys.forEach((key, index) => {
+    if (index > 0) caps.append(" or ");
+    for (const part of key.split(" ")) {
+      const cap = document.createElement(part === "–" ? "span" : "kbd");
+      cap.textContent = part;
+      caps.append(cap, " ");
+    }
+  });
+  return caps;
+}

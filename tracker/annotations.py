@@ -142,17 +142,11 @@ class AnnotationStore:
     def undo(self) -> str | None:
         """Take the last edit back; returns its label, or None where there is none."""
         with self._lock, self._errors(), self._transaction():
-            row = self._db.execute(
-                "SELECT e.id, e.parent, e.label FROM head h JOIN edits e ON e.id = h.edit"
-            ).fetchone()
+            row = self._db.execute("SELECT e.id, e.label FROM head h JOIN edits e ON e.id = h.edit").fetchone()
             if row is None:
                 return None
-            edit, parent, label = row
-            self._move("undo", edit, parent)
-            for table in ("pose", "pin"):
-                for change, previous in self._changes(table, edit)[::-1]:
-                    self._show(table, change, previous)
-            return str(label)
+            self._take_back(row[0])
+            return str(row[1])
 
     def redo(self) -> str | None:
         """Do again what the last undo took back; returns its label, or None where there is none."""
@@ -162,12 +156,35 @@ class AnnotationStore:
             ).fetchone()
             if row is None:
                 return None
-            edit, label = row
-            self._move("redo", edit, edit)
-            for table in ("pose", "pin"):
-                for change, _ in self._changes(table, edit):
-                    self._show(table, change, change)
-            return str(label)
+            self._do_again(row[0])
+            return str(row[1])
+
+    def go_to(self, edit: int | None) -> list[int]:
+        """Undo or redo, all or nothing, until an edit is the last one done; None takes everything back.
+
+        Returns:
+            Ids of the edits taken back or done again, in that order.
+
+        Raises:
+            SessionError: neither undo nor redo leads there.
+        """
+        with self._lock, self._errors(), self._transaction():
+            (head,) = self._db.execute("SELECT edit FROM head").fetchone()
+            line = "WITH RECURSIVE line (id) AS (SELECT {} UNION ALL SELECT {} FROM line WHERE id IS NOT NULL) SELECT id FROM line"
+            back = [i for (i,) in self._db.execute(line.format("?", "(SELECT parent FROM edits WHERE id = line.id)"), (head,))]
+            if edit in back:
+                way = back[: back.index(edit)]
+                for taken in way:
+                    self._take_back(taken)
+                return way
+            youngest = "(SELECT max(id) FROM edits WHERE parent IS line.id)"
+            onward = [i for (i,) in self._db.execute(line.format("(SELECT max(id) FROM edits WHERE parent IS ?)", youngest), (head,))]
+            if edit not in onward:
+                raise SessionError(f"entry {edit} of the history cannot be reached any more; look at the list again")
+            way = onward[: onward.index(edit) + 1]
+            for done in way:
+                self._do_again(done)
+            return way
 
     def history(self, limit: int = 100) -> list[HistoryEntry]:
         """Edits that redo and undo can reach, latest first; at most `limit` of each."""
@@ -295,6 +312,21 @@ class AnnotationStore:
             (limit,),
         )
 
+    def _take_back(self, edit: int) -> None:
+        """Undo the last edit."""
+        (parent,) = self._db.execute("SELECT parent FROM edits WHERE id = ?", (edit,)).fetchone()
+        self._move("undo", edit, parent)
+        for table in ("pose", "pin"):
+            for change, previous in self._changes(table, edit)[::-1]:
+                self._show(table, change, previous)
+
+    def _do_again(self, edit: int) -> None:
+        """Redo an edit that stands on the last one."""
+        self._move("redo", edit, edit)
+        for table in ("pose", "pin"):
+            for change, _ in self._changes(table, edit):
+                self._show(table, change, change)
+
     def _changes(self, kind: str, edit: int) -> list[tuple[int, int | None]]:
         """Ids of an edit's changes, and of what was there before each, in order."""
         return self._db.execute(
@@ -335,10 +367,11 @@ class AnnotationStore:
         self._db.execute("BEGIN IMMEDIATE")
         try:
             yield
+            self._db.execute("COMMIT")
         except BaseException:
-            self._db.execute("ROLLBACK")
+            if self._db.in_transaction:  # a full disk may have ended it already
+                self._db.execute("ROLLBACK")
             raise
-        self._db.execute("COMMIT")
 
     @contextmanager
     def _errors(self) -> Generator[None, None, None]:

@@ -1,0 +1,33 @@
+/** What to do first, on one card: shown until it is dismissed for good, found again in the palette. */
+
+import { button, byId } from "./elements.js";
+
+const STORED = "quadrille.first_steps";
+
+export class FirstSteps {
+  #card = byId("first-steps", HTMLElement);
+
+  /** @param {import("./store.js").Store} store */
+  constructor(store) {
+    button("close-first-steps", () => this.#close());
+    this.#card.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape") return;
+      event.preventDefault();
+      this.#close();
+    });
+    store.subscribe((changed) => {
+      if (changed.has("session") && localStorage.getItem(STORED) !== "seen") this.#card.hidden = false;
+    });
+  }
+
+  /** Show the card again, and where it can be closed. */
+  show() {
+    this.#card.hidden = false;
+    byId("close-first-steps", HTMLButtonElement).focus();
+  }
+
+  #close() {
+    localStorage.setItem(STORED, "seen");
+    this.#card.hidden = true;
+  }
+}

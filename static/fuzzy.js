@@ -1,0 +1,52 @@
+/** How well a few typed letters fit a text: whole beginnings of words first, then pieces of words, then scattered letters. */
+
+const START = 30;
+const WORD = 20;
+const INSIDE = 10;
+
+/**
+ * @param {string} query words in any order
+ * @param {string} text
+ * @returns {number | null} the higher the better; null where some word of the query does not fit
+ */
+export function fitness(query, text) {
+  const there = text.toLowerCase();
+  let total = 0;
+  for (const word of query.toLowerCase().split(/\s+/).filter(Boolean)) {
+    const found = wordFitness(word, there);
+    if (found === null) return null;
+    total += found;
+  }
+  return total - there.length / 200;
+}
+
+/**
+ * @param {string} word
+ * @param {string} text
+ */
+function wordFitness(word, text) {
+  if (text.startsWith(word)) return START;
+  const at = text.search(new RegExp(`(^|[^a-z0-9])${word.replace(/[^a-z0-9]/g, "\\$&")}`));
+  if (at >= 0) return WORD - at / 100;
+  const inside = text.indexOf(word);
+  if (inside >= 0) return INSIDE - inside / 100;
+  return scattered(word, text);
+}
+
+/**
+ * Letters in their order with others between them; the fewer the better, and not from all over the text.
+ *
+ * @param {string} word
+ * @param {string} text
+ */
+function scattered(word, text) {
+  let at = -1;
+  let first = 0;
+  for (const letter of word) {
+    at = text.indexOf(letter, at + 1);
+    if (at < 0) return null;
+    if (letter === word[0] && first === 0) first = at;
+  }
+  const spread = at - first + 1 - word.length;
+  return spread <= 2 * word.length ? 5 - spread / 10 : null;
+}
