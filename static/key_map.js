@@ -13,7 +13,7 @@ export class KeyMap {
   constructor(table) {
     /** @type {Map<string, HTMLElement>} */
     const areas = new Map();
-    for (const { keys, label, area = "More" } of table) {
+    for (const { keys, label, area = "More" } of table.filter((binding) => binding.keys.length > 0)) {
       let section = areas.get(area);
       if (!section) {
         section = document.createElement("section");

@@ -7,6 +7,8 @@ import { posingBindings } from "./posing_keys.js";
 import { control, plain } from "./key_matching.js";
 import { timelineKeys } from "./timeline_keys.js";
 import { sceneBindings } from "./scene_keys.js";
+import { reasonsOf } from "./reasons.js";
+import { keepsUndo } from "./typing.js";
 
 /**
  * @typedef {object} Binding
@@ -14,6 +16,9 @@ import { sceneBindings } from "./scene_keys.js";
  * @property {string} label
  * @property {(event: KeyboardEvent) => boolean} matches
  * @property {(event: KeyboardEvent) => void} run
+ * @property {string} [area] what it is about
+ * @property {() => string | null} [why] why it is not possible now; null where it is
+ * @property {boolean} [anywhere] obeyed while something is typed, too
  */
 
 /** Keys that belong to viser's camera while the 3-D view has the focus. */
@@ -42,6 +47,10 @@ const SLIDER_KEYS = new Set([
  * @property {import("./snap.js").Snap} snap
  * @property {import("./pinning.js").Pinning} pinning
  * @property {import("./floor.js").Floor} floor
+ * @property {import("./notices.js").Notices} notices
+ * @property {import("./history_list.js").HistoryList} history
+ * @property {() => void} showPalette
+ * @property {() => void} showFirstSteps
  * @property {() => void} showHelp
  */
 
@@ -52,15 +61,21 @@ const SLIDER_KEYS = new Set([
 // prettier-ignore
 export function bindings({
   store, actions, navigation, playback, jumps, frameWindow, grid, gestures, drawer, posing, pinning, inspector, layers,
-  layersMenu, snap, floor, showHelp,
+  layersMenu, snap, floor, notices, history, showPalette, showFirstSteps, showHelp,
 }) {
   const escape = () => {
     if (gestures.cancel() || closePopover() || floor.cancel() || pinning.cancel() || actions.leaveReplay()) return;
     if (hasTrack(store.facts.state)) actions.stopTracking();
     else if (store.facts.state?.range.running) actions.stopRange();
     else if (hasSearch(store.facts.state)) actions.search("stop");
+    else if (notices.dismiss()) return;
     else if (store.facts.range) store.set({ range: null });
     else if (store.facts.filled !== null) grid.toggleFill(store.facts.filled);
+  };
+  const why = reasonsOf(store);
+  const nextPerson = () => {
+    const { state, session } = store.facts;
+    if (state && session) actions.selectPerson((state.person + 1) % session.people.length);
   };
   const search = (/** @type {"step" | "stage" | "frame"} */ action) => () => {
     if (store.facts.connected && !store.facts.state?.job.running) actions.search(action);
@@ -74,6 +89,7 @@ export function bindings({
     store.set({ range: { first: Math.min(target, other), last: Math.max(target, other) } });
   };
   return [
+    ...area("Frames", [
     { keys: [","], label: "Previous frame", matches: plain(",", "Comma"), run: () => navigation.step(-1) },
     { keys: ["."], label: "Next frame", matches: plain(".", "Period"), run: () => navigation.step(1) },
     { keys: ["Shift ,"], label: "Ten frames back", matches: plain("<", "Comma", true), run: () => navigation.step(-10) },
@@ -81,33 +97,56 @@ export function bindings({
     { keys: ["Home"], label: "First frame", matches: plain("home"), run: () => navigation.first() },
     { keys: ["End"], label: "Last frame", matches: plain("end"), run: () => navigation.last() },
     { keys: ["Space"], label: "Play or pause", matches: plain(" "), run: () => playback.toggle() },
-    { keys: ["Ctrl Z"], label: "Undo", matches: control("z", false), run: () => actions.undo() },
+    ]),
+    ...area("History and help", [
+    { keys: ["Ctrl K"], label: "Commands", matches: control("k", false), anywhere: true, run: showPalette },
+    { keys: ["Ctrl Z"], label: "Undo", matches: control("z", false), anywhere: true, why: why.undo, run: () => actions.undo() },
     {
       keys: ["Ctrl Shift Z", "Ctrl Y"],
       label: "Redo",
+      anywhere: true,
+      why: why.redo,
       matches: (event) => control("z", true)(event) || control("y", false)(event),
       run: () => actions.redo(),
     },
-    { keys: ["S"], label: "Search: one step", matches: plain("s"), run: search("step") },
-    { keys: ["Shift S"], label: "Search: to the end of the stage", matches: plain("s", undefined, true), run: search("stage") },
+    { keys: ["H"], label: "History: what was done, and back to it", matches: plain("h"), run: () => history.toggle() },
+    { keys: ["Shift H"], label: "Notices so far", matches: plain("h", undefined, true), run: () => notices.toggleLog() },
+    { keys: ["Shift Esc"], label: "Dismiss the notices", matches: plain("escape", undefined, true), run: () => notices.dismissAll() },
+    { keys: ["?"], label: "Keys", matches: (event) => event.key === "?", run: showHelp },
+    { keys: [], label: "First steps: what to do with a new recording", matches: () => false, run: showFirstSteps },
+    ]),
+    ...area("Search", [
+    { keys: ["S"], label: "Search: one step", matches: plain("s"), why: why.search, run: search("step") },
+    { keys: ["Shift S"], label: "Search: to the end of the stage", matches: plain("s", undefined, true), why: why.search, run: search("stage") },
     { keys: ["Shift F"], label: "Search: again from the same start", matches: plain("f", undefined, true), run: () => actions.searchAgain() },
-    { keys: ["F"], label: "Search: this frame", matches: plain("f"), run: search("frame") },
+    { keys: ["F"], label: "Search: this frame", matches: plain("f"), why: why.search, run: search("frame") },
+    ]),
+    ...area("Tracking", [
     {
       keys: ["Esc"],
       label: "Cancel the drag, leave the replay, else stop what is at work, else put the marked range away",
       matches: plain("escape"),
       run: escape,
     },
-    { keys: ["T"], label: "Track forward", matches: plain("t"), run: track("forward") },
-    { keys: ["Shift T"], label: "Track backward", matches: plain("t", undefined, true), run: track("backward") },
-    { keys: ["P"], label: "Pause tracking, or go on", matches: plain("p"), run: () => actions.togglePause() },
-    { keys: ["L"], label: "Follow the tracker, or not", matches: plain("l"), run: () => actions.toggleFollow() },
+    { keys: ["T"], label: "Track forward", matches: plain("t"), why: why.track, run: track("forward") },
+    { keys: ["Shift T"], label: "Track backward", matches: plain("t", undefined, true), why: why.track, run: track("backward") },
+    { keys: ["P"], label: "Pause tracking, or go on", matches: plain("p"), why: why.tracking, run: () => actions.togglePause() },
+    { keys: ["L"], label: "Follow the tracker, or not", matches: plain("l"), why: why.tracking, run: () => actions.toggleFollow() },
+    ]),
+    ...area("Timeline", [
     ...timelineKeys({ store, actions, playback, jumps, frameWindow }),
     { keys: ["["], label: "A range begins here", matches: plain("[", "BracketLeft"), run: mark("first") },
     { keys: ["]"], label: "The range ends here", matches: plain("]", "BracketRight"), run: mark("last") },
+    ]),
     // Before the keys of posing: Enter means the floor while it is being set.
+    ...area("3-D view", [
     ...sceneBindings(snap, floor, plain),
+    ], why.away),
+    ...area("Posing", [
     ...posingBindings(posing, inspector, plain),
+    { keys: ["Shift P"], label: "Work on the next person", matches: plain("p", undefined, true), why: why.people, run: nextPerson },
+    ], why.away),
+    ...area("Pins", [
     { keys: ["X"], label: "Pin the selected joint by clicks, or no more", matches: plain("x"), run: () => pinning.toggle() },
     { keys: ["G"], label: "Fit to pins and edges", matches: plain("g"), run: () => pinning.fit() },
     {
@@ -128,6 +167,8 @@ export function bindings({
       matches: plain("delete", undefined, true),
       run: () => pinning.clear(),
     },
+    ], why.away),
+    ...area("Views", [
     { keys: ["C"], label: "Curves", matches: plain("c"), run: () => drawer.toggleCurves() },
     { keys: ["B"], label: "Search: watch it in the drawer", matches: plain("b"), run: () => drawer.toggle("search") },
     { keys: ["V"], label: "Landscape of the cost", matches: plain("v"), run: () => drawer.toggle("landscape") },
@@ -153,8 +194,20 @@ export function bindings({
       matches: plain("0"),
       run: () => grid.typeCamera(0) || grid.resetViews(),
     },
-    { keys: ["?"], label: "This list", matches: (event) => event.key === "?", run: showHelp },
+    ]),
   ];
+}
+
+/**
+ * Say what some bindings are about, and why none of them is possible where that is so.
+ *
+ * @param {string} name
+ * @param {Binding[]} table
+ * @param {() => string | null} [why]
+ * @returns {Binding[]}
+ */
+function area(name, table, why) {
+  return table.map((binding) => ({ area: name, why, ...binding }));
 }
 
 /**
@@ -168,11 +221,11 @@ export function listen(target, table, { viser, isDragging }) {
   target.addEventListener("keydown", (event) => {
     const from = /** @type {HTMLElement | null} */ (event.target);
     const isEscape = event.key === "Escape";
-    if (event.defaultPrevented || target.querySelector("dialog[open]")) return;
-    if (!isEscape && (isDragging() || writes(from) || operates(from, event))) return;
+    if (event.defaultPrevented || document.querySelector("dialog[open]")) return;
+    if (!isEscape && (isDragging() || operates(from, event))) return;
     if (viser && !event.ctrlKey && VISER_KEYS.has(event.key.toLowerCase())) return;
     const binding = table.find(({ matches }) => matches(event));
-    if (!binding) return;
+    if (!binding || (writes(from) && !isEscape && !(binding.anywhere && !keepsUndo(from, event)))) return;
     event.preventDefault();
     binding.run(event);
   });
@@ -195,27 +248,4 @@ function operates(element, event) {
     return !!element?.matches?.("[type=radio], [role=slider], [role=separator], [role=menuitem], [role=tab]");
   }
   return [" ", "Enter"].includes(event.key) && !!element?.matches?.("button, input, a, summary, [role=button]");
-}
-
-/**
- * Fill the dialog that lists the keys.
- *
- * @param {HTMLElement} list
- * @param {Binding[]} table
- */
-export function describe(list, table) {
-  for (const { keys, label } of table) {
-    const term = document.createElement("dt");
-    keys.forEach((key, index) => {
-      if (index > 0) term.append(" or ");
-      for (const part of key.split(" ")) {
-        const cap = document.createElement(part === "–" ? "span" : "kbd");
-        cap.textContent = part;
-        term.append(cap, " ");
-      }
-    });
-    const description = document.createElement("dd");
-    description.textContent = label;
-    list.append(term, description);
-  }
 }

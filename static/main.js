@@ -1,33 +1,41 @@
 /** Puts the page together: messages go into the store, the views read it, gestures and keys send. */
 
 import { Actions } from "./actions.js";
+import { Announcer } from "./announcer.js";
 import { Connection } from "./connection.js";
 import { Curves } from "./curves.js";
 import { Drawer } from "./drawer.js";
 import { button, byId } from "./elements.js";
 import { Floor } from "./floor.js";
+import { FirstSteps } from "./first_steps.js";
 import { FrameCard } from "./frame_card.js";
 import { FrameWindow } from "./frame_window.js";
 import { Gestures } from "./gestures.js";
+import { HistoryList } from "./history_list.js";
 import { Inspector } from "./inspector.js";
 import { JumpMenu } from "./jump_menu.js";
 import { Jumps } from "./jumps.js";
+import { KeyMap } from "./key_map.js";
 import * as keys from "./keys.js";
 import { LandscapePanel } from "./landscape.js";
+import { Latency } from "./latency.js";
 import { Layers } from "./layers.js";
 import { LayersMenu } from "./layers_menu.js";
 import { LookMenu } from "./look_menu.js";
 import { Looks } from "./looks.js";
-import { Latency } from "./latency.js";
 import { Navigation } from "./navigation.js";
-import { showNotice, watchConnection } from "./notices.js";
+import { Notices, watchConnection } from "./notices.js";
+import { Palette } from "./palette.js";
 import { PaneGrid } from "./pane_grid.js";
 import { PinBar } from "./pin_bar.js";
 import { Pinning } from "./pinning.js";
 import { Posing } from "./posing.js";
 import { Playback } from "./playback.js";
 import { RangeBar } from "./range_bar.js";
+import { reasonsOf } from "./reasons.js";
 import { Receiver } from "./receiver.js";
+import { SavedMark } from "./saved_mark.js";
+import { followScheme } from "./scene_scheme.js";
 import { SearchPanel } from "./search_panel.js";
 import { Snap } from "./snap.js";
 import { makeSplitter } from "./splitter.js";
@@ -36,16 +44,17 @@ import { Timeline } from "./timeline.js";
 import { TopBar } from "./top_bar.js";
 import { TrackBar } from "./track_bar.js";
 import { Transport } from "./transport.js";
+import { watchTyping } from "./typing.js";
 import { ViewRequest } from "./view_request.js";
 import { drawsInSoftware } from "./webgl.js";
 
 // A token has become a cookie by now, and does not belong into the history or a screenshot.
-if (location.search) history.replaceState(null, "", location.pathname);
+if (location.search) window.history.replaceState(null, "", location.pathname);
 
 const store = new Store();
 const latency = new Latency();
-const notices = byId("notices", HTMLElement);
-const notify = (/** @type {import("./protocol.js").NoticeMessage} */ notice) => showNotice(notices, notice);
+const notices = new Notices();
+const notify = notices.show.bind(notices);
 const receiver = new Receiver(store, notify);
 /** @type {(message: import("./protocol.js").ClientMessage) => void} */
 const send = (message) => connection.send(message);
@@ -89,24 +98,32 @@ new Timeline(byId("timeline", HTMLElement), { store, navigation, jumps, frameWin
 watchConnection(byId("banner", HTMLElement), store);
 makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement));
 
-const help = byId("help", HTMLDialogElement);
-const showHelp = () => help.showModal();
+const history = new HistoryList(store, send);
+new SavedMark(store, send);
+new Announcer(byId("announcer", HTMLElement), store);
+const firstSteps = new FirstSteps(store);
+const places = { store, navigation, grid, posing, layers, actions, away: reasonsOf(store).away };
+const palette = new Palette(places, () => table);
+button("show-palette", () => palette.toggle());
+const showPalette = palette.toggle.bind(palette);
+const showFirstSteps = firstSteps.show.bind(firstSteps);
+const showHelp = () => keyMap.show();
 const table = keys.bindings({
   store, actions, navigation, playback, jumps, frameWindow, grid, gestures, drawer, posing, pinning, inspector, layers,
-  layersMenu, snap, floor, showHelp,
+  layersMenu, snap, floor, notices, history, showPalette, showFirstSteps, showHelp,
 }); // prettier-ignore
-keys.describe(byId("help-keys", HTMLElement), table);
-button("show-help", () => help.showModal());
-help.addEventListener("click", (event) => event.target === help && help.close());
+const keyMap = new KeyMap(table);
+watchTyping(document);
 
 const isDragging = () => store.facts.dragging;
 keys.listen(document, table, { viser: false, isDragging });
 const scene = byId("scene", HTMLIFrameElement);
 scene.addEventListener("load", () => {
-  if (scene.contentDocument) keys.listen(scene.contentDocument, table, { viser: true, isDragging });
+  if (!scene.contentDocument) return;
+  watchTyping(scene.contentDocument);
+  keys.listen(scene.contentDocument, table, { viser: true, isDragging });
 });
-// viser is dark only where its address says so.
-scene.src = matchMedia("(prefers-color-scheme: dark)").matches ? "viser/?darkMode" : "viser/";
+followScheme(scene);
 
 const connection = new Connection(receiver, drawsInSoftware() ? { type: "hold_3d", hold: true } : null);
 

@@ -28,6 +28,8 @@
  *   floor: FloorPicking | null,
  *   undo: string | null, redo: string | null,
  *   saved: boolean, save_error: string | null}} StateMessage
+ * @typedef {{edit: number, label: string, author: string, time: string, undone: boolean}} HistoryEntry
+ * @typedef {{type: "history", entries: HistoryEntry[], later: boolean, earlier: boolean}} HistoryMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
  * @typedef {{source: string, cost_px: number | null, keyframe: boolean, status: Status, remark: string,
  *   reviewed: boolean}} Cell
@@ -45,7 +47,7 @@
  * @typedef {{run: number, step: number, stage: string | null, candidate_px: number | null, best_px: number | null,
  *   evaluations: number}} Replay
  * @typedef {{type: "search_runs", runs: SearchRun[], replay: Replay | null, compared: number | null}} SearchRunsMessage
- * @typedef {SessionMessage | StateMessage | NoticeMessage | TimelineMessage | SearchSetupMessage |
+ * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | SearchSetupMessage |
  *   SearchRunsMessage | DisagreeingMessage} TextMessage
  * @typedef {{type: "disagreeing", frames: number[]}} DisagreeingMessage
  *
@@ -115,6 +117,9 @@
  *   {type: "snap", camera: number | null} |
  *   {type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "revert"} |
  *   {type: "floor", action: "mark", camera: number, u: number, v: number} |
+ *   {type: "history", limit: number} |
+ *   {type: "go_to", edit: number | null} |
+ *   {type: "save"} |
  *   {type: "undo"} | {type: "redo"}} ClientMessage
  */
 

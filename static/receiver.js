@@ -52,6 +52,9 @@ export class Receiver {
       case "disagreeing":
         this.#store.set({ disagreeing: message.frames });
         break;
+      case "history":
+        this.#store.set({ history: message });
+        break;
       case "notice":
         this.#notify(message);
         break;

@@ -26,6 +26,7 @@ import { usualLayers } from "./layers.js";
  * @property {number | null} searchRun the run that the user looks at; null for the newest
  * @property {boolean} replaying whether a search is being replayed step by step
  * @property {import("./search_facts.js").Landscape | null} landscape
+ * @property {import("./protocol.js").HistoryMessage | null} history what the list of the history shows
  * @property {{first: number, last: number} | null} range the frames that the user has marked
  * @property {Shown | null} shown the pictures on the screen
  * @property {import("./protocol.js").Overlay | null} overlay the vectors on the screen
@@ -69,6 +70,7 @@ export class Store {
     searchRun: null,
     replaying: false,
     landscape: null,
+    history: null,
     range: null,
     shown: null,
     overlay: null,

@@ -12,7 +12,6 @@ export class TopBar {
   #stage = byId("search-stage", HTMLElement);
   #stages = byId("search-stages", HTMLElement);
   #figures = byId("search-figures", HTMLElement);
-  #saved = byId("saved", HTMLElement);
   #step;
   #frame;
   #stop;
@@ -66,7 +65,6 @@ export class TopBar {
     this.#cost.textContent = state.cost_px === null ? "–" : state.cost_px.toFixed(2);
     if (hasTrack(state) || state.track.message) this.#showTrack(state.track);
     else this.#showJob(state.job);
-    this.#showSaved(state);
   }
 
   /** @param {import("./protocol.js").Job} job */
@@ -99,12 +97,5 @@ export class TopBar {
     bar.style.setProperty("--done", `${(100 * done) / Math.max(1, total)}%`);
     bar.className = "is-share";
     this.#stages.replaceChildren(...(stands ? [bar] : []));
-  }
-
-  /** @param {import("./protocol.js").StateMessage} state */
-  #showSaved({ saved, save_error }) {
-    this.#saved.className = save_error !== null ? "is-failed" : saved ? "is-saved" : "is-saving";
-    this.#saved.textContent = save_error !== null ? "Not saved" : saved ? "Saved" : "Saving";
-    this.#saved.title = save_error !== null ? `Not saved: ${save_error}` : saved ? "All edits are on disk" : "Saving";
   }
 }
