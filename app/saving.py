@@ -15,7 +15,17 @@ from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model
 from tracker.pins import ViewPin
-from tracker.records import SOURCES, Change, FrameNumbers, FrameRow, HistoryEntry, Pin, PinChange, PoseChange, PoseRecord
+from tracker.records import (
+    SOURCES,
+    Change,
+    FrameNumbers,
+    FrameRow,
+    HistoryEntry,
+    Pin,
+    PinChange,
+    PoseChange,
+    PoseRecord,
+)
 from tracker.rigid import Array
 from tracker.session import Session
 from tracker.track import PoseEstimate, TrackSettings
@@ -73,6 +83,7 @@ class Saver:
         """The stored pins of a person on a frame, undistorted px; those of other cameras and bodies are passed over."""
         info, cameras = self._session.people[person], self._session.cameras
         index = {c.camera.name: i for i, c in enumerate(cameras)}
+        stored: dict[tuple[str, str], tuple[float, float] | None]
         stored = {(p.point, p.camera): p.position_px for p in self._store.pins(info.name, frame)}
         stored |= {(c.point, c.camera): c.position_px for c in self._writing.pins(info.name, frame)}
         found = []
@@ -265,7 +276,8 @@ class Saver:
             by_program: leave keyframes as they are.
 
         Returns:
-            What later calls add to; None where there was nothing to write. What cannot be written waits, and `error` says why.
+            What later calls add to; None where there was nothing to write. What cannot be written waits, and `error`
+            says why.
         """
         if not changes:
             return amend

@@ -42,7 +42,9 @@ class Writing:
         self.error: str | None = None
         """Why the last edit is not on disk; None where all is."""
 
-    def write(self, label: str, changes: Sequence[Change], amend: int | None, by_program: bool) -> tuple[int, list[int]]:
+    def write(
+        self, label: str, changes: Sequence[Change], amend: int | None, by_program: bool
+    ) -> tuple[int, list[int]]:
         """Write changes after all that waits.
 
         Args:

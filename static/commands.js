@@ -52,13 +52,13 @@ export function keyCommands(table) {
  * @returns {Command[]}
  */
 export function buttonCommands(table) {
-  const known = new Set(table.flatMap(({ keys }) => keys));
+  const known = new Set(table.flatMap(({ keys, label }) => [...keys, label]));
   const commands = [];
   for (const control of document.querySelectorAll(BUTTONS)) {
     if (!(control instanceof HTMLElement) || !isThere(control)) continue;
     const { label, title } = wordsOf(control);
     const named = [...title.matchAll(/\(([^)]*)\)/g)].flatMap(([, inside]) => inside.split(/[,:]/));
-    if (!label || named.some((key) => known.has(key.trim().replaceAll("+", " ").replace(/ $/, "+")))) continue;
+    if (!label || known.has(label) || named.some((key) => known.has(key.trim().replaceAll("+", " ").replace(/ $/, "+")))) continue;
     const input = control.matches("input") ? control : (control.querySelector("input") ?? control);
     commands.push({
       id: `button ${control.id || label}`,

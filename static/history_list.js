@@ -148,8 +148,8 @@ export class HistoryList {
  * @param {string} label
  */
 function split(label) {
-  const found = /^(.*?),? (frames? .*)$/.exec(label);
-  return found ? [found[1], found[2]] : [label, ""];
+  const found = /^(.*) (frames? [\d ,to–-]+)$/.exec(label);
+  return found ? [found[1].replace(/,$/, ""), found[2]] : [label, ""];
 }
 
 /** @param {Date} when */

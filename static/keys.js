@@ -233,6 +233,8 @@ export function listen(target, table, { viser, isDragging }) {
 
 /** @param {HTMLElement | null} element */
 function writes(element) {
+  // A field of a dialog that has just been closed has the focus until the page is drawn again.
+  if (element?.closest?.("dialog:not([open])")) return false;
   return !!element?.matches?.("input:not([type=radio], [type=checkbox], [type=range]), textarea, select, [contenteditable=true]");
 }
 

@@ -1,7 +1,6 @@
 /** Why a command is not possible now: sentences for the user, null where it is possible. */
 
 import { hasSearch, hasTrack } from "./actions.js";
-import { isDoubt } from "./protocol.js";
 
 /** @typedef {() => string | null} Reason */
 
@@ -20,9 +19,7 @@ export function reasonsOf(store) {
     stopSearch: here(() => (hasSearch(facts().state) ? null : "No search is at work.")),
     track: here(() => (facts().state?.track.running ? "A tracking run is at work; stop it first (Esc)." : null)),
     tracking: here(() => (hasTrack(facts().state) ? null : "No tracking run stands; T begins one.")),
-    doubt: here(() =>
-      [...facts().timeline.values()].some(({ status }) => isDoubt(status)) ? null : "No frame is doubtful or lost.",
-    ),
+    range: here(() => (facts().range ? null : "No range is marked: [ begins one, ] ends it.")),
     people: here(() => ((facts().session?.people.length ?? 0) > 1 ? null : "There is only one person in this session.")),
   };
 }

@@ -2,6 +2,7 @@
 
 import { KINDS } from "./jumps.js";
 import { alt, plain } from "./key_matching.js";
+import { reasonsOf } from "./reasons.js";
 
 /**
  * @param {{store: import("./store.js").Store, actions: import("./actions.js").Actions,
@@ -46,6 +47,7 @@ export function timelineKeys({ store, actions, playback, jumps, frameWindow }) {
       keys: ["Shift I"],
       label: "Interpolate the marked range",
       matches: plain("i", undefined, true),
+      why: reasonsOf(store).range,
       run: interpolate,
     },
     { keys: ["Z"], label: "Timeline: see fewer frames", matches: plain("z"), run: () => frameWindow.zoomIn() },
@@ -73,11 +75,12 @@ export function timelineKeys({ store, actions, playback, jumps, frameWindow }) {
  */
 function jumpKeys(jumps, kind, key, what) {
   const letter = key.slice(-1);
+  const why = () => (jumps.count(kind) > 0 ? null : `There is no ${what}.`);
   const match = (/** @type {boolean} */ shift) =>
     key.startsWith("Alt ") ? alt(`Key${letter}`, shift) : plain(letter.toLowerCase(), undefined, shift);
   const former = key.startsWith("Alt ") ? `Alt Shift ${letter}` : `Shift ${letter}`;
   return [
-    { keys: [key], label: `Next ${what}`, matches: match(false), run: () => jumps.go(kind, 1) },
-    { keys: [former], label: `Former ${what}`, matches: match(true), run: () => jumps.go(kind, -1) },
+    { keys: [key], label: `Next ${what}`, matches: match(false), why, run: () => jumps.go(kind, 1) },
+    { keys: [former], label: `Former ${what}`, matches: match(true), why, run: () => jumps.go(kind, -1) },
   ];
 }

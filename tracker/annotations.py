@@ -170,20 +170,19 @@ class AnnotationStore:
         """
         with self._lock, self._errors(), self._transaction():
             (head,) = self._db.execute("SELECT edit FROM head").fetchone()
-            line = "WITH RECURSIVE line (id) AS (SELECT {} UNION ALL SELECT {} FROM line WHERE id IS NOT NULL) SELECT id FROM line"
-            back = [i for (i,) in self._db.execute(line.format("?", "(SELECT parent FROM edits WHERE id = line.id)"), (head,))]
+            back = self._ids("?", "(SELECT parent FROM edits WHERE id = line.id)", head)
             if edit in back:
                 way = back[: back.index(edit)]
-                for taken in way:
-                    self._take_back(taken)
+                for last in way:
+                    self._take_back(last)
                 return way
-            youngest = "(SELECT max(id) FROM edits WHERE parent IS line.id)"
-            onward = [i for (i,) in self._db.execute(line.format("(SELECT max(id) FROM edits WHERE parent IS ?)", youngest), (head,))]
+            youngest = "(SELECT max(id) FROM edits WHERE parent IS {})"
+            onward = self._ids(youngest.format("?"), youngest.format("line.id"), head)
             if edit not in onward:
                 raise SessionError(f"entry {edit} of the history cannot be reached any more; look at the list again")
             way = onward[: onward.index(edit) + 1]
-            for done in way:
-                self._do_again(done)
+            for following in way:
+                self._do_again(following)
             return way
 
     def history(self, limit: int = 100) -> list[HistoryEntry]:
@@ -326,6 +325,17 @@ class AnnotationStore:
         for table in ("pose", "pin"):
             for change, _ in self._changes(table, edit):
                 self._show(table, change, change)
+
+    def _ids(self, start: str, onward: str, head: int | None) -> list[Any]:
+        """Ids of edits from one to the next in the tree, then None; `start` and `onward` are SQL for them."""
+        return [
+            edit
+            for (edit,) in self._db.execute(
+                f"WITH RECURSIVE line (id) AS (SELECT {start} UNION ALL SELECT {onward} FROM line "
+                "WHERE id IS NOT NULL) SELECT id FROM line",
+                (head,),
+            )
+        ]
 
     def _changes(self, kind: str, edit: int) -> list[tuple[int, int | None]]:
         """Ids of an edit's changes, and of what was there before each, in order."""

@@ -28,8 +28,23 @@ async def browser():
         except Error as error:
             why = f"no Chromium to drive the page with (`make test` finds or installs one): {error}"
             pytest.fail(why) if os.environ.get("CI") == "true" else pytest.skip(why)
+        browser.new_context = _of_a_regular(browser.new_context)
         yield browser
         await browser.close()
+
+
+def _of_a_regular(new_context):
+    """Contexts of users who have put the card with the first steps away; it would lie over the 3-D view."""
+
+    async def of_a_regular(newcomer=False, **options):
+        context = await new_context(**options)
+        if not newcomer:
+            await context.add_init_script(
+                "try { localStorage.setItem('quadrille.first_steps', 'seen'); } catch { /* not our page */ }"
+            )
+        return context
+
+    return of_a_regular
 
 
 @pytest_asyncio.fixture(loop_scope="session")

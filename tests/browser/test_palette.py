@@ -1,0 +1,133 @@
+"""The palette, the list of keys, and keys that hold everywhere, against `fake_endpoint`."""
+
+import pytest
+from driving import shows, until
+
+
+async def open_palette(page, query=""):
+    await page.keyboard.press("Control+k")
+    await shows(page, "document.querySelector('#palette').open")
+    await page.keyboard.type(query)
+
+
+async def found(page):
+    return await page.locator("#palette-list li > span:first-child").all_inner_texts()
+
+
+@pytest.mark.parametrize(
+    ("query", "kind", "message"),
+    [
+        ("track back", "track", {"type": "track", "action": "backward", "until": None}),
+        ("57", "seek", {"type": "seek", "frame": 57}),
+        ("go to frame 8", "seek", {"type": "seek", "frame": 8}),
+        ("l elb", "select", {"type": "select", "person": 0, "point": "l_elbow"}),
+        ("undo", "undo", {"type": "undo"}),
+        ("srch one", "search", {"type": "search", "action": "step"}),
+    ],
+)
+async def test_a_few_letters_and_enter_do_it(page, endpoint, query, kind, message):
+    await open_palette(page, query)
+    await page.keyboard.press("Enter")
+    await until(lambda: endpoint.heard(kind) == [message])
+    assert not await page.locator("#palette").is_visible()
+
+
+async def test_layers_and_cameras_are_found_by_name(page, endpoint):
+    await open_palette(page, "hidden cont")
+    await page.keyboard.press("Enter")
+    await shows(page, "quadrille.state.layers.shown.hidden")
+    await open_palette(page, "fill back")
+    await page.keyboard.press("Enter")
+    await shows(page, "quadrille.state.filled === 2")
+
+
+async def test_it_says_why_not(page, endpoint):
+    await open_palette(page, "redo")
+    assert "nothing to redo" in await page.locator("#palette-why").inner_text()
+    await page.keyboard.press("Enter")
+    assert await page.locator("#palette").is_visible()
+    await page.locator("#palette-query").fill("500")
+    assert await page.locator("#palette-why").inner_text() == "The last frame is 119."
+    await page.locator("#palette-query").fill("qwrtz")
+    assert "qwrtz" in await page.locator("#palette-why").inner_text()
+    await page.keyboard.press("Enter")
+    await page.keyboard.press("Escape")
+    assert not endpoint.received
+
+
+async def test_what_was_used_lately_comes_first(page):
+    await open_palette(page)
+    first = await found(page)
+    await page.keyboard.type("curves")
+    await page.keyboard.press("Enter")
+    await shows(page, "quadrille.state.drawer !== null")
+    await open_palette(page)
+    again = await found(page)
+    assert again[0] == "Curves"
+    assert first[0] != "Curves"
+    assert again[1:5] == first[:4]
+
+
+async def test_every_key_and_button_is_in_it(page):
+    await open_palette(page)
+    await page.evaluate("document.querySelector('#palette').close()")
+    missing = await page.evaluate(
+        """async () => {
+          const rows = [...document.querySelectorAll('#help-keys dd')].map((d) => d.textContent);
+          document.querySelector('#show-palette').click();
+          const query = document.querySelector('#palette-query');
+          const missing = [];
+          for (const label of rows) {
+            query.value = label.replace(/[^a-zA-Z0-9 ]/g, ' ');
+            query.dispatchEvent(new Event('input'));
+            const found = [...document.querySelectorAll('#palette-list li > span:first-child')];
+            if (!found.some((span) => span.textContent === label)) missing.push(label);
+          }
+          return missing;
+        }"""
+    )
+    # These stand for many keys, and the palette has the places that they lead to one by one.
+    assert [m for m in missing if m != "Commands"] == [
+        "Show or hide a layer, by its number in the menu",
+        "Fill the grid with a camera, and back; two digits for 10 to 16",
+    ]
+
+
+async def test_the_list_of_keys_is_searched_and_fits(page):
+    await page.set_viewport_size({"width": 1280, "height": 720})
+    await page.keyboard.press("?")
+    box = await page.locator("#help").bounding_box()
+    assert box["x"] >= 0
+    assert box["y"] >= 0
+    assert box["x"] + box["width"] <= 1280
+    assert box["y"] + box["height"] <= 720
+    assert await page.evaluate(
+        "document.querySelector('#help .scroller').scrollWidth <= document.querySelector('#help .scroller').clientWidth"
+    )
+    assert "More" not in await page.locator("#help h3").all_inner_texts()  # every key is about something
+    await page.keyboard.type("former doubt")
+    assert await page.locator("#help dd:visible").all_inner_texts() == ["Former doubtful or lost frame"]
+
+
+async def test_undo_holds_in_every_part_of_the_page(page, endpoint):
+    """In a field only what is being typed is undone by the field itself."""
+    await page.locator("#frame").click()
+    await page.keyboard.press("Control+z")
+    await until(lambda: len(endpoint.heard("undo")) == 1)
+    await page.keyboard.type("4")
+    await page.keyboard.press("Control+z")
+    await page.keyboard.press("Escape")
+    await page.locator("#frame").blur()
+    await page.keyboard.press("a")  # the menu of layers
+    await page.locator("#layers-menu input[type=range]").first.focus()
+    await page.keyboard.press("Control+Shift+z")
+    await until(lambda: len(endpoint.heard("redo")) == 1)
+    await (
+        page.frame_locator("#scene")
+        .locator("body")
+        .evaluate("(body) => { const input = document.createElement('input'); body.append(input); input.focus(); }")
+    )
+    await page.keyboard.press("Control+z")
+    await until(lambda: len(endpoint.heard("undo")) == 2)
+    await page.keyboard.press("Control+k")
+    assert await page.locator("#palette").is_visible()
