@@ -35,7 +35,7 @@ export function keyCommands(table) {
   return table
     .filter(({ keys, label }) => !keys.some((key) => key.includes("–")) && label !== "Commands")
     .map(({ keys, label, area, why, run }) => ({
-      id: `key ${keys[0] ?? label}`,
+      id: `key ${label}`,
       area: area ?? "More",
       label,
       keys,

@@ -7,6 +7,7 @@
  * @returns {import("./keys.js").Binding[]}
  */
 export function sceneBindings(snap, floor, plain) {
+  const why = () => (floor.isOn ? null : "The floor is not being set; Shift+Y begins that.");
   return [
     { keys: ["Y"], label: "3-D view: look through the camera pointed at, or let go", matches: plain("y"), run: () => snap.toggle() },
     {
@@ -19,12 +20,14 @@ export function sceneBindings(snap, floor, plain) {
       keys: ["Enter"],
       label: "While the floor is set: next point, then apply",
       matches: (event) => floor.isOn && plain("enter")(event),
+      why,
       run: () => floor.goOn(),
     },
     {
       keys: ["Backspace"],
       label: "While the floor is set: take the last click back",
       matches: (event) => floor.isOn && plain("backspace")(event),
+      why,
       run: () => floor.takeBack(),
     },
   ];
