@@ -20,6 +20,7 @@ export class Announcer {
     this.#store = store;
     store.subscribe((changed) => {
       if (!changed.has("state")) return;
+      this.#told ??= store.facts.state;
       clearTimeout(this.#timer);
       // While frames run past or a hand moves there would be no end of words.
       this.#timer = setTimeout(() => this.#say(), SETTLED_MS);
@@ -29,9 +30,8 @@ export class Announcer {
   #say() {
     const { state, session, playing, dragging } = this.#store.facts;
     if (!state || playing || dragging || state.track.running) return;
-    const before = this.#told;
+    const before = this.#told ?? state;
     this.#told = state;
-    if (!before) return;
     const words = [];
     if (state.person !== before.person) words.push(session?.people[state.person]?.name ?? "");
     if (state.point !== before.point && state.point) words.push(`${spoken(state.point)} selected`);

@@ -30,7 +30,6 @@ export class Notices {
       this.#log = [];
       this.#showLog();
     });
-    this.#panel.addEventListener("toggle", () => this.#showLog());
     this.#showLog();
   }
 
@@ -122,7 +121,6 @@ export class Notices {
   }
 
   #showLog() {
-    if (!this.#panel.matches(":popover-open")) return;
     this.#list.replaceChildren(
       ...this.#log.map(({ level, text, time, count }) => {
         const item = document.createElement("li");

@@ -13,13 +13,24 @@ class Program:
     """`quadrille open SESSION` in a process of its own."""
 
     def __init__(self, session: Path, *options: str) -> None:
-        self._words = [sys.executable, "-m", "app", "open", str(session), "--port", "0", "--no-browser", *options]
+        self._words = [sys.executable, "-m", "app", "open", str(session), "--no-browser", *options]
         self._process: asyncio.subprocess.Process | None = None
         self.address = ""
 
-    async def start(self) -> None:
+    @property
+    def pid(self) -> int:
+        """Number of its process."""
+        return self._process.pid
+
+    async def start(self, port: int = 0) -> None:
+        """Start it at a port; 0 takes a free one."""
         self._process = await asyncio.create_subprocess_exec(
-            *self._words, cwd=ROOT, stdout=asyncio.subprocess.PIPE, env={**os.environ, "PYTHONUNBUFFERED": "1"}
+            *self._words,
+            "--port",
+            str(port),
+            cwd=ROOT,
+            stdout=asyncio.subprocess.PIPE,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
         )
         async with asyncio.timeout(120):
             while not self.address:
