@@ -32,6 +32,7 @@ async def test_escape_closes_the_last_notice_and_no_more_than_three_stand(page, 
 
 async def test_notices_leave_panes_and_bars_free(page, endpoint):
     await page.set_viewport_size({"width": 1280, "height": 720})
+    await shows(page, "innerWidth === 1280")
     await say(endpoint, "a sentence of some length that says what was expected, what was found, and what to do now")
     await page.get_by_role("alert").wait_for()
     box = await page.locator("#notices .notice:visible").bounding_box()
