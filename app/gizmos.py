@@ -89,7 +89,7 @@ class Gizmos:
         with self._server.atomic():
             for which, part in (("root", 0), ("joint", joint)):
                 handle = self._handles[which]  # type: ignore[index]
-                visible = shown and (which == "root" or joint != 0)
+                visible = shown and state.view_3d.gizmos and (which == "root" or joint != 0)
                 if handle.visible != visible:
                     handle.visible = visible
                 if which == self._held or not visible:

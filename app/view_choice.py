@@ -24,6 +24,8 @@ class View3d:
     """Whether the frusta show the images of the shown frame."""
     floor: bool = True
     """Whether the grid on the floor is drawn."""
+    gizmos: bool = True
+    """Whether the handles are drawn by which bodies and joints are turned in space."""
     ghost: bool = False
     """Whether the prediction of the shown frame is drawn."""
     trail_points: frozenset[str] = frozenset()

@@ -51,6 +51,9 @@ class ViewPanel:
                     "camera images", view.images, hint="Show what each camera sees, once a frame rests"
                 ),
                 "floor": gui.add_checkbox("floor", view.floor, hint="Draw a grid on the floor, a line every 50 cm"),
+                "gizmos": gui.add_checkbox(
+                    "gizmos", view.gizmos, hint="Draw the handles that move the body and turn the selected joint"
+                ),
                 "ghost": gui.add_checkbox(
                     "prediction", view.ghost,
                     hint="Draw in grey the pose that the tracker expects here, from the poses before",

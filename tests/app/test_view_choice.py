@@ -14,6 +14,7 @@ OTHER = View3d(
     cameras=False,
     images=False,
     floor=False,
+    gizmos=False,
     ghost=True,
     trail_points=frozenset(("left_wrist", "head")),
     trail_frames=80,
