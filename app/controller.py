@@ -222,7 +222,7 @@ class Controller:
     def close(self) -> None:
         """Stop and save what is at hand; the controller is done."""
         with self.editing():
-            self._saver.retry()
+            self.history.save()
         self._disagreements.close()
         self.landscape.close()
         self.frames.close()

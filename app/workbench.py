@@ -79,6 +79,8 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
             asyncio.run(_until_interrupted(serve_forever(app, access, serving.host, serving.port, ready)))
         finally:
             controller.close()
+            if controller.state.save_error is not None:
+                say(f"not everything is saved: {controller.state.save_error}")
             viser_server.stop()
             store.close()
 

@@ -215,9 +215,10 @@ function area(name, table, why) {
  *
  * @param {Document} target the page's, or that of the 3-D view
  * @param {Binding[]} table
- * @param {{viser: boolean, isDragging: () => boolean}} options
+ * @param {{viser: boolean, isDragging: () => boolean, say: (why: string) => void}} options `say` tells the user why a key
+ *   does nothing now
  */
-export function listen(target, table, { viser, isDragging }) {
+export function listen(target, table, { viser, isDragging, say }) {
   target.addEventListener("keydown", (event) => {
     const from = /** @type {HTMLElement | null} */ (event.target);
     const isEscape = event.key === "Escape";
@@ -227,6 +228,8 @@ export function listen(target, table, { viser, isDragging }) {
     const binding = table.find(({ matches }) => matches(event));
     if (!binding || (writes(from) && !isEscape && !(binding.anywhere && !keepsUndo(from, event)))) return;
     event.preventDefault();
+    const why = binding.why?.();
+    if (why) say(why);
     binding.run(event);
   });
 }

@@ -116,12 +116,13 @@ const keyMap = new KeyMap(table);
 watchTyping(document);
 
 const isDragging = () => store.facts.dragging;
-keys.listen(document, table, { viser: false, isDragging });
+const say = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
+keys.listen(document, table, { viser: false, isDragging, say });
 const scene = byId("scene", HTMLIFrameElement);
 scene.addEventListener("load", () => {
   if (!scene.contentDocument) return;
   watchTyping(scene.contentDocument);
-  keys.listen(scene.contentDocument, table, { viser: true, isDragging });
+  keys.listen(scene.contentDocument, table, { viser: true, isDragging, say });
 });
 followScheme(scene);
 

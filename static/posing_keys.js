@@ -24,7 +24,7 @@ export function posingBindings(posing, inspector, plain) {
     { keys: ["Shift J"], label: "Previous joint", matches: plain("j", undefined, true), run: () => posing.toJoint(-1) },
     ...WAYS.map(([arrow, name, way]) => ({
       keys: [arrow],
-      label: `Selected joint, or the body, one step ${name} in the active view (Shift: ten, Ctrl: a tenth)`,
+      label: `Joint or body one step ${name} in the active view (Shift: ten, Ctrl: a tenth)`,
       matches: (/** @type {KeyboardEvent} */ event) =>
         event.key === `Arrow${name[0].toUpperCase()}${name.slice(1)}` && !event.altKey && !event.metaKey,
       run: (/** @type {KeyboardEvent} */ event) => posing.nudge(way, event.shiftKey ? 10 : event.ctrlKey ? 0.1 : 1),

@@ -1,7 +1,7 @@
 """The palette, the list of keys, and keys that hold everywhere, against `fake_endpoint`."""
 
 import pytest
-from driving import shows, until
+from driving import shows, to_client, until
 
 
 async def open_palette(page, query=""):
@@ -131,3 +131,48 @@ async def test_undo_holds_in_every_part_of_the_page(page, endpoint):
     await until(lambda: len(endpoint.heard("undo")) == 2)
     await page.keyboard.press("Control+k")
     assert await page.locator("#palette").is_visible()
+
+
+async def test_a_key_that_does_nothing_says_why(page, endpoint):
+    await page.keyboard.press("p")
+    await shows(page, "document.querySelector('.notice:not([hidden]) span')?.textContent.startsWith('No tracking run')")
+    assert not endpoint.received
+
+
+async def test_people_are_changed_by_key_by_name_and_by_a_click(browser, endpoint, address):
+    endpoint.n_people = 2
+    endpoint.__post_init__()
+    page = await (await browser.new_context(viewport={"width": 1280, "height": 720})).new_page()
+    await page.goto(address)
+    await shows(page, "window.quadrille?.state.overlay?.frame === quadrille.state.shown.frame")
+    await page.keyboard.press("Shift+P")
+    await shows(page, "quadrille.state.state.person === 1")
+    assert await page.locator("#person").input_value() == "1"
+    await page.keyboard.press("Shift+P")
+    await shows(page, "quadrille.state.state.person === 0")
+    await open_palette(page, "work on person 1")
+    await page.keyboard.press("Enter")
+    await shows(page, "quadrille.state.state.person === 1")
+    handles = await page.evaluate("quadrille.state.overlay.handles")
+    u, v = next((h["u"], h["v"]) for h in handles if h["camera"] == 0 and h["person"] == 0 and h["point"] == "r_wrist")
+    await page.mouse.click(*await to_client(page, 0, u, v))
+    await shows(page, "quadrille.state.state.person === 0 && quadrille.state.state.point === 'r_wrist'")
+    await page.context.close()
+
+
+async def test_one_frame_without_a_pose_is_a_page_too(browser, endpoint, address):
+    endpoint.n_frames = 1
+    endpoint.state |= {
+        "frame": 0, "source": None, "undo": None, "cost_px": None, "view_costs_px": [None] * 4,
+    }  # fmt: skip
+    page = await (await browser.new_context(viewport={"width": 1280, "height": 720})).new_page()
+    errors = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    await page.goto(address)
+    await shows(page, "window.quadrille?.state.shown?.frame === 0 && quadrille.state.overlay")
+    assert await page.locator("#source").inner_text() == "No pose yet"
+    for key in ("Period", "Comma", "End", "Space", "n", "k", "Control+z", "h", "Escape"):
+        await page.keyboard.press(key)
+    assert await page.locator("#frame").input_value() == "0"
+    assert errors == []
+    await page.context.close()
