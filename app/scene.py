@@ -119,6 +119,8 @@ class Scene:
         if self._ghost is None:
             self._ghost = _Parts(self._server, "/prediction", self._session, _GHOST_RGB, _GHOST_OPACITY)
         self._ghost.pose([f.values for f in found])
+        for handles, expected in zip(self._ghost.handles, found, strict=True):
+            _set_visible(handles, expected.values is not None)
 
     def _show_trails(self, state: State) -> None:
         view, version = state.view_3d, state.timeline_version
@@ -159,7 +161,7 @@ class _Parts:
             opacity: of all of them; opaque by default.
         """
         self._people = session.people
-        self._handles = [
+        self.handles = [
             [
                 server.scene.add_mesh_simple(
                     f"{root}/{person.name}/{part.name}",
@@ -176,25 +178,25 @@ class _Parts:
             ]
             for person in self._people
         ]
+        """Of each person the meshes of the parts."""
 
     def pose(self, poses: Sequence[Array | None]) -> None:
-        """Put everybody where a pose, (n_values,), says; who has none is hidden."""
-        for person, handles, values in zip(self._people, self._handles, poses, strict=True):
+        """Put everybody where a pose, (n_values,), says; who has none stays. Nobody is shown or hidden by it."""
+        for person, handles, values in zip(self._people, self.handles, poses, strict=True):
             if values is not None:
                 Ts = part_poses([Body(person.model, values)])
                 turns = rigid.quaternion_from_matrix(Ts[:, :3, :3])
                 for handle, T, wxyz in zip(handles, Ts, turns, strict=True):
                     handle.position, handle.wxyz = T[:3, 3], wxyz
-            _set_visible(handles, values is not None)
 
     def hide(self) -> None:
         """Hide everybody."""
-        for handles in self._handles:
+        for handles in self.handles:
             _set_visible(handles, False)
 
     def look(self, view: View3d) -> None:
         """Show, colour and make translucent as a view says."""
-        for person, handles in zip(self._people, self._handles, strict=True):
+        for person, handles in zip(self._people, self.handles, strict=True):
             for part, handle in zip(person.model.parts, handles, strict=True):
                 handle.color = _rgb(part.color if view.colors == "parts" else person.color)
                 handle.opacity = None if view.opacity >= 1 else view.opacity

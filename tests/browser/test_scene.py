@@ -181,3 +181,20 @@ async def test_bodies_lie_on_their_images_at_any_size_of_the_canvas(live, index,
     assert max(nearly_all) <= 1.5
     await live.set_viewport_size({"width": 1280, "height": 720})
     await snap(live, index, through=False)
+
+
+async def test_the_image_follows_the_frame_and_a_turn_leaves_the_camera(live):
+    await snap(live, 0)
+    await switch(live, "bodies")
+    await rested(live, lambda image: is_white(image).sum() > 600)
+    await live.keyboard.press(".")
+    await rested(live, lambda image: 100 < np.percentile(image, 99.9) < 150)
+    scene = await live.locator("#scene").bounding_box()
+    await live.mouse.move(scene["x"] + 60, scene["y"] + 300)
+    await live.mouse.down()
+    await live.mouse.move(scene["x"] + 110, scene["y"] + 290, steps=4)
+    await live.mouse.up()
+    await shows(live, "quadrille.state.state.snapped === null", 30)
+    assert await live.locator(".pane.is-snapped").count() == 0
+    await live.keyboard.press(",")
+    await rested(live, lambda image: not is_white(image).any())
