@@ -23,7 +23,8 @@ import { spoken } from "./text.js";
  * @property {() => string | null} away why nothing is possible while the program is away
  */
 
-const BUTTONS = ".top-bar button, .top-bar input, #inspector button, .transport button, .transport input, .drawer-bar label";
+const BUTTONS =
+  ".top-bar button, .top-bar input, #inspector button, .transport button, .transport input, #range-bar button, .drawer-bar label";
 
 /**
  * The commands of the keys; those that want to know which of many keys was pressed have commands of their own.
@@ -62,11 +63,14 @@ export function buttonCommands(table) {
     const input = control.matches("input") ? control : (control.querySelector("input") ?? control);
     commands.push({
       id: `button ${control.id || label}`,
-      area: control.closest("[role=group], fieldset")?.getAttribute("aria-label") ?? "More",
+      area: control.closest("[role=group], fieldset, [role=toolbar]")?.getAttribute("aria-label") ?? "More",
       label,
       keys: [],
       words: title,
-      why: () => (input.matches(":disabled") ? `Not possible now: ${title}.` : null),
+      why: () => {
+        if (control.closest("#range-bar[hidden]")) return "No range is marked: [ begins one, ] ends it.";
+        return input.matches(":disabled") ? `Not possible now: ${title}.` : null;
+      },
       run: () => input.click(),
     });
   }
@@ -120,5 +124,6 @@ function wordsOf(control) {
 
 /** @param {HTMLElement} control */
 function isThere(control) {
-  return !control.closest("[hidden]") && !control.hasAttribute("data-no-command");
+  const hidden = control.closest("[hidden]");
+  return (!hidden || hidden.id === "range-bar") && !control.hasAttribute("data-no-command");
 }

@@ -46,6 +46,9 @@ async def test_it_says_why_not(page, endpoint):
     assert "nothing to redo" in await page.locator("#palette-why").inner_text()
     await page.keyboard.press("Enter")
     assert await page.locator("#palette").is_visible()
+    await page.locator("#palette-query").fill("clear range")
+    assert await found(page) == ["Clear"]
+    assert "No range is marked" in await page.locator("#palette-why").inner_text()
     await page.locator("#palette-query").fill("500")
     assert await page.locator("#palette-why").inner_text() == "The last frame is 119."
     await page.locator("#palette-query").fill("qwrtz")
