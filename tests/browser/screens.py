@@ -1,0 +1,240 @@
+"""Pictures of every state of the page: `python tests/browser/screens.py OUT`, to be looked at one by one.
+
+Runs the real program on the bundled sample and on sessions made for the purpose (one camera, eight cameras, two people),
+in dark and light, on a laptop's and on a large screen. `--only NAME` takes those whose name begins so.
+"""
+
+import argparse
+import asyncio
+import shutil
+import tempfile
+from collections.abc import Awaitable, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from chromium import FLAGS, chromium_path
+from driving import handle_of, shows, to_client
+from playwright.async_api import Browser, Page, async_playwright
+from running import ROOT, Program
+
+from tracker.annotations import AnnotationStore
+from tracker.fit import fit_to_points
+from tracker.formats.model_toml import format_model
+from tracker.records import PoseChange, PoseRecord
+from tracker.references import read_joints
+from tracker.session import Session, load_session, save_session
+from tracker.simulate.record import simulate
+
+SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
+LAPTOP, LARGE = (1280, 720), (1920, 1080)
+SETTLE_S = 3.0
+"""The 3-D view draws slowly without a graphics card."""
+
+Act = Callable[[Page], Awaitable[None]]
+
+
+@dataclass(frozen=True)
+class Screen:
+    """A picture to take."""
+
+    name: str
+    session: str
+    """Which of the sessions that `make_sessions` makes."""
+    act: Act
+    """What a user does to get there."""
+    size: tuple[int, int] = LAPTOP
+    scheme: str = "dark"
+
+
+async def nothing(_: Page) -> None:
+    """The page as it opens."""
+
+
+async def posing(page: Page) -> None:
+    """In the middle of a drag of the wrist, which goes on until the picture is taken."""
+    x, y = await to_client(page, 0, *await handle_of(page, 0, "left_wrist"))
+    await page.mouse.move(x, y)
+    await page.mouse.down()
+    for k in range(1, 6):
+        await page.mouse.move(x + 5 * k, y - 7 * k)
+    await shows(page, "quadrille.state.overlay.paths.some((path) => path.kind === 'epipolar')", 20)
+
+
+async def pins(page: Page) -> None:
+    """Two views pinned: they meet in space."""
+    await page.mouse.click(*await to_client(page, 0, *await handle_of(page, 0, "left_wrist")))
+    await shows(page, "quadrille.state.state.point === 'left_wrist'", 20)
+    for camera in (0, 1):
+        u, v = await handle_of(page, camera, "left_wrist")
+        await page.keyboard.down("Control")
+        await page.mouse.click(*await to_client(page, camera, u + 12, v - 8))
+        await page.keyboard.up("Control")
+        await shows(page, f"quadrille.state.overlay.pins.length === {camera + 1}", 20)
+
+
+async def layers(page: Page) -> None:
+    """Every layer in its menu, some of them on."""
+    for key in ("Shift+Digit7", "Shift+Digit8"):
+        await page.keyboard.press(key)
+    await page.keyboard.press("a")
+
+
+async def searching(page: Page) -> None:
+    """A search at a speed for watching."""
+    await page.keyboard.press("b")
+    await page.select_option("select[aria-label*='peed']:visible >> nth=-1", index=1)
+    await page.keyboard.press("f")
+    await shows(page, "quadrille.state.state.job.evaluations > 100", 60)
+
+
+async def searched(page: Page) -> None:
+    await page.keyboard.press("b")
+    await page.keyboard.press("f")
+    await shows(page, "quadrille.state.state.job.message.startsWith('done')", 120)
+
+
+async def replaying(page: Page) -> None:
+    """A finished search, looked at half way."""
+    await searched(page)
+    box = await page.locator("#drawer input[type=range]").bounding_box()
+    await page.mouse.click(box["x"] + box["width"] / 3, box["y"] + box["height"] / 2)
+
+
+async def landscape(page: Page) -> None:
+    await page.mouse.click(*await to_client(page, 0, *await handle_of(page, 0, "left_elbow")))
+    await page.keyboard.press("v")
+
+
+async def tracking(page: Page) -> None:
+    """A tracker at work."""
+    await page.keyboard.press("t")
+    await shows(page, "quadrille.state.state.track.done > 12", 120)
+
+
+async def tracked(page: Page) -> None:
+    """Tracked, with the curves of the arms."""
+    await page.keyboard.press("t")
+    await shows(page, "quadrille.state.state.track.message.startsWith('done')", 180)
+    await page.keyboard.press("c")
+
+
+async def refused(page: Page) -> None:
+    """An error, said to the user."""
+    await page.keyboard.press("End")
+    await shows(page, "quadrille.state.state.frame > 40", 20)
+    await page.keyboard.press("t")
+
+
+async def helping(page: Page) -> None:
+    await page.keyboard.press("?")
+
+
+async def filled(page: Page) -> None:
+    await page.keyboard.press("1")
+
+
+SCREENS = [
+    Screen("empty", "fresh", nothing),
+    Screen("empty-light", "fresh", nothing, scheme="light"),
+    Screen("posing", "placed", posing),
+    Screen("posing-large", "placed", posing, LARGE),
+    Screen("filled", "placed", filled),
+    Screen("pins", "placed", pins),
+    Screen("pins-light", "placed", pins, scheme="light"),
+    Screen("layers", "placed", layers),
+    Screen("search-running", "near", searching),
+    Screen("search-replay", "near", replaying),
+    Screen("search-replay-large", "near", replaying, LARGE, "light"),
+    Screen("landscape", "placed", landscape),
+    Screen("tracking", "placed", tracking),
+    Screen("curves", "placed", tracked),
+    Screen("curves-light-large", "placed", tracked, LARGE, "light"),
+    Screen("notice", "placed", refused),
+    Screen("keys", "placed", helping),
+    Screen("one-camera", "one", nothing),
+    Screen("eight-cameras", "eight", nothing),
+    Screen("eight-cameras-large-light", "eight", nothing, LARGE, "light"),
+    Screen("two-people", "two", nothing),
+]
+
+
+def make_sessions(folder: Path, wanted: set[str]) -> dict[str, Path]:
+    """The sessions that pictures are taken of, each anew."""
+    made = {name: folder / name for name in wanted}
+    for name, at in made.items():
+        if name == "eight":
+            simulate(at, "exercise", n_cameras=8, n_frames=4, size=(320, 240))
+        else:
+            shutil.copytree(SAMPLE, at)
+        session = load_session(at)
+        if name == "one":
+            save_session(replace(session, cameras=session.cameras[:1]))
+        if name == "two":
+            first = session.people[0]
+            save_session(replace(session, people=(first, replace(first, name="partner", color="#4db6ff"))))
+        if name != "fresh":
+            place(load_session(at), near=name == "near")
+    return made
+
+
+def place(session: Session, near: bool) -> None:
+    """Put everybody on frame 0 where the true joints are, a second person beside the first; near: arms a little off."""
+    joints = read_joints(session.folder / "truth.trc", session.fps)
+    places = dict(zip(joints.names, joints.points[0], strict=True))
+    store = AnnotationStore(session.annotations_path)
+    for index, person in enumerate(session.people):
+        beside = {n: p + index * np.array([0.5, 0.6, 0.0]) for n, p in places.items()}
+        values = fit_to_points(person.model, {n: p for n, p in beside.items() if n in person.model.point_names}).values
+        if near:
+            values = person.model.retract(values, np.where(np.arange(person.model.n_dofs) >= 6, 0.12, 0.02))
+            values = person.model.clip(values)
+        revision = store.add_model_revision(person.name, format_model(person.model))
+        pose = PoseRecord(values, ("manual",) * len(values), revision, keyframe=True)
+        store.commit("place", [PoseChange(person.name, 0, pose)])
+    store.close()
+
+
+@asynccontextmanager
+async def opened(browser: Browser, folder: Path, screen: Screen):
+    """The page of a session, with its first frame and its cost on the screen."""
+    with tempfile.TemporaryDirectory() as name:
+        program = Program(shutil.copytree(folder, Path(name) / folder.name))
+        await program.start()
+        context = await browser.new_context(
+            viewport={"width": screen.size[0], "height": screen.size[1]}, color_scheme=screen.scheme
+        )
+        try:
+            page = await context.new_page()
+            await page.goto(program.address, timeout=120_000)
+            await shows(page, "window.quadrille?.state.overlay && quadrille.state.state.cost_px !== null", 180)
+            yield page
+        finally:
+            await context.close()
+            await program.kill()
+
+
+async def take(out: Path, only: str) -> None:
+    """Take the pictures, one after the other."""
+    out.mkdir(parents=True, exist_ok=True)
+    screens = [s for s in SCREENS if s.name.startswith(only)]
+    with tempfile.TemporaryDirectory() as name:
+        sessions = make_sessions(Path(name), {s.session for s in screens})
+        async with async_playwright() as playwright:
+            browser = await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
+            for screen in screens:
+                async with opened(browser, sessions[screen.session], screen) as page:
+                    await screen.act(page)
+                    await asyncio.sleep(SETTLE_S)
+                    await page.screenshot(path=out / f"{screen.name}.png", timeout=120_000)
+                print(out / f"{screen.name}.png", flush=True)
+            await browser.close()
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path, help="folder for the pictures")
+    parser.add_argument("--only", default="", help="those whose name begins so")
+    words = parser.parse_args()
+    asyncio.run(take(words.out, words.only))
