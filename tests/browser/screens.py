@@ -1,7 +1,7 @@
 """Pictures of every state of the page: `python tests/browser/screens.py OUT`, to be looked at one by one.
 
-Runs the real program on the bundled sample and on sessions made for the purpose (one camera, eight cameras, two people),
-in dark and light, on a laptop's and on a large screen. `--only NAME` takes those whose name begins so.
+Runs the real program on the bundled sample and on sessions made for the purpose (one camera, eight, two people), in dark
+and light, on a laptop's and on a large screen. `--only NAME` takes those whose name begins so.
 """
 
 import argparse
@@ -84,9 +84,9 @@ async def layers(page: Page) -> None:
 async def searching(page: Page) -> None:
     """A search at a speed for watching."""
     await page.keyboard.press("b")
-    await page.select_option("select[aria-label*='peed']:visible >> nth=-1", index=1)
+    await page.select_option("select[aria-label='Expansions a second']", index=1)
     await page.keyboard.press("f")
-    await shows(page, "quadrille.state.state.job.evaluations > 100", 60)
+    await shows(page, "quadrille.state.state.job.evaluations > 50", 60)
 
 
 async def searched(page: Page) -> None:
@@ -108,9 +108,10 @@ async def landscape(page: Page) -> None:
 
 
 async def tracking(page: Page) -> None:
-    """A tracker at work."""
+    """A tracker that has been paused on its way."""
     await page.keyboard.press("t")
-    await shows(page, "quadrille.state.state.track.done > 12", 120)
+    await shows(page, "quadrille.state.state.track.done > 3", 120)
+    await page.keyboard.press("p")
 
 
 async def tracked(page: Page) -> None:
@@ -121,14 +122,27 @@ async def tracked(page: Page) -> None:
 
 
 async def refused(page: Page) -> None:
-    """An error, said to the user."""
-    await page.keyboard.press("End")
-    await shows(page, "quadrille.state.state.frame > 40", 20)
+    """An error, said to the user: nobody has been placed."""
     await page.keyboard.press("t")
+    await shows(page, "document.querySelector('#notices').childElementCount > 0", 20)
 
 
 async def helping(page: Page) -> None:
     await page.keyboard.press("?")
+
+
+async def palette(page: Page) -> None:
+    """What can be done, found by typing."""
+    await page.keyboard.press("Control+k")
+    await page.keyboard.type("track")
+
+
+async def history(page: Page) -> None:
+    """A few edits, and the list of them."""
+    for key in ("ArrowRight", "m", "ArrowUp"):
+        await page.keyboard.press(key)
+        await asyncio.sleep(1.2)
+    await page.keyboard.press("h")
 
 
 async def filled(page: Page) -> None:
@@ -151,8 +165,10 @@ SCREENS = [
     Screen("tracking", "placed", tracking),
     Screen("curves", "placed", tracked),
     Screen("curves-light-large", "placed", tracked, LARGE, "light"),
-    Screen("notice", "placed", refused),
+    Screen("notice", "fresh", refused),
     Screen("keys", "placed", helping),
+    Screen("palette", "placed", palette),
+    Screen("history", "placed", history),
     Screen("one-camera", "one", nothing),
     Screen("eight-cameras", "eight", nothing),
     Screen("eight-cameras-large-light", "eight", nothing, LARGE, "light"),
