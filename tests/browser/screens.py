@@ -1,7 +1,8 @@
 """Pictures of every state of the page: `python tests/browser/screens.py OUT`, to be looked at one by one.
 
 Runs the real program on the bundled sample and on sessions made for the purpose (one camera, eight, two people), in dark
-and light, on a laptop's and on a large screen. `--only NAME` takes those whose name begins so.
+and light, for a laptop and for a large screen. `--only NAME` takes those whose name begins so; `--tutorial` those that
+docs/tutorial.md shows, as JPEG.
 """
 
 import argparse
@@ -175,6 +176,8 @@ SCREENS = [
     Screen("two-people", "two", nothing),
 ]
 
+TUTORIAL = ("empty", "posing", "pins", "search-replay", "landscape", "curves", "palette")
+
 
 def make_sessions(folder: Path, wanted: set[str]) -> dict[str, Path]:
     """The sessions that pictures are taken of, each anew."""
@@ -231,20 +234,23 @@ async def opened(browser: Browser, folder: Path, screen: Screen):
             await program.kill()
 
 
-async def take(out: Path, only: str) -> None:
+async def take(out: Path, only: str, tutorial: bool) -> None:
     """Take the pictures, one after the other."""
     out.mkdir(parents=True, exist_ok=True)
-    screens = [s for s in SCREENS if s.name.startswith(only)]
+    screens = [s for s in SCREENS if s.name.startswith(only) and (s.name in TUTORIAL or not tutorial)]
     with tempfile.TemporaryDirectory() as name:
         sessions = make_sessions(Path(name), {s.session for s in screens})
         async with async_playwright() as playwright:
             browser = await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
             for screen in screens:
+                path = out / f"{screen.name}.{'jpg' if tutorial else 'png'}"
                 async with opened(browser, sessions[screen.session], screen) as page:
+                    if screen.session != "fresh":
+                        await page.click("#close-first-steps")
                     await screen.act(page)
                     await asyncio.sleep(SETTLE_S)
-                    await page.screenshot(path=out / f"{screen.name}.png", timeout=120_000)
-                print(out / f"{screen.name}.png", flush=True)
+                    await page.screenshot(path=path, timeout=120_000, **({"quality": 80} if tutorial else {}))
+                print(path, flush=True)
             await browser.close()
 
 
@@ -252,5 +258,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path, help="folder for the pictures")
     parser.add_argument("--only", default="", help="those whose name begins so")
+    parser.add_argument("--tutorial", action="store_true", help="those of docs/tutorial.md, as JPEG")
     words = parser.parse_args()
-    asyncio.run(take(words.out, words.only))
+    asyncio.run(take(words.out, words.only, words.tutorial))
