@@ -1,8 +1,8 @@
 """Pictures of every state of the page: `python tests/browser/screens.py OUT`, to be looked at one by one.
 
-Runs the real program on the bundled sample and on sessions made for the purpose (one camera, eight, two people), in dark
-and light, for a laptop and for a large screen. `--only NAME` takes those whose name begins so; `--tutorial` those that
-docs/tutorial.md shows, as JPEG.
+Runs the real program on the bundled sample and on sessions made for the purpose (one camera, eight, two people), in
+dark and light, for a laptop and for a large screen. `--only NAME` takes those whose name begins so, `--tutorial` those
+that docs/tutorial.md shows, as JPEG.
 """
 
 import argparse
