@@ -17,6 +17,8 @@ _BEFORE_RGB = np.array([38.0, 112.0, 233.0])
 _AFTER_RGB = np.array([240.0, 120.0, 20.0])
 _FAR_RGB = np.array([140.0, 140.0, 145.0])
 """Colours of a trail at the shown frame, from before and from after, and at its ends."""
+_GAMMA = 2.2
+"""From the colours of a screen to intensities of light."""
 
 Poses = Callable[[range], Mapping[int, Array]]
 """Gives the stored poses of a person by frame, on those of a range that have one."""
@@ -84,4 +86,6 @@ def _colors(offsets: NDArray[np.int64], length: int) -> Array:
         length: of the trail, frames to either side.
     """
     near = np.clip(1 - np.abs(offsets) / (length + 1), 0.0, 1.0)[:, None]
-    return near * np.where(offsets[:, None] < 0, _BEFORE_RGB, _AFTER_RGB) + (1 - near) * _FAR_RGB
+    shown = near * np.where(offsets[:, None] < 0, _BEFORE_RGB, _AFTER_RGB) + (1 - near) * _FAR_RGB
+    # viser takes the colours of lines for intensities of light, and would show these much paler.
+    return np.asarray(255 * (shown / 255) ** _GAMMA)

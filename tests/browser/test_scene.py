@@ -1,4 +1,4 @@
-"""The 3-D view of the real program: through a camera's eyes, trails, images in the frusta, the floor.
+"""The 3-D view of the real program: through a camera's eyes, and the floor.
 
 The footage shows what the cameras would see of the body as it stands before anybody has placed it, painted white from
 the camera's own projection. So the picture of the 3-D view without bodies says where the body belongs, and the picture
@@ -11,18 +11,18 @@ import cv2
 import numpy as np
 import pytest
 import pytest_asyncio
-from driving import shows
+from driving import shows, state_of, to_client
 from running import Program
 
 from tracker import rigid
 from tracker.annotations import AnnotationStore
 from tracker.body import Body
-from tracker.cameras import Camera
+from tracker.cameras import Camera, viewed_point
 from tracker.contours import part_poses
 from tracker.formats.model_toml import format_model, load_model
 from tracker.posing import standing_pose
 from tracker.records import PoseChange, PoseRecord
-from tracker.session import CameraSource, Person, create_session
+from tracker.session import CameraSource, Person, create_session, load_session
 
 SIZE = (640, 480)
 PAINTED = 4
@@ -198,3 +198,27 @@ async def test_the_image_follows_the_frame_and_a_turn_leaves_the_camera(live):
     assert await live.locator(".pane.is-snapped").count() == 0
     await live.keyboard.press(",")
     await rested(live, lambda image: not is_white(image).any())
+
+
+async def test_the_floor_from_three_points_lies_where_it_was_clicked(live, folder):
+    up = rigid.so3_exp(np.array([0.04, -0.03, 0.0]))[:, 2]
+    height_m = float(up @ viewed_point(CAMERAS)) - 0.9
+    await live.keyboard.press("Shift+Y")
+    await shows(live, "quadrille.state.state.floor !== null", 30)
+    for number, (x, y) in enumerate(((-0.5, -0.5), (0.6, -0.4), (0.0, 0.6)), 1):
+        place = np.array([x, y, (height_m - up[0] * x - up[1] * y) / up[2]])
+        for index, view in enumerate(CAMERAS):
+            await live.mouse.click(*await to_client(live, index, *view.pinhole.project(place)))
+            await shows(live, f"quadrille.state.state.floor.views === {index + 1}", 30)
+        if number == 1:
+            assert "2 views agree" in await live.locator("#floor-text").inner_text()
+        if number < 3:
+            await live.keyboard.press("Enter")
+            await shows(live, f"quadrille.state.state.floor.point === {number + 1}", 30)
+    await shows(live, "quadrille.state.overlay.paths.some((p) => p.kind === 'floor' && p.count > 100)", 30)
+    assert (await state_of(live))["state"]["undo"].startswith("walk"), "no joint was dragged by a click"
+    await live.get_by_role("button", name="Apply").click()
+    await shows(live, "quadrille.state.state.floor === null", 30)
+    floor = load_session(folder).floor
+    assert np.degrees(np.arccos(min(1.0, floor.normal @ up))) < 0.3
+    assert floor.offset_m == pytest.approx(height_m, abs=0.005)
