@@ -1,43 +1,24 @@
 """Frames and their evidence for the page: computed once in the background, kept for a few frames."""
 
 import threading
-from collections import OrderedDict
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Generic, TypeVar
+from contextlib import contextmanager
 
 from app import pictures
+from app.recent import Recent
 from tracker.evidence import Observer, ViewEvidence
 from tracker.proxy import Proxy
 from tracker.silhouettes import Image
 
-_KEPT_FRAMES = 6
-
-T = TypeVar("T")
-
-
-class _Recent(Generic[T]):
-    """The results of a function for the last few frames; each is computed once, whoever asks."""
-
-    def __init__(self, compute: Callable[[int], T]) -> None:
-        self._compute, self._lock = compute, threading.Lock()
-        self._cells: OrderedDict[int, tuple[threading.Lock, list[T]]] = OrderedDict()
-
-    def get(self, frame: int) -> T:
-        with self._lock:
-            lock, result = self._cells.setdefault(frame, (threading.Lock(), []))
-            self._cells.move_to_end(frame)
-            while len(self._cells) > _KEPT_FRAMES:
-                self._cells.popitem(last=False)
-        with lock:
-            if not result:
-                result.append(self._compute(frame))
-            return result[0]
-
-    def peek(self, frame: int) -> T | None:
-        with self._lock:
-            cell = self._cells.get(frame)
-        return cell[1][0] if cell is not None and cell[1] else None
+_IMAGE_BYTES = 48 * 2**20
+"""What undistorted images may take: of four 640x480 views some dozen frames; decoded ones are kept by the recording."""
+_EVIDENCE_BYTES = 96 * 2**20
+_REST_S = 0.08
+"""A frame has evidence after it has been shown for so long: pictures go out first, and who scrubs by wants no more."""
+_WAIT_S = 1.0
+"""Evidence waits no longer than this for pictures that are being made."""
 
 
 class Frames:
@@ -52,14 +33,16 @@ class Frames:
                 footage.
         """
         self.observer, self._proxies = observer, proxies
-        self._images = _Recent(self._look)
-        self._evidence = _Recent(observer.evidence)
+        self._images = Recent(self._look, _IMAGE_BYTES)
+        self._evidence = Recent(observer.evidence, _EVIDENCE_BYTES)
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="evidence")
         self._wanted: int | None = None
+        self._looking = 0  # how many pictures are being made
+        self._idle = threading.Condition()
 
     def images(self, frame: int) -> tuple[Image | None, ...]:
         """Undistorted images of all views, as whoever else shows the frame has them too; None for a damaged one."""
-        return self._images.get(frame)
+        return tuple(self._images.get((frame, camera)) for camera in range(len(self.observer.cameras)))
 
     def evidence(self, frame: int) -> tuple[ViewEvidence, ...]:
         """Evidence of a frame; waits for it."""
@@ -70,10 +53,17 @@ class Frames:
         return self._evidence.peek(frame)
 
     def request(self, frame: int, done: Callable[[int], None]) -> None:
-        """Compute the evidence of a frame in the background, unless another is requested before its turn comes."""
-        self._wanted = frame
+        """Compute the evidence of a frame in the background, unless another is requested before its turn comes.
+
+        Its turn comes when the frame has rested for a moment and nobody waits for a picture.
+        """
+        self._wanted, asked = frame, time.monotonic()
 
         def work() -> None:
+            while self._wanted == frame and time.monotonic() < asked + _REST_S:
+                time.sleep(_REST_S / 8)
+            with self._idle:
+                self._idle.wait_for(lambda: not self._looking, _WAIT_S)
             if self._wanted == frame:
                 self._evidence.get(frame)
                 done(frame)
@@ -85,16 +75,29 @@ class Frames:
         self._wanted = None
         self._pool.shutdown(wait=True, cancel_futures=True)
 
-    def _look(self, frame: int) -> tuple[Image | None, ...]:
-        """Undistorted images of a frame, from the proxies where all cameras have one that goes so far."""
-        sources, proxies = self.observer.cameras, [p for p in self._proxies if p is not None]
-        if len(proxies) < len(sources) or any(
-            frame + s.offset >= p.n_frames for s, p in zip(sources, proxies, strict=True)
-        ):
-            return self.observer.images(frame)
-        images = (p.read(frame + s.offset) for s, p in zip(sources, proxies, strict=True))
-        return tuple(None if i is None else s.camera.undistort_image(i) for s, i in zip(sources, images, strict=True))
-
     def image(self, frame: int, camera: int, reduction: int = 1) -> bytes:
         """The undistorted image of one view as JPEG; `reduction` pixels of it, along either side, become one."""
-        return pictures.footage(self._images.get(frame)[camera], self.observer.cameras[camera].camera.size, reduction)
+        with self._somebody_looks():
+            image = self._images.get((frame, camera))
+            return pictures.footage(image, self.observer.cameras[camera].camera.size, reduction)
+
+    @contextmanager
+    def _somebody_looks(self) -> Iterator[None]:
+        with self._idle:
+            self._looking += 1
+        try:
+            yield
+        finally:
+            with self._idle:
+                self._looking -= 1
+                self._idle.notify_all()
+
+    def _look(self, key: tuple[int, int]) -> Image | None:
+        """Undistorted image of a frame and camera, from its proxy where there is one that goes so far."""
+        frame, camera = key
+        source, proxy = self.observer.cameras[camera], self._proxies[camera] if self._proxies else None
+        at = frame + source.offset
+        if proxy is None or at >= proxy.n_frames:
+            return self.observer.image(frame, camera)
+        image = proxy.read(at)
+        return None if image is None else source.camera.undistort_image(image)

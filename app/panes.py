@@ -26,6 +26,8 @@ _WATCHABLE_S = 1 / 30
 """Time between two looks at a search at work: more nobody sees, and the search needs the processor too."""
 _MOST_HISTORY = 2000
 """Entries of the history, each way, that a page may ask for."""
+_EDGES = ("accepted", "rejected")
+"""Layers of lines that are drawn from the evidence."""
 _COALESCED = ("seek", "view", "replay", "preview", "search_speed")
 """Of these only the newest that waits is carried out."""
 
@@ -157,8 +159,7 @@ class _Page:
             try:
                 await self._send_state(state)
                 if self._view is not None:
-                    await self._send_overlay(state, self._view)
-                    await self._send_pictures(state, self._view)
+                    await self._send_drawn(state, self._view)
                 if sent is None or sent.timeline_version != state.timeline_version:
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
                 if sent is None or sent.disagreeing != state.disagreeing:
@@ -186,13 +187,23 @@ class _Page:
         self._sent_text, self._sent_text_at = message, loop.time()
         await self._send(message)
 
-    async def _send_pictures(self, state: State, view: View) -> None:
-        """Send what the page shows and does not have: all that a frame needs, or what has changed of it."""
-        for message in await self._pictures.missing(state, view):
+    async def _send_drawn(self, state: State, view: View) -> None:
+        """Send what the panes show and the page does not have: vectors, then the pictures made meanwhile.
+
+        In this order: the vectors wait in the page for the pictures of their frame, never the other way round.
+        """
+        pictures = asyncio.create_task(self._pictures.missing(state, view))
+        try:
+            await self._send_overlay(state, view)
+        finally:
+            made = await pictures
+        for message in made:
             await self._socket.send_bytes(message)
 
     async def _send_overlay(self, state: State, view: View) -> None:
         views = self._evidence(state, view)
+        if view.layers.isdisjoint(_EDGES):
+            views = None
         drawn = (*_drawn(state), view, views is None)
         if drawn == self._sent_overlay:
             return
@@ -201,8 +212,8 @@ class _Page:
         await self._socket.send_bytes(message)
 
     def _evidence(self, state: State, view: View) -> tuple[ViewEvidence, ...] | None:
-        """The evidence of the shown frame, if the page shows its edges and it is at hand; it is asked for where not."""
-        if view.layers.isdisjoint(("accepted", "rejected")):
+        """The evidence of the shown frame, if the page shows any of it and it is at hand; it is asked for where not."""
+        if view.layers.isdisjoint(layers.EVIDENCE):
             return None
         frames, views = self._controller.frames, self._controller.frames.evidence_at_hand(state.frame)
         if views is None:

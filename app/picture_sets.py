@@ -25,10 +25,10 @@ class PictureSets:
     async def missing(self, state: State, view: View) -> list[bytes]:
         """Make the pictures that the page lacks; they count as sent.
 
-        None where the page is on another frame by the time that they are made. A tracker always is, and is to be
+        Pictures of evidence are among them when it is at hand: those of the footage do not wait for it. None where the page is on another frame by the time that they are made. A tracker always is, and is to be
         watched.
         """
-        wanted = _wanted(state, view)
+        wanted = self._at_hand(_wanted(state, view), state)
         missing = [key for key, content in wanted.items() if self._sent.get(key) != content]
         self._sent = wanted
         made = await asyncio.gather(*(asyncio.to_thread(self._make, key, state, view) for key in missing))
@@ -42,6 +42,15 @@ class PictureSets:
             messages.binary(common | {"layer": layer, "camera": camera, "limit_px": limit_px}, data)
             for (layer, camera), (data, limit_px) in zip(missing, made, strict=True)
         ]
+
+    def _at_hand(self, wanted: dict[Key, tuple[object, ...]], state: State) -> dict[Key, tuple[object, ...]]:
+        """Those of the pictures that can be made now, or have been sent already.
+
+        Who follows a tracker sees all of each frame that is shown: none of them rests for long enough.
+        """
+        if state.track.running or self._controller.frames.evidence_at_hand(state.frame) is not None:
+            return wanted
+        return {k: c for k, c in wanted.items() if k[0] not in EVIDENCE or self._sent.get(k) == c}
 
     def _make(self, key: Key, state: State, view: View) -> tuple[bytes, float | None]:
         """A picture, and what the darkest colour of a distance image means, px."""

@@ -33,12 +33,14 @@ import { Posing } from "./posing.js";
 import { Playback } from "./playback.js";
 import { RangeBar } from "./range_bar.js";
 import { reasonsOf } from "./reasons.js";
+import { RecentImages } from "./recent_images.js";
 import { Receiver } from "./receiver.js";
 import { SavedMark } from "./saved_mark.js";
 import { followScheme } from "./scene_scheme.js";
 import { SearchPanel } from "./search_panel.js";
 import { Snap } from "./snap.js";
 import { makeSplitter } from "./splitter.js";
+import { StandIns } from "./stand_ins.js";
 import { Store } from "./store.js";
 import { Timeline } from "./timeline.js";
 import { TopBar } from "./top_bar.js";
@@ -55,7 +57,8 @@ const store = new Store();
 const latency = new Latency();
 const notices = new Notices();
 const notify = notices.show.bind(notices);
-const receiver = new Receiver(store, notify);
+const recentImages = new RecentImages();
+const receiver = new Receiver(store, notify, recentImages);
 /** @type {(message: import("./protocol.js").ClientMessage) => void} */
 const send = (message) => connection.send(message);
 
@@ -75,6 +78,7 @@ const pointers = {
   },
 };
 const grid = new PaneGrid(byId("panes", HTMLElement), store, pointers, latency, openLook);
+new StandIns(store, recentImages);
 new ViewRequest(store, send);
 const posing = new Posing(store, send);
 const inspector = new Inspector(byId("inspector", HTMLElement), store, posing, notify);
@@ -134,10 +138,11 @@ Object.assign(window, {
     toClient: grid.toClient.bind(grid),
     get state() {
       const { frame, pictures = new Map() } = store.facts.shown ?? {};
+      const standIn = store.facts.standIn && { ...store.facts.standIn, pictures: store.facts.standIn.pictures !== null };
       const sizes = [...pictures].map(([key, { bitmap }]) => [key, [bitmap.width, bitmap.height]]);
       const shown = { frame, pictures: Object.fromEntries(sizes) };
       const views = grid.panes.map(({ view }) => ({ zoom: view.zoom, scale: view.scale, origin: view.origin }));
-      return { ...store.facts, timeline: Object.fromEntries(store.facts.timeline), shown, views };
+      return { ...store.facts, timeline: Object.fromEntries(store.facts.timeline), shown, standIn, views };
     },
   },
 });

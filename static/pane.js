@@ -150,12 +150,13 @@ export class Pane {
    */
   draw(withPictures) {
     const { width, height } = this.#size;
-    const { state, session, overlay, layers } = this.#store.facts;
+    const { state, session, overlay, layers, standIn } = this.#store.facts;
     if (width === 0 || height === 0) return;
     if (withPictures) this.#drawPictures();
     const context = drawing.prepare(this.#overlay, width, height, true);
     if (IN_SOFTWARE) context.drawImage(this.#image, 0, 0, width, height);
-    if (!state || !session || !overlay) return;
+    this.#corner.showStandIn(standIn);
+    if (!state || !session || !overlay || standIn?.pictures) return;
     drawing.drawPaths(context, this.view, overlay, this.#camera, layers);
     this.#drawJoints(context, state, session.people);
     this.#showJoint(state);
@@ -168,13 +169,14 @@ export class Pane {
 
   #drawPictures() {
     const { width, height } = this.#size;
-    const { shown, layers, looks } = this.#store.facts;
+    const { shown, standIn, layers, looks } = this.#store.facts;
+    const pictures = standIn?.pictures ?? shown?.pictures;
     const context = drawing.prepare(this.#image, width, height, IN_SOFTWARE);
     drawing.drawBackground(context, this.view);
     /** @type {number | null} */
     let limitPx = null;
     for (const layer of /** @type {const} */ (["image", "distance", "silhouette", "parts"])) {
-      const picture = layers.shown[layer] ? shown?.pictures.get(keyOf(layer, this.#camera)) : undefined;
+      const picture = layers.shown[layer] ? pictures?.get(keyOf(layer, this.#camera)) : undefined;
       if (!picture) continue;
       const source = layer === "image" ? this.#toned.of(picture.bitmap, looks[this.#camera]) : picture.bitmap;
       drawing.drawPicture(context, this.view, source, layers.opacity[layer]);

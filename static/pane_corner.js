@@ -23,6 +23,7 @@ export class PaneCorner {
   #joint = document.createElement("output");
   #cost = document.createElement("output");
   #tools = document.createElement("div");
+  #standIn = document.createElement("div");
   #scale = document.createElement("div");
   #limit = document.createElement("span");
   #fit;
@@ -49,6 +50,10 @@ export class PaneCorner {
     this.#cost.className = "pane-cost";
     this.#cost.title = "Chamfer cost of this view, in pixels";
 
+    this.#standIn.className = "pane-stand-in";
+    this.#standIn.title = "The picture of the frame asked for is on its way; until it is here the nearest one at hand is shown";
+    this.#standIn.hidden = true;
+
     this.#scale.className = "pane-scale";
     const bar = document.createElement("i");
     this.#scale.append("0", bar, this.#limit);
@@ -68,7 +73,7 @@ export class PaneCorner {
   }
 
   get elements() {
-    return [this.#label, this.#cost, this.#tools];
+    return [this.#label, this.#cost, this.#standIn, this.#tools];
   }
 
   get lookButton() {
@@ -78,6 +83,15 @@ export class PaneCorner {
   /** @param {number | null} cost in pixels */
   showCost(cost) {
     this.#cost.textContent = px(cost);
+  }
+
+  /** @param {import("./store.js").StandIn | null} standIn which frame is shown in place of which */
+  showStandIn(standIn) {
+    this.#standIn.hidden = standIn === null || standIn.frame === standIn.target;
+    if (!standIn) return;
+    const word = document.createElement("span"); // there is no room for it in a narrow pane
+    word.textContent = "frame ";
+    this.#standIn.replaceChildren(word, `${standIn.frame}, while ${standIn.target} loads`);
   }
 
   /** @param {boolean} isReset whether the whole image is shown already */

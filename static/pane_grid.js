@@ -7,6 +7,8 @@ import { Pane } from "./pane.js";
 const SECOND_DIGIT_MS = 700;
 /** What is drawn otherwise under the pointer. @type {(keyof import("./store.js").Facts)[]} */
 const HOVERED = ["hover", "hoverPart", "pinHover", "heldPin"];
+/** What changes the pictures under the vectors. @type {(keyof import("./store.js").Facts)[]} */
+const PICTURED = ["shown", "standIn", "layers", "looks"];
 
 export class PaneGrid {
   /** @type {Pane[]} */
@@ -112,7 +114,7 @@ export class PaneGrid {
     if (changed.has("session")) this.#build();
     if (changed.has("filled")) this.#layOut();
     if (changed.has("active") || changed.has("session")) this.#markActive();
-    const withPictures = changed.has("shown") || changed.has("layers") || changed.has("looks");
+    const withPictures = PICTURED.some((fact) => changed.has(fact));
     // A new state comes with every move of a drag; only its choice of what to draw concerns the vectors.
     const { person, point } = this.#store.facts.state ?? {};
     const choice = JSON.stringify([person, point]);

@@ -17,6 +17,7 @@ export function keyOf(layer, camera) {
 
 export class PictureAssembler {
   #onShow;
+  #onSet;
   /** @type {Arrived[]} of one set */
   #arriving = [];
   /** @type {{frame: number, pictures: Map<string, Arrived>} | null} complete sets of the newest frame that wait for the decoder */
@@ -24,9 +25,13 @@ export class PictureAssembler {
   #decoding = false;
   #closed = false;
 
-  /** @param {(frame: number, pictures: Pictures) => void} onShow takes over the bitmaps */
-  constructor(onShow) {
+  /**
+   * @param {(frame: number, pictures: Pictures) => void} onShow takes over the bitmaps
+   * @param {(frame: number, arrived: Map<string, Arrived>) => void} onSet hears of each complete set, before it is decoded
+   */
+  constructor(onShow, onSet) {
     this.#onShow = onShow;
+    this.#onSet = onSet;
   }
 
   /**
@@ -42,6 +47,7 @@ export class PictureAssembler {
     if (this.#waiting?.frame !== header.frame) this.#waiting = { frame: header.frame, pictures: new Map() };
     for (const one of this.#arriving) this.#waiting.pictures.set(keyOf(one.header.layer, one.header.camera), one);
     this.#arriving = [];
+    this.#onSet(header.frame, this.#waiting.pictures);
     void this.#decode();
   }
 

@@ -10,16 +10,20 @@ const MOST_EARLY = 8;
 export class Receiver {
   #store;
   #notify;
-  #pictures = new PictureAssembler(() => {});
+  #recent;
+  /** @type {PictureAssembler | null} */
+  #pictures = null;
   /** @type {Map<number, import("./protocol.js").Overlay>} vectors that came before the images of their frame */
   #early = new Map();
 
   /**
    * @param {import("./store.js").Store} store
    * @param {(notice: import("./protocol.js").NoticeMessage) => void} notify
+   * @param {import("./recent_images.js").RecentImages} recent keeps the images of the frames that came last
    */
-  constructor(store, notify) {
+  constructor(store, notify, recent) {
     this.#store = store;
+    this.#recent = recent;
     this.#notify = notify;
     store.subscribe((changed) => {
       if (changed.has("layers")) this.#forgetHidden();
@@ -68,7 +72,7 @@ export class Receiver {
   onBinary(header, payload) {
     switch (header.type) {
       case "image":
-        this.#pictures.receive(header, payload);
+        this.#pictures?.receive(header, payload);
         break;
       case "overlay":
         this.#takeOverlay({ ...header, segments: new Float32Array(payload) });
@@ -113,9 +117,13 @@ export class Receiver {
 
   /** @param {import("./protocol.js").SessionMessage} session */
   #begin(session) {
-    this.#pictures.close();
-    this.#pictures = new PictureAssembler((frame, pictures) => this.#show(frame, pictures));
+    this.#pictures?.close();
+    this.#pictures = new PictureAssembler(
+      (frame, pictures) => this.#show(frame, pictures),
+      (frame, arrived) => this.#recent.keep(frame, arrived),
+    );
     this.#early.clear();
+    this.#recent.clear(); // the footage may have changed while the program was away
     const former = this.#store.facts.session?.cameras;
     this.#store.set({ session });
     if (JSON.stringify(former) !== JSON.stringify(session.cameras)) this.#store.set({ shown: null, overlay: null });

@@ -10,6 +10,9 @@ import { usualLayers } from "./layers.js";
  * @typedef {{camera: number, person: number, point: string}} Joint
  * @typedef {{frame: number, pictures: import("./pictures.js").Pictures}} Shown
  *
+ * @typedef {{frame: number, target: number, pictures: import("./pictures.js").Pictures | null}} StandIn pictures: those of `frame`,
+ *   without vectors; null where `frame` is the one shown anyway
+ *
  * @typedef {object} Facts
  * @property {boolean} connected
  * @property {import("./protocol.js").SessionMessage | null} session
@@ -29,6 +32,7 @@ import { usualLayers } from "./layers.js";
  * @property {import("./protocol.js").HistoryMessage | null} history what the list of the history shows
  * @property {{first: number, last: number} | null} range the frames that the user has marked
  * @property {Shown | null} shown the pictures on the screen
+ * @property {StandIn | null} standIn what is shown until the pictures of the frame asked for are there
  * @property {import("./protocol.js").Overlay | null} overlay the vectors on the screen
  * @property {Joint | null} hover the joint under the pointer
  * @property {{camera: number, person: number, part: number} | null} hoverPart the part under the pointer, where no joint is
@@ -73,6 +77,7 @@ export class Store {
     history: null,
     range: null,
     shown: null,
+    standIn: null,
     overlay: null,
     hover: null,
     hoverPart: null,
@@ -134,7 +139,8 @@ export class Store {
    * that grabs a joint mean what it sees. While a tracker is followed the program is always a little ahead.
    */
   get isSettled() {
-    const { state, shown, overlay, connected } = this.facts;
+    const { state, shown, standIn, overlay, connected } = this.facts;
+    if (standIn) return false;
     const isThere = shown?.frame === state?.frame || (state?.track.running && state.follow);
     return connected && !!state && !!isThere && overlay?.frame === shown?.frame;
   }

@@ -69,6 +69,7 @@ ORDER = [
         "app.viser_proxy",
         "app.painting",
         "app.pictures",
+        "app.recent",
         "app.tracked",
         "app.writing",
     ],

@@ -284,12 +284,10 @@ class Observer:
         """The views as they are matched, whole: without lens distortion, at the scale of matching."""
         return tuple(v.camera for v in self._views)
 
-    def images(self, k: int) -> tuple[Image | None, ...]:
-        """Frame k of each camera in undistorted pixels, (H, W, 3) RGB; None where it is damaged."""
-        return tuple(
-            None if image is None else source.camera.undistort_image(image)
-            for source, image in zip(self.cameras, self._recording.read(k), strict=True)
-        )
+    def image(self, k: int, camera: int) -> Image | None:
+        """Frame k of one camera, by its index, in undistorted pixels, (H, W, 3) RGB; None where it is damaged."""
+        image = self._recording.read_view(camera, k)
+        return None if image is None else self.cameras[camera].camera.undistort_image(image)
 
     def prefetch(self, k: int) -> None:
         """Begin to decode frame k, and to do with it what needs no region; `evidence` will find it done.

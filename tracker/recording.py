@@ -56,9 +56,13 @@ class Recording:
         Raises:
             RecordingError: k is out of range, or a file cannot be read any more.
         """
-        if not 0 <= k < self.n_frames:
-            raise RecordingError(f"expected a frame from 0 to {self.n_frames - 1}, found {k}")
+        self._check(k)
         return tuple(self._pool.map(lambda i: self._read_one(i, k), range(len(self._cameras))))
+
+    def read_view(self, camera: int, k: int) -> Image | None:
+        """Frame k of one camera, by its index; otherwise as `read`."""
+        self._check(k)
+        return self._read_one(camera, k)
 
     def cached(self, k: int) -> bool:
         """Whether frame k of every camera is at hand without decoding."""
@@ -76,6 +80,10 @@ class Recording:
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
         self.close()
+
+    def _check(self, k: int) -> None:
+        if not 0 <= k < self.n_frames:
+            raise RecordingError(f"expected a frame from 0 to {self.n_frames - 1}, found {k}")
 
     def _read_one(self, camera: int, k: int) -> Image | None:
         with self._cache_lock:

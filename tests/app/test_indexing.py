@@ -46,14 +46,14 @@ def test_the_page_looks_at_the_proxy_and_matches_the_footage(run, session, monke
     loaded = load_session(session)
     recording = Recording(loaded.cameras)
     decoded = []
-    real = recording.read
-    monkeypatch.setattr(recording, "read", lambda k: decoded.append(k) or real(k))
+    real = recording._read_one
+    monkeypatch.setattr(recording, "_read_one", lambda camera, k: decoded.append(k) or real(camera, k))
     observer = Observer(loaded.cameras, recording)
     frames, plain = Frames(observer, indexing.proxies(loaded)), Frames(observer)
     try:
-        seen = frames._look(31)
+        seen = frames.images(31)
         assert decoded == []
-        for image, truth in zip(seen, plain._look(31), strict=True):
+        for image, truth in zip(seen, plain.images(31), strict=True):
             assert np.abs(image.astype(int) - truth).mean() < 4
         frames.request(31, lambda _: None)
         wait_for(lambda: frames.evidence_at_hand(31) is not None)

@@ -308,14 +308,18 @@ async def test_many_cells_travel_as_columns(controller, monkeypatch):
         assert np.frombuffer(gone["payload"], np.uint8, 3, 8 * 3).tolist() == [255] * 3
 
 
-async def test_pictures_of_a_frame_come_as_one_set_of_the_size_asked_for(controller):
+async def test_pictures_of_a_frame_come_as_sets_of_the_size_asked_for(controller):
     async with visiting(controller) as page:
         await page.hear("timeline")
         await page.shows("image", "distance", "silhouette", "parts", reductions=(1, 2, 0, 4))
         await page.send("seek", frame=5)
-        told = [await page.hear("image", lambda m: m["frame"] == 5 and m["of"] == 12)]
+        told = [await page.hear("image", lambda m: m["frame"] == 5)]
         told += [await page.hear("image") for _ in range(11)]
-        assert len({m["set"] for m in told}) == 1
+        # What the footage shows does not wait for what is computed from it.
+        sets = [
+            sorted({(m["layer"], m["of"]) for m in told if m["set"] == n}) for n in sorted({m["set"] for m in told})
+        ]
+        assert sets == [[("image", 6), ("parts", 6)], [("distance", 6), ("silhouette", 6)]]
         sizes = {(m["layer"], m["camera"]): size_of(m["payload"]) for m in told}
         assert {key: size for key, size in sizes.items() if key[0] == "image"} == {
             ("image", 0): (640, 480), ("image", 1): (320, 240), ("image", 3): (160, 120),
@@ -324,6 +328,26 @@ async def test_pictures_of_a_frame_come_as_one_set_of_the_size_asked_for(control
         assert sizes["parts", 1] == (320, 240)
         limits = {m["layer"]: m["limit_px"] for m in told}
         assert limits == {"image": None, "silhouette": None, "parts": None, "distance": pytest.approx(2 * 0.03 * 640)}
+
+
+async def test_evidence_waits_for_the_pictures(controller):
+    """Both need the processor: what the eye waits for goes first."""
+    frames, made = controller.frames, []
+    image, evidence = frames.image, frames.observer.evidence
+
+    def slow(*args):
+        picture = image(*args)
+        made.append("image")
+        return picture
+
+    async with visiting(controller) as page:
+        await page.hear("image", lambda m: m["of"] == 4)
+        await page.hear("state", lambda m: m["cost_px"] is not None)
+        frames.image = slow
+        frames._evidence._compute = lambda k: made.append("evidence") or evidence(k)
+        await page.send("seek", frame=7)
+        await page.hear("state", lambda m: m["frame"] == 7 and m["cost_px"] is not None)
+    assert made == ["image"] * 4 + ["evidence"]
 
 
 async def test_a_pose_changes_the_part_masks_alone(controller):

@@ -89,6 +89,8 @@ class FakeEndpoint:
     overlay_delay_s: float = 0.0
     """How long each overlay takes, to try what a slow program does."""
     image_delay_s: float = 0.0
+    held: asyncio.Event | None = None
+    """Images are kept back until it is set; None: none are."""
     n_frames: int = N_FRAMES
     received: list = field(default_factory=list)
     """Every message of every page, but for what each says when it connects."""
@@ -356,6 +358,8 @@ class FakeEndpoint:
         together = {"set": next(self.set_numbers), "of": len(wanted)}
         for layer, camera in wanted:
             await asyncio.sleep(self.image_delay_s)
+            if self.held:
+                await self.held.wait()
             header = self.header(camera, frame, layer) | together
             await self.send_binary(header, self.picture(camera, frame, layer), sockets)
         await self.send_overlay(sockets)
