@@ -16,6 +16,7 @@ from app.frames import Frames
 from app.hand import Hand
 from app.history import History
 from app.landscape import Landscapes
+from app.listing import Listing
 from app.locks import Locks
 from app.pinning import Pinning
 from app.pose_edits import PoseEdits
@@ -59,6 +60,7 @@ class Controller:
         self.ranges = Ranges(self._screen, self._tracking, self.editing)
         """Works on ranges of frames, and marks them."""
         self._disagreements = Disagreements(self._screen)
+        self._listing = Listing(self._screen)
         self.pinning = Pinning(self._screen, self.editing)
         """Sets pins, and fits people to them."""
         self.replay = Replay(self._screen, runs, self.editing)
@@ -224,6 +226,7 @@ class Controller:
         with self.editing():
             self.history.save()
         self._disagreements.close()
+        self._listing.close()
         self.landscape.close()
         self.frames.close()
 

@@ -1,5 +1,6 @@
 """Frames and their evidence for the page: computed once in the background, kept for a few frames."""
 
+import logging
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -8,10 +9,12 @@ from contextlib import contextmanager
 
 from app import pictures
 from app.recent import Recent
+from tracker.errors import RecordingError
 from tracker.evidence import Observer, ViewEvidence
 from tracker.proxy import Proxy
 from tracker.silhouettes import Image
 
+_LOG = logging.getLogger(__name__)
 _IMAGE_BYTES = 48 * 2**20
 """What undistorted images may take: of four 640x480 views some dozen frames; decoded ones are kept by the recording."""
 _EVIDENCE_BYTES = 96 * 2**20
@@ -45,8 +48,38 @@ class Frames:
         return tuple(self._images.get((frame, camera)) for camera in range(len(self.observer.cameras)))
 
     def evidence(self, frame: int) -> tuple[ViewEvidence, ...]:
-        """Evidence of a frame; waits for it."""
+        """Evidence of a frame; waits for it.
+
+        Raises:
+            RecordingError: the frame is not listed yet, or cannot be read.
+        """
+        if not self._matched(frame):
+            share = self.observer.recording.listed_share or 0.0
+            raise RecordingError(
+                f"frame {frame} is not there yet: the footage is being indexed ({share:.0%} so far); wait a moment"
+            )
         return self._evidence.get(frame)
+
+    @property
+    def listed_share(self) -> float | None:
+        """How far the footage has been listed, 0 to 1; None when all is.
+
+        Raises:
+            RecordingError: what was wrong with a file came out on the way.
+        """
+        return self.observer.recording.listed_share
+
+    def listed(self, frame: int) -> bool:
+        """Whether the pictures of a frame can be made without waiting for the lists of frames."""
+        return all(
+            self._proxy_of(frame, camera) is not None or self.observer.recording.listed(camera, frame)
+            for camera in range(len(self.observer.cameras))
+        )
+
+    def _matched(self, frame: int) -> bool:
+        """Whether the footage itself can be read without waiting, as evidence needs it."""
+        recording = self.observer.recording
+        return all(recording.listed(camera, frame) for camera in range(len(self.observer.cameras)))
 
     def evidence_at_hand(self, frame: int) -> tuple[ViewEvidence, ...] | None:
         """Evidence of a frame if it has been computed."""
@@ -64,9 +97,14 @@ class Frames:
                 time.sleep(_REST_S / 8)
             with self._idle:
                 self._idle.wait_for(lambda: not self._looking, _WAIT_S)
-            if self._wanted == frame:
-                self._evidence.get(frame)
-                done(frame)
+            try:
+                if self._wanted == frame and self._matched(frame):
+                    self._evidence.get(frame)
+                    done(frame)
+            except RecordingError as error:  # the pictures of the frame say it to whoever looks
+                _LOG.warning("no evidence of frame %d: %s", frame, error)
+            except Exception:
+                _LOG.exception("no evidence of frame %d", frame)
 
         self._pool.submit(work)
 
@@ -95,9 +133,14 @@ class Frames:
     def _look(self, key: tuple[int, int]) -> Image | None:
         """Undistorted image of a frame and camera, from its proxy where there is one that goes so far."""
         frame, camera = key
-        source, proxy = self.observer.cameras[camera], self._proxies[camera] if self._proxies else None
-        at = frame + source.offset
-        if proxy is None or at >= proxy.n_frames:
+        source, proxy = self.observer.cameras[camera], self._proxy_of(frame, camera)
+        if proxy is None:
             return self.observer.image(frame, camera)
-        image = proxy.read(at)
+        image = proxy.read(frame + source.offset)
         return None if image is None else source.camera.undistort_image(image)
+
+    def _proxy_of(self, frame: int, camera: int) -> Proxy | None:
+        """The proxy of a camera, where there is one that goes so far."""
+        proxy = self._proxies[camera] if self._proxies else None
+        at = frame + self.observer.cameras[camera].offset
+        return None if proxy is None or at >= proxy.n_frames else proxy

@@ -80,6 +80,7 @@ def state(session: Session, state: State) -> dict[str, Any]:
         "follow": state.follow,
         "snapped": state.snapped,
         "floor": _floor(state.floor.picking),
+        "footage": asdict(state.footage),
         "undo": state.undo,
         "redo": state.redo,
         "saved": state.save_error is None,

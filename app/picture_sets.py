@@ -25,8 +25,9 @@ class PictureSets:
     async def missing(self, state: State, view: View) -> list[bytes]:
         """Make the pictures that the page lacks; they count as sent.
 
-        Pictures of evidence are among them when it is at hand: those of the footage do not wait for it. None where the page is on another frame by the time that they are made. A tracker always is, and is to be
-        watched.
+        Pictures of evidence are among them when it is at hand: those of the footage do not wait for it. None where the
+        page is on another frame by the time that they are made (a tracker always is, and is to be watched), or the
+        frame is not listed yet.
         """
         wanted = self._at_hand(_wanted(state, view), state)
         missing = [key for key, content in wanted.items() if self._sent.get(key) != content]
@@ -48,6 +49,8 @@ class PictureSets:
 
         Who follows a tracker sees all of each frame that is shown: none of them rests for long enough.
         """
+        if not self._controller.frames.listed(state.frame):
+            return {k: c for k, c in wanted.items() if self._sent.get(k) == c}
         if state.track.running or self._controller.frames.evidence_at_hand(state.frame) is not None:
             return wanted
         return {k: c for k, c in wanted.items() if k[0] not in EVIDENCE or self._sent.get(k) == c}

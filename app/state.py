@@ -155,6 +155,16 @@ class RangeState:
 
 
 @dataclass(frozen=True)
+class FootageState:
+    """How far the frames of the videos have been listed, which the first opening of long footage does beside."""
+
+    listed: float | None = None
+    """Share of the footage, 0 to 1; None when all of it is."""
+    error: str | None = None
+    """What was wrong with a file; None where nothing was."""
+
+
+@dataclass(frozen=True)
 class DragState:
     """A hand on a point."""
 
@@ -211,6 +221,7 @@ class State:
     """Numbers of the pages that want the 3-D view to rest during a drag."""
     view_3d: View3d = field(default_factory=View3d)
     floor: FloorState = field(default_factory=FloorState)
+    footage: FootageState = field(default_factory=FootageState)
     snapped: int | None = None
     """The camera through which the 3-D view looks, by index; None where it is free."""
     settings: TrackSettings = field(default_factory=TrackSettings)

@@ -58,7 +58,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
     session = load_session(folder)
     access = access_for(serving.host, serving.allow_hosts)
     static = static_folder()
-    with SessionLock(session.folder), Recording(session.cameras, indices=_indices()) as recording:
+    with SessionLock(session.folder), Recording(session.cameras, indices=_indices(), in_background=True) as recording:
         store = AnnotationStore(session.annotations_path)
         frames = Frames(Observer(session.cameras, recording), indexing.proxies(session))
         controller = Controller(session, Saver(session, store, _author()), frames)

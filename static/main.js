@@ -22,6 +22,7 @@ import { Latency } from "./latency.js";
 import { Layers } from "./layers.js";
 import { LayersMenu } from "./layers_menu.js";
 import { LookMenu } from "./look_menu.js";
+import { showListing } from "./listing_mark.js";
 import { Looks } from "./looks.js";
 import { Navigation } from "./navigation.js";
 import { Notices, watchConnection } from "./notices.js";
@@ -85,6 +86,7 @@ const inspector = new Inspector(byId("inspector", HTMLElement), store, posing, n
 const floor = new Floor(byId("panes", HTMLElement), store, grid, send);
 const snap = new Snap(store, grid, send);
 new TopBar(store, actions);
+showListing(store);
 const playback = new Playback(store, navigation);
 const jumps = new Jumps(store, navigation);
 const frameWindow = new FrameWindow(store);

@@ -20,6 +20,7 @@ ORDER = [
         "tracker.store_schema",
         "tracker.footage_index",
     ],
+    ["tracker.footage_listing"],
     [
         "tracker.cameras",
         "tracker.floor",
@@ -85,6 +86,7 @@ ORDER = [
         "app.searching",
         "app.tracking",
         "app.disagreements",
+        "app.listing",
     ],
     ["app.flooring", "app.viewing"],
     ["app.landscape", "app.pinning", "app.ranges", "app.replay", "app.search_settings"],

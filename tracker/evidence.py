@@ -269,7 +269,8 @@ class Observer:
             RecordingError: a background is missing, unreadable or of the wrong size.
         """
         self.cameras = tuple(cameras)
-        self._recording = recording
+        self.recording = recording
+        """Their footage."""
         self._views = [MatchedView(c.camera) for c in cameras]
         self._probes = [Probes(v.source.size, v.scale) for v in self._views]
         self._empty = [self._empty_scene(i, read_background(c)) for i, c in enumerate(self.cameras)]
@@ -286,7 +287,7 @@ class Observer:
 
     def image(self, k: int, camera: int) -> Image | None:
         """Frame k of one camera, by its index, in undistorted pixels, (H, W, 3) RGB; None where it is damaged."""
-        image = self._recording.read_view(camera, k)
+        image = self.recording.read_view(camera, k)
         return None if image is None else self.cameras[camera].camera.undistort_image(image)
 
     def prefetch(self, k: int) -> None:
@@ -327,8 +328,7 @@ class Observer:
 
     def _prepare(self, k: int) -> list[_Prepared | None]:
         return [
-            None if frame is None else self._prepare_view(i, frame, k)
-            for i, frame in enumerate(self._recording.read(k))
+            None if frame is None else self._prepare_view(i, frame, k) for i, frame in enumerate(self.recording.read(k))
         ]
 
     def _prepare_view(self, i: int, frame: Image, k: int) -> _Prepared:

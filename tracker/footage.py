@@ -7,7 +7,7 @@ their EXIF orientation says, which is how OpenCV reads them and so how calibrati
 
 import re
 import threading
-from collections.abc import Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Iterator
 from itertools import chain
 from pathlib import Path
 
@@ -18,9 +18,10 @@ from av.packet import Packet
 from av.video.frame import VideoFrame
 from numpy.typing import NDArray
 
-from tracker import footage_index
+from tracker import footage_index, footage_listing
 from tracker.errors import RecordingError
 from tracker.footage_index import Index
+from tracker.footage_listing import Listed
 
 Image = NDArray[np.uint8]
 
@@ -30,53 +31,79 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 _CHECKED_FRAMES = 16
 # Intervals between frames that differ by more than this part of the usual one make the rate variable.
 _RATE_JITTER = 0.2
+# As the number of the next frame that the decoder gives: not known, so that the next frame is sought.
+_NOWHERE = 2**62
 
 
 class VideoFile:
-    """A video file, indexed when it is opened. Safe to use from several threads."""
+    """A video file, whose frames are listed when it is opened or soon after. Safe to use from several threads."""
 
     path: Path
     size: tuple[int, int]
     """Width and height as displayed, px."""
-    n_frames: int
     fps: float
-    """Mean frame rate, 1/s."""
+    """Mean frame rate, 1/s; what the header says while frames are being listed."""
     has_constant_rate: bool
-    """Whether all frames follow each other at the same interval."""
+    """Whether all frames follow each other at the same interval; true while frames are being listed."""
 
-    def __init__(self, path: Path, camera: str, indices: Path | None = None) -> None:
-        """Open and index a video.
+    def __init__(self, path: Path, camera: str, indices: Path | None = None, in_background: bool = False) -> None:
+        """Open a video and list its frames.
 
         Args:
             path: the file.
             camera: name of its camera, for messages.
             indices: folder in which indices of videos are kept between openings; None for nowhere.
+            in_background: do not wait for the list where none is kept: `read` waits until the frame is in it.
 
         Raises:
             RecordingError: the file is missing, unreadable, truncated, or has no usable time stamps.
         """
-        self.path = path
+        self.path, self._indices = path, indices
         self._where = f"camera '{camera}': video {path}"
         self._lock = threading.Lock()
+        self._grown = threading.Condition()  # guards the four below
+        self._listed = Listed(Index(np.empty(0, np.int64), {}, np.empty(0, np.int64)), 0.0)
+        self._is_listed, self._closed = False, False
+        self._failure: RecordingError | None = None
+        self._index = self._listed.frames
         if not path.is_file():
             raise RecordingError(f"{self._where} not found; check the path")
         try:
             self._open()
             kept = footage_index.load(path, indices)
-            if kept is None:
-                self._index = self._read_index()
-                self._open()
-                footage_index.save(path, indices, self._index)
-            else:
-                self._index = kept
-            first = self._check_order()
+            if kept is not None:
+                self._finish(kept)
+            elif not in_background:
+                self._list()
+            self._index = self._listed.frames
+            first = self._check_order(self._index) if self._is_listed else next(self._frames, None)
+            self._container.close()
+            self._open()
         except av.FFmpegError as error:
-            raise RecordingError(
-                f"{self._where} cannot be read: {error.strerror}; it may be truncated, or not a video"
-            ) from error
+            raise self._unreadable(error) from error
+        if first is None:
+            raise RecordingError(f"{self._where} has no frames; record or convert it again")
         self.size = (first.width, first.height) if first.rotation % 180 == 0 else (first.height, first.width)
-        self.n_frames = len(self._index.pts)
-        self.fps, self.has_constant_rate = self._rate()
+        if not self._is_listed:
+            self.fps, self.has_constant_rate = float(self._stream.average_rate or 1.0), True
+            threading.Thread(target=self._list_beside, name="list frames", daemon=True).start()
+
+    @property
+    def n_frames(self) -> int:
+        """Number of frames; of those listed so far while they are being listed."""
+        return len(self._listed.frames.pts)
+
+    @property
+    def listed_share(self) -> float | None:
+        """How much of the file has been listed, 0 to 1; None when all is.
+
+        Raises:
+            RecordingError: what was wrong with the file came out on the way.
+        """
+        with self._grown:
+            if self._failure:
+                raise self._failure
+            return None if self._is_listed else self._listed.share
 
     def read(self, k: int) -> Image | None:
         """Decode frame k, (H, W, 3) RGB; None where the frame is damaged.
@@ -84,9 +111,15 @@ class VideoFile:
         Raises:
             RecordingError: k is out of range, or the file cannot be read any more.
         """
+        self._wait_for(k)
         if not 0 <= k < self.n_frames:
             raise RecordingError(f"{self._where}: expected a frame from 0 to {self.n_frames - 1}, found {k}")
         with self._lock:
+            if self._closed:
+                raise RecordingError(f"{self._where} has been closed")
+            if self._index is not self._listed.frames:
+                # Where the decoder stands was told by the shorter list.
+                self._index, self._next = self._listed.frames, _NOWHERE
             try:
                 frame = self._decode_frame(k)
             except av.FFmpegError as error:
@@ -97,6 +130,9 @@ class VideoFile:
 
     def close(self) -> None:
         """Release the file; reading is over."""
+        with self._grown:
+            self._closed = True
+            self._grown.notify_all()
         with self._lock:
             self._frames.close()
             self._container.close()
@@ -140,68 +176,74 @@ class VideoFile:
             except av.InvalidDataError:
                 continue
 
-    def _read_index(self) -> Index:
-        """List the frames from the packets alone, which takes a hundredth of the time of decoding."""
-        every: list[int] = []
-        shown: list[int] = []
-        keys: list[int] = []
-        end, damaged = 0, False
-        for packet in self._container.demux(self._stream):
-            if not packet.size:
-                continue
-            if packet.pts is None:
-                raise RecordingError(
-                    f"{self._where} has frames without time stamps, so they cannot be found; convert it to MP4"
-                )
-            if packet.is_keyframe:
-                keys.append(packet.pts)
-            every.append(packet.pts)
-            # Frames cut off by an edit list are needed to decode others, but never shown; nor are frames before the
-            # first key frame, in the order of the file or of display, because they need what is not there.
-            if keys and not packet.is_discard and packet.pts >= keys[0]:
-                shown.append(packet.pts)
-            end = max(end, packet.pts + (packet.duration or 0))
-            damaged = damaged or packet.is_corrupt
-        pts = np.array(sorted(shown), dtype=np.int64)
-        if not len(pts):
-            raise RecordingError(f"{self._where} has no frames; record or convert it again")
-        if len(np.unique(pts)) != len(pts):
-            raise RecordingError(f"{self._where} has frames with the same time stamp; convert it to MP4")
-        if damaged or self._promises_more(end):
-            raise RecordingError(
-                f"{self._where} is truncated: its header promises more than the {len(pts)} frames that it holds; "
-                "copy or convert it again"
+    def _list(self, report: Callable[[Listed], None] | None = None) -> None:
+        """List the frames, by a decoder of its own."""
+        with av.open(str(self.path)) as container:
+            index = footage_listing.list_frames(container, self._where, report)
+        footage_index.save(self.path, self._indices, index)
+        self._finish(index)
+
+    def _list_beside(self) -> None:
+        """List the frames while others read what is listed by now."""
+        try:
+            self._list(self._grow)
+        except av.FFmpegError as error:
+            self._fail(self._unreadable(error))
+        except RecordingError as error:
+            self._fail(error)
+
+    def _grow(self, listed: Listed) -> None:
+        if not self.n_frames:
+            with av.open(str(self.path)) as container:
+                stream = container.streams.video[0]
+                self._check_order(listed.frames, self._decode(container.demux(stream)))
+        with self._grown:
+            if self._closed:
+                raise RecordingError(f"{self._where} has been closed")
+            self._listed = listed
+            self._grown.notify_all()
+
+    def _finish(self, index: Index) -> None:
+        self.fps, self.has_constant_rate = self._rate(index)
+        with self._grown:
+            self._listed, self._is_listed = Listed(index, 1.0), True
+            self._grown.notify_all()
+
+    def _fail(self, error: RecordingError) -> None:
+        with self._grown:
+            self._failure = error
+            self._grown.notify_all()
+
+    def _wait_for(self, k: int) -> None:
+        """Wait until frame k is listed, or the list has come to its end."""
+        with self._grown:
+            self._grown.wait_for(
+                lambda: k < len(self._listed.frames.pts) or self._is_listed or self._failure or self._closed
             )
-        return Index(pts, {p: i for i, p in enumerate(every)}, np.array(sorted(keys)))
+            if self._failure and k >= len(self._listed.frames.pts):
+                raise self._failure
+            if self._closed:
+                raise RecordingError(f"{self._where} has been closed")
 
-    def _promises_more(self, end: int) -> bool:
-        """Whether the header speaks of frames that the file does not hold; `end` is where the last one ends, ticks."""
-        if "mp4" in self._container.format.name:
-            # The durations here are of no use, because an edit list may rightly skip frames.
-            entries = self._stream.index_entries
-            return any(e.pos + e.size > self._container.size for e in entries)
-        if self._container.duration is None or len(self._container.streams) > 1:
-            return False  # the file's duration may be that of its sound
-        missing_s = self._container.duration / av.time_base - end * self._tick_s
-        return missing_s > 1.5 / float(self._stream.average_rate or 1)
+    def _unreadable(self, error: av.FFmpegError) -> RecordingError:
+        return RecordingError(f"{self._where} cannot be read: {error.strerror}; it may be truncated, or not a video")
 
-    def _check_order(self) -> VideoFrame:
+    def _check_order(self, index: Index, frames: Iterator[VideoFrame] | None = None) -> VideoFrame:
         """Check that the decoder shows frames in the order of their time stamps; return the first."""
-        first = None
-        for expected in self._index.pts[:_CHECKED_FRAMES]:
-            frame = next(self._frames, None)
+        first, frames = None, frames or self._frames
+        for expected in index.pts[:_CHECKED_FRAMES]:
+            frame = next(frames, None)
             if frame is None or frame.pts != expected:
                 raise RecordingError(
                     f"{self._where} has time stamps that do not follow the order of its frames, as AVI files with "
                     "B-frames have; convert it to MP4"
                 )
             first = first or frame
-            self._next += 1
         assert first is not None
         return first
 
-    def _rate(self) -> tuple[float, bool]:
-        intervals = np.diff(self._index.pts)
+    def _rate(self, index: Index) -> tuple[float, bool]:
+        intervals = np.diff(index.pts)
         declared = float(self._stream.average_rate or 0)
         if not len(intervals):
             return declared or 1.0, True
@@ -254,6 +296,7 @@ class ImageFolder:
     fps: None = None
     """Images do not say when they were taken."""
     has_constant_rate: bool = True
+    listed_share: None = None
 
     def __init__(self, path: Path, camera: str) -> None:
         """List the images and read the first.
@@ -302,13 +345,13 @@ class ImageFolder:
 Footage = VideoFile | ImageFolder
 
 
-def open_footage(path: Path, camera: str, indices: Path | None = None) -> Footage:
-    """Open a video file or a folder of images; `indices` as for `VideoFile`.
+def open_footage(path: Path, camera: str, indices: Path | None = None, in_background: bool = False) -> Footage:
+    """Open a video file or a folder of images; `indices` and `in_background` as for `VideoFile`.
 
     Raises:
         RecordingError: it is missing, unreadable, truncated or empty.
     """
-    return ImageFolder(path, camera) if path.is_dir() else VideoFile(path, camera, indices)
+    return ImageFolder(path, camera) if path.is_dir() else VideoFile(path, camera, indices, in_background)
 
 
 def read_image(path: Path, where: str) -> Image:

@@ -21,13 +21,15 @@ DEFAULT_CACHE_BYTES = 256 * 2**20
 class Recording:
     """The footage of all cameras, with a cache of frames bounded in bytes. Safe to use from several threads."""
 
-    n_frames: int
-    """Number of frames that all cameras have."""
     fps: float | None
     """Frame rate of the videos, 1/s; None where all cameras are folders of images."""
 
     def __init__(
-        self, cameras: Sequence[CameraSource], cache_bytes: int = DEFAULT_CACHE_BYTES, indices: Path | None = None
+        self,
+        cameras: Sequence[CameraSource],
+        cache_bytes: int = DEFAULT_CACHE_BYTES,
+        indices: Path | None = None,
+        in_background: bool = False,
     ) -> None:
         """Open the footage of all cameras, which lists the frames of every video.
 
@@ -35,20 +37,44 @@ class Recording:
             cameras: where each camera's footage lies, and what its offset is.
             cache_bytes: how much memory decoded frames may keep; the frames in use come on top.
             indices: folder in which the lists of frames are kept between openings; None for nowhere.
+            in_background: do not wait for lists that are not kept; see `listed_share`.
 
         Raises:
             RecordingError: footage is missing, unreadable, truncated or empty, or its size is not the camera's.
         """
         self._cameras = tuple(cameras)
         self._pool = ThreadPoolExecutor(max(1, len(self._cameras)), thread_name_prefix="decode")
-        self._footage = list(self._pool.map(lambda c: open_footage(c.footage, c.camera.name, indices), self._cameras))
+        self._footage = list(
+            self._pool.map(lambda c: open_footage(c.footage, c.camera.name, indices, in_background), self._cameras)
+        )
         for source, footage in zip(self._cameras, self._footage, strict=True):
             check_size(source.camera.name, footage.path, footage.size, source.camera.size)
-        self.n_frames = min(f.n_frames - c.offset for c, f in zip(self._cameras, self._footage, strict=True))
         self.fps = next((f.fps for f in self._footage if f.fps is not None), None)
         self._cache: OrderedDict[tuple[int, int], Image] = OrderedDict()
         self._cache_bytes, self._cached_bytes = cache_bytes, 0
         self._cache_lock = threading.Lock()
+
+    @property
+    def n_frames(self) -> int:
+        """Number of frames that all cameras have; of those listed so far while they are being listed."""
+        return min(f.n_frames - c.offset for c, f in zip(self._cameras, self._footage, strict=True))
+
+    @property
+    def listed_share(self) -> float | None:
+        """How far the footage has been listed, 0 to 1, of the camera that is behind; None when all is.
+
+        What is not listed yet can be read, but has to be waited for; frame numbers are the same then as ever.
+
+        Raises:
+            RecordingError: what was wrong with a file came out on the way.
+        """
+        shares = [f.listed_share for f in self._footage]
+        return min((s for s in shares if s is not None), default=None)
+
+    def listed(self, camera: int, k: int) -> bool:
+        """Whether frame k of a camera, by its index, can be read without waiting for the list of frames."""
+        footage = self._footage[camera]
+        return k + self._cameras[camera].offset < footage.n_frames or footage.listed_share is None
 
     def read(self, k: int) -> tuple[Image | None, ...]:
         """Frame k of each camera as filmed, (H, W, 3) RGB, not writable; None where it is damaged.
@@ -71,9 +97,9 @@ class Recording:
 
     def close(self) -> None:
         """Release all files; reading is over."""
-        self._pool.shutdown()
         for footage in self._footage:
-            footage.close()
+            footage.close()  # first: a reader may wait for the list of frames
+        self._pool.shutdown()
 
     def __enter__(self) -> "Recording":
         return self
@@ -82,7 +108,7 @@ class Recording:
         self.close()
 
     def _check(self, k: int) -> None:
-        if not 0 <= k < self.n_frames:
+        if k < 0 or (self.listed_share is None and k >= self.n_frames):
             raise RecordingError(f"expected a frame from 0 to {self.n_frames - 1}, found {k}")
 
     def _read_one(self, camera: int, k: int) -> Image | None:

@@ -120,7 +120,7 @@ class FakeEndpoint:
             "source": "manual", "status": "", "remark": "", "parts_px": [], "job": self.idle_job(""), "replay": None,
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "dofs": [1.0, 2.0, 90.0, 30.0], "locked": [],
-            "snapped": None, "floor": None,
+            "snapped": None, "floor": None, "footage": {"listed": None, "error": None},
             "saved": True, "save_error": None,
         }  # fmt: skip
 

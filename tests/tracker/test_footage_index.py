@@ -18,8 +18,8 @@ def clip(tmp_path):
 def listed(monkeypatch):
     """How often the packets of a video have been listed."""
     calls = []
-    real = VideoFile._read_index
-    monkeypatch.setattr(VideoFile, "_read_index", lambda self: calls.append(self.path) or real(self))
+    real = VideoFile._list
+    monkeypatch.setattr(VideoFile, "_list", lambda self, report=None: calls.append(self.path) or real(self, report))
     return calls
 
 
