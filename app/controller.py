@@ -6,6 +6,7 @@ must not call back.
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +27,11 @@ from app.runs import Runs
 from app.saving import Saver
 from app.screen import Screen
 from app.searching import Searching
+from app.sizing import Sizing
 from app.state import State
 from app.tracking import Tracking
 from app.viewing import Viewing
+from tracker.body import BodyModel
 from tracker.records import FrameNumbers
 from tracker.rigid import Array
 from tracker.session import Session
@@ -46,11 +49,11 @@ class Controller:
             saver: keeps its poses.
             frames: gives images and evidence.
         """
-        self.session, self.frames, self._saver = session, frames, saver
+        self.frames, self._saver = frames, saver
         self._screen = Screen(session, saver, frames)
         runs = Runs()
         self._searching, self._tracking = Searching(self._screen, runs), Tracking(self._screen)
-        self._lock, self.models = self._screen.lock, self._screen.models
+        self._lock = self._screen.lock
         self.hand = Hand(self._screen, self.editing)
         """Poses people by hand."""
         self.pose_edits = PoseEdits(self._screen, self.editing)
@@ -65,7 +68,9 @@ class Controller:
         """Sets pins, and fits people to them."""
         self.replay = Replay(self._screen, runs, self.editing)
         """Looks back at searches."""
-        self.history = History(self._screen, self.editing)
+        self.sizing = Sizing(self._screen, runs, self.editing)
+        """Edits the sizes of bodies."""
+        self.history = History(self._screen, self.editing, self.sizing.follow)
         """Moves along the history."""
         self.landscape = Landscapes(self._screen, self.editing)
         """Looks at the cost along one degree of freedom."""
@@ -80,6 +85,21 @@ class Controller:
     def state(self) -> State:
         """What the screen shows now."""
         return self._screen.state
+
+    @property
+    def session(self) -> Session:
+        """What is open, with the present body of everybody."""
+        return self._screen.session
+
+    @property
+    def models(self) -> tuple[BodyModel, ...]:
+        """The bodies in which everybody is shown now."""
+        return self._screen.models
+
+    def session_of(self, state: State) -> Session:
+        """The session with everybody in the body that a state shows, as poses are drawn."""
+        people = zip(self.session.people, state.models, strict=True)
+        return replace(self.session, people=tuple(replace(p, model=m) for p, m in people))
 
     def free(self) -> list[NDArray[np.bool_]]:
         """Of each person the degrees of freedom that are not locked, (n_dofs,)."""
@@ -108,12 +128,16 @@ class Controller:
         return frames, self._saver.numbers(person, frames)
 
     def poses(self, person: int, frames: range) -> dict[int, Array]:
-        """Stored poses of a person by frame, (n_values,) each, on those of a range of frames that have one."""
-        n_values = len(self.models[person].value_names)
+        """Stored poses of a person in the present body, by frame, (n_values,) each; frames without one are left out."""
+        saver = self._saver
         with self._lock:
             listed = self._saver.frames_within(person, frames)
         rows = self._saver.numbers(person, listed)
-        return {row.frame: row.values for row in rows if len(row.values) == n_values}
+        return {
+            row.frame: saver.in_present_body(person, row.values, row.model_revision)
+            for row in rows
+            if saver.fits(person, row.model_revision)
+        }
 
     # --- looking -----------------------------------------------------------------------------------------------
 

@@ -54,12 +54,13 @@ class Disagreements:
 
     def _look_at(self, person: int, first: int, last: int) -> None:
         """Look anew at a stretch of frames of one person."""
-        screen, model = self._screen, self._screen.models[person]
+        screen = self._screen
         around = range(max(0, first - 2 * _REACH), last + 2 * _REACH + 1)
-        rows = [r for r in screen.saver.numbers(person, around) if len(r.values) == len(model.value_names)]
+        rows = [r for r in screen.saver.numbers(person, around) if screen.saver.fits(person, r.model_revision)]
+        models = [screen.saver.body(r.model_revision) for r in rows]
         keyframes = {r.frame for r in screen.saver.rows(person, around) if r.keyframe}
         values = np.array([r.values for r in rows])
-        off = disagreeing(model, [r.frame for r in rows], values, keyframes, screen.session.fps)
+        off = disagreeing(models, [r.frame for r in rows], values, keyframes, screen.session.fps)
         touched = range(max(0, first - _REACH), last + _REACH + 1)
         known = self._found[person]
         known -= {f for f in known if f in touched}

@@ -97,7 +97,7 @@ class Flooring:
 
     def _change(self, up: str, plane: Floor | None) -> None:
         before = self._screen.state.floor
-        save_floor(self._screen.session, up, plane)
+        self._screen.session = save_floor(self._screen.session, up, plane)
         self._screen.saver.keep_setting(_KEY, _kept(before.up, before.plane))
         self._screen.stand(up_rotation(up, plane))
         self._screen.set(floor=FloorState(up, plane, former=True))

@@ -82,7 +82,7 @@ class Gizmos:
     def _show(self, state: State) -> None:
         if state.rests_3d:
             return
-        model, values = self._controller.models[state.person], state.poses[state.person]
+        model, values = state.models[state.person], state.poses[state.person]
         joint = joint_of(model, state.point)
         places = model.kinematics(values).Ts_world_part
         shown = not state.track.running and not state.job.running and state.look.replay is None

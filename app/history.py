@@ -10,14 +10,17 @@ from tracker.records import HistoryEntry
 class History:
     """Moves along the history of one session."""
 
-    def __init__(self, screen: Screen, editing: Callable[[], AbstractContextManager[None]]) -> None:
+    def __init__(
+        self, screen: Screen, editing: Callable[[], AbstractContextManager[None]], follow: Callable[[], None]
+    ) -> None:
         """Move along the history behind this screen.
 
         Args:
             screen: what is shown.
             editing: gives a block in which nothing else changes anything.
+            follow: lets what is kept beside the poses follow a move (`Sizing.follow`).
         """
-        self._screen, self._editing = screen, editing
+        self._screen, self._editing, self._follow = screen, editing, follow
 
     def entries(self, limit: int) -> list[HistoryEntry]:
         """Entries that redo and undo can reach, latest first; at most `limit` of each."""
@@ -61,4 +64,7 @@ class History:
                 changed = move()
             finally:
                 self._screen.refresh_saving()
-            self._screen.show(min(changed, key=lambda frame: abs(frame - here), default=here))
+            try:
+                self._follow()
+            finally:
+                self._screen.show(min(changed, key=lambda frame: abs(frame - here), default=here))

@@ -98,12 +98,12 @@ class Landscapes:
     def _work_out(self, state: State) -> None:
         views = self._screen.frames.evidence_at_hand(state.frame)
         person, poses = state.person, state.poses
-        model = self._screen.models[person]
+        model = state.models[person]
         dof = self._dof_of(model, state)
         key = (state.frame, person, dof, state.settings, *map(id, poses))
         if views is None or not self._pages or key == self._worked_out:
             return
-        found = landscape(views, self._screen.models, poses, state.settings, person, dof)
+        found = landscape(views, state.models, poses, state.settings, person, dof)
         self._worked_out = key
         self._screen.set(landscape=found)
 

@@ -73,6 +73,7 @@ def state(session: Session, state: State) -> dict[str, Any]:
         "parts_px": list(shown.parts_px),
         "dofs": dofs.shown(session.people[state.person].model, shown.values),
         "locked": sorted(state.locked[state.person]),
+        "other_sizes": state.revisions[state.person] != state.present[state.person],
         "job": _job(state.job),
         "replay": _replay(state.look.replay),
         "track": _track(state.track),

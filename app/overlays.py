@@ -12,6 +12,7 @@ from tracker.body import Body, BodyModel
 from tracker.cameras import Camera, epipolar_segment
 from tracker.contours import Contour, FloatArray
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
+from tracker.rebody import rebodied
 from tracker.rigid import Array
 from tracker.segments import accept
 from tracker.session import Session
@@ -83,6 +84,8 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         camera = session.cameras[index].camera.pinhole
         if not view.layers.isdisjoint(("contours", "hidden")):
             out += _model(session, bodies, camera, index, view)
+        if state.draft is not None:
+            out += _drafted(session, state, bodies, camera, index)
         if "contours" in view.layers and tried is not None:
             out += _outlined(session, tried, camera, index, "candidate", CANDIDATE_COLOR)
         for ghost, color in ghosts:
@@ -144,6 +147,18 @@ def _outlined(
     bodies = [Body(p.model, v) for p, v in zip(session.people, poses, strict=True)]
     contour = _traced(bodies, camera)
     return _by_person(bodies, contour, ~contour.hidden, index, kind, [color] * len(bodies))
+
+
+def _drafted(session: Session, state: State, bodies: Sequence[Body], camera: Camera, index: int) -> list[Path]:
+    """What one would see of the person whose sizes are being edited, everybody in the poses shown."""
+    draft = state.draft
+    assert draft is not None
+    people = list(bodies)
+    shown = people[draft.person]
+    people[draft.person] = Body(draft.model, rebodied(shown.values, shown.model, draft.model))
+    contour = _traced(people, camera)
+    colors = [PREVIEW_COLOR] * len(people)
+    return [p for p in _by_person(people, contour, ~contour.hidden, index, "ghost", colors) if p.person == draft.person]
 
 
 def _by_person(

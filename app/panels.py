@@ -1,4 +1,4 @@
-"""State to viser's panels and back: pose sliders."""
+"""State to viser's panels and back: pose sliders; the panels of other modules beside them."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from app.body_panel import BodyPanel
 from app.controller import Controller
 from app.jobs import Latest
 from app.settings_panel import SettingsPanel
@@ -45,6 +46,7 @@ class Panels:
             with folder:
                 self._sliders.append(self._add_sliders(index, person.model, middle))
             self._folders.append(folder)
+        self._body = BodyPanel(server, controller)
         self._settings = SettingsPanel(server, controller)
         latest = Latest(self._show, "panels", _REST_S)
         controller.subscribe(latest.offer)
@@ -90,6 +92,7 @@ class Panels:
             return
         with self._server.atomic():
             self._settings.show(state.settings)
+            self._body.show(state)
             for index, (sliders, folder) in enumerate(zip(self._sliders, self._folders, strict=True)):
                 folder.visible = index == state.person
                 model = self._controller.models[index]

@@ -208,7 +208,9 @@ class _Page:
         if drawn == self._sent_overlay:
             return
         self._sent_overlay = drawn
-        message = await asyncio.to_thread(messages.overlay, self._controller.session, state, self._number, view, views)
+        message = await asyncio.to_thread(
+            messages.overlay, self._controller.session_of(state), state, self._number, view, views
+        )
         await self._socket.send_bytes(message)
 
     def _evidence(self, state: State, view: View) -> tuple[ViewEvidence, ...] | None:
@@ -265,7 +267,17 @@ def _drawn(state: State) -> tuple[object, ...]:
     """What an overlay depends on, to be compared."""
     poses = tuple(id(p.values) for p in state.people)
     candidate = None if state.job.candidate is None else tuple(id(c) for c in state.job.candidate)
-    drawn = (state.frame, poses, candidate, state.job.running, state.look, state.drag, state.drag_seqs)
+    drawn = (
+        state.frame,
+        poses,
+        state.revisions,
+        state.draft,
+        candidate,
+        state.job.running,
+        state.look,
+        state.drag,
+        state.drag_seqs,
+    )
     return (*drawn, _pins(state), state.floor.picking)
 
 

@@ -58,7 +58,11 @@ class PictureSets:
     def _make(self, key: Key, state: State, view: View) -> tuple[bytes, float | None]:
         """A picture, and what the darkest colour of a distance image means, px."""
         layer, camera = key
-        reduction, session, frames = view.reductions[camera], self._controller.session, self._controller.frames
+        reduction, session, frames = (
+            view.reductions[camera],
+            self._controller.session_of(state),
+            self._controller.frames,
+        )
         if layer == "image":
             return frames.image(state.frame, camera, reduction), None
         if layer == "parts":
@@ -78,6 +82,6 @@ def _wanted(state: State, view: View) -> dict[Key, tuple[object, ...]]:
         for camera in sorted(view.cameras):
             # Evidence comes at the scale of matching, whatever the pane.
             content = () if layer in EVIDENCE else (view.reductions[camera],)
-            poses = tuple(id(p) for p in state.drawn.poses) if layer == "parts" else ()
+            poses = (state.revisions, *map(id, state.drawn.poses)) if layer == "parts" else ()
             wanted[layer, camera] = (state.frame, *content, *poses)
     return wanted

@@ -12,6 +12,7 @@ from tracker.body import BodyModel
 from tracker.errors import TrackerError
 from tracker.orienting import orient
 from tracker.pose_edits import limb_of, mirrored, taken_over
+from tracker.rebody import rebodied
 from tracker.rigid import Array
 
 _SAME_GESTURE_S = 1.0
@@ -128,7 +129,9 @@ class PoseEdits:
                 raise TrackerError(
                     f"expected a pose of {name} on frame {other} to copy, found none; choose another frame"
                 )
-            values = taken_over(model, self._screen.state.poses[person], stored.values, self._screen.free(person))
+            assert stored.revision is not None
+            copied = rebodied(stored.values, self._screen.saver.body(stored.revision), model)
+            values = taken_over(model, self._screen.state.poses[person], copied, self._screen.free(person))
             self._take(person, values, f"copy frame {other}")
 
     def reset(self, person: int, point: str | None, frame: int | None = None) -> None:

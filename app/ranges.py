@@ -232,16 +232,16 @@ class Ranges:
 
     def _filled(self, person: int, start: int, end: int) -> Iterator[PoseChange]:
         """Poses for the frames between two that have one."""
-        saver, name, model = self._screen.saver, self._name(person), self._screen.models[person]
-        ends = [saver.pose(person, frame) for frame in (start, end)]
+        saver, name, model = self._screen.saver, self._name(person), self._screen.present[person]
+        ends = [saver.pose_now(person, frame) for frame in (start, end)]
         if ends[0] is None or ends[1] is None:  # of a body model of other values
             return
-        revision, sources = saver.revision(person), ("interpolated",) * len(ends[0].values)
+        revision, sources = saver.revision(person), ("interpolated",) * len(ends[0])
         frames = range(start + 1, end)
         for at in range(0, len(frames), _AT_ONCE):
             piece = frames[at : at + _AT_ONCE]
             shares = (np.array(piece) - start) / (end - start)
-            for frame, values in zip(piece, between(model, ends[0].values, ends[1].values, shares), strict=True):
+            for frame, values in zip(piece, between(model, ends[0], ends[1], shares), strict=True):
                 told = {"method": "interpolate", "between": [start, end]}
                 yield PoseChange(name, frame, PoseRecord(values, sources, revision, settings=told))
 

@@ -186,6 +186,10 @@ class Runs:
             del self._runs[next(iter(self._runs))]
         return run
 
+    def clear(self) -> None:
+        """Keep none of them any more."""
+        self._runs.clear()
+
     def of_frame(self, frame: int) -> list[Run]:
         """Runs of a frame, the oldest first."""
         return list(self._runs.get(frame, []))

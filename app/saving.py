@@ -12,9 +12,11 @@ from app.state import Shown, State
 from app.tracked import keyframes_of, tracked_changes
 from app.writing import Writing
 from tracker.annotations import AnnotationStore
+from tracker.body import BodyModel
 from tracker.errors import SessionError
-from tracker.formats.model_toml import format_model
+from tracker.formats.model_toml import format_model, parse_model
 from tracker.pins import ViewPin
+from tracker.rebody import rebodied
 from tracker.records import (
     SOURCES,
     Change,
@@ -51,18 +53,47 @@ class Saver:
             author: who makes the edits, for the history.
         """
         self._session, self._store, self._writing = session, store, Writing(store, author)
-        self._revisions = [store.add_model_revision(p.name, format_model(p.model)) for p in session.people]
+        self._bodies: dict[int, BodyModel] = {}
+        self._revisions: list[int] = []
+        self.embody(session)
         self._cells: dict[int, dict] = {}
         self._frames: list[list[int]] = [[] for _ in session.people]
         self._changed: dict[int, int] = {}  # frame -> version of the timeline it changed in last, latest last
         self.timeline_version = 1
         """Rises with every change of stored poses."""
+        self.passed: tuple[int, ...] = ()
+        """Entries of the history that the last undo, redo or walk took back or did again, in that order."""
         self._reload()
 
     @property
     def error(self) -> str | None:
         """Why an edit is not on disk; None where all are."""
         return self._writing.error
+
+    def embody(self, session: Session) -> None:
+        """Keep the bodies of a session's people as revisions: new poses belong to them."""
+        self._session = session
+        self._revisions = [self._store.add_model_revision(p.name, format_model(p.model)) for p in session.people]
+        self._bodies |= dict(zip(self._revisions, (p.model for p in session.people), strict=True))
+
+    def body(self, revision: int) -> BodyModel:
+        """The body model that a pose names: always the same object, so that what is computed of it is kept."""
+        if revision not in self._bodies:
+            text = self._store.model_revision(revision).toml
+            self._bodies[revision] = parse_model(text, f"of the store, revision {revision}")
+        return self._bodies[revision]
+
+    def former_body(self, person: int) -> BodyModel | None:
+        """The body that a person had before the present one, where the store knows one of the same joints."""
+        present = self._revisions[person]
+        known = [r.id for r in self._store.model_revisions(self._session.people[person].name) if r.id != present]
+        fitting = [r for r in known if self.fits(person, r)]
+        earlier = [r for r in fitting if r < present] or fitting
+        return self.body(earlier[-1]) if earlier else None
+
+    def fits(self, person: int, revision: int) -> bool:
+        """Whether poses of a body model can be shown as this person's: it has the same degrees of freedom."""
+        return self.body(revision).value_names == self._session.people[person].model.value_names
 
     def setting(self, key: str, default: Any = None) -> Any:
         """A setting that is kept with the session: anything that JSON holds."""
@@ -74,10 +105,21 @@ class Saver:
 
     def pose(self, person: int, frame: int) -> Shown | None:
         """The stored pose of a person on a frame."""
-        record = self._record(self._session.people[person].name, frame)
-        if record is None or len(record.values) != len(self._session.people[person].model.value_names):
+        record = self.record(person, frame)
+        if record is None or not self.fits(person, record.model_revision):
             return None
-        return Shown(record.values, _summary(record.sources), record.status, record.remark, record.parts_px)
+        source, revision = _summary(record.sources), record.model_revision
+        return Shown(record.values, source, record.status, record.remark, record.parts_px, (), revision)
+
+    def pose_now(self, person: int, frame: int) -> Array | None:
+        """The stored pose of a person, (n_values,), taken over into the present body where it was made with another."""
+        shown = self.pose(person, frame)
+        return None if shown is None else self.in_present_body(person, shown.values, shown.revision)
+
+    def in_present_body(self, person: int, values: Array, revision: int | None) -> Array:
+        """A pose of one of a person's bodies, (n_values,), taken over into the present one."""
+        present = self._session.people[person].model
+        return values if revision is None else rebodied(values, self.body(revision), present)
 
     def pins(self, person: int, frame: int) -> tuple[ViewPin, ...]:
         """The stored pins of a person on a frame, undistorted px; those of other cameras and bodies are passed over."""
@@ -104,16 +146,17 @@ class Saver:
         return listed[bisect_left(listed, frames.start) : bisect_left(listed, frames.stop)]
 
     def keyframes(self, frames: Collection[int]) -> dict[int, dict[int, Array]]:
-        """Poses of the keyframes among some frames, by frame and person."""
-        return keyframes_of(self._store, self._session.people, frames)
+        """Poses of the keyframes among some frames, in the present bodies, by frame and person."""
+        found = keyframes_of(self._store, self._session.people, frames)
+        now = {frame: {p: self.pose_now(p, frame) for p in held} for frame, held in found.items()}
+        return {frame: {p: v for p, v in held.items() if v is not None} for frame, held in now.items()}
 
     def nearest_pose(self, person: int, frame: int) -> Array | None:
         """The stored pose nearest in time, the earlier one where two are as near; None where there is none."""
         frames = self._frames[person]
         at = bisect_left(frames, frame)
         near = sorted(frames[max(0, at - 1) : at + 1], key=lambda f: (abs(f - frame), f))
-        found = self.pose(person, near[0]) if near else None
-        return None if found is None else found.values
+        return self.pose_now(person, near[0]) if near else None
 
     def numbers(self, person: int, frames: Sequence[int]) -> list[FrameNumbers]:
         """What is stored on those of some frames, ascending, that have a pose. Needs no lock of the controller."""
@@ -138,10 +181,11 @@ class Saver:
             What later calls add to; None where there was nothing to write. Where writing fails, `error` says why.
         """
         changes: list[Change] = self._pin_changes(state)
-        for person, (shown, revision) in enumerate(zip(state.people, self._revisions, strict=True)):
+        for person, (shown, revision) in enumerate(zip(state.people, state.revisions, strict=True)):
             name = self._session.people[person].name
             stored = self._record(name, state.frame)
-            if shown.source is None or (stored is not None and np.array_equal(stored.values, shown.values)):
+            same = stored is not None and stored.model_revision == revision
+            if shown.source is None or (same and np.array_equal(stored.values, shown.values)):  # type: ignore[union-attr]
                 continue
             known = stored is not None and len(stored.values) == len(shown.values)
             sources = tuple(
@@ -208,7 +252,7 @@ class Saver:
         self._write_all()
         entry = self._next_undo()
         if entry is None:
-            return []
+            return self._moved([])
         self._store.undo()
         return self._moved([entry.edit])
 
@@ -217,7 +261,7 @@ class Saver:
         self._write_all()
         entry = self._next_redo()
         if entry is None:
-            return []
+            return self._moved([])
         self._store.redo()
         return self._moved([entry.edit])
 
@@ -254,7 +298,8 @@ class Saver:
         return next((e for e in self._store.history(1) if e.undone), None)
 
     def _moved(self, edits: Iterable[int]) -> list[int]:
-        frames = sorted({frame for edit in edits for frame in self._store.frames_of(edit)})
+        self.passed = tuple(edits)
+        frames = sorted({frame for edit in self.passed for frame in self._store.frames_of(edit)})
         self._note(frames)
         return frames
 
@@ -266,7 +311,13 @@ class Saver:
         """The body model that new poses of a person belong to."""
         return self._revisions[person]
 
-    def write(self, label: str, changes: Sequence[Change], amend: int | None, by_program: bool) -> int | None:
+    def record(self, person: int, frame: int) -> PoseRecord | None:
+        """The stored pose of a person on a frame with all that is known of it."""
+        return self._record(self._session.people[person].name, frame)
+
+    def write(
+        self, label: str, changes: Sequence[Change], amend: int | None, by_program: bool, even_empty: bool = False
+    ) -> int | None:
         """Commit changes, or add them to an entry of the history.
 
         Args:
@@ -274,12 +325,13 @@ class Saver:
             changes: of poses, their marks, or pins.
             amend: the entry of the history to add to; None makes a new one.
             by_program: leave keyframes as they are.
+            even_empty: make an entry of no changes too, of something that is kept elsewhere.
 
         Returns:
             What later calls add to; None where there was nothing to write. What cannot be written waits, and `error`
             says why.
         """
-        if not changes:
+        if not (changes or even_empty):
             return amend
         edit, written = self._writing.write(label, changes, amend, by_program)
         self._note(written)

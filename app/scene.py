@@ -18,7 +18,7 @@ from app.trails import Trails
 from app.view_choice import View3d
 from app.view_panel import ViewPanel
 from tracker import rigid
-from tracker.body import Body
+from tracker.body import Body, BodyModel
 from tracker.cameras import Camera, viewed_point
 from tracker.contours import part_poses
 from tracker.posing import up_rotation
@@ -50,9 +50,11 @@ class Scene:
         self._laid: tuple[object, ...] = ()
         self._panel = ViewPanel(server, controller)
         self._grid = _add_surroundings(server, self._session)
-        self._parts = _Parts(server, "/people", self._session)
+        self._parts = _Parts(server, "/people", controller.session_of(controller.state))
+        self._shape: tuple[BodyModel, ...] = controller.state.models
         self._ghost: _Parts | None = None
-        self._trails = [Trails(p.model, partial(controller.poses, i)) for i, p in enumerate(self._session.people)]
+        self._present = controller.state.present
+        self._trails = self._new_trails()
         self._frusta = Frusta(server, controller)
         latest = Latest(self._show, "scene", _REST_S)
         controller.subscribe(latest.offer)
@@ -67,6 +69,7 @@ class Scene:
         self._shown_at = time.monotonic()
         with self._server.atomic():
             self._frusta.show(state)
+            self._show_bodies(state)
             self._show_look(state.view_3d)
             self._show_floor(state.floor)
             poses = tuple(id(p) for p in state.poses)
@@ -75,6 +78,25 @@ class Scene:
                 self._parts.pose(state.poses)
             self._show_ghost(state)
             self._show_trails(state)
+
+    def _show_bodies(self, state: State) -> None:
+        """Make the meshes anew where somebody is shown in a body of other sizes than before."""
+        if state.models != self._shape:
+            self._shape = state.models
+            self._parts.remove()
+            self._parts = _Parts(self._server, "/people", self._controller.session_of(state))
+            self._posed, self._look = (), None
+        if state.present != self._present:
+            self._present = state.present
+            if self._ghost is not None:
+                self._ghost.remove()
+                self._ghost = None
+            self._expected = ()
+            self._trails, self._trailed = self._new_trails(), ()
+
+    def _new_trails(self) -> list[Trails]:
+        people = self._controller.session.people
+        return [Trails(p.model, partial(self._controller.poses, i)) for i, p in enumerate(people)]
 
     def _show_look(self, view: View3d) -> None:
         if view == self._look:
@@ -111,13 +133,13 @@ class Scene:
         frame, settings = state.frame, state.settings.predict
         found = [
             prediction(p.model, partial(self._controller.poses, i), frame, settings, backward)
-            for i, p in enumerate(self._session.people)
+            for i, p in enumerate(self._controller.session.people)
         ]
         several = len(found) > 1
         told = [f"{p.name}: {f.why}" if several else f.why for p, f in zip(self._session.people, found, strict=True)]
         self._panel.say_of_ghost("; ".join(told))
         if self._ghost is None:
-            self._ghost = _Parts(self._server, "/prediction", self._session, _GHOST_RGB, _GHOST_OPACITY)
+            self._ghost = _Parts(self._server, "/prediction", self._controller.session, _GHOST_RGB, _GHOST_OPACITY)
         self._ghost.pose([f.values for f in found])
         for handles, expected in zip(self._ghost.handles, found, strict=True):
             _set_visible(handles, expected.values is not None)
@@ -188,6 +210,12 @@ class _Parts:
                 turns = rigid.quaternion_from_matrix(Ts[:, :3, :3])
                 for handle, T, wxyz in zip(handles, Ts, turns, strict=True):
                     handle.position, handle.wxyz = T[:3, 3], wxyz
+
+    def remove(self) -> None:
+        """Take the meshes out of the scene."""
+        for handles in self._handles:
+            for handle in handles:
+                handle.remove()
 
     def hide(self) -> None:
         """Hide everybody."""

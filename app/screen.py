@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,9 @@ from app.frames import Frames
 from app.saving import Saver
 from app.state import Shown, State, finite_or_none
 from tracker import posing
+from tracker.body import BodyModel
 from tracker.pins import ViewPin
+from tracker.rebody import rebodied
 from tracker.rigid import Array
 from tracker.session import Session
 from tracker.track import pose_cost
@@ -30,7 +33,6 @@ class Screen:
             frames: gives images and evidence.
         """
         self.session, self.saver, self.frames = session, saver, frames
-        self.models = tuple(p.model for p in session.people)
         self.lock = threading.RLock()
         self.stand(posing.up_rotation(session.up, session.floor))
         self._subscribers: list[Callable[[State], None]] = []
@@ -39,14 +41,30 @@ class Screen:
         """The gesture whose next save amends the last entry of the history; None makes a new entry."""
         self.last_save = 0.0
         """When poses were last written, s of the monotonic clock."""
-        unlocked = (frozenset[int](),) * len(self.models)
-        self.state = State(frame=0, people=self._load(0), pins=self._load_pins(0), locked=unlocked)
+        unlocked = (frozenset[int](),) * len(session.people)
+        shown = self._load(0)
+        self.state = State(frame=0, pins=self._load_pins(0), locked=unlocked, **shown._asdict())
         self.refresh_saving()
         self.frames.request(0, self._evidence_ready)
 
+    @property
+    def models(self) -> tuple[BodyModel, ...]:
+        """The bodies in which everybody is shown."""
+        return self.state.models
+
+    @property
+    def present(self) -> tuple[BodyModel, ...]:
+        """The bodies that new poses are made with."""
+        return tuple(p.model for p in self.session.people)
+
+    def present_poses(self) -> tuple[Array, ...]:
+        """The poses shown, taken over into the present bodies where they were made with others, (n_values,) each."""
+        bodies = zip(self.state.poses, self.state.models, self.present, strict=True)
+        return tuple(rebodied(values, was, becomes) for values, was, becomes in bodies)
+
     def free(self, person: int) -> NDArray[np.bool_]:
         """The degrees of freedom of a person that may move, (n_dofs,): those that are not locked."""
-        return ~np.isin(np.arange(self.models[person].n_dofs), list(self.state.locked[person]))
+        return ~np.isin(np.arange(self.present[person].n_dofs), list(self.state.locked[person]))
 
     def within_locks(self, poses: Sequence[Array]) -> tuple[Array, ...]:
         """Poses, (n_values,) of each person, with what is locked as it is shown."""
@@ -59,7 +77,14 @@ class Screen:
     def stand(self, R_world_up: Array) -> None:
         """Let whom nobody has placed stand upright, by a rotation whose z axis points up, (3, 3)."""
         cameras = [c.camera for c in self.session.cameras]
-        self._standing = tuple(posing.standing_pose(m, cameras, R_world_up) for m in self.models)
+        self._R_world_up = R_world_up
+        self._standing = tuple(posing.standing_pose(m, cameras, R_world_up) for m in self.present)
+
+    def embody(self, session: Session) -> None:
+        """Go on with a session whose people have other bodies; to be followed by `show`."""
+        self.session = session
+        self.saver.embody(session)
+        self.stand(self._R_world_up)
 
     def subscribe(self, view: Callable[[State], None]) -> Callable[[], None]:
         """Tell a view every new state from now on; returns what ends it."""
@@ -85,10 +110,10 @@ class Screen:
     def show(self, frame: int, **changes: object) -> None:
         """Show the stored poses of a frame; what amends the last entry of the history is over."""
         self.edit_of = None
-        people = self._load(frame)
-        costs = self.costs(tuple(p.values for p in people), frame)
+        shown = self._load(frame)
+        costs = self.costs(tuple(p.values for p in shown.people), frame, shown.models)
         pins = self._load_pins(frame)
-        self.set(frame=frame, people=people, pins=pins, drag=None, holds_pin=False, **costs, **changes)
+        self.set(frame=frame, pins=pins, drag=None, holds_pin=False, **shown._asdict(), **costs, **changes)
         self.request_evidence()
 
     def request_evidence(self) -> None:
@@ -96,12 +121,14 @@ class Screen:
         if self.frames.evidence_at_hand(self.state.frame) is None:
             self.frames.request(self.state.frame, self._evidence_ready)
 
-    def costs(self, poses: tuple[Array, ...], frame: int | None = None) -> dict[str, object]:
-        """The state's costs of given poses; empty while there is no evidence."""
+    def costs(
+        self, poses: tuple[Array, ...], frame: int | None = None, models: tuple[BodyModel, ...] | None = None
+    ) -> dict[str, object]:
+        """The state's costs of given poses, by default of the bodies shown; empty while there is no evidence."""
         views = self.frames.evidence_at_hand(self.state.frame if frame is None else frame)
         if views is None:
             return {"cost_px": None, "view_costs_px": ()}
-        cost = pose_cost(views, self.models, poses, self.state.settings)(poses)
+        cost = pose_cost(views, models or self.models, poses, self.state.settings)(poses)
         return {
             "cost_px": finite_or_none(cost.total_px),
             "view_costs_px": tuple(finite_or_none(c) for c in cost.views_px),
@@ -125,9 +152,9 @@ class Screen:
         undo, redo = self.saver.undo_label(), self.saver.redo_label()
         self.set(undo=undo, redo=redo, save_error=self.saver.error, timeline_version=self.saver.timeline_version)
 
-    def _load(self, frame: int) -> tuple[Shown, ...]:
+    def _load(self, frame: int) -> "_Loaded":
         """What a frame shows: stored poses, else drafts from the nearest frame that has one."""
-        shown = []
+        shown: list[Shown] = []
         for person, standing in enumerate(self._standing):
             stored = self.saver.pose(person, frame)
             if stored is not None:
@@ -135,16 +162,32 @@ class Screen:
             else:
                 nearest = self.saver.nearest_pose(person, frame)
                 shown.append(Shown(standing if nearest is None else nearest, None))
-        return tuple(shown)
+        present = tuple(self.saver.revision(person) for person in range(len(shown)))
+        return _Loaded(tuple(shown), *self.bodies(shown), present)
+
+    def bodies(self, shown: Sequence[Shown]) -> tuple[tuple[BodyModel, ...], tuple[int, ...]]:
+        """The bodies of poses, and what the store calls them: the present ones of those that are not stored."""
+        saver = self.saver
+        revisions = tuple(saver.revision(i) if p.revision is None else p.revision for i, p in enumerate(shown))
+        return tuple(saver.body(r) for r in revisions), revisions
 
     def _load_pins(self, frame: int) -> tuple[tuple[ViewPin, ...], ...]:
         """The pins of everybody on a frame."""
-        return tuple(self.saver.pins(person, frame) for person in range(len(self.models)))
+        return tuple(self.saver.pins(person, frame) for person in range(len(self.session.people)))
 
     def _evidence_ready(self, frame: int) -> None:
         with self.lock:
             if frame == self.state.frame:
                 self.set(**self.costs(self.state.poses))
+
+
+class _Loaded(NamedTuple):
+    """What the state shows of a frame."""
+
+    people: tuple[Shown, ...]
+    models: tuple[BodyModel, ...]
+    revisions: tuple[int, ...]
+    present: tuple[int, ...]
 
 
 def spoken(name: str) -> str:

@@ -100,18 +100,18 @@ class Searching:
         """The search that stands, or a new one from given poses, else from those shown."""
         screen, state = self._screen, self._screen.state
         if self._job is None or self._job.ended:
-            frame, settings = state.frame, state.settings
+            frame, settings, models = state.frame, state.settings, screen.models
             poses = state.poses if start is None else screen.within_locks(start)
-            free = [screen.free(person) for person in range(len(screen.models))]
-            if not stages(screen.models, settings.search, free=free):
+            free = [screen.free(person) for person in range(len(models))]
+            if not stages(models, settings.search, free=free):
                 raise TrackerError(
                     "expected something that a search may move, found everything locked; unlock some of it"
                 )
             start_px = screen.costs(poses)["cost_px"]
             known_px = start_px if isinstance(start_px, float) else np.nan
-            run = self._runs.begin(frame, screen.models, poses, known_px, settings, free)
+            run = self._runs.begin(frame, models, poses, known_px, settings, free)
             job: Job[SearchStep] = Job(
-                lambda: search_frame(screen.frames.evidence(frame), screen.models, poses, settings, free=free),
+                lambda: search_frame(screen.frames.evidence(frame), models, poses, settings, free=free),
                 lambda step, seconds: self._stepped(job, step, seconds),
                 lambda error: self._ended(job, error),
                 lambda: self._paused(job),

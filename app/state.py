@@ -6,6 +6,7 @@ import numpy as np
 
 from app.floor_picks import FloorState
 from app.view_choice import View3d
+from tracker.body import BodyModel
 from tracker.pins import ViewPin
 from tracker.rigid import Array
 from tracker.track import TrackSettings
@@ -27,6 +28,8 @@ class Shown:
     """Cost of each part, px; None for an unseen part, empty where unknown."""
     sources: tuple[str, ...] = ()
     """Where each value of a pose that is not stored yet comes from, (n_values,); empty: all from `source`."""
+    revision: int | None = None
+    """The body model that a stored pose belongs to; None for one as it is not stored."""
 
 
 @dataclass(frozen=True)
@@ -185,11 +188,32 @@ class DragState:
 
 
 @dataclass(frozen=True, eq=False)
+class SizeDraft:
+    """Sizes of a person's body that are being edited and not applied yet."""
+
+    person: int
+    model: BodyModel
+    """The body as it would be."""
+
+
+@dataclass(frozen=True, eq=False)
 class State:
     """Everything the views need, and nothing they could derive."""
 
     frame: int
     people: tuple[Shown, ...]
+    models: tuple[BodyModel, ...] = ()
+    """The body in which each person is shown: the one that a stored pose was made with, else the present one."""
+    revisions: tuple[int, ...] = ()
+    """What the store calls each of these bodies."""
+    present: tuple[int, ...] = ()
+    """What it calls the present body of each person, which new poses are made with."""
+    draft: SizeDraft | None = None
+    """Sizes being edited."""
+    sides_alike: bool = True
+    """Whether sizes are edited on both sides at once."""
+    sizes_message: str = ""
+    """What came of the last change of sizes."""
     person: int = 0
     """Index of the person worked on."""
     point: str | None = None

@@ -60,18 +60,17 @@ class Tracking:
         screen = self._screen
         with screen.lock:
             state, saver = screen.state, screen.saver
-            people = tuple(i for i in range(len(screen.models)) if saver.frames(i))
+            models = screen.present
+            people = tuple(i for i in range(len(models)) if saver.frames(i))
             if not people:
                 raise TrackerError("expected a person who has been placed, found none; pose the body here first")
             frames = self._frames(backward, until, people)
-            way, settings, poses = "backward" if backward else "forward", state.settings, state.poses
+            way, settings, poses = "backward" if backward else "forward", state.settings, screen.present_poses()
             run = _Run(f"track {way} from frame {frames[0]}", people, settings, saver.keyframes(frames))
             fixed = {frame: dict(held) for frame, held in run.fixed.items()}
-            free = [screen.free(person) for person in range(len(screen.models))]
+            free = [screen.free(person) for person in range(len(models))]
             run.job = Job(
-                lambda: track_chamfer(
-                    screen.frames.observer, screen.models, poses, frames, settings, fixed, people, free
-                ),
+                lambda: track_chamfer(screen.frames.observer, models, poses, frames, settings, fixed, people, free),
                 lambda found, seconds: self._tracked(run, found, seconds),
                 lambda error: self._ended(run, error),
                 lambda: self._paused(run),
@@ -167,13 +166,16 @@ class Tracking:
             if stored is not None:
                 people.append(stored)
             elif i not in run.people:
-                people.append(Shown(shown.values, None))
+                people.append(Shown(shown.values, None, revision=self._screen.state.revisions[i]))
             else:
                 parts_px = tuple(finite_or_none(c) for c in found.parts_px[i])
                 people.append(Shown(found.poses[i], "tracked", found.statuses[i], found.remarks[i], parts_px))
+        models, revisions = self._screen.bodies(people)
         return {
             "frame": found.frame,
             "people": tuple(people),
+            "models": models,
+            "revisions": revisions,
             "cost_px": finite_or_none(found.cost_px),
             "view_costs_px": tuple(finite_or_none(c) for c in found.views_px),
         }

@@ -48,8 +48,10 @@ ORDER = [
         "tracker.evaluate",
         "tracker.interpolate",
         "tracker.disagree",
+        "tracker.measures",
     ],
     ["tracker.occlusion", "tracker.pins", "tracker.posing", "tracker.sizes", "tracker.evaluate"],
+    ["tracker.rebody"],
     # The session keeps its cameras and models in files of these formats, so it reads and writes by them; a format
     # knows cameras, bodies and tables, never a session.
     ["tracker.session", "tracker.proxy"],
@@ -89,9 +91,10 @@ ORDER = [
         "app.listing",
     ],
     ["app.flooring", "app.viewing"],
-    ["app.landscape", "app.pinning", "app.ranges", "app.replay", "app.search_settings"],
+    ["app.landscape", "app.pinning", "app.sizing", "app.ranges", "app.replay", "app.search_settings"],
     ["app.controller", "app.messages", "app.headless", "app.indexing"],
     [
+        "app.body_panel",
         "app.frusta",
         "app.gizmos",
         "app.pose_intentions",

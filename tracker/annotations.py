@@ -200,11 +200,11 @@ class AnnotationStore:
         return sorted(frame for (frame,) in self._all(sql, (edit,)))
 
     def add_model_revision(self, person: str, toml: str) -> int:
-        """Keep a body model for good; returns its id, that of the person's latest where nothing has changed."""
+        """Keep a body model for good; returns its id, that of the same body where the person has had it before."""
         with self._lock, self._errors(), self._transaction():
-            latest = self.model_revisions(person)[-1:]
-            if latest and latest[0].toml == toml:
-                return latest[0].id
+            for known in self.model_revisions(person):
+                if known.toml == toml:
+                    return known.id
             row = self._db.execute(
                 "INSERT INTO model_revisions (person, toml, time) VALUES (?, ?, ?)", (person, toml, _now())
             ).lastrowid

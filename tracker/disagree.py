@@ -47,12 +47,12 @@ def steps_off_m(points_world: Array) -> Array:
 
 
 def disagreeing(
-    model: BodyModel, frames: Sequence[int], values: Array, keyframes: frozenset[int] | set[int], fps: float
+    models: Sequence[BodyModel], frames: Sequence[int], values: Array, keyframes: frozenset[int] | set[int], fps: float
 ) -> list[int]:
     """Find the frames that disagree with their neighbours.
 
     Args:
-        model: the body.
+        models: the body that each pose was made with.
         frames: that have a pose, ascending.
         values: their poses, (n, n_values).
         keyframes: those that a person vouches for; of two that disagree the other one is named.
@@ -64,7 +64,7 @@ def disagreeing(
     at = np.asarray(frames, dtype=np.int64)
     found: list[int] = []
     for run in np.split(np.arange(len(at)), np.flatnonzero(np.diff(at) != 1) + 1):
-        off = steps_off_m(np.array([model.points_world(values[i]) for i in run])) if len(run) > 1 else np.zeros(0)
+        off = steps_off_m(np.array([models[i].points_world(values[i]) for i in run])) if len(run) > 1 else np.zeros(0)
         # A jump shows, halved, in the steps beside it too: only the largest of them is one.
         beside = np.pad(off, 1)
         peaks = (off > threshold_m(fps)) & (off >= beside[:-2]) & (off > beside[2:])

@@ -126,6 +126,8 @@ class FrameNumbers(NamedTuple):
     cost_px: float | None
     views_px: tuple[float | None, ...]
     """Cost of each view, px; None without edges, empty where unknown."""
+    model_revision: int = 0
+    """The body model that the values belong to."""
 
 
 class HistoryEntry(NamedTuple):

@@ -253,6 +253,27 @@ def save_floor(session: Session, up: str, floor: Floor | None) -> Session:
     return changed
 
 
+def save_model(session: Session, person: int, model: BodyModel) -> Session:
+    """Write another body model of a person into a session, which is otherwise left as it is.
+
+    Returns:
+        The session with that model.
+
+    Raises:
+        SessionError: the folder cannot be written.
+    """
+    people = [replace(p, model=model) if i == person else p for i, p in enumerate(session.people)]
+    changed = replace(session, people=tuple(people))
+    path = session.folder / "models" / f"{people[person].name}.toml"
+    try:
+        path.parent.mkdir(exist_ok=True)
+        write_text_whole(path, format_model(model))
+        _write_session(changed, session.folder)  # which may have named another file
+    except OSError as error:
+        raise SessionError(f"cannot write {path}: {error}; see that you may write to the folder") from error
+    return changed
+
+
 def _load_floor(row: dict[str, Any] | None, where: str) -> Floor | None:
     if row is None:
         return None

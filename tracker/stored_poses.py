@@ -21,7 +21,7 @@ RECORD = (
 """Columns that `record_of` reads; `e` is the edit, `t` what its program was told."""
 FRAME = "c.frame, c.sources, c.status, c.cost_px, c.keyframe, c.views_px, c.remark, c.reviewed"
 """Columns that `frame_of` reads."""
-NUMBERS = "c.frame, c.numbers, c.cost_px, c.views_px"
+NUMBERS = "c.frame, c.numbers, c.cost_px, c.views_px, c.model_revision"
 """Columns that `numbers_of` reads."""
 CONTENT = "numbers, sources, keyframe, status, cost_px, model_revision, views_px, parts_px, remark, reviewed, told"
 """Columns that `content_of` writes, and `told`, which names what the program was told."""
@@ -49,8 +49,8 @@ def frame_of(row: Sequence[Any]) -> FrameRow:
 
 def numbers_of(row: Sequence[Any]) -> FrameNumbers:
     """The numbers of a row of `NUMBERS`."""
-    frame, numbers, cost, views = row
-    return FrameNumbers(frame, _array(numbers), cost, _costs(views))
+    frame, numbers, cost, views, revision = row
+    return FrameNumbers(frame, _array(numbers), cost, _costs(views), revision)
 
 
 def content_of(pose: PoseRecord) -> tuple[Any, ...]:

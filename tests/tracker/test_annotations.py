@@ -281,6 +281,7 @@ def test_model_revisions(store):
     second = store.add_model_revision("ann", "a = 2")
     other = store.add_model_revision("bob", "a = 2")
     assert len({first.id, second, other}) == 3
+    assert store.add_model_revision("ann", "a = 1") == first.id  # as it was before
     assert store.model_revision(second).toml == "a = 2"
     assert store.model_revision(first.id).toml == "a = 1"
     assert [r.id for r in store.model_revisions("ann")] == [first.id, second]

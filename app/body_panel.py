@@ -1,0 +1,149 @@
+"""The sizes of bodies in viser's panel, in centimetres: one folder for each person."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import viser
+
+from app.controller import Controller
+from app.state import State
+from tracker.errors import TrackerError
+from tracker.measures import PartSizes, sizes_of, spoken, twin
+
+_REFIT, _KEEP = "refit keyframes", "keep poses"
+_HEADING = "**length · half depth · half width**, cm"
+
+
+@dataclass(frozen=True)
+class _Folder:
+    """The controls of one person."""
+
+    folder: viser.GuiFolderHandle
+    height: viser.GuiInputHandle[float]
+    alike: viser.GuiInputHandle[bool]
+    parts: dict[str, viser.GuiVector3Handle]
+    """By name of the part: its length and half girths."""
+    widths: dict[str, viser.GuiNumberHandle[float]]
+    poses: viser.GuiDropdownHandle[str]
+    apply: viser.GuiButtonHandle
+    discard: viser.GuiButtonHandle
+    told: viser.GuiMarkdownHandle
+
+
+class BodyPanel:
+    """Shows the sizes being edited, else the present ones; what is entered goes to the controller at once."""
+
+    def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
+        """Build the folders."""
+        self._server, self._controller, self._sizing = server, controller, controller.sizing
+        self._folders = [self._add(i) for i in range(len(controller.session.people))]
+
+    def show(self, state: State) -> None:
+        """Show the sizes of the person worked on."""
+        for person, controls in enumerate(self._folders):
+            controls.folder.visible = person == state.person
+            if person == state.person:
+                self._show_one(person, controls, state)
+
+    def _show_one(self, person: int, controls: _Folder, state: State) -> None:
+        sizes, drafted = sizes_of(self._sizing.model(person)), state.draft is not None and state.draft.person == person
+        _put(controls.height, _cm(sizes.height_m))
+        _put(controls.alike, state.sides_alike)
+        for name, row in controls.parts.items():
+            _put(row, _row(sizes.parts[name]))
+            other = twin(name)
+            row.visible = not (state.sides_alike and other in controls.parts and name.startswith("right_"))
+            row.label = spoken(name.removeprefix("left_") if state.sides_alike else name)
+        for name, number in controls.widths.items():
+            _put(number, _cm(sizes.widths_m[name]))
+        controls.discard.disabled = not drafted
+        told = "Not applied yet: the blue outline shows it." if drafted else state.sizes_message
+        if not told and state.revisions[person] != state.present[person]:
+            told = "The pose of this frame was made with other sizes, and is shown with them."
+        if controls.told.content != told:
+            controls.told.content = told
+        controls.told.visible = bool(told)
+
+    def _add(self, person: int) -> _Folder:
+        gui, sizes = self._server.gui, sizes_of(self._controller.session.people[person].model)
+        folder = gui.add_folder(f"Body of {self._controller.session.people[person].name}", expand_by_default=False)
+        with folder:
+            height = gui.add_number(
+                "height, cm", _cm(sizes.height_m), step=0.5, hint="Body height; everything else scales with it"
+            )
+            alike = gui.add_checkbox("both sides alike", True, hint="Change left and right together")
+            gui.add_markdown(_HEADING)
+            parts = {
+                name: gui.add_vector3(
+                    spoken(name), _row(own), step=0.1,
+                    hint=f"{spoken(name).capitalize()}: length between its joints; half its thickness, front to back "
+                    "and side to side, at its middle; cm",
+                )
+                for name, own in sizes.parts.items()
+            }  # fmt: skip
+            widths = {
+                name: gui.add_number(
+                    f"{name}s apart, cm", _cm(own), step=0.1, hint=f"Distance of the centres of the {name} joints"
+                )
+                for name, own in sizes.widths_m.items()
+            }
+            poses = gui.add_dropdown(
+                "stored poses", (_REFIT, _KEEP),
+                hint="Refit keyframes: each is brought to its old joints and pins in the new body, as one undoable "
+                "edit. Keep poses: all stay as they are, in the body that they were made with",
+            )  # fmt: skip
+            apply = gui.add_button("Apply", hint="Make these the sizes of the body from now on; undo takes it back")
+            discard = gui.add_button("Discard", hint="Back to the sizes that the body has")
+            former = gui.add_button("Previous sizes", hint="Enter the sizes before these; Apply takes them over")
+            told = gui.add_markdown("")
+        controls = _Folder(folder, height, alike, parts, widths, poses, apply, discard, told)
+        self._listen(person, controls, former)
+        return controls
+
+    def _listen(self, person: int, controls: _Folder, former: viser.GuiButtonHandle) -> None:
+        sizing = self._sizing
+        self._on(controls.height, lambda: sizing.set_height(person, controls.height.value / 100))
+        self._on(controls.alike, lambda: sizing.couple(controls.alike.value))
+        for name, row in controls.parts.items():
+            self._on(row, lambda name=name, row=row: self._set_part(person, name, row.value))  # type: ignore[misc]
+        for name, number in controls.widths.items():
+            self._on(number, lambda n=name, w=number: sizing.set_width(person, n, w.value / 100))  # type: ignore[misc]
+        self._on(controls.apply, lambda: sizing.apply(person, controls.poses.value == _REFIT))
+        self._on(controls.discard, sizing.discard)
+        self._on(former, lambda: sizing.recall(person))
+
+    def _set_part(self, person: int, part: str, row_cm: tuple[float, float, float]) -> None:
+        """Send what was entered; what was not, keeps the digits that the panel does not show."""
+        before = sizes_of(self._sizing.model(person)).parts[part]
+        same = zip((before.length_m, *before.girths_m), _row(before), row_cm, strict=True)
+        length, first, second = (own if shown == entered else entered / 100 for own, shown, entered in same)
+        self._sizing.set_part(person, part, PartSizes(length, (first, second)))
+
+    def _on(self, control: Any, act: Callable[[], None]) -> None:
+        """Carry out what somebody did with a control; what is refused is said, and the control goes back."""
+
+        async def done(event: viser.GuiEvent[Any]) -> None:
+            if event.client is None:  # the program set it
+                return
+            try:
+                await asyncio.to_thread(act)
+            except TrackerError as error:
+                event.client.add_notification("Body", str(error), color="red", auto_close_seconds=8.0)
+                self.show(self._controller.state)
+
+        (control.on_click if isinstance(control, viser.GuiButtonHandle) else control.on_update)(done)
+
+
+def _put(control: Any, value: Any) -> None:
+    if control.value != value:
+        control.value = value
+
+
+def _cm(length_m: float) -> float:
+    return round(100 * length_m, 1)
+
+
+def _row(sizes: PartSizes) -> tuple[float, float, float]:
+    return _cm(sizes.length_m), _cm(sizes.girths_m[0]), _cm(sizes.girths_m[1])
