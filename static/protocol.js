@@ -23,7 +23,7 @@
  *   why: string}} FloorPicking
  * @typedef {{type: "state", frame: number, person: number, point: string | null,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
- *   parts_px: (number | null)[], dofs: number[], locked: number[], job: Job, track: Track, range: RangeWork,
+ *   parts_px: (number | null)[], dofs: number[], locked: number[], other_sizes: boolean, job: Job, track: Track, range: RangeWork,
  *   replay: {run: number, step: number, steps: number, stage: string | null} | null, follow: boolean, snapped: number | null,
  *   floor: FloorPicking | null, footage: {listed: number | null, error: string | null},
  *   undo: string | null, redo: string | null,

@@ -119,7 +119,7 @@ class FakeEndpoint:
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
             "source": "manual", "status": "", "remark": "", "parts_px": [], "job": self.idle_job(""), "replay": None,
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
-            "dofs": [1.0, 2.0, 90.0, 30.0], "locked": [],
+            "dofs": [1.0, 2.0, 90.0, 30.0], "locked": [], "other_sizes": False,
             "snapped": None, "floor": None, "footage": {"listed": None, "error": None},
             "saved": True, "save_error": None,
         }  # fmt: skip
