@@ -213,7 +213,7 @@ class _Parts:
 
     def remove(self) -> None:
         """Take the meshes out of the scene."""
-        for handles in self._handles:
+        for handles in self.handles:
             for handle in handles:
                 handle.remove()
 
