@@ -127,7 +127,8 @@ class Sizing:
                     "enter a length in the panel first"
                 )
             n = len(refitted.changes)
-            told = f", {n} keyframe{'' if n == 1 else 's'} refitted" if refit else ", poses kept"
+            counted = f", {n} keyframe{'' if n == 1 else 's'} refitted" if n else ""
+            told = counted if refit else ", poses kept"
             edit = screen.saver.write(
                 f"sizes of {name}{told}", refitted.changes, None, by_program=False, even_empty=True
             )
