@@ -6,6 +6,8 @@ import os
 import sys
 from pathlib import Path
 
+from driving import shows
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -52,3 +54,22 @@ class Program:
             self._process.terminate()
         await asyncio.wait_for(self._process.wait(), 30)
         self.address = ""
+
+
+@contextlib.asynccontextmanager
+async def visited(browser, address, size=(1280, 720), viser=False):
+    """The page of a program with its first cost on the screen; fails where the page reports an error.
+
+    Without viser the 3-D view is an empty page: it takes much of a machine without a graphics card.
+    """
+    context = await browser.new_context(viewport={"width": size[0], "height": size[1]}, color_scheme="dark")
+    page = await context.new_page()
+    errors = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    if not viser:
+        await page.route("**/viser/**", lambda route: route.fulfill(body="<!doctype html>", content_type="text/html"))
+    await page.goto(address, timeout=120_000)
+    await shows(page, "window.quadrille?.state.overlay && quadrille.state.state?.cost_px !== null", 180)
+    yield page
+    await context.close()
+    assert errors == []

@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest_asyncio
 from driving import handle_of, shows, state_of
-from running import ROOT, Program
+from running import ROOT, Program, visited
 
 from tracker.annotations import AnnotationStore
 from tracker.formats.model_toml import format_model
@@ -39,16 +39,9 @@ async def program(tmp_path):
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def live(browser, program):
-    context = await browser.new_context(viewport={"width": 1440, "height": 900}, color_scheme="dark")
-    page = await context.new_page()
-    errors = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    await page.goto(program.address, timeout=120_000)
-    await shows(page, "window.quadrille?.state.overlay && window.quadrille.state.state.cost_px !== null", 120)
-    await go_to(page, START)
-    yield page
-    await context.close()
-    assert errors == []
+    async with visited(browser, program.address, (1440, 900), viser=True) as page:
+        await go_to(page, START)
+        yield page
 
 
 FOLLOWED = "quadrille.state.shown.frame === {0} && quadrille.state.overlay.frame === {0}"

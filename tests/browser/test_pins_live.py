@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from driving import handle_of, shows, state_of, to_client
-from running import ROOT, Program
+from running import ROOT, Program, visited
 
 from tracker.annotations import AnnotationStore
 from tracker.formats.model_toml import format_model
@@ -50,16 +50,9 @@ async def opened(browser, tmp_path_factory):
     store.close()
     program = Program(folder)
     await program.start()
-    context = await browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark")
-    page = await context.new_page()
-    errors = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    await page.goto(program.address, timeout=120_000)
-    await shows(page, "window.quadrille?.state.overlay && quadrille.state.state?.cost_px !== null", 180)
-    yield page, Truth(session)
-    await context.close()
+    async with visited(browser, program.address, viser=True) as page:
+        yield page, Truth(session)
     await program.kill()
-    assert errors == []
 
 
 @pytest_asyncio.fixture(loop_scope="session")

@@ -7,7 +7,7 @@ import pytest
 import pytest_asyncio
 from driving import handle_of, state_of
 from driving import shows as shows_within
-from running import ROOT, Program
+from running import ROOT, Program, visited
 
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 
@@ -22,17 +22,8 @@ async def program(tmp_path_factory):
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def live(browser, program):
-    context = await browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark")
-    page = await context.new_page()
-    errors = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    # The 3-D view has no part in this, and takes much of a machine without a graphics card.
-    await page.route("**/viser/**", lambda route: route.fulfill(body="<!doctype html>", content_type="text/html"))
-    await page.goto(program.address, timeout=120_000)
-    await shows(page, "window.quadrille?.state.overlay && quadrille.state.state.cost_px !== null", 120)
-    yield page
-    await context.close()
-    assert errors == []
+    async with visited(browser, program.address) as page:
+        yield page
 
 
 async def shows(page, expression, timeout_s=30.0):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest_asyncio
 from driving import handle_of, state_of, to_client
 from driving import shows as shows_within
-from running import ROOT, Program
+from running import ROOT, Program, visited
 from scripted_user import TRUNK, ScriptedUser
 
 from tracker.annotations import AnnotationStore
@@ -53,18 +53,9 @@ def user_of(session, frame):
 async def live(browser, folder):
     program = Program(folder)
     await program.start()
-    context = await browser.new_context(viewport={"width": 1440, "height": 900}, color_scheme="dark")
-    page = await context.new_page()
-    errors = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    # The 3-D view has no part in this, and takes much of a machine without a graphics card.
-    await page.route("**/viser/**", lambda route: route.fulfill(body="<!doctype html>", content_type="text/html"))
-    await page.goto(program.address, timeout=120_000)
-    await shows(page, "window.quadrille?.state.overlay && quadrille.state.state.cost_px !== null", 120)
-    yield page
-    await context.close()
+    async with visited(browser, program.address, (1440, 900)) as page:
+        yield page
     await program.kill()
-    assert errors == []
 
 
 async def shows(page, expression, timeout_s=30.0):
