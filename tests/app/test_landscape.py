@@ -40,10 +40,10 @@ def test_it_follows_the_pose_while_a_page_looks(opened):
     controller.landscape.choose("left_elbow.extension")
     dof = controller.models[0].dof_names.index("left_elbow.extension")
     wait_for(lambda: controller.state.landscape is not None and controller.state.landscape.dof == dof)
-    controller.hand.set_dof(0, dof, 0.5)
+    controller.pose_edits.set_dof(0, dof, 0.5)
     wait_for(lambda: controller.state.landscape.current == pytest.approx(0.5))
     controller.landscape.watch(7, False)
-    controller.hand.set_dof(0, dof, 0.9)
+    controller.pose_edits.set_dof(0, dof, 0.9)
     controller.seek(1)
     assert controller.state.landscape.current == pytest.approx(0.5)
 

@@ -137,7 +137,7 @@ def test_what_is_locked_stays_in_a_run_again_and_in_what_is_taken(opened):
     model = controller.models[0]
     dof = model.dof_names.index("left_shoulder.abduction")
     run = searched(controller)
-    controller.hand.set_dof(0, dof, 0.7)
+    controller.pose_edits.set_dof(0, dof, 0.7)
     controller.locks.set(0, [dof], True)
     controller.replay.take(run.number, None)
     assert controller.state.poses[0][dof] == pytest.approx(0.7)
