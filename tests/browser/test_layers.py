@@ -12,7 +12,7 @@ ROW = """([camera, from, to, v]) => {
   const context = canvas.getContext("2d");
   return Array.from({ length: to - from }, (_, k) => {
     const { x, y } = quadrille.toClient(camera, from + k, v);
-    const at = [(x - box.left) * devicePixelRatio, (y - box.top) * devicePixelRatio].map(Math.round);
+    const at = [(x - box.left) * devicePixelRatio, (y - box.top) * devicePixelRatio].map(Math.floor);
     return [...context.getImageData(...at, 1, 1).data].slice(0, 3);
   });
 }"""
