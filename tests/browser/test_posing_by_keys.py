@@ -94,7 +94,7 @@ async def test_mirror_copy_and_reset(live):
     await live.keyboard.press("m")
     await shows(live, "quadrille.state.state.undo === 'mirror, frame 5'")
     await live.keyboard.press("Alt+,")  # nobody has posed frame 4
-    await shows(live, "document.querySelector('.notice')?.textContent.includes('on frame 4 to copy, found none')")
+    await shows(live, "document.querySelector('#notices')?.textContent.includes('on frame 4 to copy, found none')")
     await live.locator("#copy-pose").focus()
     await live.keyboard.press("Enter")
     await live.get_by_role("menuitem", name="Keyframe 3").focus()
@@ -116,7 +116,7 @@ async def test_locks_hold_under_keys_and_show(live):
     assert await live.locator(".dof .number-entry").is_disabled()
     before = (await state_of(live))["state"]
     await live.keyboard.press("+")
-    await shows(live, "document.querySelector('.notice')?.textContent.includes('left elbow extension is locked')")
+    await shows(live, "document.querySelector('#notices')?.textContent.includes('left elbow extension is locked')")
     assert (await state_of(live))["state"]["dofs"] == before["dofs"]
     await live.keyboard.press("Shift+O")
     await shows(live, "quadrille.state.state.locked.length > 3")
