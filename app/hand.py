@@ -62,8 +62,7 @@ class Hand:
         if part is not None and not 0 <= part < len(model.parts):
             return
         with self._editing():
-            if frame is not None and frame != self._screen.state.frame and 0 <= frame < self._screen.session.n_frames:
-                self._screen.show(frame)
+            self._screen.go_to(frame)
             values = self._screen.state.poses[person]
             view, pointer = self._screen.session.cameras[camera].camera, np.array(pointer_px)
             free = self._screen.free(person)
@@ -111,12 +110,8 @@ class Hand:
             hand, drag = self._grab, self._screen.state.drag
             if hand is None or drag is None or page != self._grab_page:
                 return
-            checkpointed = self._screen.edit_of is hand
-            self._grab = self._hold = self._screen.edit_of = None
-            if checkpointed:
-                self._screen.saver.undo()
-                self._screen.refresh_saving()
-            self._screen.show(self._screen.state.frame)
+            self._grab = self._hold = None
+            self._screen.take_back(hand)
 
     def finish(self) -> None:
         """End the drag at hand, if there is one, and save it."""

@@ -116,10 +116,7 @@ def _snap(controller: Controller, _: int, message: Message) -> None:
 def _floor(controller: Controller, _: int, message: Message) -> None:
     flooring, action = controller.flooring, message["action"]
     if action == "mark":
-        place_px = (float(message["u"]), float(message["v"]))
-        if not np.all(np.isfinite(place_px)):
-            raise ValueError("a position that is not a number")
-        flooring.mark(int(message["camera"]), place_px)
+        flooring.mark(int(message["camera"]), _place(message))
         return
     actions = {
         "begin": flooring.begin,

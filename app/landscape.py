@@ -7,8 +7,8 @@ from contextlib import AbstractContextManager
 import numpy as np
 
 from app.jobs import Latest
-from app.screen import Screen
-from app.state import Landscape, Shown, State
+from app.screen import Screen, spoken
+from app.state import Landscape, State
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence import ViewEvidence
@@ -80,12 +80,8 @@ class Landscapes:
         with self._editing():
             model, state = models[person], self._screen.state
             values = model.clip(along(model, state.poses[person], dof, np.array([value]))[0])
-            people = [*state.people]
-            people[person] = Shown(values, "manual")
-            self._screen.set(people=tuple(people), **self._screen.costs(tuple(p.values for p in people)))
-            self._screen.edit_of = None
-            self._screen.save(f"set {model.dof_names[dof].replace('_', ' ').replace('.', ' ')}", "manual", object())
-            self._screen.edit_of = None
+            self._screen.pose(person, values)
+            self._screen.save(f"set {spoken(model.dof_names[dof])}", "manual")
 
     def close(self) -> None:
         """End the thread."""

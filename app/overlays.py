@@ -79,13 +79,14 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
     tried = state.job.candidate if state.job.running or state.look.replay is not None else None
+    drafted = _with_draft(state, bodies)
     ghosts = ((state.look.compared, COMPARED_COLOR), (state.look.preview, PREVIEW_COLOR))
     for index in sorted(view.cameras):
         camera = session.cameras[index].camera.pinhole
         if not view.layers.isdisjoint(("contours", "hidden")):
             out += _model(session, bodies, camera, index, view)
         if state.draft is not None:
-            out += _drafted(session, state, bodies, camera, index)
+            out += _drafted(state.draft.person, drafted, camera, index)
         if "contours" in view.layers and tried is not None:
             out += _outlined(session, tried, camera, index, "candidate", CANDIDATE_COLOR)
         for ghost, color in ghosts:
@@ -149,16 +150,20 @@ def _outlined(
     return _by_person(bodies, contour, ~contour.hidden, index, kind, [color] * len(bodies))
 
 
-def _drafted(session: Session, state: State, bodies: Sequence[Body], camera: Camera, index: int) -> list[Path]:
-    """What one would see of the person whose sizes are being edited, everybody in the poses shown."""
-    draft = state.draft
-    assert draft is not None
-    people = list(bodies)
-    shown = people[draft.person]
-    people[draft.person] = Body(draft.model, rebodied(shown.values, shown.model, draft.model))
+def _with_draft(state: State, bodies: Sequence[Body]) -> list[Body]:
+    """Everybody in the poses shown, the person whose sizes are being edited in the draft's body."""
+    people, draft = list(bodies), state.draft
+    if draft is not None:
+        shown = people[draft.person]
+        people[draft.person] = Body(draft.model, rebodied(shown.values, shown.model, draft.model))
+    return people
+
+
+def _drafted(person: int, people: Sequence[Body], camera: Camera, index: int) -> list[Path]:
+    """What one would see of the person whose sizes are being edited."""
     contour = _traced(people, camera)
     colors = [PREVIEW_COLOR] * len(people)
-    return [p for p in _by_person(people, contour, ~contour.hidden, index, "ghost", colors) if p.person == draft.person]
+    return [p for p in _by_person(people, contour, ~contour.hidden, index, "ghost", colors) if p.person == person]
 
 
 def _by_person(

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.hand import spoken
-from app.screen import Screen
+from app.screen import Screen, spoken
 from app.state import Shown
 from tracker.errors import TrackerError
 from tracker.frame_fit import fit_frame
@@ -79,7 +78,7 @@ class Pinning:
                 f"({place_px[0]:.0f}, {place_px[1]:.0f}); set it where the image shows the joint"
             )
         with self._editing():
-            self._go_to(frame)
+            self._screen.go_to(frame)
             state = self._screen.state
             self._held = _Held(page, person, point, camera, state.pins, state.people, live)
             self._screen.last_save = time.monotonic()
@@ -115,12 +114,8 @@ class Pinning:
             held = self._held
             if held is None or page != held.page:
                 return
-            checkpointed = self._screen.edit_of is held
-            self._held = self._screen.edit_of = None
-            if checkpointed:
-                self._screen.saver.undo()
-                self._screen.refresh_saving()
-            self._screen.show(self._screen.state.frame)
+            self._held = None
+            self._screen.take_back(held)
 
     def finish(self) -> None:
         """End the gesture at hand, if there is one, and save it; called under the lock."""
@@ -136,7 +131,7 @@ class Pinning:
         if not (0 <= frame < self._screen.session.n_frames and 0 <= person < len(self._screen.models)):
             return
         with self._editing():
-            self._go_to(frame)
+            self._screen.go_to(frame)
             pins = list(self._screen.state.pins)
             pins[person] = tuple(
                 p for p in pins[person]
@@ -146,8 +141,7 @@ class Pinning:
                 return
             self._screen.set(pins=tuple(pins))
             what = "remove all pins" if point is None else f"remove pin {spoken(point)}{self._in(camera)}"
-            self._screen.save(what, "manual", object())
-            self._screen.edit_of = None
+            self._screen.save(what, "manual")
 
     def fit(self, frame: int) -> None:
         """Fit the person worked on, and everybody with pins, to pins and edges together.
@@ -158,7 +152,7 @@ class Pinning:
         if not 0 <= frame < self._screen.session.n_frames:
             return
         with self._editing():
-            self._go_to(frame)
+            self._screen.go_to(frame)
             state = self._screen.state
             views = self._screen.frames.evidence_at_hand(frame)
             pinned = [i for i, pins in enumerate(state.pins) if pins]
@@ -170,12 +164,7 @@ class Pinning:
             people = sorted({state.person, *pinned}) if views is not None else pinned
             self._show_fit(people, state.people, state.pins)
             told = " and ".join([*(["pins"] if pinned else []), *(["edges"] if views is not None else [])])
-            self._screen.save(f"fit to {told}", "fitted", object())
-            self._screen.edit_of = None
-
-    def _go_to(self, frame: int) -> None:
-        if frame != self._screen.state.frame:
-            self._screen.show(frame)
+            self._screen.save(f"fit to {told}", "fitted")
 
     def _show_fit(self, fitted: Iterable[int], start: tuple[Shown, ...], pins: Pins) -> None:
         """Fit some people from a start, the others as they stand, and show them."""

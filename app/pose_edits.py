@@ -146,8 +146,7 @@ class PoseEdits:
     def _on(self, person: int, frame: int | None) -> Iterator[BodyModel]:
         """Work on the frame that the user saw; gives the person's model."""
         with self._editing():
-            if frame is not None and frame != self._screen.state.frame and 0 <= frame < self._screen.session.n_frames:
-                self._screen.show(frame)
+            self._screen.go_to(frame)
             yield self._screen.models[person]
 
     def _numbers(self, person: int) -> Array:

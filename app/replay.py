@@ -111,9 +111,7 @@ class Replay:
             for p, new in zip(screen.state.people, poses, strict=True)
         )
         screen.set(people=people, **screen.costs(poses))
-        screen.edit_of = None
-        screen.save(label, "searched", object())
-        screen.edit_of = None
+        screen.save(label, "searched")
 
     def _run(self, number: int) -> Run:
         run = self._runs.find(number)

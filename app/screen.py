@@ -14,6 +14,7 @@ from app.saving import Saver
 from app.state import Shown, State, finite_or_none
 from tracker import posing
 from tracker.body import BodyModel
+from tracker.fit import held
 from tracker.pins import ViewPin
 from tracker.rebody import rebodied
 from tracker.rigid import Array
@@ -68,10 +69,9 @@ class Screen:
 
     def within_locks(self, poses: Sequence[Array]) -> tuple[Array, ...]:
         """Poses, (n_values,) of each person, with what is locked as it is shown."""
-        steps = [m.difference(new, now) for m, new, now in zip(self.models, poses, self.state.poses, strict=True)]
         return tuple(
-            model.retract(now, np.where(self.free(i), step, 0.0)) if self.state.locked[i] else new
-            for i, (model, new, now, step) in enumerate(zip(self.models, poses, self.state.poses, steps, strict=True))
+            held(model, new, now, self.free(i)) if self.state.locked[i] else new
+            for i, (model, new, now) in enumerate(zip(self.models, poses, self.state.poses, strict=True))
         )
 
     def stand(self, R_world_up: Array) -> None:
@@ -140,9 +140,22 @@ class Screen:
         people[person] = Shown(values, "manual")
         self.set(people=tuple(people), **self.costs(tuple(p.values for p in people)), **changes)
 
-    def save(self, label: str, source: str, gesture: object) -> None:
-        """Write the poses shown; calls of one gesture make one entry of the history."""
-        amend = self._edit if self.edit_of is gesture or self.edit_of == gesture else None
+    def go_to(self, frame: int | None) -> None:
+        """Show the frame that the user saw, which a tracker may have left meanwhile; None for the one shown."""
+        if frame is not None and frame != self.state.frame and 0 <= frame < self.session.n_frames:
+            self.show(frame)
+
+    def take_back(self, gesture: object) -> None:
+        """Show the frame as it was before a gesture, which may have been written in part."""
+        if self.edit_of is gesture:
+            self.saver.undo()
+            self.refresh_saving()
+        self.show(self.state.frame)
+
+    def save(self, label: str, source: str, gesture: object = None) -> None:
+        """Write the poses shown; calls of one gesture make one entry of the history, without one each makes its own."""
+        goes_on = gesture is not None and (self.edit_of is gesture or self.edit_of == gesture)
+        amend = self._edit if goes_on else None
         self._edit = self.saver.save(self.state, label, source, amend)
         self.edit_of, self.last_save = gesture, time.monotonic()
         self.refresh_saving()

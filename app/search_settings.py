@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.screen import spoken
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
 from tracker.search import SearchSettings, stages
@@ -122,8 +123,7 @@ def described(settings: TrackSettings) -> dict[str, str]:
     for what, single in (("bound", s.bounds), ("step", s.steps)):
         for name, value in single.items():
             is_length = name.endswith((".x", ".y", ".z"))
-            spoken = name.replace("_", " ").replace(".", " ")
-            found[f"{what} of {spoken}"] = f"{100 * value:.3g} cm" if is_length else f"{np.degrees(value):.3g}°"
+            found[f"{what} of {spoken(name)}"] = f"{100 * value:.3g} cm" if is_length else f"{np.degrees(value):.3g}°"
     return found
 
 

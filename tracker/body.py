@@ -285,8 +285,12 @@ class BodyModel:
 
     def points_world(self, values: Array) -> Array:
         """Positions of the body's points (see `point_names`), (n_points, 3), metres."""
-        T = self.kinematics(values).Ts_world_part[self.point_parts]
-        return np.einsum("nij,nj->ni", T[:, :3, :3], self.points_part) + T[:, :3, 3]
+        return self.points_at(self.kinematics(values), np.arange(len(self.point_parts)))
+
+    def points_at(self, kinematics: Kinematics, points: IntArray) -> Array:
+        """Positions of some of the points, given by index (N,), where the parts are known, (N, 3), metres."""
+        T = kinematics.Ts_world_part[self.point_parts[points]]
+        return np.einsum("nij,nj->ni", T[:, :3, :3], self.points_part[points]) + T[:, :3, 3]
 
     def point_jacobian(self, kinematics: Kinematics, parts: IntArray, points_world: Array) -> Array:
         """Derivative of points fixed to parts by the degrees of freedom.

@@ -69,8 +69,7 @@ class PointTargets:
     def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `Block`."""
         parts = model.point_parts[self.points]
-        T = kinematics.Ts_world_part[parts]
-        points_world = np.einsum("nij,nj->ni", T[:, :3, :3], model.points_part[self.points]) + T[:, :3, 3]
+        points_world = model.points_at(kinematics, self.points)
         J = model.point_jacobian(kinematics, parts, points_world) * self.weights[:, None, None]
         r = (points_world - self.targets_world) * self.weights[:, None]
         return normal_of(r.ravel(), J.reshape(-1, model.n_dofs))

@@ -103,7 +103,7 @@ def scaled(sizes: BodySizes, height_m: float) -> BodySizes:
 
 
 def twin(name: str) -> str | None:
-    """Name of the part on the other side; None for one in the middle."""
+    """Name of the part or joint on the other side; None for one in the middle."""
     for own, other in (_SIDES, _SIDES[::-1]):
         if name.startswith(own):
             return other + name.removeprefix(own)

@@ -63,8 +63,7 @@ class PinBlock:
     def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `fit.Block`."""
         parts = model.point_parts[self.points]
-        T = kinematics.Ts_world_part[parts]
-        points_world = np.einsum("nij,nj->ni", T[:, :3, :3], model.points_part[self.points]) + T[:, :3, 3]
+        points_world = model.points_at(kinematics, self.points)
         Ts_camera_world, K = self._projections
         x = np.einsum("nij,nj->ni", Ts_camera_world[:, :3, :3], points_world) + Ts_camera_world[:, :3, 3]
         J = Ts_camera_world[:, :3, :3] @ model.point_jacobian(kinematics, parts, points_world)  # (N, 3, n_dofs)

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from tracker.body import BodyModel, Joint
 from tracker.confidence import limbs
 from tracker.kinematics import IntArray
+from tracker.measures import twin
 from tracker.orienting import orient
 from tracker.rigid import Array
 
@@ -61,7 +62,7 @@ def mirrored(model: BodyModel, values: Array) -> Array:
     names = {joint.name: i for i, joint in enumerate(model.joints)}
     before = model.kinematics(values).Ts_world_part[:, :3, :3]
     for i, joint in enumerate(model.joints):  # parents first: what is turned in the world stands on its parent
-        other = names.get(_counterpart(joint.name), i)
+        other = names.get(twin(joint.name) or joint.name, i)
         if i == 0 or not np.any(model.dof_joint == i):
             continue
         at, at_other = _turns(model, i), _turns(model, other)
@@ -73,14 +74,6 @@ def mirrored(model: BodyModel, values: Array) -> Array:
             R_parent = model.kinematics(out).Ts_world_part[model.parents[i], :3, :3]
             out = orient(model, out, i, R_parent @ _MIRROR @ R_local @ _MIRROR)
     return model.clip(out)
-
-
-def _counterpart(name: str) -> str:
-    if name.startswith("left_"):
-        return "right_" + name.removeprefix("left_")
-    if name.startswith("right_"):
-        return "left_" + name.removeprefix("right_")
-    return name
 
 
 def _turns(model: BodyModel, joint: int) -> IntArray:

@@ -251,9 +251,7 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
     model = hand.model
     target = hand.camera.back_project(np.asarray(pointer_px) + hand.offset_px, hand.depth_m)
     if hand.moves_body:
-        step = np.zeros(model.n_dofs)
-        step[:3] = target - hand.place_world(hand.values)
-        return model.retract(hand.values, np.where(hand.free, step, 0.0))
+        return _moved_body(hand, target)
     blocks: list[Block] = [
         _UnderPointer(hand, target),
         _rest(hand),
@@ -325,11 +323,16 @@ def push(hand: Grab, pointer_px: Array, values: Array) -> Array:
     depth = max(_NEAREST_PUSH_M, hand.depth_m + _PUSH_GAIN * up_m)
     target = camera.back_project(hand.pointer_px + hand.offset_px, depth)
     if hand.moves_body:
-        step = np.zeros(model.n_dofs)
-        step[:3] = target - hand.place_world(hand.values)
-        return model.retract(hand.values, np.where(hand.free, step, 0.0))
+        return _moved_body(hand, target)
     blocks: list[Block] = [_UnderPointer(hand, target, _PUSH_DEPTH_WEIGHT), _rest(hand)]
     return solve(model, values, blocks, free=hand.free, **_QUICK).values
+
+
+def _moved_body(hand: Grab, target_world: Array) -> Array:
+    """The pose at the grab, moved as a whole so that the grabbed point comes to a place, (3,), metres."""
+    step = np.zeros(hand.model.n_dofs)
+    step[:3] = target_world - hand.place_world(hand.values)
+    return hand.model.retract(hand.values, np.where(hand.free, step, 0.0))
 
 
 def _rest(hand: Grab) -> StayNear:
