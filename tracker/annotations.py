@@ -19,6 +19,7 @@ from typing import Any
 from tracker import store_schema, stored_poses
 from tracker.errors import SessionError
 from tracker.records import (
+    Alternative,
     Change,
     Committed,
     FrameNumbers,
@@ -87,6 +88,15 @@ class AnnotationStore:
             (person, frame),
         )
         return None if row is None else stored_poses.record_of(row)
+
+    def alternatives(self, person: str, frame: int) -> tuple[Alternative, ...]:
+        """Poses that are about as good as the one that a person has in a frame, best first."""
+        rows = self._all(
+            f"SELECT {stored_poses.ALTERNATIVE} FROM poses p JOIN alternatives a ON a.change = p.change "
+            "WHERE p.person = ? AND p.frame = ? ORDER BY a.rank",
+            (person, frame),
+        )
+        return tuple(stored_poses.alternative_of(row) for row in rows)
 
     def frames(self, person: str, within: range = range(1 << 31)) -> list[FrameRow]:
         """The frames of a range in which the person has a pose, ascending, in short; by default of all frames."""
@@ -273,6 +283,10 @@ class AnnotationStore:
             (edit, change.person, change.frame, *content),
         ).lastrowid
         self._show("pose", row, row)
+        self._db.executemany(
+            "INSERT INTO alternatives (change, rank, numbers, model_revision, cost_px) VALUES (?, ?, ?, ?, ?)",
+            [(row, i, *stored_poses.alternative_content_of(a)) for i, a in enumerate(change.alternatives)],
+        )
 
     def _mark(self, edit: int, change: MarkChange) -> None:
         """Write the pose that is there again with other marks: the log holds every state of a frame as a whole."""
@@ -284,6 +298,12 @@ class AnnotationStore:
             (edit, change.keyframe, change.reviewed, change.person, change.frame),
         )
         if found.rowcount:
+            kept = "rank, numbers, model_revision, cost_px"
+            self._db.execute(
+                f"INSERT INTO alternatives (change, {kept}) SELECT ?1, {kept} FROM alternatives "
+                "WHERE change = (SELECT previous FROM pose_changes WHERE id = ?1)",
+                (found.lastrowid,),
+            )
             self._show("pose", found.lastrowid, found.lastrowid)
 
     def _told(self, settings: Mapping[str, Any]) -> int:

@@ -47,6 +47,18 @@ class PoseRecord:
 
 
 @dataclass(frozen=True, eq=False)
+class Alternative:
+    """Another pose of a person in a frame that is about as good as the one that was taken."""
+
+    values: Array
+    """Pose, (n_values,), in the order of the body model's `value_names`."""
+    model_revision: int
+    """The body model that the values belong to."""
+    cost_px: float | None = None
+    """Mean cost over the views with everybody else as they were found, px; None where nobody has computed it."""
+
+
+@dataclass(frozen=True, eq=False)
 class PoseChange:
     """Set the pose of a person in a frame, or clear it."""
 
@@ -54,6 +66,8 @@ class PoseChange:
     frame: int
     pose: PoseRecord | None
     """The new pose; None clears."""
+    alternatives: tuple[Alternative, ...] = ()
+    """Poses that are about as good, best first, for a person to choose from; kept as long as the pose is shown."""
 
 
 class MarkChange(NamedTuple):

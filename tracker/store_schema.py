@@ -5,7 +5,7 @@ Upgrading adds tables and columns and never rewrites a row: the log of edits is 
 
 import sqlite3
 
-VERSION = 4
+VERSION = 5
 
 _SCHEMA = """
 CREATE TABLE edits (
@@ -45,6 +45,12 @@ CREATE INDEX pose_changes_edit ON pose_changes (edit);
 CREATE TABLE poses (
     person TEXT, frame INTEGER, change INTEGER NOT NULL REFERENCES pose_changes, PRIMARY KEY (person, frame)
 ) WITHOUT ROWID;
+CREATE TABLE alternatives (                                      -- poses about as good as that of a change
+    change INTEGER NOT NULL REFERENCES pose_changes, rank INTEGER NOT NULL,
+    model_revision INTEGER NOT NULL REFERENCES model_revisions,
+    numbers BLOB NOT NULL,                                       -- little-endian float64
+    cost_px REAL, PRIMARY KEY (change, rank)
+) WITHOUT ROWID;
 CREATE TABLE pin_changes (
     id INTEGER PRIMARY KEY AUTOINCREMENT,
     edit INTEGER NOT NULL REFERENCES edits,
@@ -72,10 +78,20 @@ _UPGRADES = {
         "ALTER TABLE pose_changes ADD COLUMN told INTEGER REFERENCES told",
     ),
     3: ("ALTER TABLE pose_changes ADD COLUMN reviewed INTEGER",),
+    4: (
+        "CREATE TABLE alternatives (change INTEGER NOT NULL REFERENCES pose_changes, rank INTEGER NOT NULL, "
+        "model_revision INTEGER NOT NULL REFERENCES model_revisions, numbers BLOB NOT NULL, cost_px REAL, "
+        "PRIMARY KEY (change, rank)) WITHOUT ROWID",
+    ),
 }
 # Columns of the changes of poses that a store of each older version lacks. Where it must not be written it is read
 # through temporary views, which stand in front of the tables of their names.
-_LACKING = {1: ("views_px", "parts_px", "remark", "told", "reviewed"), 2: ("told", "reviewed"), 3: ("reviewed",)}
+_LACKING = {
+    1: ("views_px", "parts_px", "remark", "told", "reviewed"),
+    2: ("told", "reviewed"),
+    3: ("reviewed",),
+    4: (),
+}
 
 
 def version(db: sqlite3.Connection) -> int:
@@ -104,8 +120,11 @@ def show_as_new(db: sqlite3.Connection) -> int:
     found = version(db)
     if found not in _LACKING:
         return found
-    nothing = ", ".join(f"NULL AS {column}" for column in _LACKING[found])
-    db.execute(f"CREATE TEMP VIEW pose_changes AS SELECT *, {nothing} FROM main.pose_changes")
+    if _LACKING[found]:
+        nothing = ", ".join(f"NULL AS {column}" for column in _LACKING[found])
+        db.execute(f"CREATE TEMP VIEW pose_changes AS SELECT *, {nothing} FROM main.pose_changes")
+    nothing = ", ".join(f"NULL AS {column}" for column in ("change", "rank", "model_revision", "numbers", "cost_px"))
+    db.execute(f"CREATE TEMP VIEW alternatives AS SELECT {nothing} WHERE 0")
     if "told" in _LACKING[found]:
         db.execute("CREATE TEMP VIEW told AS SELECT NULL AS id, NULL AS settings WHERE 0")
     return VERSION

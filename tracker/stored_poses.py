@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tracker.records import SOURCES, STATUSES, FrameNumbers, FrameRow, PoseRecord
+from tracker.records import SOURCES, STATUSES, Alternative, FrameNumbers, FrameRow, PoseRecord
 from tracker.rigid import Array
 
 SHOWN = "FROM poses p JOIN pose_changes c ON c.id = p.change"
@@ -25,6 +25,8 @@ NUMBERS = "c.frame, c.numbers, c.cost_px, c.views_px, c.model_revision"
 """Columns that `numbers_of` reads."""
 CONTENT = "numbers, sources, keyframe, status, cost_px, model_revision, views_px, parts_px, remark, reviewed, told"
 """Columns that `content_of` writes, and `told`, which names what the program was told."""
+ALTERNATIVE = "a.numbers, a.model_revision, a.cost_px"
+"""Columns that `alternative_of` reads; `a` is the alternative."""
 UNMARKED = "numbers, sources, status, cost_px, model_revision, views_px, parts_px, remark, told, settings"
 """Columns that stay as they are when a pose is marked."""
 
@@ -51,6 +53,18 @@ def numbers_of(row: Sequence[Any]) -> FrameNumbers:
     """The numbers of a row of `NUMBERS`."""
     frame, numbers, cost, views, revision = row
     return FrameNumbers(frame, _array(numbers), cost, _costs(views), revision)
+
+
+def alternative_of(row: Sequence[Any]) -> Alternative:
+    """The other pose of a row of `ALTERNATIVE`."""
+    numbers, revision, cost = row
+    return Alternative(_array(numbers), revision, cost)
+
+
+def alternative_content_of(pose: Alternative) -> tuple[Any, ...]:
+    """What a row keeps of another pose: its numbers, model revision and cost."""
+    assert np.all(np.isfinite(pose.values))
+    return np.asarray(pose.values, dtype="<f8").tobytes(), pose.model_revision, pose.cost_px
 
 
 def content_of(pose: PoseRecord) -> tuple[Any, ...]:

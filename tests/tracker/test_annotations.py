@@ -11,7 +11,7 @@ import pytest
 
 from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
-from tracker.records import FrameRow, MarkChange, Pin, PinChange, PoseChange, PoseRecord
+from tracker.records import Alternative, FrameRow, MarkChange, Pin, PinChange, PoseChange, PoseRecord
 
 
 @pytest.fixture
@@ -101,6 +101,44 @@ def test_a_mark_leaves_the_pose_as_it_is(store):
     store.undo()
     store.undo()
     assert not store.pose("ann", 3).keyframe
+
+
+def first_of(alternatives):
+    return [(a.values[0], a.cost_px) for a in alternatives]
+
+
+def test_alternatives_come_and_go_with_their_pose(store, path):
+    other = Alternative(np.array([7.0, 2.0, 1 / 3]), 1, 1.5)
+    third = Alternative(np.array([8.0, 2.0, 1 / 3]), 1)
+    store.commit("track", [PoseChange("ann", 3, pose(1.0), (other, third)), put(4, 1.0)])
+    assert first_of(store.alternatives("ann", 3)) == [(7.0, 1.5), (8.0, None)]
+    np.testing.assert_array_equal(store.alternatives("ann", 3)[0].values, other.values)
+    assert store.alternatives("ann", 4) == store.alternatives("bob", 3) == ()
+    store.commit("take the other", [PoseChange("ann", 3, pose(7.0), (Alternative(pose(1.0).values, 1, 1.4),))])
+    assert first_of(store.alternatives("ann", 3)) == [(1.0, 1.4)]
+    store.commit("drag", [put(3, 2.0)])
+    assert store.alternatives("ann", 3) == ()
+    store.undo()
+    store.undo()
+    assert first_of(store.alternatives("ann", 3)) == [(7.0, 1.5), (8.0, None)]
+    store.close()
+    assert first_of(AnnotationStore(path, read_only=True).alternatives("ann", 3)) == [(7.0, 1.5), (8.0, None)]
+
+
+def test_a_marked_pose_keeps_its_alternatives(store):
+    store.commit("track", [PoseChange("ann", 3, pose(1.0), (Alternative(pose(7.0).values, 1, 1.5),))])
+    store.commit("review", [MarkChange("ann", 3, False, True)])
+    store.commit("verify", [MarkChange("ann", 3, True, True), MarkChange("ann", 9, True, True)])
+    assert first_of(store.alternatives("ann", 3)) == [(7.0, 1.5)]
+    store.undo()
+    assert first_of(store.alternatives("ann", 3)) == [(7.0, 1.5)]
+
+
+def test_a_keyframe_that_a_program_leaves_alone_gets_no_alternatives(store):
+    store.commit("hand", [put(3, 1.0, keyframe=True)])
+    other = Alternative(pose(7.0).values, 1)
+    store.commit("track", [PoseChange("ann", 3, pose(2.0), (other,))], by_program=True)
+    assert store.alternatives("ann", 3) == ()
 
 
 def test_a_new_pose_is_not_reviewed(store):

@@ -7,7 +7,7 @@ import pytest
 from tracker import store_schema
 from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
-from tracker.records import MarkChange, Pin, PoseChange, PoseRecord
+from tracker.records import Alternative, MarkChange, Pin, PoseChange, PoseRecord
 from tracker.store_schema import VERSION
 
 
@@ -50,6 +50,38 @@ def version_3(path):
     db.executescript(Path(__file__).with_name("store_version_3.sql").read_text("utf-8"))
     db.close()
     return path
+
+
+@pytest.fixture
+def version_4(version_3):
+    """The same store as the program of version 4 has left it, one pose reviewed."""
+    db = sqlite3.connect(version_3)
+    for statement in store_schema._UPGRADES[3]:
+        db.execute(statement)
+    db.execute("UPDATE pose_changes SET reviewed = 1 WHERE frame = 3")
+    db.execute("PRAGMA user_version = 4")
+    db.commit()
+    db.close()
+    return version_3
+
+
+@pytest.mark.parametrize("read_only", [False, True])
+def test_in_version_4_there_were_no_alternatives(version_4, read_only):
+    before = version_4.read_bytes()
+    store = AnnotationStore(version_4, read_only=read_only)
+    assert [(r.frame, r.reviewed) for r in store.frames("ann")] == [(1, True), (2, False), (3, True)]
+    assert store.alternatives("ann", 3) == ()
+    store.close()
+    assert (version_4.read_bytes() == before) == read_only
+
+
+def test_a_store_of_version_4_takes_alternatives(version_4):
+    store = AnnotationStore(version_4)
+    here = store.pose("ann", 3)
+    store.commit("track", [PoseChange("ann", 3, here, (Alternative(here.values + 1, here.model_revision, 2.0),))])
+    store.close()
+    (found,) = AnnotationStore(version_4).alternatives("ann", 3)
+    np.testing.assert_array_equal(found.values, here.values + 1)
 
 
 @pytest.mark.parametrize("read_only", [False, True])
