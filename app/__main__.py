@@ -215,7 +215,7 @@ def track(
     from app import headless
     from tracker.predict import PredictSettings
     from tracker.search import SearchSettings
-    from tracker.track import TrackSettings
+    from tracker.track_settings import TrackSettings
 
     at = commands.target(session, person, several=True)
     wanted: Sequence[int] = commands.frame_range(frames, at.session)

@@ -21,7 +21,8 @@ from tracker.recording import Recording
 from tracker.refine import ContourMatch
 from tracker.rigid import Array
 from tracker.search import BEFORE_REFINEMENT, SearchSettings, search
-from tracker.track import TrackSettings, track_chamfer
+from tracker.track import track_chamfer
+from tracker.track_settings import TrackSettings
 
 _CANDIDATES = 100
 _PIPELINE_FRAMES = range(5, 45)
@@ -130,7 +131,7 @@ def _searched_and_refined(frame: BenchFrame, start: Array) -> Fit:
 
 
 def _refined(frame: BenchFrame, start: Array, predicted: Array) -> Fit:
-    """Refine as the tracker does; see `tracker.track`."""
+    """Refine as the tracker does; see `tracker.scene`."""
     model = frame.model
     match = ContourMatch(frame.views, [Body(model, start)])
     sigma = np.where(model.dof_is_length, _SETTINGS.trust_m, _SETTINGS.trust_rad)

@@ -35,7 +35,7 @@ from tracker.body import BodyModel
 from tracker.records import FrameNumbers
 from tracker.rigid import Array
 from tracker.session import Session
-from tracker.track import TrackSettings
+from tracker.track_settings import TrackSettings
 
 
 class Controller:

@@ -19,7 +19,8 @@ from tracker.records import PoseChange
 from tracker.rigid import Array
 from tracker.session import Person
 from tracker.session_lock import SessionLock
-from tracker.track import PoseEstimate, TrackSettings, track_chamfer
+from tracker.track import PoseEstimate, track_chamfer
+from tracker.track_settings import TrackSettings
 
 _SAVE_FRAMES = 10
 """A tracking run is on disk at least every so many frames."""

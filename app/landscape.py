@@ -13,7 +13,7 @@ from tracker.body import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence import ViewEvidence
 from tracker.rigid import Array
-from tracker.track import TrackSettings, pose_cost
+from tracker.track_settings import TrackSettings, pose_cost
 
 SAMPLES = 121
 _REACH_M, _REACH_RAD = 0.5, float(np.pi)

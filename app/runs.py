@@ -10,7 +10,7 @@ from tracker.body import BodyModel
 from tracker.contours import FloatArray
 from tracker.rigid import Array
 from tracker.search import SearchStep, Stage, stages
-from tracker.track import TrackSettings
+from tracker.track_settings import TrackSettings
 
 KEPT_STEPS = 10_000
 """Steps of a run that are kept at most; beyond, every other one that found nothing better is dropped."""

@@ -30,7 +30,8 @@ from tracker.records import (
 )
 from tracker.rigid import Array
 from tracker.session import Session
-from tracker.track import PoseEstimate, TrackSettings
+from tracker.track import PoseEstimate
+from tracker.track_settings import TrackSettings
 
 _WORST_FIRST = ("lost", "doubtful", "good", "")
 _BY_HAND = ("manual", "pinned", "fitted")

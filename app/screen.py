@@ -19,7 +19,7 @@ from tracker.pins import ViewPin
 from tracker.rebody import rebodied
 from tracker.rigid import Array
 from tracker.session import Session
-from tracker.track import pose_cost
+from tracker.track_settings import pose_cost
 
 
 class Screen:

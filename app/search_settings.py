@@ -11,7 +11,7 @@ from app.screen import spoken
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
 from tracker.search import SearchSettings, stages
-from tracker.track import TrackSettings
+from tracker.track_settings import TrackSettings
 
 _PLAIN = ("bound_rad", "bound_m", "step_rad", "step_m")
 

@@ -11,7 +11,7 @@ from tracker.errors import TrackerError
 from tracker.predict import MOST_ORDER, PredictSettings
 from tracker.recover import RecoverSettings
 from tracker.search import SearchSettings
-from tracker.track import Estimation, TrackSettings
+from tracker.track_settings import Estimation, TrackSettings
 
 _METHODS: dict[Estimation, str] = {"refine": "refine, else search", "search": "search alone (paper)"}
 _ORDERS = ("stays", "constant velocity", "constant acceleration")

@@ -9,7 +9,7 @@ from app.view_choice import View3d
 from tracker.body import BodyModel
 from tracker.pins import ViewPin
 from tracker.rigid import Array
-from tracker.track import TrackSettings
+from tracker.track_settings import TrackSettings
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,8 @@ from tracker.annotations import AnnotationStore
 from tracker.records import PoseChange, PoseRecord
 from tracker.rigid import Array
 from tracker.session import Person
-from tracker.track import PoseEstimate, TrackSettings
+from tracker.track import PoseEstimate
+from tracker.track_settings import TrackSettings
 
 Keyframes = Mapping[int, Mapping[int, Array]]
 """Poses that a tracker takes as they are, by frame and index of the person."""

@@ -10,7 +10,8 @@ from app.state import Shown, TrackState, finite_or_none
 from tracker import confidence
 from tracker.errors import TrackerError
 from tracker.rigid import Array
-from tracker.track import PoseEstimate, TrackSettings, track_chamfer
+from tracker.track import PoseEstimate, track_chamfer
+from tracker.track_settings import TrackSettings
 
 _SAVE_S = 0.5
 """A running tracker is on disk at least this often, and writes no more often of its own accord."""

@@ -59,10 +59,12 @@ ORDER = [
     ["tracker.assemble", "tracker.evidence", "tracker.simulate"],
     ["tracker.matching"],
     ["tracker.chamfer", "tracker.predict", "tracker.appearance", "tracker.refine", "tracker.apart"],
+    ["tracker.sharing", "tracker.surroundings"],
     ["tracker.search", "tracker.confidence"],
-    ["tracker.recover", "tracker.pose_edits"],
+    ["tracker.recover", "tracker.pose_edits", "tracker.memory"],
+    ["tracker.track_settings"],
+    ["tracker.scene", "tracker.frame_fit"],
     ["tracker.track"],
-    ["tracker.frame_fit"],
     # The program: what the screen shows, then who may change it, then who shows it.
     [
         "app",
@@ -204,5 +206,5 @@ def test_formats_know_no_session():
 
 def test_the_cost_knows_no_part_edges():
     """Where parts meet is drawn for the eye and never matched (GD96 Sect. 5)."""
-    for module in ("tracker.chamfer", "tracker.search", "tracker.track"):
+    for module in ("tracker.chamfer", "tracker.search", "tracker.scene", "tracker.track"):
         assert "tracker.occlusion" not in OWN[module]

@@ -176,11 +176,7 @@ def accepted(view: ViewEvidence, predicted_px: FloatArray, threshold_px: float |
         threshold_px: mean distance of a segment to them up to which it is accepted, px; by default half of theta.
     """
     assert view.segments is not None
-    chosen = accept(view.segments, predicted_px, threshold_px or ACCEPTED_SHARE * view.theta_px)
-    nothing = np.zeros((view.camera.height, view.camera.width), np.uint8)
-    points, normals, found = _matched_edges(view.segments, chosen, nothing)
-    distance = distance_image(found, 2 * view.theta_px)
-    return replace(view, points_px=points, normals=normals, distance=distance, accepted=chosen)
+    return with_segments(view, accept(view.segments, predicted_px, threshold_px or ACCEPTED_SHARE * view.theta_px))
 
 
 def unfiltered(view: ViewEvidence) -> ViewEvidence:
@@ -188,12 +184,16 @@ def unfiltered(view: ViewEvidence) -> ViewEvidence:
     if view.segments is None or view.accepted is None or view.accepted.all():
         return view
     everything = np.ones(len(view.accepted), np.bool_) if view.still is None else ~view.still
+    seen = with_segments(view, everything)
+    return replace(seen, accepted=None) if view.still is None else seen
+
+
+def with_segments(view: ViewEvidence, chosen: NDArray[np.bool_]) -> ViewEvidence:
+    """The same view with only the edges of some segments, (S,); its segments must be known."""
     nothing = np.zeros((view.camera.height, view.camera.width), np.uint8)
-    points, normals, found = _matched_edges(view.segments, everything, nothing)
+    points, normals, found = _matched_edges(view.segments, chosen, nothing)
     distance = distance_image(found, 2 * view.theta_px)
-    return replace(
-        view, points_px=points, normals=normals, distance=distance, accepted=None if view.still is None else everything
-    )
+    return replace(view, points_px=points, normals=normals, distance=distance, accepted=chosen)
 
 
 def _matched_edges(

@@ -19,7 +19,7 @@ from tracker.fit import Block, of_values, solve
 from tracker.pins import PinBlock, ViewPin, pin_block
 from tracker.refine import ContourMatch
 from tracker.rigid import Array
-from tracker.track import TrackSettings, prior_blocks
+from tracker.track_settings import TrackSettings, prior_blocks
 
 _REACHES = (2.0, 1.0)
 """Outlier distances of one round after the other, in those of the settings."""

@@ -71,10 +71,23 @@ def accept(segments: Segments, pieces_px: FloatArray, threshold_px: float) -> ND
     Returns:
         (S,) bool.
     """
-    accepted = np.zeros(len(segments.firsts) - 1, np.bool_)
-    if len(accepted) and len(pieces_px):
-        _accept(segments, np.ascontiguousarray(pieces_px, np.float32), threshold_px, MAX_ANGLE_RAD, accepted)
-    return accepted
+    total, count = _summed(segments, pieces_px, 2.0 * threshold_px)
+    return np.asarray(total <= threshold_px * count)
+
+
+def distances(segments: Segments, pieces_px: FloatArray, reach_px: float) -> NDArray[np.float64]:
+    """Mean distance of each segment, (S,), px, to contours as `accept` takes it, each pixel's cut off at a reach."""
+    total, count = _summed(segments, pieces_px, reach_px)
+    return total / np.maximum(count, 1)
+
+
+def _summed(segments: Segments, pieces_px: FloatArray, reach_px: float) -> tuple[FloatArray, IntArray]:
+    """Summed distances of the pixels of each segment that are asked, (S,), px, and their number, (S,)."""
+    n = len(segments.firsts) - 1
+    total, count = np.empty(n, np.float32), np.empty(n, np.int64)
+    if n:
+        _sum_distances(segments, np.ascontiguousarray(pieces_px, np.float32), reach_px, MAX_ANGLE_RAD, total, count)
+    return total, count
 
 
 def pixels_of(segments: Segments, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -173,12 +186,12 @@ def _cut(points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_], fir
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _accept(
-    segments: Segments, pieces: FloatArray, threshold: float, max_angle: float, accepted: NDArray[np.bool_]
+def _sum_distances(
+    segments: Segments, pieces: FloatArray, reach: float, max_angle: float, totals: FloatArray, counts: IntArray
 ) -> None:
-    """See `accept`. Pieces are filed by cells as large as the largest distance that counts."""
+    """See `_summed`. Pieces are filed by cells as large as the largest distance that counts."""
     points, normals, firsts = segments.points_px, segments.normals, segments.firsts
-    far = np.float32(2.0 * threshold)
+    far = np.float32(reach)
     across = np.float32(np.sin(max_angle) ** 2)
     low_u, low_v = points[:, 0].min() - far, points[:, 1].min() - far
     columns = int((points[:, 0].max() + far - low_u) / far) + 1
@@ -191,7 +204,7 @@ def _accept(
         if 0 <= r < rows and 0 <= c < columns:
             following[k] = heads[r, c]
             heads[r, c] = k
-    for s in range(accepted.shape[0]):
+    for s in range(totals.shape[0]):
         first, last = firsts[s], firsts[s + 1]
         total, count = np.float32(0.0), 0
         for i in range(first, last, _STRIDE):
@@ -214,4 +227,4 @@ def _accept(
                         k = following[k]
             total += np.sqrt(best)
             count += 1
-        accepted[s] = total <= threshold * count
+        totals[s], counts[s] = total, count

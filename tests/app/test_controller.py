@@ -10,7 +10,7 @@ from hands import FRONT, PAGE, drag, pixel_of, wait_for
 from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
 from tracker.search import SearchSettings
-from tracker.track import TrackSettings
+from tracker.track_settings import TrackSettings
 
 
 def test_a_fresh_session_shows_a_draft_that_is_not_stored(opened):

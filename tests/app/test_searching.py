@@ -8,7 +8,7 @@ from hands import drag, wait_for
 
 from tracker.errors import TrackerError
 from tracker.search import SearchSettings
-from tracker.track import TrackSettings
+from tracker.track_settings import TrackSettings
 
 QUICK = TrackSettings(search=SearchSettings(passes=(1.0,), max_expansions=3))
 

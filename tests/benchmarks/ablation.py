@@ -30,7 +30,8 @@ from tracker.refine import MatchSettings
 from tracker.search import SearchSettings
 from tracker.session import CameraSource, load_session
 from tracker.simulate import simulate
-from tracker.track import TrackSettings, track_chamfer
+from tracker.track import track_chamfer
+from tracker.track_settings import TrackSettings
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "ablation.md"
 DEFAULT = TrackSettings()

@@ -32,7 +32,8 @@ from tracker.references import read_joints
 from tracker.rigid import Array
 from tracker.session import load_session
 from tracker.simulate import simulate
-from tracker.track import TrackSettings, track_chamfer
+from tracker.track import track_chamfer
+from tracker.track_settings import TrackSettings
 
 VGA, SMALL = (640, 480), (320, 240)
 FIT = (

@@ -25,7 +25,7 @@ from tracker.footage import open_footage
 from tracker.references import read_joints
 from tracker.session import CameraSource, Session, load_session, save_session
 from tracker.simulate.encode import VideoWriter
-from tracker.track import TrackSettings
+from tracker.track_settings import TrackSettings
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"
 EVERY = 100

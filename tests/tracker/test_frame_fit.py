@@ -16,7 +16,7 @@ from tracker.pins import ViewPin
 from tracker.recording import Recording
 from tracker.references import read_joints
 from tracker.session import load_session
-from tracker.track import TrackSettings
+from tracker.track_settings import TrackSettings
 
 GAVRILA = load_model("gavrila22")
 CAMERAS = cameras_around(3)

@@ -14,7 +14,8 @@ from tracker.predict import predict
 from tracker.recording import Recording
 from tracker.session import Session
 from tracker.simulate.record import simulate
-from tracker.track import TrackSettings, track_chamfer
+from tracker.track import track_chamfer
+from tracker.track_settings import TrackSettings
 
 N = 6
 BAD = 3

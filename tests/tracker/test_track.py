@@ -15,7 +15,8 @@ from tracker.recording import Recording
 from tracker.references import read_joints
 from tracker.search import SearchSettings
 from tracker.session import CameraSource
-from tracker.track import TrackSettings, pose_cost, search_frame, track_chamfer
+from tracker.track import track_chamfer
+from tracker.track_settings import TrackSettings, pose_cost, search_frame
 
 COARSE = TrackSettings(
     estimate="search", search=SearchSettings(passes=(1.0,)), predict=PredictSettings(order=0), recover=None
@@ -199,7 +200,7 @@ def test_what_is_locked_is_neither_refined_nor_searched(gavrila, monkeypatch):
     truth = dancing(gavrila, 4, jump_at=2)
     views = [dressed([Body(gavrila, v)], cameras_around(4), SUIT) for v in truth]
     searched = []
-    monkeypatch.setattr("tracker.track.search_limbs", lambda m, due, fit, *_: searched.extend(due) or fit)
+    monkeypatch.setattr("tracker.scene.search_limbs", lambda m, due, fit, *_: searched.extend(due) or fit)
     free = ~np.array([name.startswith(("left_shoulder", "left_elbow")) for name in gavrila.dof_names])
     start = truth[0].copy()
     outside = gavrila.dof_names.index("left_elbow.extension")

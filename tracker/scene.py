@@ -1,0 +1,262 @@
+"""One frame of a recording: its evidence, and where everybody stands so far.
+
+The prediction of each person is first refined on the edges around it (`refine`), the others standing where they are as
+far as is known (GD96 Fig. 2), then everybody once more with all others found. Only where the outcome is not credible
+(`confidence`) the best-first search of the paper is spent, on the whole body, and proposals on single limbs
+(`recover`); the cheapest refined pose wins.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker import confidence
+from tracker.apart import KeepBodiesApart
+from tracker.appearance import Colors
+from tracker.body import Body
+from tracker.confidence import Limb, Quality, Status
+from tracker.evidence import ACCEPTED_SHARE, ViewEvidence, unfiltered
+from tracker.fit import Block, Fit, covariance, held, solve
+from tracker.memory import Memory
+from tracker.recover import Judge, search_limbs
+from tracker.refine import WORTH_A_STEP, ContourMatch, PartCosts
+from tracker.rigid import Array
+from tracker.scenery import Scenery
+from tracker.search import BEFORE_REFINEMENT, SearchSettings
+from tracker.sharing import own_views
+from tracker.surroundings import px_per_m, visible_outline
+from tracker.track_settings import TrackSettings, prior_blocks, search_frame
+
+_ITERATIONS = 15
+_TOLERANCE = 1e-3  # rad or metres: a tenth of a pixel on a limb
+_AT_ONCE = 2
+"""Limbs that are searched in a frame at most, the likeliest to be lost first; the others come in the next frames."""
+_MOVED_RAD, _ANEW_RAD = 0.05, 0.3
+"""A search of a limb was not in vain where a joint turned farther; the limb is elsewhere where it turned this far."""
+_STILL_M = 0.002
+"""The joint refinement ends when nobody moves farther, metres."""
+
+
+class Found(NamedTuple):
+    """One person on one frame."""
+
+    status: Status
+    remark: str
+    parts_px: Array
+    covariance: Array
+    evaluations: int
+    quality: Quality | None
+
+
+class _Seen(NamedTuple):
+    """One person as far as they are found."""
+
+    match: ContourMatch
+    """The evidence that they were fitted to."""
+    fit: Fit
+    anew: tuple[Limb, ...] | None = None
+    """Limbs whose prediction is not trusted, where the person was searched anew; None where that was not needed."""
+    quality: Quality | None = None
+    """What the evidence says of the fit, where that has been asked."""
+    evaluations: int = 0
+    """Poses that the best-first search scored."""
+    remarks: tuple[str, ...] = ()
+    """What was done to find them."""
+
+
+class Scene:
+    """One frame: its evidence, and where everybody stands so far."""
+
+    def __init__(
+        self, views: Sequence[ViewEvidence], memories: Sequence[Memory], poses: Sequence[Array], settings: TrackSettings
+    ) -> None:
+        """Begin with everybody where they are expected.
+
+        Args:
+            views: the evidence of the frame.
+            memories: of each person.
+            poses: where each is expected, or given, (n_values,).
+            settings: of the tracker.
+        """
+        self.poses = list(poses)
+        """Where each person stands so far, (n_values,)."""
+        self._views, self._settings = views, settings
+        self._memories, self._models, self._predicted = memories, [m.model for m in memories], tuple(poses)
+        self._thetas = np.array([v.outlier_px(settings.theta_px) for v in views])
+
+    def teach(self, scenery: Sequence[Scenery]) -> None:
+        """Show what remembers the room the edges away from everybody, of views whose silhouette nothing tells."""
+        for view, room in zip(self._views, scenery, strict=True):
+            if view.segments is not None and view.silhouette is None:
+                pieces = visible_outline(self._bodies(), view.camera)
+                room.learn(view.segments, view.corner_px, view.camera.size, pieces, ACCEPTED_SHARE * view.theta_px)
+
+    def colors(self, person: int) -> Colors:
+        """The colours of this frame under a person."""
+        return Colors(self._views, *self._around(person))
+
+    def held(self, person: int) -> Found:
+        """Judge nobody: a pose that was given is taken as it is."""
+        n, costs = self._models[person].n_dofs, self._match(person, self._views).part_costs(self.poses[person])
+        return Found("good", "", self._parts_px(costs), np.zeros((n, n)), 0, None)
+
+    def estimate(self, people: Sequence[int]) -> dict[int, Found]:
+        """Find the poses of some people, one after the other, then together; they take their places in `poses`."""
+        if self._settings.estimate == "search":
+            return {p: self._judged(p, self._searched(p)) for p in people}
+        seen = {p: self._refined(p) for p in people}  # the others as found, or as expected
+        self._refine_together(seen)
+        seen = {p: self._recovered(p, s) for p, s in seen.items()}
+        if any(s.anew is not None for s in seen.values()):
+            self._refine_together(seen)
+        return {p: self._judged(p, s) for p, s in seen.items()}
+
+    def _searched(self, person: int) -> _Seen:
+        """Search a person by best-first search alone."""
+        match = self._match(person, self._views)
+        evaluations = self._search(person, self._settings.search)
+        blocks = [match, *self._priors(person)]
+        fit = solve(self._models[person], self.poses[person], blocks, self._memories[person].free, max_iterations=0)
+        return _Seen(match, fit, evaluations=evaluations)
+
+    def _refined(self, person: int, before: _Seen | None = None) -> _Seen:
+        """Refine a person from where they stand, as they were seen before if they were."""
+        anew = None if before is None else before.anew
+        views = self._views if anew is None else [unfiltered(v) for v in self._views]
+        match = self._match(person, views, everywhere=anew is not None)
+        blocks = [match, *self._priors(person, anew or ())]
+        model, free = self._models[person], self._memories[person].free
+        fit = solve(model, self.poses[person], blocks, free, _ITERATIONS, _TOLERANCE)
+        self.poses[person] = fit.values
+        return _Seen(match, fit) if before is None else before._replace(match=match, fit=fit, quality=None)
+
+    def _refine_together(self, seen: dict[int, _Seen]) -> None:
+        """Refine people again and again, each with the others where they were found, until nobody moves."""
+        for _ in range(self._settings.rounds if len(self._models) > 1 else 0):
+            moved_m = 0.0
+            for person, before in seen.items():
+                seen[person] = self._refined(person, before)
+                model, was, now = self._models[person], before.fit.values, seen[person].fit.values
+                moved = np.linalg.norm(model.points_world(now) - model.points_world(was), axis=1)
+                moved_m = max(moved_m, float(moved.max()))
+            if moved_m < _STILL_M:
+                break
+
+    def _recovered(self, person: int, seen: _Seen) -> _Seen:
+        """Search what the refinement alone did not find, if anything, among all edges.
+
+        The prediction may have refused the right ones.
+        """
+        memory, settings = self._memories[person], self._settings
+        found = self._quality(person, seen)
+        seen = seen._replace(quality=found)
+        blind = not any(len(v.points_px) for v in self._views)  # then there is nothing to search in
+        if settings.recover is None or blind or not (found.suspects or found.body_lost):
+            return seen
+        model, free = memory.model, memory.free
+        suspects = tuple(x for name in found.suspects for x in memory.limbs if x.name == name)  # not those locked
+        priors = self._priors(person, suspects)
+        views = self._own([unfiltered(v) for v in self._views], person)
+        bodies, index = self._around(person)
+        match = ContourMatch(views, bodies, index, settings.match, settings.theta_px, everywhere=True)
+        judge = Judge(match, priors, Colors(views, bodies, index), memory.known, settings.recover, free)
+        fit = solve(model, seen.fit.values, [match, *priors], free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
+        remarks: list[str] = []
+        evaluations = 0
+        if found.body_lost:
+            evaluations, fit = self._search_body(person, fit, judge)
+            remarks.append("body searched anew")
+        due = [x for x in suspects if memory.may_search(x)][:_AT_ONCE]
+        others = (memory.past[-1], self._predicted[person])
+        better = search_limbs(model, due, fit, others, judge, _ITERATIONS)
+        turned = np.abs(model.difference(better.values, fit.values))
+        for limb in due:
+            memory.searched(limb, found=turned[limb.dofs].max() > _MOVED_RAD)
+            if turned[limb.dofs].max() > _ANEW_RAD:
+                remarks.append(f"{confidence.spoken(limb.name)} searched anew")
+        self.poses[person] = better.values
+        return _Seen(match, better, suspects, None, evaluations, tuple(remarks))
+
+    def _judged(self, person: int, seen: _Seen) -> Found:
+        """Put a person in the pose that was found, with the judgement of it."""
+        self.poses[person] = seen.fit.values
+        found = seen.quality or self._quality(person, seen)
+        costs = seen.match.part_costs(seen.fit.values)
+        return Found(
+            confidence.judge(found), ", ".join(seen.remarks) or confidence.reason(found), self._parts_px(costs),
+            covariance(self._models[person], seen.fit), seen.evaluations, found,
+        )  # fmt: skip
+
+    def _priors(self, person: int, suspects: Sequence[Limb] = ()) -> list[Block]:
+        """What holds a pose besides the image: its prediction, but for limbs that seem lost, how people bend, and the
+        others."""
+        settings, model = self._settings, self._models[person]
+        sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
+        for limb in suspects:
+            assert settings.recover is not None
+            sigma[limb.dofs] = settings.recover.trust_rad
+        blocks = prior_blocks(model, self._predicted[person], sigma)
+        if len(self._models) > 1 and settings.apart > 0:
+            blocks.append(KeepBodiesApart(self._bodies(), person, settings.apart))
+        return blocks
+
+    def _search_body(self, person: int, fit: Fit, judge: Judge) -> tuple[int, Fit]:
+        """Best-first search from the prediction and from the last good pose; the best of what refines from there."""
+        memory, predicted, best, evaluations = self._memories[person], self._predicted[person], fit, 0
+        for start in (predicted, memory.last_good):
+            self.poses[person] = held(memory.model, start, predicted, memory.free)
+            evaluations += self._search(person, BEFORE_REFINEMENT)
+            blocks, here = [judge.match, *judge.priors], self.poses[person]
+            refined = solve(memory.model, here, blocks, memory.free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
+            if judge.cost(refined) < judge.cost(best):
+                best = refined
+        self.poses[person] = best.values
+        return evaluations, best
+
+    def _search(self, person: int, how: SearchSettings) -> int:
+        """Best-first search of one person from where they stand; returns how many poses were scored."""
+        evaluations, start, free = 0, self.poses[person], self._memories[person].free
+        bodies, index = self._around(person)
+        models, poses = [b.model for b in bodies], [b.values for b in bodies]
+        masks = None if free is None else [free] * len(bodies)  # only that of the person counts
+        for step in search_frame(self._views, models, poses, replace(self._settings, search=how), [index], masks):
+            self.poses[person], evaluations = step.best[index], step.evaluations
+        self.poses[person] = held(self._models[person], self.poses[person], start, free)
+        return evaluations
+
+    def _quality(self, person: int, seen: _Seen) -> Quality:
+        known, colors = self._memories[person].known, None
+        if known is not None:
+            colors = self.colors(person).score(seen.fit.values, known), known
+        trusts = np.array([0.0 if v.silhouette is None else v.silhouette.trust for v in self._views])
+        model, values = self._models[person], seen.fit.values
+        scale = px_per_m([v.camera for v in self._views], model, values)
+        return confidence.quality(model, seen.fit, seen.match.part_costs(values), self._thetas, trusts, scale, colors)
+
+    def _parts_px(self, costs: PartCosts) -> Array:
+        """Mean distance of each part's contour to the edges, (n_parts,), px of the footage."""
+        scales = np.array([v.scale for v in self._views])
+        length = (costs.length_px / scales[:, None]).sum(axis=0)
+        far = np.nansum(costs.forward_px * costs.length_px / scales[:, None] ** 2, axis=0)
+        return np.divide(far, length, out=np.full_like(length, np.nan), where=length > 0)
+
+    def _match(self, person: int, views: Sequence[ViewEvidence], everywhere: bool = False) -> ContourMatch:
+        """The residuals of a person's contours, the others where they stand."""
+        bodies, index = self._around(person)
+        settings = self._settings
+        return ContourMatch(self._own(views, person), bodies, index, settings.match, settings.theta_px, everywhere)
+
+    def _own(self, views: Sequence[ViewEvidence], person: int) -> Sequence[ViewEvidence]:
+        """The evidence without what the others explain."""
+        return own_views(views, *self._around(person))
+
+    def _around(self, person: int) -> tuple[list[Body], int]:
+        """Who is in the scene for a person, and their index there."""
+        bodies = self._bodies()
+        return (bodies, person) if self._settings.occlusion else ([bodies[person]], 0)
+
+    def _bodies(self) -> list[Body]:
+        """Everybody where they stand so far."""
+        return [Body(m, p) for m, p in zip(self._models, self.poses, strict=True)]
