@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tracker.annotations import AnnotationStore
-from tracker.records import PoseChange, PoseRecord
+from tracker.records import Alternative, PoseChange, PoseRecord
 from tracker.rigid import Array
 from tracker.session import Person
 from tracker.track import PoseEstimate
@@ -51,6 +51,7 @@ def tracked_changes(
                 parts_px=tuple(_number(c) for c in found.parts_px[i]),
                 remark=found.remarks[i],
             ),
+            tuple(Alternative(o.values, revisions[i], _number(o.cost_px)) for o in found.alternatives[i]),
         )
         for found in estimates
         for i in people

@@ -9,6 +9,7 @@ together.
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +25,9 @@ from tracker.rigid import Array
 
 _APART_M, _SAME_M = 0.12, 0.06
 """How far apart the places are that are improved; poses nearer to each other than the second lead to the same one."""
-_LEAST_GAIN = 3.0
-"""What a pose must cost less to take the place of the one at hand: it must be some 20 times likelier."""
+LEAST_GAIN = 3.0
+"""What a pose must cost less to take the place of the one at hand: it must be some 20 times likelier. Poses whose costs
+differ by less are about equally good."""
 
 
 @dataclass(frozen=True)
@@ -83,10 +85,19 @@ class Judge:
         return -self.settings.colors * self.colors.score(values, self.known).nats
 
 
+class Searched(NamedTuple):
+    """What a search of limbs came to."""
+
+    best: Fit
+    """What is cheapest; the pose at hand where nothing is by far."""
+    others: tuple[Fit, ...] = ()
+    """Poses about as good, with a limb elsewhere, cheapest first."""
+
+
 def search_limbs(
     model: BodyModel, suspects: Sequence[Limb], here: Fit, others: Sequence[Array], judge: Judge, iterations: int
-) -> Fit:
-    """Search the limbs that seem lost, one after the other; returns what is cheapest, `here` itself where nothing is.
+) -> Searched:
+    """Search the limbs that seem lost, one after the other.
 
     A limb may stand where another belongs, and each alone looks best as it is: therefore the best few poses of each,
     worse ones too, are kept while the next is searched.
@@ -106,7 +117,12 @@ def search_limbs(
         away = [p for x in suspects if x is not limb for p in x.parts]
         found = [fit for start in kept for fit in _search_limb(model, limb, away, start, others, judge, iterations)]
         kept = _distinct(model, [*kept, *found], judge, judge.settings.kept)
-    return kept[0] if judge.cost(kept[0]) < judge.cost(here) - _LEAST_GAIN else here
+    best = kept[0] if judge.cost(kept[0]) < judge.cost(here) - LEAST_GAIN else here
+    enough = judge.cost(best) + LEAST_GAIN
+    order = sorted((fit for fit in (*kept, here) if judge.cost(fit) < enough), key=judge.cost)
+    places = [best, *(fit for fit in order if fit is not best)]
+    rivals = _apart(lambda i: model.points_world(places[i].values), range(len(places)), judge.settings.kept, _APART_M)
+    return Searched(best, tuple(places[i] for i in rivals[1:]))
 
 
 def _search_limb(

@@ -6,8 +6,9 @@ far as is known (GD96 Fig. 2), then everybody once more with all others found. O
 (`recover`); the cheapest refined pose wins.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from tracker.confidence import Limb, Quality, Status
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence, unfiltered
 from tracker.fit import Block, Fit, covariance, held, solve
 from tracker.memory import Memory
-from tracker.recover import Judge, search_limbs
+from tracker.recover import LEAST_GAIN, Judge, search_limbs
 from tracker.refine import WORTH_A_STEP, ContourMatch, PartCosts
 from tracker.rigid import Array
 from tracker.scenery import Scenery
@@ -35,6 +36,8 @@ _AT_ONCE = 2
 """Limbs that are searched in a frame at most, the likeliest to be lost first; the others come in the next frames."""
 _MOVED_RAD, _ANEW_RAD = 0.05, 0.3
 """A search of a limb was not in vain where a joint turned farther; the limb is elsewhere where it turned this far."""
+_MOST_EXCESS = 60.0
+"""What two people's predictions may speak against their exchange for it to be tried: more no image makes good."""
 _STILL_M = 0.002
 """The joint refinement ends when nobody moves farther, metres."""
 
@@ -48,6 +51,15 @@ class Found(NamedTuple):
     covariance: Array
     evaluations: int
     quality: Quality | None
+    others: tuple[tuple[Array, ...], ...] = ()
+    """What is about as good: poses of everybody, (n_values,) each, in which this person is elsewhere, best first."""
+
+
+def _in_doubt(found: Found, remark: str, others: Sequence[tuple[Array, ...]]) -> Found:
+    """The same where the evidence goes as well with other poses."""
+    status: Status = "doubtful" if found.status == "good" else found.status
+    remarks = ", ".join(r for r in (found.remark, remark) if r)
+    return found._replace(status=status, remark=remarks, others=(*found.others, *others))
 
 
 class _Seen(NamedTuple):
@@ -64,6 +76,8 @@ class _Seen(NamedTuple):
     """Poses that the best-first search scored."""
     remarks: tuple[str, ...] = ()
     """What was done to find them."""
+    rivals: tuple[Array, ...] = ()
+    """Poses that are about as good, (n_values,) each, best first."""
 
 
 class Scene:
@@ -111,7 +125,11 @@ class Scene:
         seen = {p: self._recovered(p, s) for p, s in seen.items()}
         if any(s.anew is not None for s in seen.values()):
             self._refine_together(seen)
-        return {p: self._judged(p, s) for p, s in seen.items()}
+        found = {p: self._judged(p, s) for p, s in seen.items()}
+        for (p, q), poses in self._exchanges(seen).items():
+            for one, other in ((p, q), (q, p)):
+                found[one] = _in_doubt(found[one], f"may be exchanged with person {other + 1}", [poses])
+        return found
 
     def _searched(self, person: int) -> _Seen:
         """Search a person by best-first search alone."""
@@ -170,24 +188,69 @@ class Scene:
             remarks.append("body searched anew")
         due = [x for x in suspects if memory.may_search(x)][:_AT_ONCE]
         others = (memory.past[-1], self._predicted[person])
-        better = search_limbs(model, due, fit, others, judge, _ITERATIONS)
+        better, rivals = search_limbs(model, due, fit, others, judge, _ITERATIONS)
         turned = np.abs(model.difference(better.values, fit.values))
         for limb in due:
             memory.searched(limb, found=turned[limb.dofs].max() > _MOVED_RAD)
             if turned[limb.dofs].max() > _ANEW_RAD:
                 remarks.append(f"{confidence.spoken(limb.name)} searched anew")
         self.poses[person] = better.values
-        return _Seen(match, better, suspects, None, evaluations, tuple(remarks))
+        return _Seen(match, better, suspects, None, evaluations, tuple(remarks), tuple(r.values for r in rivals))
 
     def _judged(self, person: int, seen: _Seen) -> Found:
         """Put a person in the pose that was found, with the judgement of it."""
         self.poses[person] = seen.fit.values
         found = seen.quality or self._quality(person, seen)
         costs = seen.match.part_costs(seen.fit.values)
-        return Found(
+        out = Found(
             confidence.judge(found), ", ".join(seen.remarks) or confidence.reason(found), self._parts_px(costs),
             covariance(self._models[person], seen.fit), seen.evaluations, found,
         )  # fmt: skip
+        if not seen.rivals:
+            return out
+        model = self._models[person]
+        turned = np.abs([model.difference(rival, seen.fit.values) for rival in seen.rivals]).max(axis=0)
+        names = [confidence.spoken(x.name) for x in confidence.limbs(model) if turned[x.dofs].max() > _ANEW_RAD]
+        remark = f"{' and '.join(names) or 'body'} may be elsewhere"
+        return _in_doubt(out, remark, [self._with(person, rival) for rival in seen.rivals])
+
+    def _exchanges(self, seen: Mapping[int, _Seen]) -> dict[tuple[int, int], tuple[Array, ...]]:
+        """Pairs of people who might as well be each other, and the poses of everybody if they were.
+
+        Each takes the other's pose and is refined there, held by the own prediction and the own colours.
+        """
+        exchanges = {}
+        for p, q in combinations(seen, 2):
+            if self._models[p].value_names != self._models[q].value_names or not self._may_be_exchanged(p, q):
+                continue
+            before, colors = list(self.poses), self._settings.recover.colors if self._settings.recover else 0.0
+            here = sum(seen[i].fit.cost - colors * self._nats(i) for i in (p, q))
+            self.poses[p], self.poses[q] = self.poses[q], self.poses[p]
+            there = 0.0
+            for i in (p, q):
+                there += self._refined(i, seen[i]).fit.cost - colors * self._nats(i)
+            if there < here + LEAST_GAIN:
+                exchanges[p, q] = tuple(self.poses)
+            self.poses = before
+        return exchanges
+
+    def _may_be_exchanged(self, p: int, q: int) -> bool:
+        """Whether two people are where each was expected to be about as much as where the other was."""
+        excess = 0.0
+        for i, other in ((p, q), (q, p)):
+            model, expected = self._models[i], self._priors(i)[0]
+            costs = [expected.normal(model, self.poses[k], model.kinematics(self.poses[k])).cost for k in (other, i)]
+            excess += costs[0] - costs[1]
+        return excess < _MOST_EXCESS
+
+    def _nats(self, person: int) -> float:
+        """What the colours say for a person where they stand; nothing where nobody has shown them."""
+        known = self._memories[person].known
+        return 0.0 if known is None else self.colors(person).score(self.poses[person], known).nats
+
+    def _with(self, person: int, values: Array) -> tuple[Array, ...]:
+        """Where everybody stands, but for one person."""
+        return (*self.poses[:person], values, *self.poses[person + 1 :])
 
     def _priors(self, person: int, suspects: Sequence[Limb] = ()) -> list[Block]:
         """What holds a pose besides the image: its prediction, but for limbs that seem lost, how people bend, and the

@@ -17,6 +17,15 @@ from tracker.surroundings import regions, visible_outline
 from tracker.track_settings import TrackSettings, pose_cost
 
 
+class OtherPose(NamedTuple):
+    """A pose of a person that the evidence goes as well with."""
+
+    values: Array
+    """Pose, (n_values,)."""
+    cost_px: float
+    """What `PoseEstimate.cost_px` would be, px; where two people may be exchanged, with both exchanged."""
+
+
 class PoseEstimate(NamedTuple):
     """Poses found on one frame."""
 
@@ -39,6 +48,8 @@ class PoseEstimate(NamedTuple):
     """Covariance of each pose, (n_dofs, n_dofs) each, rad and metres; of a pose that was given, zero."""
     qualities: tuple[Quality | None, ...]
     """What the statuses were judged by; None for a pose that was given."""
+    alternatives: tuple[tuple[OtherPose, ...], ...]
+    """Of each person poses that are about as good, best first; where there are any, the status is at most doubtful."""
 
 
 def track_chamfer(
@@ -90,9 +101,11 @@ def track_chamfer(
             memory.update(scene.poses[p], scene.colors(p), seen.status, given=p in given)
         if scenery is not None:
             scene.teach(scenery)
-        cost = pose_cost(views, models, scene.poses, settings)(scene.poses)
+        cost_of = pose_cost(views, models, scene.poses, settings)
+        cost = cost_of(scene.poses)
+        others = [[OtherPose(poses[p], cost_of(poses).total_px) for poses in f.others] for p, f in enumerate(found)]
         yield PoseEstimate(
             frame, tuple(scene.poses), cost.total_px, cost.views_px, sum(f.evaluations for f in found),
             tuple(f.status for f in found), tuple(f.remark for f in found), tuple(f.parts_px for f in found),
-            tuple(f.covariance for f in found), tuple(f.quality for f in found),
+            tuple(f.covariance for f in found), tuple(f.quality for f in found), tuple(map(tuple, others)),
         )  # fmt: skip

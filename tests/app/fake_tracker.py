@@ -20,6 +20,7 @@ class Estimate(NamedTuple):
     remarks: tuple
     parts_px: tuple
     covariances: tuple
+    alternatives: tuple
 
 
 class FakeTracker:
@@ -58,5 +59,5 @@ class FakeTracker:
             n = len(models)
             yield Estimate(
                 frame, tuple(poses), 1.0 + 0.1 * frame, views_px, 9, (status,) * n, (remark,) * n, (parts_px,) * n,
-                tuple(np.eye(m.n_dofs) for m in models),
+                tuple(np.eye(m.n_dofs) for m in models), ((),) * n,
             )  # fmt: skip

@@ -1,8 +1,9 @@
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from staging import SUIT, cameras_around, dressed, posed
+from staging import SUIT, cameras_around, dressed, own_evidence, posed
 
 from tracker import recover
 from tracker.appearance import Colors
@@ -42,6 +43,9 @@ class Staged:
         self.here = solve(model, wrong, self.blocks, max_iterations=15, tolerance=1e-3)
 
     def search(self, limb, others=()):
+        return self.searched(limb, others).best
+
+    def searched(self, limb, others=()):
         return search_limbs(self.model, [limb], self.here, others, self.judge, 15)
 
     def off_m(self, fit, parts):
@@ -102,7 +106,7 @@ def test_limbs_that_are_lost_together(gavrila):
         staged = Staged(gavrila, truth, wrong)
         suspects = [limb_of(gavrila, n) for n in ("left_forearm", "left_calf")]
         assert all(staged.off_m(staged.here, x.parts) > 0.15 for x in suspects)
-        found = search_limbs(gavrila, suspects, staged.here, (), staged.judge, 15)
+        found = search_limbs(gavrila, suspects, staged.here, (), staged.judge, 15).best
         n_found += all(staged.off_m(found, x.parts) < 0.03 for x in suspects)
     assert n_found >= 2
 
@@ -128,6 +132,39 @@ def test_where_nothing_is_better_the_pose_is_kept(gavrila):
     staged.here = solve(gavrila, truth, staged.blocks, max_iterations=60, tolerance=1e-7)
     for limb in limbs(gavrila):
         assert staged.search(limb) is staged.here
+
+
+def both_shown(one, other):
+    """Evidence that shows two figures where there is one person, all of one colour: the edges of both."""
+    return [
+        replace(
+            a,
+            points_px=np.concatenate([a.points_px, b.points_px]),
+            normals=np.concatenate([a.normals, b.normals]),
+            distance=np.minimum(a.distance, b.distance),
+            colors=np.zeros((a.camera.height, a.camera.width, 3), np.uint8),
+        )
+        for a, b in zip(one, other, strict=True)
+    ]
+
+
+def test_two_places_that_are_about_as_good_are_both_told(gavrila):
+    """The edges show the arm twice, and no colours tell which is meant: the other place is kept."""
+    here, there = (turned(gavrila, posed(gavrila, 1), left_shoulder__abduction=a) for a in (80, 120))
+    arm, cameras = limb_of(gavrila, "left_forearm"), cameras_around(4)
+    views = both_shown(*(own_evidence([Body(gavrila, v)], cameras) for v in (here, there)))
+    body = [Body(gavrila, here)]
+    judge = Judge(ContourMatch(views, body, everywhere=True), [], Colors(views, body), None, RecoverSettings())
+    fit = solve(gavrila, here, [judge.match], max_iterations=15, tolerance=1e-3)
+    found = search_limbs(gavrila, [arm], fit, (), judge, 15)
+    wrist = gavrila.point_names.index("left_wrist")
+    ends = np.array([gavrila.points_world(f.values)[wrist] for f in (found.best, *found.others)])
+    wanted = np.array([gavrila.points_world(v)[wrist] for v in (here, there)])
+    assert np.linalg.norm(ends[:, None] - wanted, axis=-1).min(axis=0).max() < 0.05  # both are there
+    assert all(judge.cost(f) < judge.cost(found.best) + recover.LEAST_GAIN for f in found.others)
+    # Where the edges show it once there is nothing to choose from.
+    once = Staged(gavrila, here, turned(gavrila, here, **LOST["inside the trunk"]))
+    assert once.searched(arm).others == ()
 
 
 def test_the_same_every_time(gavrila):

@@ -12,6 +12,7 @@ from tracker.fit import fit_to_points
 from tracker.joint_maps import LIMB_JOINTS
 from tracker.predict import PredictSettings
 from tracker.recording import Recording
+from tracker.recover import Searched
 from tracker.references import read_joints
 from tracker.search import SearchSettings
 from tracker.session import CameraSource
@@ -195,12 +196,37 @@ def filmed(model, truth):
     return Observer([CameraSource(c, footage=None) for c in cameras], Film(model, truth, cameras))
 
 
+def test_two_people_who_might_as_well_be_each_other_are_in_doubt():
+    """Two alike within reach of each other's prediction: both poses are kept, and nobody is called good."""
+    rod = solid((0.03, 0.03, 0.3))
+    values = np.zeros((2, 6))
+    values[:, 1] = -0.035, 0.035
+    cameras = cameras_around(4)
+    settings = TrackSettings(predict=PredictSettings(order=0), recover=None)
+    (found,) = track_chamfer(Shown([own_evidence([at(rod, *v[:3]) for v in values], cameras)]), [rod, rod], values,
+                             [0], settings)  # fmt: skip
+    np.testing.assert_allclose([p[:3] for p in found.poses], values[:, :3], atol=0.01)
+    assert "lost" in found.statuses or set(found.statuses) == {"doubtful"}
+    assert [r.split(", ")[-1] for r in found.remarks] == [
+        "may be exchanged with person 2", "may be exchanged with person 1",
+    ]  # fmt: skip
+    for person in (0, 1):
+        (other,) = found.alternatives[person]
+        np.testing.assert_allclose(other.values[:3], values[1 - person, :3], atol=0.01)
+        assert other.cost_px == pytest.approx(found.cost_px, abs=0.2)
+    # Where each was expected half a metre from the other nobody asks.
+    values[:, 1] = -0.25, 0.25
+    (found,) = track_chamfer(Shown([own_evidence([at(rod, *v[:3]) for v in values], cameras)]), [rod, rod], values,
+                             [0], settings)  # fmt: skip
+    assert found.alternatives == ((), ())
+
+
 def test_what_is_locked_is_neither_refined_nor_searched(gavrila, monkeypatch):
     """The arm that jumps is locked: it stays to the last bit, is not searched, and everything else is followed."""
     truth = dancing(gavrila, 4, jump_at=2)
     views = [dressed([Body(gavrila, v)], cameras_around(4), SUIT) for v in truth]
     searched = []
-    monkeypatch.setattr("tracker.scene.search_limbs", lambda m, due, fit, *_: searched.extend(due) or fit)
+    monkeypatch.setattr("tracker.scene.search_limbs", lambda m, due, fit, *_: searched.extend(due) or Searched(fit))
     free = ~np.array([name.startswith(("left_shoulder", "left_elbow")) for name in gavrila.dof_names])
     start = truth[0].copy()
     outside = gavrila.dof_names.index("left_elbow.extension")
