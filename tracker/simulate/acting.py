@@ -1,19 +1,26 @@
-"""From postures to poses: trunk and feet are placed, the legs follow."""
+"""From postures to poses: trunk, feet and hands are placed, the limbs follow."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from tracker import rigid
-from tracker.body import BodyModel
+from tracker.body import BodyModel, IntArray
 from tracker.rigid import Array
 from tracker.simulate.anatomy import ANKLE_HEIGHT
+from tracker.simulate.builds import MAN, Build
+from tracker.simulate.outfit import Outfit
 
 HEADING_RAD = np.radians(32.0)
 """Where the person faces: towards FRONT, but not straight at it, where a forward motion would hardly show."""
 TOES_OUT_RAD = np.radians(9.0)
+ELBOW_WEIGHT = 0.03
+"""How much a metre that an elbow is off its place counts against one that the wrist is off."""
+WITHIN_REACH_M = 0.01
+"""How near a wrist has to come to where it should be, metres: within flesh, joint limits may forbid more."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +32,19 @@ class Role:
     """Body height, metres."""
     act: Callable[[BodyModel, float], "Posture"]
     """Posture of a body of these sizes at a time in seconds."""
+    build: Build = MAN
+    """Bones and flesh."""
+    outfit: Outfit = field(default_factory=Outfit)
+    """Clothes and colours."""
+
+
+class Reach(NamedTuple):
+    """Where an arm reaches to, in the frame of the actor's place."""
+
+    wrist_m: tuple[float, float, float]
+    """The wrist, metres."""
+    elbow_to: tuple[float, float, float]
+    """Direction from the line between shoulder and wrist in which the elbow points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +58,11 @@ class Posture:
     feet_m: Mapping[str, tuple[float, float, float]]
     """`left` and `right` ankle in the frame of the actor's place, metres."""
     angles: Mapping[str, float]
-    """Degrees of freedom of the arms, rad."""
+    """Degrees of freedom of the arms that do not reach anywhere, rad."""
     toes_rad: Mapping[str, float] = field(default_factory=lambda: {"left": 0.0, "right": 0.0})
     """Where the `left` and `right` foot head, turned left from ahead in the frame of the actor's place."""
+    reaches: Mapping[str, Reach] = field(default_factory=dict)
+    """Where the `left` and the `right` arm reach to, where they do."""
 
 
 def perform(role: Role, model: BodyModel, n_frames: int, fps: float) -> Array:
@@ -59,6 +81,8 @@ def perform(role: Role, model: BodyModel, n_frames: int, fps: float) -> Array:
             values[at_twist] += 2 * np.pi * np.round((poses[-1][at_twist] - values[at_twist]) / (2 * np.pi))
         for side, ankle in posture.feet_m.items():
             _plant(model, values, side, R_world_place @ ankle, HEADING_RAD + posture.toes_rad[side])
+        for side, (wrist, elbow_to) in posture.reaches.items():
+            _reach(model, values, side, R_world_place @ wrist, R_world_place @ elbow_to)
         assert np.allclose(values, model.clip(values)), "the scene asks for a pose beyond the joint limits"
         poses.append(values)
     return np.array(poses)
@@ -71,10 +95,11 @@ def ramp(t: float, start: float, end: float) -> float:
 
 
 def _upright(model: BodyModel) -> Array:
-    """Pose to start the first frame's leg search from: knees a little bent, so that they know which way to go."""
+    """Pose to start the first frame's limbs from: knees and elbows bent, so that they know which way to go."""
     values = model.neutral()
     for i, name in enumerate(model.value_names):
         values[i] += 0.4 * name.endswith("_knee.extension") + 0.2 * name.endswith("_hip.elevation")
+        values[i] += 1.2 * name.endswith("_elbow.extension") + 0.4 * name.endswith("_shoulder.elevation")
     return values
 
 
@@ -113,8 +138,42 @@ def _plant(model: BodyModel, values: Array, side: str, ankle_world: Array, headi
         R_calf = model.kinematics(trial).Ts_world_part[calf, :3, :3]
         return np.append(model.points_world(trial)[ankle] - ankle_world, R_calf[:, 0] @ aside)
 
+    cost = _solve(model, values, dofs, errors)
+    assert cost < 1e-8, f"the {side} leg cannot reach its place on the floor"
+
+
+def _reach(model: BodyModel, values: Array, side: str, wrist_world: Array, elbow_to_world: Array) -> None:
+    """Solve one arm's four angles, in place: the wrist where it should be, the elbow on its side of the way there."""
+    dofs = np.array([i for i, n in enumerate(model.dof_names) if n.startswith((f"{side}_shoulder.", f"{side}_elbow."))])
+    at = model.dof_value[dofs]
+    shoulder, elbow, wrist = (model.point_names.index(f"{side}_{name}") for name in ("shoulder", "elbow", "wrist"))
+    points = model.points_world(values)
+    upper, fore = np.linalg.norm(points[elbow] - points[shoulder]), np.linalg.norm(points[wrist] - points[elbow])
+    way = wrist_world - points[shoulder]
+    length = np.linalg.norm(way)
+    assert abs(upper - fore) < length < upper + fore, f"the {side} hand cannot reach {length:.2f} m"
+    ahead = way / length
+    aside = elbow_to_world - (elbow_to_world @ ahead) * ahead
+    # The two circles about shoulder and wrist on which the elbow may lie meet here.
+    along = (upper**2 - fore**2 + length**2) / (2 * length)
+    bend = points[shoulder] + along * ahead + np.sqrt(upper**2 - along**2) * aside / np.linalg.norm(aside)
+
+    def errors(angles: Array) -> Array:
+        trial = values.copy()
+        trial[at] = angles
+        found = model.points_world(trial)
+        return np.append(found[wrist] - wrist_world, ELBOW_WEIGHT * (found[elbow] - bend))
+
+    _solve(model, values, dofs, errors)
+    off = float(np.linalg.norm(model.points_world(values)[wrist] - wrist_world))
+    assert off < WITHIN_REACH_M, f"the {side} hand is {off:.3f} m from where it should be"
+
+
+def _solve(model: BodyModel, values: Array, dofs: IntArray, errors: Callable[[Array], Array]) -> float:
+    """Bring errors of some degrees of freedom down from where they are, in place; the cost that is left."""
+    at = model.dof_value[dofs]
     low, high = model.limits[dofs].T
     start = np.clip(values[at], low + 1e-3, high - 1e-3)
     solution = least_squares(errors, start, bounds=(low, high), xtol=1e-12, ftol=1e-12, gtol=1e-12)
-    assert solution.cost < 1e-8, f"the {side} leg cannot reach its place on the floor"
     values[at] = solution.x
+    return float(solution.cost)

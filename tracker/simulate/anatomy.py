@@ -10,6 +10,7 @@ import numpy as np
 from tracker import rigid
 from tracker.body import BodyModel
 from tracker.rigid import Array
+from tracker.simulate.skeleton import Factors
 
 Point = tuple[float, float, float]
 
@@ -30,7 +31,7 @@ class Lobe(NamedTuple):
     """Centre of the other ball, fraction of body height."""
     radii: tuple[float, float]
     """Radii of the balls, fraction of body height."""
-    squash: Point = (1.0, 1.0, 1.0)
+    squash: Factors = (1.0, 1.0, 1.0)
     """Factor by which the lobe is scaled along the bone's x, y, z (about the bone's origin, hence no offset there)."""
 
 

@@ -16,7 +16,6 @@ SIDES = ("left", "right")
 
 _SWING = (0.06, 0.94)
 """When in its step a foot leaves the floor and lands."""
-_STEP_HEIGHT_M = 0.07
 _SMALLEST_STEP = (0.03, np.radians(6.0))
 """A foot that would move by less, metres and rad, stays."""
 _SOFTNESS_M = 0.010
@@ -54,7 +53,7 @@ class Choreography:
     """One person's motion in the frame of the actor's place: x ahead, y left, z up."""
 
     arms: Mapping[str, Track]
-    """Angles of the `left` and `right` arm, in the order of `ARM_DOFS`, rad."""
+    """Angles of the `left` and `right` arm, in the order of `ARM_DOFS`, rad; none of an arm that reaches somewhere."""
     path: Track
     """Where the trunk is on the floor, metres, and where it faces, turned left from ahead, rad; (K, 3)."""
     crouch: Track
@@ -66,6 +65,10 @@ class Choreography:
     """How often the trunk sways, 1/s."""
     step_s: float = 0.42
     """Time from the landing of one foot to that of the other, seconds."""
+    step_height_m: float = 0.07
+    """How high a stepping foot is lifted, metres."""
+    ahead_m: float = 0.0
+    """How far the trunk is ahead of the feet, metres, as of a body that leans on somebody."""
 
     def act(self, model: BodyModel, t: float) -> Posture:
         """Posture at a time in seconds."""
@@ -83,14 +86,14 @@ class Choreography:
             feet[side], toes[side] = (float(foot_x + ahead[0]), float(foot_y + ahead[1]), float(z)), float(foot_yaw)
         # The weight goes over the standing foot; bending forward, the hips go back.
         aside = 0.16 * (lifts[1] - lifts[0]) * model.height_m
-        moved = _turned(yaw)[:2, :2] @ (-0.13 * np.sin(bend) * model.height_m, aside)
+        moved = _turned(yaw)[:2, :2] @ (self.ahead_m - 0.13 * np.sin(bend) * model.height_m, aside)
         wanted = standing_height(model) - (0.006 + depth) * model.height_m
         trunk = np.array([x + moved[0], y + moved[1], wanted])
         trunk[2] = _within_reach(model, trunk, lean, feet)
         angles = {
             f"{side}_{dof}": float(angle)
-            for side in SIDES
-            for dof, angle in zip(ARM_DOFS, self.arms[side].at(t), strict=True)
+            for side, track in self.arms.items()
+            for dof, angle in zip(ARM_DOFS, track.at(t), strict=True)
         }
         return Posture((float(trunk[0]), float(trunk[1]), float(trunk[2])), lean, feet, angles, toes)
 
@@ -103,7 +106,7 @@ class Choreography:
                 break
             share = ramp(t, start + _SWING[0] * self.step_s, start + _SWING[1] * self.step_s)
             here = before + share * (landing - before)
-            height = 4.0 * share * (1.0 - share) * _STEP_HEIGHT_M * bool(np.any(landing != before))
+            height = 4.0 * share * (1.0 - share) * self.step_height_m * bool(np.any(landing != before))
             before = landing
         offset = _turned(here[2])[:2, :2] @ stance(model)[side][:2]
         return here[0] + offset[0], here[1] + offset[1], here[2], height

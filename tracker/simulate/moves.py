@@ -118,15 +118,42 @@ def leaving(seed: int) -> Choreography:
     return trunk.with_arms({"left": _arm(rng, swing), "right": _arm(rng, swing[1:])})
 
 
+def mingling(seed: int, home: tuple[float, float, float]) -> Choreography:
+    """Gesture with bent arms and turn to and fro among others, who may stand as near as a metre.
+
+    Args:
+        seed: of the motion.
+        home: x, y in the frame of the actor's place, metres, and where the person faces, rad.
+    """
+    rng = np.random.default_rng([seed, 15])
+    keys = ("rest", "open", "guard", "head", "hip", "belly", "chest", "shoulder", "swing ahead")
+    scores = {
+        side: [(str(rng.choice(keys)), rng.uniform(0.4, 0.6), rng.uniform(0.0, 0.2)) for _ in range(120)]
+        for side in SIDES
+    }
+    trunk = _Trunk(rng, home=home)
+    while trunk.time_s < _PERFORMANCE_S:
+        trunk.turn(rng.uniform(30.0, 80.0))
+        trunk.lift(rng.uniform(0.08, 0.16))
+        trunk.crouch(rng.uniform(0.02, 0.08), rng.uniform(0.0, 8.0), 0.9)
+        trunk.step(rng.uniform(0.02, 0.06), 0.6)
+    return trunk.with_arms({side: _arm(rng, score) for side, score in scores.items()})
+
+
 class _Trunk:
     """Writes down what the trunk and the legs do, one thing after the other."""
 
-    def __init__(self, rng: np.random.Generator, step_s: float = 0.36) -> None:
+    def __init__(
+        self, rng: np.random.Generator, step_s: float = 0.36, home: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ) -> None:
         self.time_s = 0.15
         self._rng, self._step_s = rng, step_s
         self._turned, self._lifted = (int(i) for i in rng.integers(2, size=2))
-        self._place = np.zeros(3)
-        self._keys = {name: [(0.0, np.zeros(size))] for name, size in (("path", 3), ("crouch", 2), ("lifts", 2))}
+        self._home = self._place = np.array(home)
+        self._keys = {
+            name: [(0.0, start)]
+            for name, start in (("path", self._home), ("crouch", np.zeros(2)), ("lifts", np.zeros(2)))
+        }
 
     def stand(self, duration_s: float) -> None:
         """Let time pass."""
@@ -138,14 +165,15 @@ class _Trunk:
         self.face(self._place[2] + (1 - 2 * self._turned) * np.radians(degrees))
 
     def face(self, yaw_rad: float) -> None:
-        """Turn on the spot with steps, as fast as the hips allow; yaw is counted from the first frame's."""
+        """Turn on the spot with steps, as fast as the hips allow; yaw is turned left from ahead."""
         x, y, yaw = self._place
         self._go((x, y, yaw_rad), max(0.3, 1.5 * abs(yaw_rad - yaw) * self._step_s / _HIP_TURN_RAD))
 
     def step(self, length_m: float, duration_s: float) -> None:
-        """Step to somewhere near the middle of the place."""
+        """Step to somewhere near home."""
         angle = self._rng.uniform(0.0, 2 * np.pi)
-        self._go((length_m * np.cos(angle), length_m * np.sin(angle), self._place[2]), duration_s)
+        x, y = self._home[:2] + length_m * np.array([np.cos(angle), np.sin(angle)])
+        self._go((x, y, self._place[2]), duration_s)
 
     def walk(self, length_m: float, duration_s: float) -> None:
         """Walk straight ahead."""

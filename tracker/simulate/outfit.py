@@ -74,3 +74,28 @@ class Outfit:
         out[front & (np.hypot(side, z - 0.088) < 0.0055)] = (0.13, 0.10, 0.09)
         out[front & (side < 0.010) & (np.abs(z - 0.099) < 0.0025)] = self.hair
         out[front & (np.abs(y) < 0.013) & (np.abs(z - 0.053) < 0.0028)] = (0.58, 0.30, 0.27)
+
+
+_SKIN_OF_HERS: Color = (0.76, 0.55, 0.43)
+BLACK_AND_WHITE = Outfit(
+    shirt=(0.20, 0.22, 0.26),
+    left_sleeve=(0.82, 0.82, 0.80),
+    right_sleeve=(0.82, 0.82, 0.80),
+    trousers=(0.34, 0.32, 0.30),
+)
+RED = Outfit(
+    shirt=(0.66, 0.14, 0.16),
+    left_sleeve=_SKIN_OF_HERS,
+    right_sleeve=_SKIN_OF_HERS,
+    trousers=(0.22, 0.20, 0.24),
+    shoes=(0.55, 0.12, 0.14),
+    skin=_SKIN_OF_HERS,
+    hair=(0.14, 0.09, 0.06),
+)
+GREEN = Outfit(
+    shirt=(0.30, 0.42, 0.28),
+    left_sleeve=(0.30, 0.42, 0.28),
+    right_sleeve=(0.30, 0.42, 0.28),
+    trousers=(0.52, 0.46, 0.36),
+    hair=(0.45, 0.32, 0.18),
+)

@@ -24,7 +24,6 @@ from tracker.session import PALETTE, CameraSource, Person, Session, load_session
 from tracker.simulate.acting import Role, perform
 from tracker.simulate.encode import VideoWriter
 from tracker.simulate.film import Image, exposed, film, freeze
-from tracker.simulate.outfit import Outfit
 from tracker.simulate.parts import PartsFigure
 from tracker.simulate.render import Figure
 from tracker.simulate.rig import make_cameras
@@ -82,13 +81,15 @@ def simulate(
     cast = cast_of(scene, seed)
     cameras = make_cameras(n_cameras, size, seed)
     presets = [load_model(PRESET, role.height_m) for role in cast]
-    models = [altered_model(m) if body == "skinned" else m for m in presets]
+    models = [
+        altered_model(m, r.build.bone_factors) if body == "skinned" else m for r, m in zip(cast, presets, strict=True)
+    ]
     poses = [perform(role, model, n_frames, fps) for role, model in zip(cast, models, strict=True)]
     temporary = out.with_name(f".{out.name}.{secrets.token_hex(4)}.tmp")
     try:
         temporary.mkdir(parents=True)
         sources = [_source(temporary, c, masks) for c in cameras]
-        figures = [_figure(model, body) for model in models]
+        figures = [_figure(role, model, body) for role, model in zip(cast, models, strict=True)]
         _shoot(sources, figures, poses, fps, seed, progress)
         _write_truth(temporary, cast, models, poses, fps)
         people = [Person(r.name, m, color) for r, m, color in zip(cast, presets, cycle(PALETTE), strict=False)]
@@ -114,8 +115,8 @@ def _check(out: Path, n_frames: int, fps: float, body: str) -> None:
         raise TrackerError(f"expected a body that is one of {', '.join(get_args(BodyKind))}, found '{body}'")
 
 
-def _figure(model: BodyModel, body: BodyKind) -> Figure:
-    return make_skin(model, Outfit()) if body == "skinned" else PartsFigure(model)
+def _figure(role: Role, model: BodyModel, body: BodyKind) -> Figure:
+    return make_skin(model, role.outfit, role.build) if body == "skinned" else PartsFigure(model)
 
 
 def _source(folder: Path, camera: Camera, masks: bool) -> CameraSource:

@@ -1,6 +1,7 @@
 """What the simulated people do."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -9,7 +10,10 @@ from tracker import rigid
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
 from tracker.simulate.acting import Posture, Role, ramp, stance, standing_height
-from tracker.simulate.moves import dance, exercise, leaving, reach_and_cross
+from tracker.simulate.builds import MAN, WOMAN
+from tracker.simulate.moves import dance, exercise, leaving, mingling, reach_and_cross
+from tracker.simulate.outfit import BLACK_AND_WHITE, GREEN, RED, Outfit
+from tracker.simulate.pairs import COUPLE_APART_M, Partner, couple, tango
 
 
 def elbow_rotation(model: BodyModel, t: float) -> Posture:
@@ -56,7 +60,31 @@ def walk_in_place(model: BodyModel, t: float) -> Posture:
     return Posture(trunk, lean, feet, angles)
 
 
+def _face_to_face(partners: tuple[Partner, Partner]) -> tuple[Role, ...]:
+    man, woman = partners
+    return Role("man", MAN_M, man.act, MAN, BLACK_AND_WHITE), Role("woman", WOMAN_M, woman.act, WOMAN, RED)
+
+
+def _couple(apart_m: float, seed: int) -> tuple[Role, ...]:
+    return _face_to_face(couple(apart_m, seed))
+
+
+def _crowd(n: int, seed: int) -> tuple[Role, ...]:
+    """People at the corners of a triangle or a square, each `CROWD_APART_M` from the next and facing its middle."""
+    radius = CROWD_APART_M / (2 * np.sin(np.pi / n))
+    looks = ((1.82, MAN, BLACK_AND_WHITE), (1.64, WOMAN, RED), (1.74, MAN, Outfit()), (1.70, WOMAN, GREEN))
+    roles = []
+    for i, (height_m, build, outfit) in enumerate(looks[:n]):
+        angle = 2 * np.pi * i / n
+        home = (radius * np.cos(angle), radius * np.sin(angle), angle + np.pi)
+        roles.append(Role(f"person{i + 1}", height_m, mingling(n * seed + i, home).act, build, outfit))
+    return tuple(roles)
+
+
 Casting = Callable[[int], tuple[Role, ...]]
+
+MAN_M, WOMAN_M = 1.80, 1.66
+CROWD_APART_M = 1.0
 
 SCENES: Mapping[str, Casting] = MappingProxyType(
     {
@@ -66,9 +94,13 @@ SCENES: Mapping[str, Casting] = MappingProxyType(
         "dance": lambda seed: (Role("person", 1.78, dance(seed).act),),
         "reach_and_cross": lambda seed: (Role("person", 1.78, reach_and_cross(seed).act),),
         "leaving": lambda seed: (Role("person", 1.78, leaving(seed).act),),
+        "tango": lambda seed: _face_to_face(tango(MAN_M, WOMAN_M)),
+        **{f"couple_{name}": partial(_couple, m) for name, m in COUPLE_APART_M.items()},
+        "crowd_of_three": partial(_crowd, 3),
+        "crowd_of_four": partial(_crowd, 4),
     }
 )
-"""Who does what, by the name of the scene, for a seed; the first two are the same for every seed."""
+"""Who does what, by the name of the scene, for a seed; the first two and the tango are the same for every seed."""
 
 
 def cast_of(scene: str, seed: int = 0) -> tuple[Role, ...]:

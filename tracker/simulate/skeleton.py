@@ -1,59 +1,68 @@
 """The true skeleton of a simulated person: a preset's joints at other proportions."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 from tracker.body import BodyModel, Joint, Landmark, Part
 
+Factors = tuple[float, float, float]
+"""Factors along x, y, z."""
+
 # Every bone is 5% or more off the preset's, some longer and some shorter, in such a way that the body keeps its
 # height: a tracker that assumes the preset is wrong in the way it would be wrong about a real person.
-BONE_FACTORS = {
-    "neck": (1.0, 1.0, 1.055),
-    "shoulder": (1.0, 1.08, 1.055),
-    "elbow": (1.0, 1.0, 1.07),
-    "wrist": (1.0, 1.0, 0.94),
-    "hip": (1.0, 0.945, 0.94),
-    "knee": (1.0, 1.0, 0.945),
-    "ankle": (1.0, 1.0, 1.055),
-    "head": (1.0, 1.0, 1.08),
-}
+BONE_FACTORS: Mapping[str, Factors] = MappingProxyType(
+    {
+        "neck": (1.0, 1.0, 1.055),
+        "shoulder": (1.0, 1.08, 1.055),
+        "elbow": (1.0, 1.0, 1.07),
+        "wrist": (1.0, 1.0, 0.94),
+        "hip": (1.0, 0.945, 0.94),
+        "knee": (1.0, 1.0, 0.945),
+        "ankle": (1.0, 1.0, 1.055),
+        "head": (1.0, 1.0, 1.08),
+    }
+)
 """Factor along x, y, z on the position of each joint or landmark in its parent's frame, left and right alike."""
 
 _END_OF_PART = {"upper_arm": "elbow", "forearm": "wrist", "thigh": "knee", "calf": "ankle"}
 
 
-def altered_model(model: BodyModel) -> BodyModel:
-    """Return a model with the same degrees of freedom but other bone lengths (`BONE_FACTORS`)."""
+def altered_model(model: BodyModel, factors: Mapping[str, Factors] = BONE_FACTORS) -> BodyModel:
+    """Return a model with the same degrees of freedom but other bone lengths, by factors as in `BONE_FACTORS`."""
     return replace(
         model,
         name=f"{model.name}_true",
-        joints=tuple(_moved_joint(j) for j in model.joints),
-        parts=tuple(_stretched_part(p) for p in model.parts),
-        landmarks=tuple(_moved_landmark(m) for m in model.landmarks),
+        joints=tuple(_moved_joint(j, factors) for j in model.joints),
+        parts=tuple(_stretched_part(p, factors) for p in model.parts),
+        landmarks=tuple(_moved_landmark(m, factors) for m in model.landmarks),
     )
 
 
-def _factors(name: str) -> tuple[float, float, float]:
-    return BONE_FACTORS.get(name.removeprefix("left_").removeprefix("right_"), (1.0, 1.0, 1.0))
+def _factors_of(name: str, factors: Mapping[str, Factors]) -> Factors:
+    return factors.get(name.removeprefix("left_").removeprefix("right_"), (1.0, 1.0, 1.0))
 
 
-def _scaled(position: tuple[float, float, float], name: str) -> tuple[float, float, float]:
-    x, y, z = (p * f for p, f in zip(position, _factors(name), strict=True))
+def _moved(
+    position: tuple[float, float, float], name: str, factors: Mapping[str, Factors]
+) -> tuple[float, float, float]:
+    x, y, z = (p * f for p, f in zip(position, _factors_of(name, factors), strict=True))
     return x, y, z
 
 
-def _moved_joint(joint: Joint) -> Joint:
-    return replace(joint, position=_scaled(joint.position, joint.name))
+def _moved_joint(joint: Joint, factors: Mapping[str, Factors]) -> Joint:
+    return replace(joint, position=_moved(joint.position, joint.name, factors))
 
 
-def _moved_landmark(landmark: Landmark) -> Landmark:
-    return replace(landmark, position=_scaled(landmark.position, landmark.name))
+def _moved_landmark(landmark: Landmark, factors: Mapping[str, Factors]) -> Landmark:
+    return replace(landmark, position=_moved(landmark.position, landmark.name, factors))
 
 
-def _stretched_part(part: Part) -> Part:
+def _stretched_part(part: Part, factors: Mapping[str, Factors]) -> Part:
     """Stretch a limb's shape with its bone; the trunk and the head keep theirs."""
     end = _END_OF_PART.get(part.name.removeprefix("left_").removeprefix("right_"))
     if end is None:
         return part
-    stretch = _factors(end)[2]
+    stretch = _factors_of(end, factors)[2]
     (a1, a2, a3), (x, y, z) = part.half_axes, part.center
     return replace(part, half_axes=(a1, a2, a3 * stretch), center=(x, y, z * stretch))

@@ -10,7 +10,8 @@ from scipy import sparse
 from tracker import rigid
 from tracker.body import BodyModel, IntArray
 from tracker.rigid import Array
-from tracker.simulate.anatomy import Lobe, bone_names, bone_poses, lobes
+from tracker.simulate.anatomy import Lobe, bone_names, bone_poses
+from tracker.simulate.builds import MAN, Build
 from tracker.simulate.outfit import Outfit
 from tracker.simulate.surface_nets import surface_nets
 
@@ -84,9 +85,9 @@ class Skin:
         return self.outfit.colors(names, points_bone / height, points_torso / height)
 
 
-def make_skin(model: BodyModel, outfit: Outfit) -> Skin:
+def make_skin(model: BodyModel, outfit: Outfit, build: Build = MAN) -> Skin:
     """Grow the skin of a body: blend its lobes, mesh the surface, tie it to the bones."""
-    flesh = lobes(model)
+    flesh = build.flesh(model)
     Ts_rest = bone_poses(model, rest_values(model))
     names = bone_names(model)
     Ts_lobe = [Ts_rest[names.index(lobe.bone)] for lobe in flesh]

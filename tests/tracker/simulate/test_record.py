@@ -99,6 +99,25 @@ def test_progress_counts_images(tmp_path):
     assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
+def test_two_people_have_truth_each_and_masks_by_person(tmp_path):
+    session = simulate(tmp_path / "s", **(ARGUMENTS | {"n_frames": 1}), scene="tango", masks=True)
+    assert [p.name for p in session.people] == ["man", "woman"]
+    assert len({p.color for p in session.people}) == 2
+    for k, person in enumerate(session.people):
+        true = load_model(tmp_path / "s" / f"truth_{person.name}_model.toml")
+        assert true.height_m == person.model.height_m
+        assert true.joints != person.model.joints
+        (values,) = read_pose_table(tmp_path / "s" / f"truth_{person.name}.csv").values_for(true)
+        truth = read_trc(tmp_path / "s" / f"truth_{person.name}.trc")
+        index = [true.point_names.index(name) for name in truth.names]
+        assert np.allclose(true.points_world(values)[index], truth.points[0], atol=1e-5)
+        for source in session.cameras:
+            mask = read_image(source.masks / "000000.png", "mask")[..., 0]
+            assert set(np.unique(mask)) == {0, 1, 2}
+            own = np.argwhere(mask == k + 1).mean(axis=0)[::-1]
+            assert np.linalg.norm(own - source.camera.project(truth.points[0]).mean(axis=0)) < 8
+
+
 def test_an_interrupted_run_leaves_nothing(tmp_path):
     def interrupt(done, total):
         raise KeyboardInterrupt

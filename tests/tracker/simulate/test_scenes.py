@@ -2,8 +2,11 @@ import numpy as np
 import pytest
 
 from tracker.errors import TrackerError
+from tracker.formats.model_toml import load_model
 from tracker.simulate.acting import HEADING_RAD, perform
-from tracker.simulate.scenes import SCENES, cast_of
+from tracker.simulate.pairs import COUPLE_APART_M, TANGO_APART_M
+from tracker.simulate.scenes import CROWD_APART_M, SCENES, cast_of
+from tracker.simulate.skeleton import altered_model
 
 FPS = 25.0
 
@@ -19,7 +22,9 @@ def degrees(model, poses, name):
 
 # Degrees that the fastest angle may move in a frame: a punch bends the elbow by 130 degrees in a quarter of a second.
 FASTEST_DEGREES = {"elbow_rotation": 18, "walk_in_place": 18}
-PERFORMED = [(scene, seed) for scene in SCENES for seed in ((0,) if scene in FASTEST_DEGREES else (0, 1, 2, 7))]
+ALONE = [scene for scene in SCENES if len(cast_of(scene)) == 1]
+TOGETHER = [scene for scene in SCENES if scene not in ALONE]
+PERFORMED = [(scene, seed) for scene in ALONE for seed in ((0,) if scene in FASTEST_DEGREES else (0, 1, 2, 7))]
 VARIED = ("exercise", "dance", "reach_and_cross", "leaving")
 
 
@@ -36,6 +41,35 @@ def test_poses_keep_the_limits_and_move_smoothly(performed, performances, true_m
     assert np.abs(np.diff(poses[:, 3:], axis=0)).max() < np.radians(FASTEST_DEGREES.get(performed[0], 60))
     # At 25 frames a second nobody walks faster than 2.25 m/s.
     assert np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1).max() < 0.09
+
+
+@pytest.mark.parametrize("scene", TOGETHER)
+def test_people_together_keep_the_limits_and_their_distance_and_move_smoothly(scene):
+    cast = cast_of(scene, 3)
+    models = [altered_model(load_model("gavrila22", role.height_m), role.build.bone_factors) for role in cast]
+    poses = [perform(role, model, 50, FPS) for role, model in zip(cast, models, strict=True)]
+    for model, own in zip(models, poses, strict=True):
+        assert all(np.allclose(values, model.clip(values)) for values in own)
+        assert np.abs(np.diff(own[:, 3:], axis=0)).max() < np.radians(30)
+        limbs = [i for i, name in enumerate(model.dof_names) if "shoulder" in name or "knee" in name]
+        assert np.ptp(own[:, limbs], axis=0).max() > np.radians(15)
+    places = np.array(poses)[:, :, :2]
+    for i, place in enumerate(places[:-1]):
+        apart = np.linalg.norm(places[i + 1 :] - place, axis=2)
+        wanted = {**COUPLE_APART_M, "tango": TANGO_APART_M}.get(scene.removeprefix("couple_"), CROWD_APART_M)
+        assert np.abs(apart.min() - wanted) < 0.15
+
+
+def test_the_tango_turns_once_in_sixty_frames_face_to_face():
+    cast = cast_of("tango")
+    models = [altered_model(load_model("gavrila22", role.height_m), role.build.bone_factors) for role in cast]
+    twists = [
+        degrees(model, perform(role, model, 61, FPS), "torso.twist") for role, model in zip(cast, models, strict=True)
+    ]
+    assert [round(np.ptp(twist)) for twist in twists] == [360, 360]
+    assert np.allclose((twists[0] - twists[1]) % 360, 180, atol=3)
+    assert cast[0].height_m - cast[1].height_m > 0.1
+    assert cast[0].outfit != cast[1].outfit
 
 
 def test_standing_feet_do_not_slide(performances, true_model):
