@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from app.casting import Casting
 from app.disagreements import Disagreements
 from app.flooring import Flooring
 from app.frames import Frames
@@ -76,6 +77,8 @@ class Controller:
         """Looks at the cost along one degree of freedom."""
         self.flooring = Flooring(self._screen, self.editing)
         """Sets the floor."""
+        self.casting = Casting(self._screen)
+        """Whom the views show."""
         self.view_3d = Viewing(self._screen)
         """What the 3-D view shows."""
 
@@ -113,10 +116,15 @@ class Controller:
         """Tell a view every new state from now on; returns what ends it."""
         return self._screen.subscribe(view)
 
-    def timeline(self, since: int = 0) -> dict[int, dict | None]:
-        """Cells of the frames whose stored poses changed after a version of the timeline; all for 0."""
+    def timeline(self, since: int = 0, person: int | None = None) -> dict[int, dict | None]:
+        """Cells of the frames whose stored poses changed after a version of the timeline; all for 0.
+
+        Args:
+            since: the version.
+            person: of whom among several; by default what is said of all together.
+        """
         with self._lock:
-            return self._saver.timeline(since)
+            return self._saver.timeline(since, person)
 
     def numbers(self, person: int, since: int = 0) -> tuple[list[int], list[FrameNumbers]]:
         """Frames on which a person's stored poses changed after a version of the timeline, and what they hold now.
@@ -175,26 +183,30 @@ class Controller:
             self._screen.set(settings=settings)
             self._screen.set(**self._screen.costs(self.state.poses))
 
-    def search_step(self) -> None:
-        """Do one expansion of the search on this frame, beginning one where none stands."""
-        self._search(self._searching.step)
+    def search_step(self, person: int | None = None) -> None:
+        """Do one expansion of the search on this frame, beginning one where none stands.
 
-    def search_stage(self) -> None:
-        """Search this frame to the end of the stage at hand."""
-        self._search(self._searching.run_stage)
+        Args:
+            person: whom to search, the others as they stand; everybody by default.
+        """
+        self._search(lambda: self._searching.step(person))
 
-    def search_frame(self) -> None:
-        """Search this frame to the end, going on with a search that stands."""
-        self._search(self._searching.run)
+    def search_stage(self, person: int | None = None) -> None:
+        """Search this frame to the end of the stage at hand; for `person` see `search_step`."""
+        self._search(lambda: self._searching.run_stage(person))
 
-    def search_again(self, run: int | None = None) -> None:
+    def search_frame(self, person: int | None = None) -> None:
+        """Search this frame to the end, going on with a search that stands; for `person` see `search_step`."""
+        self._search(lambda: self._searching.run(person))
+
+    def search_again(self, run: int | None = None, person: int | None = None) -> None:
         """Search this frame from where a run of it began, by the settings of now; None for the newest run.
 
         Raises:
             TrackerError: the run is kept no more.
         """
         self._searching.halt()
-        self._search(lambda: self._searching.run_again(run))
+        self._search(lambda: self._searching.run_again(run, person))
 
     def pace_search(self, speed: float | None) -> None:
         """Watch so many expansions a second; None for as many as there can be.

@@ -85,7 +85,8 @@ class Gizmos:
         model, values = state.models[state.person], state.poses[state.person]
         joint = joint_of(model, state.point)
         places = model.kinematics(values).Ts_world_part
-        shown = not state.track.running and not state.job.running and state.look.replay is None
+        at_work = state.track.running or state.job.running or state.look.replay is not None
+        shown = not at_work and state.person not in state.cast.hidden
         with self._server.atomic():
             for which, part in (("root", 0), ("joint", joint)):
                 handle = self._handles[which]  # type: ignore[index]

@@ -25,7 +25,7 @@ class Outline(NamedTuple):
 
 
 def outlines(session: Session, state: State, view: View) -> list[Outline]:
-    """The parts that a pointer can take in the views that a page shows: all of everybody.
+    """The parts that a pointer can take in the views that a page shows: all of everybody who is shown.
 
     There are none while a hand holds a point, and of a part that is held by its surface there is that one alone: what
     the hand does not need would only make it wait. A step that is replayed is no pose to be taken.
@@ -39,6 +39,8 @@ def outlines(session: Session, state: State, view: View) -> list[Outline]:
         if index not in view.cameras:
             continue
         for one in picking.part_outlines(bodies, source.camera.pinhole):
+            if one.body in state.cast.hidden:
+                continue
             if drag is None or (one.body, one.part) == (drag.person, drag.part):
                 ends = np.hstack([one.polygon_px, np.roll(one.polygon_px, -1, axis=0)]).astype(np.float32)
                 out.append(Outline(index, one.body, one.part, one.depth_m, ends))

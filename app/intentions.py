@@ -66,6 +66,26 @@ def _unpin(controller: Controller, _: int, message: Message) -> None:
     controller.pinning.remove(int(message["frame"]), int(message["person"]), message["point"], camera)
 
 
+def _fit(controller: Controller, _: int, message: Message) -> None:
+    person = message.get("person")
+    controller.pinning.fit(int(message["frame"]), None if person is None else _person(controller, message))
+
+
+def _people(controller: Controller, _: int, message: Message) -> None:
+    actions: dict[str, Callable[[], None]] = {
+        "show": lambda: controller.casting.show(_person(controller, message), bool(message["shown"])),
+        "solo": lambda: controller.casting.solo(bool(message["on"])),
+    }
+    actions[message["action"]]()
+
+
+def _person(controller: Controller, message: Message) -> int:
+    person = int(message["person"])
+    if not 0 <= person < len(controller.models):
+        raise ValueError(f"there is no person {person}")
+    return person
+
+
 def _place(message: Message) -> tuple[float, float]:
     """Where the pointer is, undistorted px."""
     place_px = float(message["u"]), float(message["v"])
@@ -140,7 +160,8 @@ _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "pose": pose,
     "pin": _pin,
     "unpin": _unpin,
-    "fit": lambda controller, _, message: controller.pinning.fit(int(message["frame"])),
+    "fit": _fit,
+    "people": _people,
     "track": _track,
     "follow": lambda controller, _, message: controller.follow(bool(message["follow"])),
     "hold_3d": lambda controller, page, message: controller.hold_3d(page, bool(message["hold"])),

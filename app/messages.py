@@ -46,6 +46,8 @@ def session(session: Session) -> dict[str, Any]:
             {
                 "name": p.name,
                 "color": p.color,
+                "model": p.model.name,
+                "height_m": p.model.height_m,
                 "points": list(p.model.point_names),
                 "minor": list(minor_points(p.model)),
                 "bones": [list(b) for b in overlays.bones(p.model)],
@@ -65,6 +67,11 @@ def state(session: Session, state: State) -> dict[str, Any]:
         "frame": state.frame,
         "person": state.person,
         "point": state.point,
+        "people": [
+            {"source": p.source, "status": p.status, "shown": i not in state.cast.hidden}
+            for i, p in enumerate(state.people)
+        ],
+        "solo": state.cast.solo,
         "cost_px": drawn.cost_px,
         "view_costs_px": list(drawn.view_costs_px),
         "source": shown.source,
@@ -143,19 +150,24 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
     return binary(header, np.concatenate(segments).astype("<f4").tobytes() if segments else b"")
 
 
-def timeline(cells: Mapping[int, dict[str, Any] | None], replace: bool) -> dict[str, Any] | bytes:
+def timeline(
+    cells: Mapping[int, dict[str, Any] | None], replace: bool, person: int | None = None
+) -> dict[str, Any] | bytes:
     """Cells of the timeline: a few by name, many as columns.
 
     Args:
         cells: by frame; None for a frame that has no pose any more.
         replace: whether all other frames have no pose.
+        person: whose, of several; None for what is said of all together.
     """
     if len(cells) <= _FEW_CELLS:
-        return {"type": "timeline", "cells": {str(k): cell for k, cell in cells.items()}, "replace": replace}
+        named = {str(k): cell for k, cell in cells.items()}
+        return {"type": "timeline", "person": person, "cells": named, "replace": replace}
     frames = sorted(cells)
     rows = [cells[k] or _NO_CELL for k in frames]
     header = {
         "type": "cells",
+        "person": person,
         "replace": replace,
         "count": len(frames),
         "sources": SOURCES,

@@ -15,7 +15,7 @@ from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.rebody import rebodied
 from tracker.rigid import Array
 from tracker.segments import accept
-from tracker.session import Session
+from tracker.session import Person, Session
 from tracker.silhouettes import Mask
 
 CANDIDATE_COLOR = "#ffffff"
@@ -25,6 +25,8 @@ PART_EDGE_COLOR = "#9aa3ad"
 EPIPOLAR_COLOR = "#ffd54a"
 ACCEPTED_COLOR = "#35e0c8"
 REJECTED_COLOR = "#ff4fa3"
+_OF_A_PERSON = ("model", "hidden", "candidate", "ghost")
+"""Kinds of lines that are somebody's, and go where that person is not to be shown."""
 _EDGE_STRIDE = 3
 """Every so many pixels of an edge are drawn: more would be seen only far in, and cost the browser much."""
 
@@ -98,11 +100,11 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
             out += [s for s in _segments(bodies, views[index], index, view) if s.kind in view.layers]
     if state.drag is not None and "epipolar" in view.layers:
         out += [line for line in _epipolar_lines(session, state) if line.camera in view.cameras]
-    return out
+    return [p for p in out if p.kind not in _OF_A_PERSON or p.person not in state.cast.hidden]
 
 
 def handles(session: Session, state: State, cameras: Collection[int]) -> list[Handle]:
-    """The joints of everybody in some views, given by index; those behind a camera are left out."""
+    """The joints of everybody shown, in some views, given by index; those behind a camera are left out."""
     bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     points = [b.model.points_world(b.values) for b in bodies]
     out = []
@@ -113,16 +115,16 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
         for person, body in enumerate(bodies):
             px = camera.project(points[person])
             for i, name in enumerate(body.model.point_names):
-                if np.all(np.isfinite(px[i])):
+                if person not in state.cast.hidden and np.all(np.isfinite(px[i])):
                     u, v = float(px[i, 0]), float(px[i, 1])
                     out.append(Handle(index, person, name, u, v, not hidden[first + i]))
             first += len(px)
     return out
 
 
-def part_colors(session: Session) -> list[str]:
-    """Colours of the parts, counted through all people."""
-    return [part.color for person in session.people for part in person.model.parts]
+def part_colors(people: Sequence[Person]) -> list[str]:
+    """Colours of the parts, counted through some people."""
+    return [part.color for person in people for part in person.model.parts]
 
 
 def _traced(bodies: Sequence[Body], camera: Camera) -> Contour:
@@ -181,7 +183,7 @@ def _by_part(
     session: Session, bodies: Sequence[Body], contour: Contour, those: Mask, index: int, kind: str
 ) -> list[Path]:
     """Those pieces of a contour, one path for each part that has any."""
-    people, colors = contours.surfaces_of(tuple(b.model for b in bodies)).people, part_colors(session)
+    people, colors = contours.surfaces_of(tuple(b.model for b in bodies)).people, part_colors(session.people)
     return [
         Path(index, int(people[part]), kind, colors[part], contour.pieces_px[those & (contour.parts == part)])
         for part in np.unique(contour.parts[those])

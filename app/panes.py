@@ -223,11 +223,11 @@ class _Page:
         return views
 
     async def _send_timeline(self, since: int) -> None:
-        message = await asyncio.to_thread(messages.timeline, self._controller.timeline(since), since == 0)
-        if isinstance(message, bytes):
-            await self._socket.send_bytes(message)
-        else:
-            await self._send(message)
+        several = range(len(self._controller.models)) if len(self._controller.models) > 1 else ()
+        for person in (None, *several):
+            cells = self._controller.timeline(since, person)
+            message = await asyncio.to_thread(messages.timeline, cells, since == 0, person)
+            await (self._socket.send_bytes(message) if isinstance(message, bytes) else self._send(message))
 
     async def _send_curves(self, state: State) -> None:
         """Send the open group of curves: whole where it is another than before, else the frames that changed."""
@@ -277,6 +277,7 @@ def _drawn(state: State) -> tuple[object, ...]:
         state.look,
         state.drag,
         state.drag_seqs,
+        state.cast.hidden,
     )
     return (*drawn, _pins(state), state.floor.picking)
 

@@ -66,9 +66,10 @@ class PictureSets:
         if layer == "image":
             return frames.image(state.frame, camera, reduction), None
         if layer == "parts":
-            bodies = [Body(p.model, v) for p, v in zip(session.people, state.drawn.poses, strict=True)]
-            pinhole = session.cameras[camera].camera.pinhole
-            return pictures.parts(bodies, pinhole, overlays.part_colors(session), reduction), None
+            shown = [i for i in range(len(session.people)) if i not in state.cast.hidden]
+            bodies = [Body(session.people[i].model, state.drawn.poses[i]) for i in shown]
+            colors = overlays.part_colors([session.people[i] for i in shown])
+            return pictures.parts(bodies, session.cameras[camera].camera.pinhole, colors, reduction), None
         evidence = frames.evidence(state.frame)[camera]
         if layer == "silhouette":
             return pictures.silhouette(evidence), None
@@ -82,6 +83,6 @@ def _wanted(state: State, view: View) -> dict[Key, tuple[object, ...]]:
         for camera in sorted(view.cameras):
             # Evidence comes at the scale of matching, whatever the pane.
             content = () if layer in EVIDENCE else (view.reductions[camera],)
-            poses = (state.revisions, *map(id, state.drawn.poses)) if layer == "parts" else ()
+            poses = (state.revisions, state.cast.hidden, *map(id, state.drawn.poses)) if layer == "parts" else ()
             wanted[layer, camera] = (state.frame, *content, *poses)
     return wanted

@@ -50,10 +50,10 @@ class Meeting(NamedTuple):
 
 
 def pin_marks(session: Session, state: State) -> list[PinMark]:
-    """All pins of the frame."""
+    """All pins of the frame, of everybody who is shown."""
     out = []
     for person, (info, pins) in enumerate(zip(session.people, state.pins, strict=True)):
-        if not pins:
+        if not pins or person in state.cast.hidden:
             continue
         points = info.model.points_world(state.poses[person])
         for point, camera, place_px in pins:
@@ -100,5 +100,7 @@ def pin_lines(session: Session, state: State, view: View) -> list[Path]:
 
 
 def _of_joint(state: State) -> list[ViewPin]:
-    """The pins of the joint worked on."""
-    return [p for p in state.pins[state.person] if p.point == state.point] if state.pins else []
+    """The pins of the joint worked on; none of a person who is not shown."""
+    if not state.pins or state.person in state.cast.hidden:
+        return []
+    return [p for p in state.pins[state.person] if p.point == state.point]

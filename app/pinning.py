@@ -143,8 +143,13 @@ class Pinning:
             what = "remove all pins" if point is None else f"remove pin {spoken(point)}{self._in(camera)}"
             self._screen.save(what, "manual")
 
-    def fit(self, frame: int) -> None:
-        """Fit the person worked on, and everybody with pins, to pins and edges together.
+    def fit(self, frame: int, person: int | None = None) -> None:
+        """Fit people to pins and edges together.
+
+        Args:
+            frame: that the user saw.
+            person: whom to fit, the others as they stand; by default the person worked on and everybody who has been
+                placed or pinned on the frame.
 
         Raises:
             TrackerError: there is nothing to fit to: neither pins nor, yet, edges.
@@ -155,13 +160,15 @@ class Pinning:
             self._screen.go_to(frame)
             state = self._screen.state
             views = self._screen.frames.evidence_at_hand(frame)
-            pinned = [i for i, pins in enumerate(state.pins) if pins]
+            placed = [i for i, shown in enumerate(state.people) if shown.source is not None or state.pins[i]]
+            meant = {state.person, *placed} if person is None else {person}
+            pinned = sorted(i for i in meant if state.pins[i])
             if views is None and not pinned:
                 raise TrackerError(
                     "expected pins or edges to fit to, found no pin on this frame and its edges not there yet; "
                     "set pins, or try again in a moment"
                 )
-            people = sorted({state.person, *pinned}) if views is not None else pinned
+            people = sorted(meant) if views is not None else pinned
             self._show_fit(people, state.people, state.pins)
             told = " and ".join([*(["pins"] if pinned else []), *(["edges"] if views is not None else [])])
             self._screen.save(f"fit to {told}", "fitted")

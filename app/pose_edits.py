@@ -11,7 +11,7 @@ from tracker import confidence, posing
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
 from tracker.orienting import orient
-from tracker.pose_edits import limb_of, mirrored, taken_over
+from tracker.pose_edits import bent_alike, limb_of, mirrored, taken_over
 from tracker.rebody import rebodied
 from tracker.rigid import Array
 
@@ -133,6 +133,19 @@ class PoseEdits:
             copied = rebodied(stored.values, self._screen.saver.body(stored.revision), model)
             values = taken_over(model, self._screen.state.poses[person], copied, self._screen.free(person))
             self._take(person, values, f"copy frame {other}")
+
+    def copy_person(self, person: int, other: int, frame: int | None = None) -> None:
+        """Bend as another person does on the same frame, where they have joints of the same name; place and turn stay.
+
+        Raises:
+            TrackerError: there is nobody else of that index.
+        """
+        if other == person or not 0 <= other < len(self._screen.models):
+            raise TrackerError(f"expected another person to copy the pose of, found number {other}; choose another")
+        with self._on(person, frame) as model:
+            values, body = self._screen.state.poses, self._screen.models[other]
+            bent = bent_alike(model, values[person], body, values[other], self._screen.free(person))
+            self._take(person, bent, f"copy the pose of {self._screen.session.people[other].name}")
 
     def reset(self, person: int, point: str | None, frame: int | None = None) -> None:
         """Put the limb of a point back to the neutral pose; without a point, or with the root's, all but the root."""

@@ -40,6 +40,7 @@ def pose(controller: Controller, _: int, message: Mapping[str, Any]) -> None:
         "nudge": nudge,
         "mirror": lambda: edits.mirror(person, frame),
         "copy": lambda: edits.copy_from(person, int(message["from"]), frame),
+        "copy_person": lambda: edits.copy_person(person, int(message["from"]), frame),
         "reset": lambda: edits.reset(person, point, frame),
         "lock": lambda: controller.locks.set(person, [int(d) for d in message["dofs"]], bool(message["locked"])),
     }

@@ -3,11 +3,11 @@
 from bisect import bisect_left
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict
-from itertools import takewhile
 from typing import Any
 
 import numpy as np
 
+from app.cells import Cells
 from app.state import Shown, State
 from app.tracked import keyframes_of, tracked_changes
 from app.writing import Writing
@@ -33,7 +33,6 @@ from tracker.session import Session
 from tracker.track import PoseEstimate
 from tracker.track_settings import TrackSettings
 
-_WORST_FIRST = ("lost", "doubtful", "good", "")
 _BY_HAND = ("manual", "pinned", "fitted")
 """Sources of a person's own edits: a frame that a person's word was fitted to is a keyframe as one set by drags is."""
 _SAME_PX = 1e-6
@@ -57,14 +56,16 @@ class Saver:
         self._bodies: dict[int, BodyModel] = {}
         self._revisions: list[int] = []
         self.embody(session)
-        self._cells: dict[int, dict] = {}
+        self._cells = Cells(p.name for p in session.people)
         self._frames: list[list[int]] = [[] for _ in session.people]
-        self._changed: dict[int, int] = {}  # frame -> version of the timeline it changed in last, latest last
-        self.timeline_version = 1
-        """Rises with every change of stored poses."""
         self.passed: tuple[int, ...] = ()
         """Entries of the history that the last undo, redo or walk took back or did again, in that order."""
         self._reload()
+
+    @property
+    def timeline_version(self) -> int:
+        """Rises with every change of stored poses."""
+        return self._cells.version
 
     @property
     def error(self) -> str | None:
@@ -285,12 +286,14 @@ class Saver:
         entry = self._next_redo()
         return None if entry is None else entry.label
 
-    def timeline(self, since: int) -> dict[int, dict | None]:
-        """Cells of the frames that changed after a version of the timeline; all for 0."""
-        if since <= 0:
-            return dict(self._cells)
-        latest = takewhile(lambda change: change[1] > since, reversed(self._changed.items()))
-        return {frame: self._cells.get(frame) for frame, _ in latest}
+    def timeline(self, since: int, person: int | None = None) -> dict[int, dict | None]:
+        """Cells of the frames that changed after a version of the timeline; all for 0.
+
+        Args:
+            since: the version.
+            person: of whom among several; by default what is said of all together.
+        """
+        return self._cells.since(since, None if person is None else self._session.people[person].name)
 
     def _next_undo(self) -> HistoryEntry | None:
         return next((e for e in self._store.history(1) if not e.undone), None)
@@ -365,13 +368,12 @@ class Saver:
             self._frames[person] = [row.frame for row in found]
             for row in found:
                 rows.setdefault(row.frame, {})[info.name] = row
-        self._cells = {frame: _cell(people) for frame, people in rows.items()}
+        self._cells.begin(rows)
 
     def _note(self, frames: Sequence[int]) -> None:
         """Bring the cells of some frames, ascending, up to date."""
         if not frames:
             return
-        changed = set(frames)
         rows: dict[int, dict[str, FrameRow]] = {}
         for person, info in enumerate(self._session.people):
             found = self._store.frames(info.name, range(frames[0], frames[-1] + 1))
@@ -381,26 +383,7 @@ class Saver:
             listed = self._frames[person]
             between = slice(bisect_left(listed, frames[0]), bisect_left(listed, frames[-1] + 1))
             listed[between] = [row.frame for row in found]
-        self.timeline_version += 1
-        for frame in changed:
-            self._cells.pop(frame, None)
-            self._changed.pop(frame, None)
-            self._changed[frame] = self.timeline_version
-        self._cells |= {frame: _cell(people) for frame, people in rows.items() if frame in changed}
-
-
-def _cell(rows: Mapping[str, FrameRow]) -> dict:
-    """What the timeline says of a frame: of several people the worst, and the source nearest to a person's hand."""
-    costs = [row.cost_px for row in rows.values() if row.cost_px is not None]
-    remarks = [row.remark if len(rows) == 1 else f"{name}: {row.remark}" for name, row in rows.items() if row.remark]
-    return {
-        "source": min((row.source for row in rows.values()), key=SOURCES.index),
-        "cost_px": round(max(costs), 3) if costs else None,
-        "keyframe": any(row.keyframe for row in rows.values()),
-        "status": min((row.status for row in rows.values()), key=_WORST_FIRST.index),
-        "remark": "; ".join(remarks),
-        "reviewed": all(row.reviewed for row in rows.values()),
-    }
+        self._cells.change(frames, rows)
 
 
 def _summary(sources: tuple[str, ...]) -> str:

@@ -33,6 +33,8 @@ _CELL_RGB, _SECTION_RGB = (112, 116, 122), (140, 145, 152)
 """Lines of the floor, legible before black, white and an image."""
 _GHOST_RGB = (150, 158, 172)
 _GHOST_OPACITY = 0.35
+_DIMMED = 0.2
+"""Opacity of people who are dimmed, as a share of the others'."""
 
 
 class Scene:
@@ -46,11 +48,11 @@ class Scene:
         self._expected: tuple[object, ...] = ()
         self._trailed: tuple[object, ...] = ()
         self._trails_version = controller.state.timeline_version
-        self._look: View3d | None = None
+        self._look: tuple[View3d, frozenset[int], frozenset[int]] | None = None
         self._laid: tuple[object, ...] = ()
         self._panel = ViewPanel(server, controller)
         self._grid = _add_surroundings(server, self._session)
-        self._parts = _Parts(server, "/people", controller.session_of(controller.state))
+        self._parts = self._new_people(controller.state)
         self._shape: tuple[BodyModel, ...] = controller.state.models
         self._ghost: _Parts | None = None
         self._present = controller.state.present
@@ -70,7 +72,7 @@ class Scene:
         with self._server.atomic():
             self._frusta.show(state)
             self._show_bodies(state)
-            self._show_look(state.view_3d)
+            self._show_look(state)
             self._show_floor(state.floor)
             poses = tuple(id(p) for p in state.poses)
             if poses != self._posed:
@@ -84,7 +86,7 @@ class Scene:
         if state.models != self._shape:
             self._shape = state.models
             self._parts.remove()
-            self._parts = _Parts(self._server, "/people", self._controller.session_of(state))
+            self._parts = self._new_people(state)
             self._posed, self._look = (), None
         if state.present != self._present:
             self._present = state.present
@@ -94,16 +96,30 @@ class Scene:
             self._expected = ()
             self._trails, self._trailed = self._new_trails(), ()
 
+    def _new_people(self, state: State) -> "_Parts":
+        """The meshes of everybody; a click on one works on that person, and on the joint that moves the part."""
+        parts = _Parts(self._server, "/people", self._controller.session_of(state))
+        for person, handles in enumerate(parts.handles):
+            points = self._controller.models[person].point_names
+            for part, handle in enumerate(handles):
+                handle.on_click(partial(self._clicked, person, points[part]))
+        return parts
+
+    def _clicked(self, person: int, point: str, _: object) -> None:
+        self._controller.select(person, point)
+
     def _new_trails(self) -> list[Trails]:
         people = self._controller.session.people
         return [Trails(p.model, partial(self._controller.poses, i)) for i, p in enumerate(people)]
 
-    def _show_look(self, view: View3d) -> None:
-        if view == self._look:
+    def _show_look(self, state: State) -> None:
+        others = frozenset(range(len(state.people))) - {state.person}
+        look = (state.view_3d, state.cast.hidden, others if state.cast.solo else frozenset())
+        if look == self._look:
             return
-        self._look = view
-        self._parts.look(view)
-        self._grid.visible = view.floor
+        self._look = look
+        self._parts.look(*look)
+        self._grid.visible = state.view_3d.floor
 
     def _show_floor(self, floor: FloorState) -> None:
         """Lay the grid on the floor, or on the plane that is previewed."""
@@ -121,7 +137,8 @@ class Scene:
 
     def _show_ghost(self, state: State) -> None:
         backward = state.track.running and (state.track.last or 0) < (state.track.first or 0)
-        wanted = (state.view_3d.ghost, state.frame, state.timeline_version, state.settings.predict, backward)
+        hidden = state.cast.hidden
+        wanted = (state.view_3d.ghost, state.frame, state.timeline_version, state.settings.predict, backward, hidden)
         if wanted == self._expected or (not state.view_3d.ghost and self._ghost is None):
             return
         self._expected = wanted
@@ -141,12 +158,13 @@ class Scene:
         if self._ghost is None:
             self._ghost = _Parts(self._server, "/prediction", self._controller.session, _GHOST_RGB, _GHOST_OPACITY)
         self._ghost.pose([f.values for f in found])
-        for handles, expected in zip(self._ghost.handles, found, strict=True):
-            _set_visible(handles, expected.values is not None)
+        for index, (handles, expected) in enumerate(zip(self._ghost.handles, found, strict=True)):
+            _set_visible(handles, expected.values is not None and index not in hidden)
 
     def _show_trails(self, state: State) -> None:
         view, version = state.view_3d, state.timeline_version
-        wanted = (view.trail_points, view.trail_frames, state.frame, version)
+        hidden = state.cast.hidden
+        wanted = (view.trail_points, view.trail_frames, state.frame, version, hidden)
         if wanted == self._trailed or (not view.trail_points and not self._trailed):
             return
         self._trailed = wanted
@@ -155,8 +173,9 @@ class Scene:
             self._trails_version = version
             for trails in self._trails:
                 trails.forget(changed)
-        for person, trails in zip(self._session.people, self._trails, strict=True):
-            points, colors = trails.segments(state.frame, view.trail_frames, view.trail_points, self._session.n_frames)
+        for index, (person, trails) in enumerate(zip(self._session.people, self._trails, strict=True)):
+            shown = frozenset() if index in hidden else view.trail_points
+            points, colors = trails.segments(state.frame, view.trail_frames, shown, self._session.n_frames)
             self._server.scene.add_line_segments(
                 f"/trails/{person.name}", points, colors, thickness=2.5, thickness_units="screen"
             )
@@ -222,13 +241,14 @@ class _Parts:
         for handles in self.handles:
             _set_visible(handles, False)
 
-    def look(self, view: View3d) -> None:
-        """Show, colour and make translucent as a view says."""
-        for person, handles in zip(self._people, self.handles, strict=True):
+    def look(self, view: View3d, hidden: frozenset[int], dimmed: frozenset[int]) -> None:
+        """Show, colour and make translucent as a view says; but for people, by index, who are hidden or dimmed."""
+        for index, (person, handles) in enumerate(zip(self._people, self.handles, strict=True)):
+            opacity = _DIMMED * view.opacity if index in dimmed else view.opacity
             for part, handle in zip(person.model.parts, handles, strict=True):
                 handle.color = _rgb(part.color if view.colors == "parts" else person.color)
-                handle.opacity = None if view.opacity >= 1 else view.opacity
-            _set_visible(handles, view.bodies)
+                handle.opacity = None if opacity >= 1 else opacity
+            _set_visible(handles, view.bodies and index not in hidden)
 
 
 def _set_visible(handles: Sequence[viser.MeshHandle], visible: bool) -> None:

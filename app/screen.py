@@ -21,6 +21,9 @@ from tracker.rigid import Array
 from tracker.session import Session
 from tracker.track_settings import pose_cost
 
+_APART_M = 0.9
+"""How far from each other people stand whom nobody has placed, metres: each can be seen and taken by itself."""
+
 
 class Screen:
     """The state of one open session. Whoever changes it holds `lock`; the views are told within it."""
@@ -78,7 +81,11 @@ class Screen:
         """Let whom nobody has placed stand upright, by a rotation whose z axis points up, (3, 3)."""
         cameras = [c.camera for c in self.session.cameras]
         self._R_world_up = R_world_up
-        self._standing = tuple(posing.standing_pose(m, cameras, R_world_up) for m in self.present)
+        middle = (len(self.present) - 1) / 2
+        self._standing = tuple(
+            posing.standing_pose(model, cameras, R_world_up, _APART_M * (i - middle))
+            for i, model in enumerate(self.present)
+        )
 
     def embody(self, session: Session) -> None:
         """Go on with a session whose people have other bodies; to be followed by `show`."""

@@ -10,11 +10,14 @@ Message = Mapping[str, Any]
 
 
 def _search(controller: Controller, _: int, message: Message) -> None:
+    person = _number(message.get("person"))
+    if person is not None and not 0 <= person < len(controller.models):
+        raise ValueError(f"there is no person {person}")
     actions: dict[str, Callable[[], None]] = {
-        "step": controller.search_step,
-        "stage": controller.search_stage,
-        "frame": controller.search_frame,
-        "again": lambda: controller.search_again(_number(message.get("run"))),
+        "step": lambda: controller.search_step(person),
+        "stage": lambda: controller.search_stage(person),
+        "frame": lambda: controller.search_frame(person),
+        "again": lambda: controller.search_again(_number(message.get("run")), person),
         "stop": controller.stop,
     }
     actions[message["action"]]()

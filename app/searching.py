@@ -27,27 +27,28 @@ class Searching:
         self._screen, self._runs = screen, runs
         self._job: Job[SearchStep] | None = None
         self._run: Run | None = None
+        self._person: int | None = None  # who alone is searched; None for everybody
 
     @property
     def running(self) -> bool:
         """Whether a search is at work."""
         return self._job is not None and self._job.running
 
-    def step(self) -> None:
-        """Do one expansion, beginning a search where none stands."""
+    def step(self, person: int | None = None) -> None:
+        """Do one expansion, beginning a search where none of the same people stands; by default of everybody."""
         with self._screen.lock:
             if not self.running:
-                self._standing_job().step()
+                self._standing_job(person).step()
 
-    def run(self) -> None:
-        """Search to the end, going on with a search that stands."""
-        self._go(lambda _: False)
+    def run(self, person: int | None = None) -> None:
+        """Search to the end, going on with a search of the same people that stands; by default of everybody."""
+        self._go(lambda _: False, person)
 
-    def run_stage(self) -> None:
+    def run_stage(self, person: int | None = None) -> None:
         """Search to the end of the stage at hand, which is the next one where a stage has just ended."""
-        self._go(lambda step: step.stage_done)
+        self._go(lambda step: step.stage_done, person)
 
-    def run_again(self, number: int | None) -> None:
+    def run_again(self, number: int | None, person: int | None = None) -> None:
         """Search anew from where a run of this frame began, by the settings of now; None for the newest run.
 
         Raises:
@@ -61,7 +62,7 @@ class Searching:
                     raise TrackerError(f"expected a run of this frame, found run {number}, which is kept no more")
             if not self.running:
                 self.forget()
-                self._go(lambda _: False, runs[-1].start if runs else None)
+                self._go(lambda _: False, person, runs[-1].start if runs else None)
 
     def pace(self, speed: float | None) -> None:
         """Watch so many expansions a second, at once; None for as many as there can be.
@@ -89,24 +90,28 @@ class Searching:
             self._run.over = True
         self._screen.set(job=JobState())
 
-    def _go(self, until: Callable[[SearchStep], bool], start: tuple[Array, ...] | None = None) -> None:
+    def _go(
+        self, until: Callable[[SearchStep], bool], person: int | None, start: tuple[Array, ...] | None = None
+    ) -> None:
         with self._screen.lock:
             if not self.running:
-                job = self._standing_job(start)
+                job = self._standing_job(person, start)
                 self._screen.set(job=replace(self._screen.state.job, running=True))
                 job.run(until)
 
-    def _standing_job(self, start: tuple[Array, ...] | None = None) -> Job[SearchStep]:
+    def _standing_job(self, person: int | None, start: tuple[Array, ...] | None = None) -> Job[SearchStep]:
         """The search that stands, or a new one from given poses, else from those shown."""
         screen, state = self._screen, self._screen.state
-        if self._job is None or self._job.ended:
+        if self._job is None or self._job.ended or self._person != person:
             frame, settings, models = state.frame, state.settings, screen.models
             poses = state.poses if start is None else screen.within_locks(start)
-            free = [screen.free(person) for person in range(len(models))]
+            free = [screen.free(i) & (person is None or i == person) for i in range(len(models))]
             if not stages(models, settings.search, free=free):
                 raise TrackerError(
                     "expected something that a search may move, found everything locked; unlock some of it"
                 )
+            if self._run is not None:
+                self._run.over = True
             start_px = screen.costs(poses)["cost_px"]
             known_px = start_px if isinstance(start_px, float) else np.nan
             run = self._runs.begin(frame, models, poses, known_px, settings, free)
@@ -117,7 +122,7 @@ class Searching:
                 lambda: self._paused(job),
             )
             job.pace(_rest_s(state.look.speed))
-            self._job, self._run, screen.edit_of = job, run, None
+            self._job, self._run, self._person, screen.edit_of = job, run, person, None
             screen.set(job=JobState(kind="search", stages=tuple(s.name for s in run.stages)))
         return self._job
 
@@ -128,9 +133,10 @@ class Searching:
                 return
             self._run.add(step, seconds)
             people = tuple(
-                p if p.source is not None and np.array_equal(p.values, best) else Shown(best, "searched")
-                for p, best in zip(screen.state.people, step.best, strict=True)
-            )
+                p if self._is_left(i) or (p.source is not None and np.array_equal(p.values, best))
+                else Shown(best, "searched")
+                for i, (p, best) in enumerate(zip(screen.state.people, step.best, strict=True))
+            )  # fmt: skip
             shown = replace(
                 screen.state.job, running=job.running, kind="search", stage=step.stage.name,
                 evaluations=step.evaluations, per_second=step.evaluations / max(1e-6, seconds),
@@ -161,6 +167,10 @@ class Searching:
             ended = replace(screen.state.job, running=False, kind=None, stage=None, candidate=None, message=message)
             screen.set(job=ended, **screen.costs(screen.state.poses))
             self._save(job)
+
+    def _is_left(self, person: int) -> bool:
+        """Whether somebody else is searched and this person, who hides and explains, stays as he is: a draft too."""
+        return self._person is not None and person != self._person
 
     def _save(self, job: Job[SearchStep]) -> None:
         if any(p.source == "searched" for p in self._screen.state.people):

@@ -196,6 +196,16 @@ class SizeDraft:
     """The body as it would be."""
 
 
+@dataclass(frozen=True)
+class Cast:
+    """Whom the views show, and how. It changes no pose: who is not shown still hides others, and counts in costs."""
+
+    hidden: frozenset[int] = frozenset()
+    """Indices of the people whom no view shows."""
+    solo: bool = False
+    """Whether everybody but the person worked on is dimmed, and out of reach of a hand."""
+
+
 @dataclass(frozen=True, eq=False)
 class State:
     """Everything the views need, and nothing they could derive."""
@@ -218,6 +228,7 @@ class State:
     """Index of the person worked on."""
     point: str | None = None
     """The point last touched."""
+    cast: Cast = field(default_factory=Cast)
     cost_px: float | None = None
     """Mean over the views, px; None while the frame's evidence is not there yet."""
     view_costs_px: tuple[float | None, ...] = ()

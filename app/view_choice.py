@@ -39,13 +39,14 @@ def kept(view: View3d) -> dict[str, Any]:
     return asdict(view) | {"trail_points": sorted(view.trail_points)}
 
 
-def restored(data: object) -> View3d:
+def restored(data: object, usual: View3d | None = None) -> View3d:
     """The view that was kept; what is missing or makes no sense is as it is for a session that is new.
 
     Args:
         data: as `kept` made it, or whatever a file holds.
+        usual: how it is for a session that is new.
     """
-    usual = View3d()
+    usual = usual or View3d()
     if not isinstance(data, Mapping):
         return usual
     are_switches = [f.name for f in fields(View3d) if isinstance(getattr(usual, f.name), bool)]

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from app.screen import Screen
-from app.view_choice import kept, restored
+from app.view_choice import View3d, kept, restored
 
 _KEY = "view_3d"
 """Setting of the session."""
@@ -16,7 +16,9 @@ class Viewing:
     def __init__(self, screen: Screen) -> None:
         """Take over what is kept with the session."""
         self._screen = screen
-        screen.set(view_3d=restored(screen.saver.setting(_KEY)))
+        # Two bodies close together are told apart by their own colours, not by those of their parts.
+        usual = View3d(colors="people" if len(screen.session.people) > 1 else "parts")
+        screen.set(view_3d=restored(screen.saver.setting(_KEY), usual))
 
     def choose(self, **changes: Any) -> None:
         """Change fields of `View3d`; on disk when this returns.

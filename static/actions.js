@@ -23,12 +23,13 @@ export class Actions {
 
   /** @param {"step" | "stage" | "frame" | "stop"} action */
   search(action) {
-    this.#send({ type: "search", action });
+    this.#send({ type: "search", action, person: whom(this.#store.facts) });
   }
 
   /** Search again from where the run that is looked at began, by the settings of now. */
   searchAgain() {
-    this.#send({ type: "search", action: "again", run: this.#store.facts.searchRun });
+    const { facts } = this.#store;
+    this.#send({ type: "search", action: "again", run: facts.searchRun, person: whom(facts) });
   }
 
   /** Show the true pose again, where a search is replayed; whether there was something to leave. */
@@ -113,6 +114,64 @@ export class Actions {
   selectPerson(person) {
     this.#send({ type: "select", person, point: null });
   }
+
+  /**
+   * Work on the next person, or the one before.
+   *
+   * @param {1 | -1} way
+   */
+  stepPerson(way) {
+    const { state, session } = this.#store.facts;
+    const count = session?.people.length ?? 0;
+    if (state && count > 1) this.selectPerson((state.person + way + count) % count);
+  }
+
+  /**
+   * Show a person in all views, or nowhere.
+   *
+   * @param {number} person
+   * @param {boolean} shown
+   */
+  showPerson(person, shown) {
+    this.#send({ type: "people", action: "show", person, shown });
+  }
+
+  /** Show or hide the person worked on. */
+  toggleShown() {
+    const { state } = this.#store.facts;
+    if (state && state.people.length > 1) this.showPerson(state.person, !state.people[state.person].shown);
+  }
+
+  /** Dim everybody but the person worked on, or no more. */
+  toggleSolo() {
+    const { state } = this.#store.facts;
+    if (state && state.people.length > 1) this.#send({ type: "people", action: "solo", on: !state.solo });
+  }
+
+  /** Let searches and fits move everybody, or the person worked on alone. */
+  toggleWhose() {
+    const { whose, session } = this.#store.facts;
+    if ((session?.people.length ?? 0) > 1) this.#store.set({ whose: whose === "all" ? "one" : "all" });
+  }
+}
+
+/**
+ * Whom searches and fits move; null for everybody.
+ *
+ * @param {import("./store.js").Facts} facts
+ */
+export function whom({ whose, state }) {
+  return whose === "one" && state ? state.person : null;
+}
+
+/**
+ * Whether a person is dimmed, and out of reach of a hand: another is worked on alone.
+ *
+ * @param {import("./protocol.js").StateMessage | null} state
+ * @param {number} person
+ */
+export function isDimmed(state, person) {
+  return !!state?.solo && person !== state.person;
 }
 
 /**

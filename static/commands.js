@@ -108,7 +108,13 @@ export function placeCommands({ store, navigation, grid, posing, layers, actions
     commands[commands.length - 1].id = `camera ${name}`;
   });
   if ((session?.people.length ?? 0) > 1) {
-    session?.people.forEach(({ name }, index) => add("Person", `Work on ${name}`, () => actions.selectPerson(index), "person"));
+    session?.people.forEach(({ name }, index) => {
+      const isShown = state?.people[index]?.shown ?? true;
+      add("Person", `Work on ${name}`, () => actions.selectPerson(index), "person");
+      add("Person", `${isShown ? "Hide" : "Show"} ${name}`, () => actions.showPerson(index, !isShown), "person show hide");
+      commands[commands.length - 1].id = `shown ${name}`;
+      if (index !== state?.person) add("Person", `Copy the pose of ${name}`, () => posing.copyPerson(index), "person bend");
+    });
   }
   const points = session?.people[state?.person ?? 0]?.points ?? [];
   for (const point of points) add("Joint", `Select ${spoken(point)}`, () => posing.selectPoint(point), "joint");

@@ -1,4 +1,4 @@
-/** The menu of frames whose pose can be copied: the neighbours, and the keyframes nearest in time. */
+/** The menu of poses that can be copied: of the others on this frame, of the frames beside it, of the nearest keyframes. */
 
 import { byId } from "./elements.js";
 
@@ -30,7 +30,7 @@ export class CopyMenu {
   }
 
   #open() {
-    const { shown, session, timeline } = this.#store.facts;
+    const { shown, session, timeline, state } = this.#store.facts;
     if (!shown || !session) return;
     const here = shown.frame;
     const keyframes = [...timeline]
@@ -39,7 +39,9 @@ export class CopyMenu {
       .sort((a, b) => Math.abs(a - here) - Math.abs(b - here))
       .slice(0, MOST_KEYFRAMES)
       .sort((a, b) => a - b);
+    const others = [...session.people.entries()].filter(([person]) => person !== (state?.person ?? 0));
     const items = [
+      ...others.map(([person, { name }]) => this.#ofPerson(name, person)),
       this.#item("Previous frame", "Alt+,", here - 1, timeline.has(here - 1)),
       this.#item("Next frame", "Alt+.", here + 1, timeline.has(here + 1)),
       ...keyframes.map((frame) => this.#item(`Keyframe ${frame}`, away(frame - here), frame, true)),
@@ -65,17 +67,38 @@ export class CopyMenu {
    * @param {boolean} hasPose
    */
   #item(text, note, frame, hasPose) {
+    const title = hasPose ? `Copy the pose of frame ${frame}` : `Frame ${frame} has no pose`;
+    const item = this.#entry(text, hasPose ? note : "no pose", title, () => this.#posing.copyFrom(frame));
+    item.disabled = !hasPose;
+    return item;
+  }
+
+  /**
+   * @param {string} name
+   * @param {number} person
+   */
+  #ofPerson(name, person) {
+    const title = `Bend as ${name} does on this frame; place and turn stay`;
+    return this.#entry(name, "this frame", title, () => this.#posing.copyPerson(person));
+  }
+
+  /**
+   * @param {string} text
+   * @param {string} note
+   * @param {string} title
+   * @param {() => void} copy
+   */
+  #entry(text, note, title, copy) {
     const item = document.createElement("button");
     item.type = "button";
     item.setAttribute("role", "menuitem");
-    item.disabled = !hasPose;
-    item.title = hasPose ? `Copy the pose of frame ${frame}` : `Frame ${frame} has no pose`;
+    item.title = title;
     const small = document.createElement("small");
-    small.textContent = hasPose ? note : "no pose";
+    small.textContent = note;
     item.append(text, small);
     item.addEventListener("click", () => {
       this.#close();
-      this.#posing.copyFrom(frame);
+      copy();
     });
     return item;
   }

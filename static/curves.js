@@ -26,6 +26,7 @@ export class Curves {
   #frameWindow;
   #stage = byId("curves", HTMLElement);
   #legend = byId("curves-legend", HTMLElement);
+  #whose = byId("curves-whose", HTMLElement);
   #lines = document.createElement("canvas");
   #cursor = document.createElement("canvas");
   /** The group that is shown; null while the drawer is closed or shows something else. */
@@ -73,7 +74,7 @@ export class Curves {
     if (changed.has("connected") && this.#store.facts.connected) this.#actions.openCurves(this.#group);
     if (changed.has("curves")) this.#describe();
     const moved = changed.has("curves") || changed.has("session") || changed.has("visible");
-    if (moved || changed.has("timeline")) this.#drawLines();
+    if (moved || changed.has("timeline") || changed.has("lanes")) this.#drawLines();
     if (moved || changed.has("target")) this.#drawCursor();
   }
 
@@ -82,6 +83,7 @@ export class Curves {
     const { drawer } = this.#store.facts;
     const group = CURVE_GROUPS.find((one) => one === drawer) ?? null;
     this.#stage.hidden = this.#legend.hidden = group === null;
+    if (group === null) this.#whose.hidden = true;
     if (group === this.#group) return;
     this.#group = group;
     if (this.#store.facts.connected) this.#actions.openCurves(group);
@@ -114,6 +116,7 @@ export class Curves {
   /** Build the legend: one switch per name, which stands for the curves of that name in all plots. */
   #describe() {
     const data = this.#data;
+    this.#nameWhose(data);
     const labels = labelsOf(data);
     const described = JSON.stringify(labels);
     if (!data || described === this.#described) return;
@@ -133,6 +136,20 @@ export class Curves {
         return one;
       }),
     );
+  }
+
+  /**
+   * Say whose the curves are, where there are several people.
+   *
+   * @param {Data | null} data
+   */
+  #nameWhose(data) {
+    const people = this.#store.facts.session?.people ?? [];
+    const whose = data && people.length > 1 ? people[data.person] : null;
+    this.#whose.hidden = !whose;
+    this.#whose.textContent = whose?.name ?? "";
+    this.#whose.title = whose ? `The curves of ${whose.name} (P: of the next person)` : "";
+    this.#whose.style.setProperty("--person", whose?.color ?? "");
   }
 
   /**
@@ -159,7 +176,8 @@ export class Curves {
     const context = prepare(this.#lines, clientWidth, clientHeight, true);
     const data = this.#data;
     if (!data) return;
-    const keyframes = keyframesOf(this.#store.facts.timeline);
+    const { timeline, lanes } = this.#store.facts;
+    const keyframes = keyframesOf(lanes[data.person] ?? timeline);
     const style = getComputedStyle(this.#stage);
     drawCurves(context, this.#axis, clientHeight, data, labelsOf(data), this.#hidden, keyframes, style);
   }

@@ -15,17 +15,20 @@ const BEHIND_IMAGES = "#000";
 const JOINT_RADIUS = 3.5;
 const TORSO_HALF_SIDE = 5.5;
 export const TORSO = "torso";
+/** How strongly people are drawn who are dimmed. */
+export const DIMMED = 0.3;
 
 /**
  * How each kind of line is drawn, and the layer that it belongs to; null: always.
  *
- * @typedef {{width: number, dash: number[], layer: import("./protocol.js").Layer | null, hasHalo: boolean}} LineStyle
+ * @typedef {{width: number, dash: number[], layer: import("./protocol.js").Layer | null, hasHalo: boolean,
+ *   ofPerson?: boolean}} LineStyle ofPerson: whether they go faint with their person
  * @type {Record<import("./protocol.js").Path["kind"], LineStyle>}
  */
 const LINE_STYLES = {
-  model: { width: 1.75, dash: [], layer: "contours", hasHalo: true },
-  hidden: { width: 1.25, dash: [4, 4], layer: "hidden", hasHalo: false },
-  candidate: { width: 1.25, dash: [], layer: "contours", hasHalo: true },
+  model: { width: 1.75, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
+  hidden: { width: 1.25, dash: [4, 4], layer: "hidden", hasHalo: false, ofPerson: true },
+  candidate: { width: 1.25, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
   ghost: { width: 1.5, dash: [5, 4], layer: null, hasHalo: true },
   part_edge: { width: 1, dash: [], layer: "part_edges", hasHalo: true },
   epipolar: { width: 1.25, dash: [6, 4], layer: "epipolar", hasHalo: true },
@@ -93,16 +96,18 @@ export function drawPicture(context, view, picture, opacity) {
  * @param {Overlay} overlay
  * @param {number} camera
  * @param {import("./layers.js").LayerChoice} layers
+ * @param {(person: number) => boolean} isDimmed whether a person's lines are to be faint
  */
-export function drawPaths(context, view, overlay, camera, layers) {
+export function drawPaths(context, view, overlay, camera, layers, isDimmed) {
   for (const path of overlay.paths) {
     if (path.camera !== camera || path.count === 0) continue;
     const style = LINE_STYLES[path.kind];
     if (style.layer && !layers.shown[style.layer]) continue;
     const line = tracePath(view, overlay.segments, path.first, path.count);
-    context.globalAlpha = style.layer ? layers.opacity[style.layer] : 1;
+    const isFaint = style.ofPerson && isDimmed(path.person);
+    context.globalAlpha = (style.layer ? layers.opacity[style.layer] : 1) * (isFaint ? DIMMED : 1);
     context.setLineDash(style.dash);
-    stroke(context, line, path.color, style.width, style.hasHalo);
+    stroke(context, line, path.color, style.width, style.hasHalo && !isFaint);
   }
   context.setLineDash([]);
   context.globalAlpha = 1;

@@ -45,3 +45,24 @@ export function keyCaps(keys) {
   });
   return caps;
 }
+
+/**
+ * A small button with a sign in place of words.
+ *
+ * @param {string} path of the sign, in a box of 16 by 16
+ * @param {() => void} run
+ */
+export function iconButton(path, run) {
+  const one = document.createElement("button");
+  one.type = "button";
+  one.className = "is-icon";
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  svg.setAttribute("viewBox", "0 0 16 16");
+  svg.setAttribute("aria-hidden", "true");
+  const line = document.createElementNS("http://www.w3.org/2000/svg", "path");
+  line.setAttribute("d", path);
+  svg.append(line);
+  one.append(svg);
+  one.addEventListener("click", run);
+  return one;
+}

@@ -6,7 +6,10 @@
  */
 
 const DRAG_THRESHOLD = 3;
+/** By so much a joint of the person worked on is nearer than it looks: hands that touch are told apart by whose they are. */
+const YIELD_PX = 4;
 
+import { isDimmed } from "./actions.js";
 import { GRAB_RADIUS } from "./crowding.js";
 import { DragHint, modeOf } from "./drag_hint.js";
 import { partAt } from "./part_hit.js";
@@ -24,7 +27,10 @@ export class Gestures {
   #latency;
   /** @type {Drag | null} */
   #drag = null;
-  /** @type {{pane: import("./pane.js").Pane, pointer: number, x: number, y: number} | null} */
+  /**
+   * @type {{pane: import("./pane.js").Pane, pointer: number, x: number, y: number, start: {x: number, y: number},
+   *   person: number | null} | null} person: a dimmed one whom a mere click means
+   */
   #pan = null;
   #hint = new DragHint();
   #seq = 0;
@@ -89,7 +95,7 @@ export class Gestures {
     let nearest = null;
     let reach = GRAB_RADIUS;
     for (const placed of pane.graspableHandles()) {
-      const distance = Math.hypot(placed.x - at.x, placed.y - at.y);
+      const distance = Math.hypot(placed.x - at.x, placed.y - at.y) + (placed.handle.person === state?.person ? 0 : YIELD_PX);
       if (distance <= reach) [nearest, reach] = [placed, distance];
     }
     return nearest;
@@ -106,11 +112,25 @@ export class Gestures {
     const { layers, overlay, state } = this.#store.facts;
     if (!this.#store.isSettled || !overlay || !layers.shown.joints || state?.floor) return null;
     const place = pane.view.toImage(at.x, at.y);
-    const found = partAt(overlay, camera, place);
+    const found = partAt(overlay, camera, place, (person) => !isDimmed(state, person));
     if (!found) return null;
     // Joint i moves part i, and is what a part that is touched selects.
     const point = this.#store.facts.session?.people[found.person]?.points[found.part] ?? "";
     return { camera, person: found.person, part: found.part, point, ...place };
+  }
+
+  /**
+   * The person who is dimmed and lies under the pointer of the main button: no hand can take him, but a click can mean him.
+   *
+   * @param {import("./pane.js").Pane} pane
+   * @param {number} camera
+   * @param {{x: number, y: number}} at
+   * @param {number} mouseButton
+   */
+  #dimmedAt(pane, camera, at, mouseButton) {
+    const { overlay, state } = this.#store.facts;
+    if (!overlay || !state?.solo || state.floor || mouseButton !== 0) return null;
+    return partAt(overlay, camera, pane.view.toImage(at.x, at.y), (person) => isDimmed(state, person))?.person ?? null;
   }
 
   /**
@@ -124,7 +144,8 @@ export class Gestures {
     const hit = event.button === 0 ? (this.#hit(pane, at) ?? this.#hitPart(pane, camera, at)) : null;
     pane.surface.setPointerCapture(event.pointerId);
     if (!hit) {
-      this.#pan = { pane, pointer: event.pointerId, x: event.clientX, y: event.clientY };
+      const start = { x: event.clientX, y: event.clientY };
+      this.#pan = { pane, pointer: event.pointerId, ...start, start, person: this.#dimmedAt(pane, camera, at, event.button) };
       pane.surface.classList.add("is-panning");
       return;
     }
@@ -196,6 +217,10 @@ export class Gestures {
     const pointer = this.#drag?.pointer ?? this.#pan?.pointer;
     if (event.pointerId !== pointer) return;
     if (this.#drag?.begun) this.#message("end", this.#drag.at);
+    const pan = this.#pan;
+    if (pan?.person != null && Math.hypot(event.clientX - pan.start.x, event.clientY - pan.start.y) < DRAG_THRESHOLD) {
+      this.#send({ type: "select", person: pan.person, point: null });
+    }
     this.#release();
   }
 

@@ -1,6 +1,6 @@
 /** The buttons that lead from one doubtful frame to the next, and the menu of everything else there is to go to. */
 
-import { button, byId } from "./elements.js";
+import { button, byId, iconButton } from "./elements.js";
 import { KINDS } from "./jumps.js";
 import { count } from "./text.js";
 
@@ -85,19 +85,9 @@ export class JumpMenu {
    * @param {() => void} run
    */
   #arrow(path, title, run) {
-    const one = document.createElement("button");
-    one.type = "button";
-    one.className = "is-icon";
+    const one = iconButton(path, run);
     one.title = title;
     one.setAttribute("aria-label", title);
-    const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-    svg.setAttribute("viewBox", "0 0 16 16");
-    svg.setAttribute("aria-hidden", "true");
-    const line = document.createElementNS("http://www.w3.org/2000/svg", "path");
-    line.setAttribute("d", path);
-    svg.append(line);
-    one.append(svg);
-    one.addEventListener("click", run);
     return one;
   }
 

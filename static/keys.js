@@ -4,7 +4,8 @@ import { hasSearch, hasTrack } from "./actions.js";
 import { BY_KEY } from "./layers.js";
 import { closePopover } from "./popovers.js";
 import { posingBindings } from "./posing_keys.js";
-import { control, plain } from "./key_matching.js";
+import { alt, control, plain } from "./key_matching.js";
+import { peopleKeys } from "./people_keys.js";
 import { timelineKeys } from "./timeline_keys.js";
 import { sceneBindings } from "./scene_keys.js";
 import { reasonsOf } from "./reasons.js";
@@ -44,6 +45,7 @@ const SLIDER_KEYS = new Set([
  * @property {import("./inspector.js").Inspector} inspector
  * @property {import("./layers.js").Layers} layers
  * @property {import("./layers_menu.js").LayersMenu} layersMenu
+ * @property {import("./people.js").People} people
  * @property {import("./snap.js").Snap} snap
  * @property {import("./pinning.js").Pinning} pinning
  * @property {import("./floor.js").Floor} floor
@@ -61,7 +63,7 @@ const SLIDER_KEYS = new Set([
 // prettier-ignore
 export function bindings({
   store, actions, navigation, playback, jumps, frameWindow, grid, gestures, drawer, posing, pinning, inspector, layers,
-  layersMenu, snap, floor, notices, history, showPalette, showFirstSteps, showHelp,
+  layersMenu, people, snap, floor, notices, history, showPalette, showFirstSteps, showHelp,
 }) {
   const escape = () => {
     if (gestures.cancel() || closePopover() || floor.cancel() || pinning.cancel() || actions.leaveReplay()) return;
@@ -73,10 +75,6 @@ export function bindings({
     else if (store.facts.filled !== null) grid.toggleFill(store.facts.filled);
   };
   const why = reasonsOf(store);
-  const nextPerson = () => {
-    const { state, session } = store.facts;
-    if (state && session) actions.selectPerson((state.person + 1) % session.people.length);
-  };
   const search = (/** @type {"step" | "stage" | "frame"} */ action) => () => {
     if (store.facts.connected && !store.facts.state?.job.running) actions.search(action);
   };
@@ -130,7 +128,7 @@ export function bindings({
     },
     { keys: ["T"], label: "Track forward", matches: plain("t"), why: why.track, run: track("forward") },
     { keys: ["Shift T"], label: "Track backward", matches: plain("t", undefined, true), why: why.track, run: track("backward") },
-    { keys: ["P"], label: "Pause tracking, or go on", matches: plain("p"), why: why.tracking, run: () => actions.togglePause() },
+    { keys: ["Alt P"], label: "Pause tracking, or go on", matches: alt("KeyP", false), why: why.tracking, run: () => actions.togglePause() },
     { keys: ["L"], label: "Follow the tracker, or not", matches: plain("l"), why: why.tracking, run: () => actions.toggleFollow() },
     ]),
     ...area("Timeline", [
@@ -144,8 +142,8 @@ export function bindings({
     ], why.away),
     ...area("Posing", [
     ...posingBindings(posing, inspector, plain),
-    { keys: ["Shift P"], label: "Work on the next person", matches: plain("p", undefined, true), why: why.people, run: nextPerson },
     ], why.away),
+    ...area("People", peopleKeys({ store, actions, posing, people }), why.away),
     ...area("Pins", [
     { keys: ["X"], label: "Pin the selected joint by clicks, or no more", matches: plain("x"), run: () => pinning.toggle() },
     { keys: ["G"], label: "Fit to pins and edges", matches: plain("g"), run: () => pinning.fit() },

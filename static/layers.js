@@ -96,10 +96,15 @@ export const BY_KEY = /** @type {Layer[]} */ ([
 
 const STORED = "quadrille.layers.";
 
-/** @returns {LayerChoice} */
-export function usualLayers() {
+/**
+ * @param {number} people of the session: of several one wants to see who hides whom
+ * @returns {LayerChoice}
+ */
+export function usualLayers(people = 1) {
   const table = (/** @type {"shown" | "opacity"} */ field) => Object.fromEntries(LAYERS.map((l) => [l.id, l[field]]));
-  return /** @type {LayerChoice} */ ({ shown: table("shown"), opacity: table("opacity"), colors: "person" });
+  const usual = /** @type {LayerChoice} */ ({ shown: table("shown"), opacity: table("opacity"), colors: "person" });
+  if (people > 1) usual.shown.hidden = true;
+  return usual;
 }
 
 export class Layers {
@@ -143,7 +148,7 @@ export class Layers {
   }
 
   reset() {
-    this.#keep(usualLayers());
+    this.#keep(usualLayers(this.#store.facts.session?.people.length));
   }
 
   /** @param {LayerChoice} layers */
@@ -153,10 +158,10 @@ export class Layers {
   }
 
   #recall() {
-    const name = this.#store.facts.session?.name ?? "";
+    const { name = "", people = [] } = this.#store.facts.session ?? {};
     if (name === this.#session) return;
     this.#session = name;
-    this.#store.set({ layers: known(localStorage.getItem(STORED + name)) });
+    this.#store.set({ layers: known(localStorage.getItem(STORED + name), people.length) });
   }
 }
 
@@ -164,9 +169,10 @@ export class Layers {
  * What was stored, as far as it is understood: another version may have had other layers.
  *
  * @param {string | null} stored
+ * @param {number} people of the session
  */
-function known(stored) {
-  const layers = usualLayers();
+function known(stored, people) {
+  const layers = usualLayers(people);
   /** @type {Partial<LayerChoice>} */
   let found;
   try {

@@ -27,6 +27,7 @@ import { Looks } from "./looks.js";
 import { Navigation } from "./navigation.js";
 import { Notices, watchConnection } from "./notices.js";
 import { Palette } from "./palette.js";
+import { People } from "./people.js";
 import { PaneGrid } from "./pane_grid.js";
 import { PinBar } from "./pin_bar.js";
 import { Pinning } from "./pinning.js";
@@ -86,6 +87,7 @@ const inspector = new Inspector(byId("inspector", HTMLElement), store, posing, n
 const floor = new Floor(byId("panes", HTMLElement), store, grid, send);
 const snap = new Snap(store, grid, send);
 new TopBar(store, actions);
+const people = new People(store, actions, posing);
 showListing(store);
 const playback = new Playback(store, navigation);
 const jumps = new Jumps(store, navigation);
@@ -116,7 +118,7 @@ const showFirstSteps = firstSteps.show.bind(firstSteps);
 const showHelp = () => keyMap.show();
 const table = keys.bindings({
   store, actions, navigation, playback, jumps, frameWindow, grid, gestures, drawer, posing, pinning, inspector, layers,
-  layersMenu, snap, floor, notices, history, showPalette, showFirstSteps, showHelp,
+  layersMenu, people, snap, floor, notices, history, showPalette, showFirstSteps, showHelp,
 }); // prettier-ignore
 const keyMap = new KeyMap(table);
 watchTyping(document);

@@ -3,6 +3,7 @@
 import * as drawing from "./drawing.js";
 import { drawPins } from "./pin_drawing.js";
 import { uncrowded } from "./crowding.js";
+import { isDimmed } from "./actions.js";
 import { isPlain } from "./looks.js";
 import { PaneCorner } from "./pane_corner.js";
 import { PaneView } from "./pane_view.js";
@@ -102,10 +103,11 @@ export class Pane {
     return { x: event.clientX - box.left, y: event.clientY - box.top };
   }
 
-  /** The joints that a hand can take in this view, and where they lie in the pane; none while they are switched off. */
+  /** The joints that a hand can take in this view, and where they lie in the pane; of people who are dimmed none. */
   graspableHandles() {
-    const { session, hover, dragging } = this.#store.facts;
-    return uncrowded(this.#placedHandles(), session?.people ?? [], dragging ? hover : null);
+    const { session, hover, dragging, state } = this.#store.facts;
+    const placed = this.#placedHandles().filter(({ handle }) => !isDimmed(state, handle.person));
+    return uncrowded(placed, session?.people ?? [], dragging ? hover : null);
   }
 
   /** All joints of this view, and where they lie in the pane. */
@@ -157,7 +159,7 @@ export class Pane {
     if (IN_SOFTWARE) context.drawImage(this.#image, 0, 0, width, height);
     this.#corner.showStandIn(standIn);
     if (!state || !session || !overlay || standIn?.pictures) return;
-    drawing.drawPaths(context, this.view, overlay, this.#camera, layers);
+    drawing.drawPaths(context, this.view, overlay, this.#camera, layers, (person) => isDimmed(state, person));
     this.#drawJoints(context, state, session.people);
     this.#showJoint(state);
     drawPins(context, this.view, this.#store.facts, this.#camera, width);
@@ -203,7 +205,10 @@ export class Pane {
    */
   #drawJoints(context, state, people) {
     const { hover, layers } = this.#store.facts;
-    if (layers.shown.skeleton) drawing.drawSkeleton(context, this.#placedHandles(), people, layers.opacity.skeleton);
+    if (layers.shown.skeleton) {
+      const undimmed = this.#placedHandles().filter(({ handle }) => !isDimmed(state, handle.person));
+      drawing.drawSkeleton(context, undimmed, people, layers.opacity.skeleton);
+    }
     if (!layers.shown.joints) return;
     this.#drawHoveredPart(context, people);
     /** @type {drawing.PlacedHandle | null} */

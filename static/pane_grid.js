@@ -116,8 +116,8 @@ export class PaneGrid {
     if (changed.has("active") || changed.has("session")) this.#markActive();
     const withPictures = PICTURED.some((fact) => changed.has(fact));
     // A new state comes with every move of a drag; only its choice of what to draw concerns the vectors.
-    const { person, point } = this.#store.facts.state ?? {};
-    const choice = JSON.stringify([person, point]);
+    const { person, point, solo } = this.#store.facts.state ?? {};
+    const choice = JSON.stringify([person, point, solo]);
     const hovered = HOVERED.some((fact) => changed.has(fact));
     if (withPictures || changed.has("overlay") || choice !== this.#choice || hovered) {
       this.#choice = choice;

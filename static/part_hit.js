@@ -6,12 +6,13 @@
  * @param {import("./protocol.js").Overlay} overlay
  * @param {number} camera
  * @param {{u: number, v: number}} at
+ * @param {(person: number) => boolean} isMeant whose parts count
  */
-export function partAt(overlay, camera, { u, v }) {
+export function partAt(overlay, camera, { u, v }, isMeant) {
   /** @type {import("./protocol.js").Outline | null} */
   let nearest = null;
   for (const outline of overlay.outlines) {
-    if (outline.camera !== camera || (nearest && nearest.depth <= outline.depth)) continue;
+    if (outline.camera !== camera || !isMeant(outline.person) || (nearest && nearest.depth <= outline.depth)) continue;
     if (holds(overlay.segments, outline, u, v)) nearest = outline;
   }
   return nearest;

@@ -26,12 +26,12 @@ export class PinBar {
       this.#live.blur();
     });
     /** @type {(keyof import("./store.js").Facts)[]} */
-    const shown = ["state", "connected", "overlay", "pinning", "livePins"];
+    const shown = ["state", "connected", "overlay", "pinning", "livePins", "whose"];
     store.subscribe((changed) => shown.some((fact) => changed.has(fact)) && this.#show());
   }
 
   #show() {
-    const { state, connected, overlay, pinning, livePins } = this.#store.facts;
+    const { state, connected, overlay, pinning, livePins, session, whose } = this.#store.facts;
     const joint = state?.point?.replaceAll("_", " ") ?? null;
     const pins = overlay?.pins ?? [];
     const ofPerson = pins.filter(({ person }) => person === state?.person).length;
@@ -39,9 +39,11 @@ export class PinBar {
     this.#clear.disabled = !connected || ofPerson === 0;
     this.#mode.setAttribute("aria-pressed", String(pinning));
     this.#live.checked = livePins;
+    const several = (session?.people.length ?? 1) > 1;
+    const fitted = several && whose === "all" ? "everybody who has been placed" : "the person worked on";
     this.#fit.title = pins.length
-      ? "Fit the person worked on, and everybody with pins, to pins and edges together (G)"
-      : "Fit the person worked on to the edges (G); pins, where there are any, count as well";
+      ? `Fit ${fitted} to pins and edges together (G)`
+      : `Fit ${fitted} to the edges (G); pins, where there are any, count as well`;
     const [text, title] = joint === null ? ["", "No joint is selected"] : this.#figure(joint, ofPerson);
     this.#figures.textContent = text;
     this.#figures.title = title;

@@ -9,6 +9,8 @@ const HALO = "rgba(0, 0, 0, 0.55)";
 /** The joint worked on: its pins, their lines and the place where they meet. */
 const CHOSEN = "#ffd54a";
 const OFF = "#ff8a7a";
+/** How strongly the pins of people are drawn who are not worked on. */
+const OTHERS = 0.4;
 const STEM = 15;
 const HEAD_RADIUS = 5;
 /** How far from the middle of its head a pin can be taken. */
@@ -55,14 +57,22 @@ export function drawPins(context, view, facts, camera, paneWidth) {
   const { state, session, pinHover, overlay } = facts;
   if (!state || !session) return;
   const isChosen = (/** @type {PlacedPin} */ { pin }) => pin.person === state.person && pin.point === state.point;
-  // Those of the joint worked on are drawn last, over the others.
-  const placed = placedPins(facts, view, camera).sort((a, b) => Number(isChosen(a)) - Number(isChosen(b)));
-  for (const one of placed) drawOff(context, view, one);
+  // Those of the joint worked on are drawn last, over the others, and those of other people first.
+  const rank = (/** @type {PlacedPin} */ one) => Number(one.pin.person === state.person) + Number(isChosen(one));
+  const placed = placedPins(facts, view, camera).sort((a, b) => rank(a) - rank(b));
+  const strengthOf = (/** @type {PlacedPin} */ { pin }) => (pin.person === state.person ? 1 : OTHERS);
+  for (const one of placed) {
+    context.globalAlpha = strengthOf(one);
+    drawOff(context, view, one);
+  }
+  context.globalAlpha = 1;
   drawMeeting(context, view, overlay, camera, paneWidth);
   for (const one of placed) {
     const color = isChosen(one) ? CHOSEN : (session.people[one.pin.person]?.color ?? "#fff");
+    context.globalAlpha = isSame(one.pin, pinHover) ? 1 : strengthOf(one);
     drawPin(context, one, color, isSame(one.pin, pinHover) || isSame(one.pin, facts.heldPin));
   }
+  context.globalAlpha = 1;
   const named = placed.find(({ pin }) => isSame(pin, pinHover));
   if (named && !facts.heldPin) {
     const hint = "drag to move, right-click or Delete removes";

@@ -3,6 +3,7 @@
  * drag joints and views do, and keeps from them what is meant for a pin.
  */
 
+import { whom } from "./actions.js";
 import { GRAB_RADIUS } from "./crowding.js";
 import { HEAD_REACH, POINT_REACH, isSame, placedPins } from "./pin_drawing.js";
 
@@ -80,10 +81,10 @@ export class Pinning {
     else this.#say("There is no pin of this person on this frame.");
   }
 
-  /** Fit the person worked on, and everybody with pins, to pins and edges. */
+  /** Fit everybody who has been placed, or the person worked on alone, to pins and edges. */
   fit() {
-    const { state } = this.#store.facts;
-    if (state) this.#send({ type: "fit", frame: state.frame });
+    const { facts } = this.#store;
+    if (facts.state) this.#send({ type: "fit", frame: facts.state.frame, person: whom(facts) });
   }
 
   /**

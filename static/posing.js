@@ -166,6 +166,21 @@ export class Posing {
     this.#edit({ ...this.#head(), action: "copy", from });
   }
 
+  /**
+   * Bend as another person does on this frame; place and turn stay.
+   *
+   * @param {number} from
+   */
+  copyPerson(from) {
+    if (from !== this.#head().person) this.#edit({ ...this.#head(), action: "copy_person", from });
+  }
+
+  /** The same of the next person in the list. */
+  copyNextPerson() {
+    const count = this.#store.facts.session?.people.length ?? 1;
+    this.copyPerson((this.#head().person + 1) % count);
+  }
+
   /** @param {1 | -1} way */
   copyNeighbour(way) {
     const { frame } = this.#head();

@@ -5,7 +5,7 @@
  * @typedef {PictureLayer | "accepted" | "rejected" | "contours" | "hidden" | "part_edges" | "skeleton" | "joints" |
  *   "epipolar"} Layer
  * @typedef {{name: string, width: number, height: number}} CameraInfo
- * @typedef {{name: string, color: string, points: string[], minor: string[], bones: [string, string][],
+ * @typedef {{name: string, color: string, model: string, height_m: number, points: string[], minor: string[], bones: [string, string][],
  *   parts: string[], dofs: DofInfo[], point_dofs: Record<string, number[]>,
  *   point_limbs: Record<string, {name: string, dofs: number[]}>}} PersonInfo
  * @typedef {{joint: string, name: string, unit: "deg" | "cm", low: number | null, high: number | null}} DofInfo
@@ -21,7 +21,8 @@
  *   "none"} RangeAction
  * @typedef {{point: number, views: number, marked: boolean, known: boolean, error_px: number | null, ready: boolean,
  *   why: string}} FloorPicking
- * @typedef {{type: "state", frame: number, person: number, point: string | null,
+ * @typedef {{source: string | null, status: Status, shown: boolean}} PersonState
+ * @typedef {{type: "state", frame: number, person: number, point: string | null, people: PersonState[], solo: boolean,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
  *   parts_px: (number | null)[], dofs: number[], locked: number[], other_sizes: boolean, job: Job, track: Track, range: RangeWork,
  *   replay: {run: number, step: number, steps: number, stage: string | null} | null, follow: boolean, snapped: number | null,
@@ -33,7 +34,7 @@
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
  * @typedef {{source: string, cost_px: number | null, keyframe: boolean, status: Status, remark: string,
  *   reviewed: boolean}} Cell
- * @typedef {{type: "timeline", cells: Record<string, Cell | null>, replace: boolean}} TimelineMessage
+ * @typedef {{type: "timeline", person: number | null, cells: Record<string, Cell | null>, replace: boolean}} TimelineMessage
  * @typedef {{person: number, name: string, dofs: string[], bound_rad: number | null, step_rad: number | null,
  *   bound_m: number | null, step_m: number | null, angles: number, lengths: number, own: boolean}} SearchLeaf
  * @typedef {{type: "search_setup", theta_px: number | null, outliers: "truncated" | "paper", passes: number[],
@@ -76,14 +77,14 @@
  *   current_px: number | null, count: number}} LandscapeHeader
  * @typedef {ImageHeader | OverlayHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader | CellsHeader} BinaryHeader
- * @typedef {{type: "cells", replace: boolean, count: number, sources: string[], statuses: Status[],
+ * @typedef {{type: "cells", person: number | null, replace: boolean, count: number, sources: string[], statuses: Status[],
  *   remarks: Record<string, string>}} CellsHeader
  *
  * @typedef {"move" | "turn" | "push"} DragMode
  * @typedef {{type: "pose", frame: number, person: number} & (
  *   {action: "set", dof: number, value: number} | {action: "turn", dof: number, by: number} |
  *   {action: "nudge", point: string | null, camera: number, right: number, up: number} |
- *   {action: "mirror"} | {action: "copy", from: number} | {action: "reset", point: string | null} |
+ *   {action: "mirror"} | {action: "copy" | "copy_person", from: number} | {action: "reset", point: string | null} |
  *   {action: "lock", dofs: number[], locked: boolean})} PoseEdit
  * @typedef {{type: "seek", frame: number} |
  *   {type: "select", person: number, point: string | null} |
@@ -91,8 +92,9 @@
  *     point: string, part: number | null, mode: DragMode, u: number, v: number, seq: number} |
  *   PoseEdit |
  *   {type: "view", layers: Layer[], reductions: number[], by_part: boolean} |
- *   {type: "search", action: "step" | "stage" | "frame" | "stop"} |
- *   {type: "search", action: "again", run: number | null} |
+ *   {type: "search", action: "step" | "stage" | "frame" | "stop", person: number | null} |
+ *   {type: "search", action: "again", run: number | null, person: number | null} |
+ *   {type: "people", action: "show", person: number, shown: boolean} | {type: "people", action: "solo", on: boolean} |
  *   {type: "search_speed", per_second: number | null} |
  *   {type: "search_settings", changes: Record<string, unknown>} |
  *   {type: "watch", tab: "search" | "landscape" | null} |
@@ -105,7 +107,7 @@
  *   {type: "pin", phase: "start" | "move" | "end" | "cancel", frame: number, camera: number, person: number,
  *     point: string, u: number, v: number, live: boolean} |
  *   {type: "unpin", frame: number, person: number, point: string | null, camera: number | null} |
- *   {type: "fit", frame: number} |
+ *   {type: "fit", frame: number, person: number | null} |
  *   {type: "track", action: "forward" | "backward", until: number | null} |
  *   {type: "track", action: "pause" | "go_on" | "stop"} |
  *   {type: "range", action: RangeAction, first: number, last: number, person: number | null} |

@@ -78,7 +78,7 @@ export class Receiver {
         this.#takeOverlay({ ...header, segments: new Float32Array(payload) });
         break;
       case "cells":
-        this.#cells(header.replace).take(header, payload);
+        this.#cells(header).take(header, payload);
         break;
       case "curves":
         this.#store.set({ curves: mergeCurves(this.#store.facts.curves, header, payload, this.#frameCount) });
@@ -125,7 +125,7 @@ export class Receiver {
     this.#early.clear();
     this.#recent.clear(); // the footage may have changed while the program was away
     const former = this.#store.facts.session?.cameras;
-    this.#store.set({ session });
+    this.#store.set({ session, lanes: [] });
     if (JSON.stringify(former) !== JSON.stringify(session.cameras)) this.#store.set({ shown: null, overlay: null });
   }
 
@@ -164,19 +164,23 @@ export class Receiver {
   }
 
   /** @param {import("./protocol.js").TimelineMessage} message */
-  #mergeTimeline({ cells, replace }) {
-    const timeline = this.#cells(replace);
-    for (const [frame, cell] of Object.entries(cells)) timeline.set(Number(frame), cell);
+  #mergeTimeline(message) {
+    const cells = this.#cells(message);
+    for (const [frame, cell] of Object.entries(message.cells)) cells.set(Number(frame), cell);
   }
 
   /**
    * The cells to change in place: a long recording has a hundred thousand, and a tracker changes some twice a second.
    *
-   * @param {boolean} replace whether to begin with none
+   * @param {{replace: boolean, person: number | null}} message whether to begin with none; of whom among several, null
+   *   for all together
    */
-  #cells(replace) {
-    const timeline = replace ? new Cells(this.#frameCount) : this.#store.facts.timeline;
-    this.#store.set({ timeline });
-    return timeline;
+  #cells({ replace, person }) {
+    const { facts } = this.#store;
+    const known = person === null ? facts.timeline : facts.lanes[person];
+    const cells = replace || !known ? new Cells(this.#frameCount) : known;
+    if (person === null) this.#store.set({ timeline: cells });
+    else this.#store.set({ lanes: Object.assign([...facts.lanes], { [person]: cells }) });
+    return cells;
   }
 }

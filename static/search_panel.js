@@ -73,7 +73,7 @@ export class SearchPanel {
       again: makeButton("Rerun", "Search again from where the run looked at began, by the settings of now (Shift+F)", () =>
         actions.searchAgain(),
       ),
-      track: makeButton("Track", "Track forward from here (T); while it runs, pause or go on (P)", track),
+      track: makeButton("Track", "Track forward from here (T); while it runs, pause or go on (Alt+P)", track),
       stop: makeButton("Stop", "Stop what is at work, keep the best pose (Esc)", () =>
         hasTrack(store.facts.state) ? actions.stopTracking() : actions.search("stop"),
       ),

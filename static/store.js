@@ -18,6 +18,7 @@ import { usualLayers } from "./layers.js";
  * @property {import("./protocol.js").SessionMessage | null} session
  * @property {import("./protocol.js").StateMessage | null} state
  * @property {import("./cells.js").Cells} timeline the known cells by frame
+ * @property {import("./cells.js").Cells[]} lanes the same of each person, where there are several
  * @property {number[]} disagreeing frames whose pose does not go together with those around it, ascending
  * @property {import("./frame_axis.js").Span | null} visible the part of the recording that timeline and curves show; null: all
  * @property {import("./series.js").Curves | null} curves the group of curves that came last
@@ -43,6 +44,7 @@ import { usualLayers } from "./layers.js";
  * @property {boolean} livePins whether the body follows while a pin is dragged
  * @property {Joint | null} pinHover the pin under the pointer
  * @property {import("./protocol.js").PinMark | null} heldPin the pin in the hand, or just let go
+ * @property {"all" | "one"} whose whom searches and fits move: everybody, or the person worked on alone
  * @property {number} target the frame the user asked for last
  * @property {boolean} playing
  * @property {number} rate at which a clip plays, 1 for real time
@@ -63,6 +65,7 @@ export class Store {
     session: null,
     state: null,
     timeline: new Cells(0),
+    lanes: [],
     disagreeing: [],
     visible: null,
     curves: null,
@@ -88,6 +91,7 @@ export class Store {
     livePins: true,
     pinHover: null,
     heldPin: null,
+    whose: "all",
     target: 0,
     playing: false,
     rate: 1,

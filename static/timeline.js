@@ -42,17 +42,21 @@ export class Timeline {
     this.#navigation = navigation;
     this.#jumps = jumps;
     this.#frameWindow = frameWindow;
-    element.style.height = `${drawing.HEIGHT}px`;
     element.append(this.#cells, this.#cursor);
     store.subscribe((changed) => {
       const has = (/** @type {(keyof import("./store.js").Facts)[]} */ ...facts) => facts.some((f) => changed.has(f));
-      if (has("timeline", "session", "visible")) this.#drawCells();
+      if (has("session")) element.style.height = `${this.#layout.height}px`;
+      if (has("timeline", "lanes", "session", "visible")) this.#drawCells();
       if (has("target", "session", "range", "visible")) this.#drawCursor();
-      if (has("target", "timeline", "session")) this.#describe();
+      if (has("target", "timeline", "lanes", "session")) this.#describe();
     });
     new ResizeObserver(() => this.#drawAll()).observe(element);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#drawAll());
     this.#listen();
+  }
+
+  get #layout() {
+    return drawing.layout(this.#store.facts.session?.people.length ?? 1);
   }
 
   get #axis() {
@@ -146,7 +150,7 @@ export class Timeline {
 
   /** @param {MouseEvent} event */
   #isOverview(event) {
-    return event.clientY - this.#element.getBoundingClientRect().top >= drawing.OVERVIEW.top - REACH;
+    return event.clientY - this.#element.getBoundingClientRect().top >= this.#layout.overview.top - REACH;
   }
 
   #drawAll() {
@@ -157,22 +161,27 @@ export class Timeline {
   #drawCells() {
     const { clientWidth, clientHeight } = this.#element;
     const context = prepare(this.#cells, clientWidth, clientHeight, true);
-    const { timeline, session } = this.#store.facts;
+    const { timeline, lanes, session } = this.#store.facts;
     if (!session) return;
     const style = getComputedStyle(this.#element);
     const axis = this.#axis;
-    drawing.drawLabels(context, axis, style);
+    const { lanes: bands, review, overview } = this.#layout;
+    drawing.drawLabels(context, axis, style, bands, session.people);
     context.save();
     context.beginPath();
-    context.rect(axis.left, 0, axis.right - axis.left + 2, drawing.OVERVIEW.top);
+    context.rect(axis.left, 0, axis.right - axis.left + 2, overview.top);
     context.clip();
-    drawing.drawSources(context, axis, timeline, style);
-    drawing.drawKeyframes(context, axis, keyframesOf(timeline));
-    drawing.drawReviewed(context, axis, timeline, style);
+    for (const [lane, band] of bands.entries()) {
+      const cells = bands.length > 1 ? lanes[lane] : timeline;
+      if (!cells) continue; // it comes right behind
+      drawing.drawSources(context, axis, cells, style, band);
+      drawing.drawKeyframes(context, axis, keyframesOf(cells), band);
+    }
+    drawing.drawReviewed(context, axis, timeline, style, review);
     drawing.drawStatuses(context, axis, timeline, style);
     drawing.drawCosts(context, axis, timeline, style);
     context.restore();
-    drawing.drawOverview(context, this.#whole, timeline, style);
+    drawing.drawOverview(context, this.#whole, timeline, style, overview);
   }
 
   #drawCursor() {
@@ -182,17 +191,18 @@ export class Timeline {
     if (!session) return;
     const style = getComputedStyle(this.#element);
     const axis = this.#axis;
-    if (range) drawing.drawRange(context, axis, range, style);
+    const { cells, overview } = this.#layout;
+    if (range) drawing.drawRange(context, axis, range, style, overview.top - 3);
     if (this.#hovered !== null) {
       context.fillStyle = style.getPropertyValue("--muted");
       context.globalAlpha = 0.5;
-      context.fillRect(axis.middle(this.#hovered) - 0.5, 0, 1, drawing.OVERVIEW.top - REACH);
+      context.fillRect(axis.middle(this.#hovered) - 0.5, 0, 1, overview.top - REACH);
       context.globalAlpha = 1;
     }
-    drawing.drawWindow(context, this.#whole, visible, target, style);
+    drawing.drawWindow(context, this.#whole, visible, target, style, overview);
     if (!axis.shows(target)) return;
     const width = Math.max(2, axis.pitch);
-    const [top, bottom] = [drawing.CELL.top - 2, drawing.CELL.bottom + 2];
+    const [top, bottom] = [cells.top - 2, cells.bottom + 2];
     context.fillStyle = context.strokeStyle = style.getPropertyValue("--text");
     context.fillRect(axis.middle(target) - 0.5, 2, 1, top - 2);
     context.lineWidth = 2;
@@ -205,9 +215,25 @@ export class Timeline {
     if (!cell) return `Frame ${frame}: no pose`;
     const { source, keyframe, status, remark, cost_px, reviewed } = cell;
     const seen = keyframe ? "keyframe" : reviewed && "reviewed";
-    const parts = [source, seen, status, px(cost_px)].filter(Boolean).join(", ");
+    const parts = [source, seen, status, px(cost_px)].filter(Boolean).join(", ") + this.#describeLanes(frame);
     const jumps = this.#store.facts.disagreeing.includes(frame) ? "\ndisagrees with the frames beside it" : "";
     return `Frame ${frame}: ${parts}${remark && `\n${remark}`}${jumps}`;
+  }
+
+  /**
+   * A line for each of several people.
+   *
+   * @param {number} frame
+   */
+  #describeLanes(frame) {
+    const { lanes, session } = this.#store.facts;
+    return lanes
+      .map((lane, person) => {
+        const { source = "no pose", keyframe = false, status = "" } = lane.get(frame) ?? {};
+        const told = [source, keyframe && "keyframe", status].filter(Boolean).join(", ");
+        return `\n${session?.people[person]?.name}: ${told}`;
+      })
+      .join("");
   }
 
   #describe() {

@@ -11,13 +11,33 @@ import { trace } from "./series.js";
  * @typedef {import("./cells.js").Cells} Cells
  */
 
-export const HEIGHT = 72;
 const COST = { top: 4, bottom: 24 };
 const STATUS = { top: 28, bottom: 40 };
 const KEYFRAME_GAP = 5;
-export const CELL = { top: 44, bottom: 56 };
-const REVIEW = { top: 58, bottom: 60 };
-export const OVERVIEW = { top: 64, bottom: 70 };
+const CELLS_TOP = 44;
+/** Height of the cells, of one person and of each of several, and the gap between lanes. */
+const [CELL_HEIGHT, LANE_HEIGHT, LANE_GAP] = [12, 10, 2];
+
+/** @typedef {{top: number, bottom: number}} Band */
+
+/**
+ * Where things lie below each other: one person has a single lane of cells, each of several a lane of his own.
+ *
+ * @param {number} people
+ * @returns {{cells: Band, lanes: Band[], review: Band, overview: Band, height: number}}
+ */
+export function layout(people) {
+  const several = people > 1;
+  const height = several ? LANE_HEIGHT : CELL_HEIGHT;
+  const lanes = Array.from({ length: Math.max(1, people) }, (_, lane) => {
+    const top = CELLS_TOP + lane * (height + LANE_GAP);
+    return { top, bottom: top + height };
+  });
+  const { bottom } = lanes[lanes.length - 1];
+  const overview = { top: bottom + 8, bottom: bottom + 14 };
+  const cells = { top: CELLS_TOP, bottom };
+  return { cells, lanes, review: { top: bottom + 2, bottom: bottom + 4 }, overview, height: overview.bottom + 2 };
+}
 
 /** Statuses that are drawn, the worst last and on top: each has a height of its own besides its colour. */
 export const STATUSES = /** @type {const} */ (["good", "doubtful", "lost"]);
@@ -27,15 +47,38 @@ const STATUS_HEIGHTS = { good: 3, doubtful: 7, lost: 12 };
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
  * @param {CSSStyleDeclaration} style
+ * @param {Band[]} lanes of the cells
+ * @param {import("./protocol.js").PersonInfo[]} people
  */
-export function drawLabels(context, axis, style) {
+export function drawLabels(context, axis, style, lanes, people) {
   context.font = "10.5px system-ui, sans-serif";
   context.textAlign = "right";
   context.textBaseline = "middle";
   context.fillStyle = style.getPropertyValue("--muted");
-  for (const [text, { top, bottom }] of /** @type {const} */ ([["cost", COST], ["status", STATUS], ["pose", CELL]])) {
-    context.fillText(text, axis.left - 8, (top + bottom) / 2);
-  }
+  /** @type {[string, Band][]} */
+  const rows = [["cost", COST], ["status", STATUS]]; // prettier-ignore
+  if (people.length < 2) rows.push(["pose", lanes[0]]);
+  for (const [text, { top, bottom }] of rows) context.fillText(text, axis.left - 8, (top + bottom) / 2);
+  if (people.length > 1) people.forEach((person, lane) => drawName(context, axis, person, lanes[lane]));
+}
+
+/**
+ * The name of a lane, as much of it as there is room for, and a strip in the colour of its person.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {import("./protocol.js").PersonInfo} person
+ * @param {Band} lane
+ */
+function drawName(context, axis, { name, color }, { top, bottom }) {
+  const room = axis.left - 12;
+  let text = name;
+  while (text.length > 1 && context.measureText(text).width > room) text = `${text.slice(0, -2)}…`;
+  context.fillText(text, axis.left - 9, (top + bottom) / 2);
+  const { fillStyle } = context;
+  context.fillStyle = color;
+  context.fillRect(axis.left - 6, top, 4, bottom - top);
+  context.fillStyle = fillStyle;
 }
 
 /**
@@ -67,16 +110,17 @@ function gapOf(axis) {
  * @param {FrameAxis} axis
  * @param {Cells} cells
  * @param {CSSStyleDeclaration} style
+ * @param {Band} lane
  */
-export function drawSources(context, axis, cells, style) {
-  const height = CELL.bottom - CELL.top;
+export function drawSources(context, axis, cells, style, { top, bottom }) {
+  const height = bottom - top;
   context.fillStyle = style.getPropertyValue("--track");
-  context.fillRect(axis.left, CELL.top, axis.right - axis.left, height);
+  context.fillRect(axis.left, top, axis.right - axis.left, height);
   const colors = SOURCES.map((source) => style.getPropertyValue(`--source-${source}`));
   const { sources } = cells;
   eachRun(axis, (frame) => (sources[frame] === NO_POSE ? -1 : sources[frame]), gapOf(axis), (source, x, width) => {
     context.fillStyle = colors[source];
-    context.fillRect(x, CELL.top, width, height);
+    context.fillRect(x, top, width, height);
   });
 }
 
@@ -84,9 +128,10 @@ export function drawSources(context, axis, cells, style) {
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
  * @param {Iterable<number>} keyframes
+ * @param {Band} lane
  */
-export function drawKeyframes(context, axis, keyframes) {
-  const y = (CELL.top + CELL.bottom) / 2;
+export function drawKeyframes(context, axis, keyframes, { top, bottom }) {
+  const y = (top + bottom) / 2;
   for (const x of placesOf(keyframes, axis)) drawDiamond(context, x, y, 4);
 }
 
@@ -111,12 +156,13 @@ export function placesOf(frames, axis) {
  * @param {FrameAxis} axis
  * @param {Cells} cells
  * @param {CSSStyleDeclaration} style
+ * @param {Band} band
  */
-export function drawReviewed(context, axis, cells, style) {
+export function drawReviewed(context, axis, cells, style, { top, bottom }) {
   context.fillStyle = style.getPropertyValue("--good");
   const { marks } = cells;
   eachRun(axis, (frame) => (marks[frame] & REVIEWED ? 0 : -1), 0, (_, x, width) => {
-    context.fillRect(x, REVIEW.top, width, REVIEW.bottom - REVIEW.top);
+    context.fillRect(x, top, width, bottom - top);
   });
 }
 
@@ -175,11 +221,12 @@ export function drawCosts(context, axis, cells, style) {
  * @param {FrameAxis} whole axis of all frames
  * @param {Cells} cells
  * @param {CSSStyleDeclaration} style
+ * @param {Band} overview
  */
-export function drawOverview(context, whole, cells, style) {
-  const height = OVERVIEW.bottom - OVERVIEW.top;
+export function drawOverview(context, whole, cells, style, overview) {
+  const height = overview.bottom - overview.top;
   context.fillStyle = style.getPropertyValue("--track");
-  context.fillRect(whole.left, OVERVIEW.top, whole.right - whole.left, height);
+  context.fillRect(whole.left, overview.top, whole.right - whole.left, height);
   const { statuses, marks, sources } = cells;
   /** @type {[(frame: number) => boolean, string, number, number][]} what, colour, share of the height, least width */
   const layers = [
@@ -191,11 +238,11 @@ export function drawOverview(context, whole, cells, style) {
   for (const [is, color, share, least] of layers) {
     context.fillStyle = style.getPropertyValue(color);
     eachRun(whole, (frame) => (is(frame) ? 0 : -1), 0, (_, x, width) => {
-      context.fillRect(x, OVERVIEW.bottom - share * height, Math.max(least, width), share * height);
+      context.fillRect(x, overview.bottom - share * height, Math.max(least, width), share * height);
     });
   }
   context.fillStyle = style.getPropertyValue("--text");
-  for (const x of placesOf(keyframesOf(cells), whole)) context.fillRect(x - 0.5, OVERVIEW.top, 1, 3);
+  for (const x of placesOf(keyframesOf(cells), whole)) context.fillRect(x - 0.5, overview.top, 1, 3);
 }
 
 /**
@@ -206,19 +253,20 @@ export function drawOverview(context, whole, cells, style) {
  * @param {import("./frame_axis.js").Span | null} visible
  * @param {number} target
  * @param {CSSStyleDeclaration} style
+ * @param {Band} overview
  */
-export function drawWindow(context, whole, visible, target, style) {
+export function drawWindow(context, whole, visible, target, style, overview) {
   context.fillStyle = style.getPropertyValue("--text");
-  context.fillRect(whole.middle(target) - 0.5, OVERVIEW.top - 1, 1, OVERVIEW.bottom - OVERVIEW.top + 2);
+  context.fillRect(whole.middle(target) - 0.5, overview.top - 1, 1, overview.bottom - overview.top + 2);
   if (!visible) return;
   const [left, right] = [whole.start(visible.start), whole.start(visible.end)];
   const width = Math.max(6, right - left);
   context.fillStyle = context.strokeStyle = style.getPropertyValue("--accent");
   context.globalAlpha = 0.25;
-  context.fillRect(left, OVERVIEW.top - 2, width, OVERVIEW.bottom - OVERVIEW.top + 4);
+  context.fillRect(left, overview.top - 2, width, overview.bottom - overview.top + 4);
   context.globalAlpha = 1;
   context.lineWidth = 1.5;
-  context.strokeRect(left, OVERVIEW.top - 2, width, OVERVIEW.bottom - OVERVIEW.top + 4);
+  context.strokeRect(left, overview.top - 2, width, overview.bottom - overview.top + 4);
 }
 
 /**
@@ -228,14 +276,15 @@ export function drawWindow(context, whole, visible, target, style) {
  * @param {FrameAxis} axis
  * @param {{first: number, last: number}} range
  * @param {CSSStyleDeclaration} style
+ * @param {number} bottom of what is marked
  */
-export function drawRange(context, axis, { first, last }, style) {
+export function drawRange(context, axis, { first, last }, style, bottom) {
   const left = Math.max(axis.left, axis.start(first));
   const right = Math.min(axis.right, axis.start(last + 1));
   if (right <= axis.left || left >= axis.right) return;
   context.fillStyle = style.getPropertyValue("--accent");
   context.globalAlpha = 0.14;
-  context.fillRect(left, 0, right - left, OVERVIEW.top - 3);
+  context.fillRect(left, 0, right - left, bottom);
   context.globalAlpha = 1;
   context.fillRect(left, 0, Math.max(2, right - left), 2);
   if (axis.shows(first)) context.fillRect(left, 0, 2, 7);

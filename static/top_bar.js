@@ -7,7 +7,6 @@ import { count, px } from "./text.js";
 export class TopBar {
   #store;
   #session = byId("session-name", HTMLElement);
-  #person = byId("person", HTMLSelectElement);
   #cost = byId("cost", HTMLElement);
   #stage = byId("search-stage", HTMLElement);
   #stages = byId("search-stages", HTMLElement);
@@ -29,10 +28,6 @@ export class TopBar {
     this.#stop = button("search-stop", () => actions.search("stop"));
     this.#undo = button("undo", () => actions.undo());
     this.#redo = button("redo", () => actions.redo());
-    this.#person.addEventListener("change", () => {
-      actions.selectPerson(Number(this.#person.value));
-      this.#person.blur();
-    });
     store.subscribe((changed) => {
       if (changed.has("session")) this.#showSession();
       if (changed.has("state") || changed.has("connected") || changed.has("session")) this.#showState();
@@ -45,8 +40,6 @@ export class TopBar {
     this.#session.textContent = session.name;
     this.#session.title = session.name;
     document.title = `${session.name} – Quadrille`;
-    this.#person.replaceChildren(...session.people.map(({ name }, index) => new Option(name, String(index))));
-    this.#person.hidden = session.people.length < 2;
   }
 
   #showState() {
@@ -57,11 +50,9 @@ export class TopBar {
     this.#stop.disabled = !isReady || !hasSearch(state);
     this.#undo.disabled = !isReady || state.undo === null;
     this.#redo.disabled = !isReady || state.redo === null;
-    this.#person.disabled = !isReady;
     if (!state) return;
     this.#undo.title = state.undo === null ? "Nothing to undo" : `Undo ${state.undo} (Ctrl+Z)`;
     this.#redo.title = state.redo === null ? "Nothing to redo" : `Redo ${state.redo} (Ctrl+Shift+Z)`;
-    this.#person.value = String(state.person);
     this.#cost.textContent = state.cost_px === null ? "–" : state.cost_px.toFixed(2);
     if (hasTrack(state) || state.track.message) this.#showTrack(state.track);
     else this.#showJob(state.job);

@@ -40,7 +40,7 @@ export class TrackBar {
     this.#forward.title = `Track forward from this frame, ${to} (T)`;
     this.#back.title = `Track backward from this frame, ${range ? to : "to its beginning"} (Shift+T)`;
     this.#pause.classList.toggle("is-paused", stands && !isRunning);
-    this.#pause.title = stands && !isRunning ? "Go on tracking (P)" : "Pause tracking (P)";
+    this.#pause.title = stands && !isRunning ? "Go on tracking (Alt+P)" : "Pause tracking (Alt+P)";
     this.#pause.setAttribute("aria-label", stands && !isRunning ? "Go on tracking" : "Pause tracking");
     this.#follow.checked = state?.follow ?? true;
   }

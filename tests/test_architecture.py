@@ -69,6 +69,7 @@ ORDER = [
     [
         "app",
         "app.access",
+        "app.cells",
         "app.jobs",
         "app.layers",
         "app.viser_proxy",
@@ -83,6 +84,7 @@ ORDER = [
     ["app.bench_scenes", "app.commands", "app.curves", "app.frames", "app.overlays", "app.saving", "app.server"],
     ["app.bench_rows", "app.dofs", "app.floor_lines", "app.graspable", "app.pin_marks", "app.runs", "app.screen"],
     [
+        "app.casting",
         "app.hand",
         "app.history",
         "app.locks",

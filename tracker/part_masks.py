@@ -40,9 +40,11 @@ def part_labels(bodies: Sequence[Body], camera: Camera) -> NDArray[np.uint8]:
     Returns:
         (H, W): 1 + the index of the part seen, counted through all bodies; 0 where there is none.
     """
+    labels = np.zeros((camera.height, camera.width), np.uint8)
+    if not bodies:
+        return labels
     mesh = _mesh(tuple(b.model for b in bodies))
     T = projection(camera) @ part_poses(bodies)  # (P, 3, 4), to homogeneous pixels
-    labels = np.zeros((camera.height, camera.width), np.uint8)
     nearness = np.zeros((camera.height, camera.width), np.float32)
     image = np.empty((mesh.points.shape[1], 3), np.float32)
     _project(T.astype(np.float32), mesh.points, mesh.owners, image)

@@ -1,4 +1,4 @@
-"""Whole poses changed at a stroke: mirrored, taken over from another frame, put back to neutral."""
+"""Whole poses changed at a stroke: mirrored, taken over from another frame or person, put back to neutral."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,24 @@ def taken_over(model: BodyModel, values: Array, other: Array, dofs: NDArray[np.b
     for index in np.unique(np.concatenate([at, *(at[whole] + k for k in (1, 2, 3))])):
         out[index] = other[index]
     return out
+
+
+def bent_alike(model: BodyModel, values: Array, other: BodyModel, theirs: Array, free: NDArray[np.bool_]) -> Array:
+    """A pose with the joints bent as in one of another body, where both have them by name; the root stays.
+
+    Args:
+        model: the body that is to bend.
+        values: its pose, (n_values,).
+        other: the body that is bent so, of whatever model.
+        theirs: the pose of that, (n_values of the other,).
+        free: which degrees of freedom may change, (n_dofs,).
+
+    Returns:
+        The pose, (n_values,), within the body's own limits.
+    """
+    known = dict(zip(other.value_names, theirs, strict=True))
+    wanted = np.array([known.get(n, own) for n, own in zip(model.value_names, values, strict=True)])
+    return model.clip(taken_over(model, values, wanted, free & (model.dof_joint != 0)))
 
 
 def joint_of(model: BodyModel, point: str | None) -> int:

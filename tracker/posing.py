@@ -51,6 +51,9 @@ _REACHED_M = 0.002
 _BEND_RAD = 0.35
 """How far the last joint of a chain is bent to leave a straight limb's dead point."""
 
+_STRAIGHT_DOWN = 0.1
+"""A camera whose axis has a smaller level component than this looks from above, or from below."""
+
 _QUICK: _Solving = {"max_iterations": 15, "tolerance": 1e-4}
 """A hand makes dozens of moves a second, each from where the last one ended."""
 
@@ -340,14 +343,26 @@ def _rest(hand: Grab) -> StayNear:
     return StayNear(hand.values, np.where(np.isfinite(hand.model.spreads), _STIFF_WEIGHT, _REST_WEIGHT))
 
 
-def standing_pose(model: BodyModel, cameras: Sequence[Camera], R_world_up: Array | None = None) -> Array:
+def standing_pose(
+    model: BodyModel, cameras: Sequence[Camera], R_world_up: Array | None = None, beside_m: float = 0.0
+) -> Array:
     """Upright pose where the cameras look: where a model stands before anybody has placed it.
 
     Args:
         model: the body.
         cameras: the views.
         R_world_up: rotation whose z axis points up, (3, 3); by default the world's z does.
+        beside_m: how far from the middle it stands, metres to the right as the first camera sees it.
     """
     R = np.eye(3) if R_world_up is None else R_world_up
-    points = model.points_world(model.neutral()) @ R.T + viewed_point(cameras)
+    middle = viewed_point(cameras) + beside_m * _rightward(cameras[0], R[:, 2])
+    points = model.points_world(model.neutral()) @ R.T + middle
     return fit_to_points(model, dict(zip(model.point_names, points, strict=True))).values
+
+
+def _rightward(camera: Camera, up: Array) -> Array:
+    """Level direction, (3,), that a camera sees as rightward, however it is rolled; any from straight above."""
+    right = np.cross(camera.T_world_camera[:3, 2], up)
+    if np.linalg.norm(right) < _STRAIGHT_DOWN:
+        right = np.cross(camera.T_world_camera[:3, 1], up)
+    return np.asarray(right / np.linalg.norm(right))

@@ -69,6 +69,19 @@ def opened(session):
 
 
 @pytest.fixture
+def couple(session, opened):
+    """A controller of two people, ann and bob, of whom the sample's footage shows one; nobody has been placed."""
+    toml = session / "session.toml"
+    row = '    { name = "person", model = "models/person.toml", color = "#f2a33a" },\n'
+    ann = row.replace('"person"', '"ann"', 1)
+    bob = row.replace('"person"', '"bob"', 1).replace("#f2a33a", "#4cc3d9")
+    text = toml.read_text("utf-8")
+    assert row in text
+    toml.write_text(text.replace(row, ann + bob), "utf-8")
+    return opened()
+
+
+@pytest.fixture
 def tracker(monkeypatch):
     """Stands for the tracker: takes its steps when it is let go."""
     return FakeTracker(monkeypatch)

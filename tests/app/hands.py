@@ -14,15 +14,15 @@ def wait_for(condition, timeout_s=60.0):
         time.sleep(0.01)
 
 
-def pixel_of(controller, point, camera=FRONT):
-    model = controller.models[0]
-    place = model.points_world(controller.state.poses[0])[model.point_names.index(point)]
+def pixel_of(controller, point, camera=FRONT, person=0):
+    model = controller.models[person]
+    place = model.points_world(controller.state.poses[person])[model.point_names.index(point)]
     return controller.session.cameras[camera].camera.pinhole.project(place)
 
 
-def drag(controller, point, by, camera=FRONT):
-    start = pixel_of(controller, point, camera)
-    controller.hand.begin_drag(PAGE, camera, 0, point, tuple(start))
+def drag(controller, point, by, camera=FRONT, person=0):
+    start = pixel_of(controller, point, camera, person)
+    controller.hand.begin_drag(PAGE, camera, person, point, tuple(start))
     for t in (0.5, 1.0):
         controller.hand.move_drag(PAGE, tuple(start + t * np.array(by)), int(10 * t))
     controller.hand.end_drag(PAGE)

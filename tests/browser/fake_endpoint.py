@@ -119,7 +119,8 @@ class FakeEndpoint:
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
             "source": "manual", "status": "", "remark": "", "parts_px": [], "job": self.idle_job(""), "replay": None,
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
-            "dofs": [1.0, 2.0, 90.0, 30.0], "locked": [], "other_sizes": False,
+            "dofs": [1.0, 2.0, 90.0, 30.0], "locked": [], "other_sizes": False, "solo": False,
+            "people": [{"source": "manual", "status": "", "shown": True} for _ in range(self.n_people)],
             "snapped": None, "floor": None, "footage": {"listed": None, "error": None},
             "saved": True, "save_error": None,
         }  # fmt: skip
@@ -161,6 +162,8 @@ class FakeEndpoint:
             case "select":
                 self.state |= {"person": message["person"], "point": message["point"]}
                 await self.broadcast(self.state)
+            case "people":
+                await self.cast(message)
             case "view":
                 await self.send_frame()
             case "drag":
@@ -181,6 +184,13 @@ class FakeEndpoint:
                 await self.broadcast(self.state)
             case "undo" | "redo":
                 await self.broadcast(self.state)
+
+    async def cast(self, message):
+        if message["action"] == "solo":
+            self.state["solo"] = message["on"]
+        else:
+            self.state["people"][message["person"]]["shown"] = message["shown"]
+        await self.broadcast(self.state)
 
     async def drag(self, message):
         key = (message["person"], message["point"])
@@ -263,7 +273,7 @@ class FakeEndpoint:
                 "remark": "",
                 "reviewed": False,
             }
-            await self.broadcast({"type": "timeline", "cells": {frame: cell}, "replace": False})
+            await self.broadcast({"type": "timeline", "person": None, "cells": {frame: cell}, "replace": False})
             if self.state["follow"]:
                 self.state |= self.judged(frame)
                 await self.send_frame()
@@ -305,6 +315,8 @@ class FakeEndpoint:
             {
                 "name": f"person {p}",
                 "color": COLORS[p],
+                "model": "stick",
+                "height_m": 1.7,
                 "points": list(REST),
                 "minor": ["waist"],
                 "bones": BONES,
@@ -334,7 +346,9 @@ class FakeEndpoint:
             }
             for k in range(self.n_frames * 100 // N_FRAMES)
         }
-        await socket.send_str(json.dumps({"type": "timeline", "cells": cells, "replace": True}))
+        for person in (None, *(range(self.n_people) if self.n_people > 1 else ())):
+            told = {"type": "timeline", "person": person, "cells": cells, "replace": True}
+            await socket.send_str(json.dumps(told))
         await socket.send_str(json.dumps({"type": "disagreeing", "frames": DISAGREEING}))
         if self.views:
             await self.send_frame([socket])

@@ -112,7 +112,7 @@ async def tracking(page: Page) -> None:
     """A tracker that has been paused on its way."""
     await page.keyboard.press("t")
     await shows(page, "quadrille.state.state.track.done > 3", 120)
-    await page.keyboard.press("p")
+    await page.keyboard.press("Alt+p")
 
 
 async def tracked(page: Page) -> None:

@@ -28,7 +28,8 @@ async def test_frames_end_at_the_ends(page, endpoint):
     ("key", "message"),
     [
         ("Control+z", {"type": "undo"}), ("Control+Shift+z", {"type": "redo"}), ("Control+y", {"type": "redo"}),
-        ("s", {"type": "search", "action": "step"}), ("f", {"type": "search", "action": "frame"}),
+        ("s", {"type": "search", "action": "step", "person": None}),
+        ("f", {"type": "search", "action": "frame", "person": None}),
     ],
 )  # fmt: skip
 async def test_keys_send_one_message(page, endpoint, key, message):

@@ -65,7 +65,7 @@ async def test_a_run_is_watched_paused_looked_at_and_taken_back(live):
     before = await handle_of(live, 0, "left_wrist")
     await live.keyboard.press("t")
     await said(live, "quadrille.state.state.track.done > 2", 120)
-    await live.keyboard.press("p")
+    await live.keyboard.press("Alt+p")
     await said(live, "!quadrille.state.state.track.running")
     at = (await state_of(live))["state"]["track"]["at"]
     assert START + 3 <= at < 49
@@ -85,7 +85,7 @@ async def test_a_run_is_watched_paused_looked_at_and_taken_back(live):
     await live.mouse.click(box["x"] + 52 + (START + 2.5) * (box["width"] - 60) / 50, box["y"] + 60)
     await shows(live, FOLLOWED.format(START + 2), 60)
 
-    await live.keyboard.press("p")
+    await live.keyboard.press("Alt+p")
     await said(live, f"quadrille.state.state.track.at > {at}", 120)
     await live.keyboard.press("Escape")
     await shows(live, "quadrille.state.state.track.first === null", 60)

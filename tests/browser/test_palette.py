@@ -22,7 +22,7 @@ async def found(page):
         ("go to frame 8", "seek", {"type": "seek", "frame": 8}),
         ("l elb", "select", {"type": "select", "person": 0, "point": "l_elbow"}),
         ("undo", "undo", {"type": "undo"}),
-        ("srch one", "search", {"type": "search", "action": "step"}),
+        ("srch one", "search", {"type": "search", "action": "step", "person": None}),
     ],
 )
 async def test_a_few_letters_and_enter_do_it(page, endpoint, query, kind, message):
@@ -137,7 +137,7 @@ async def test_undo_holds_in_every_part_of_the_page(page, endpoint):
 
 
 async def test_a_key_that_does_nothing_says_why(page, endpoint):
-    await page.keyboard.press("p")
+    await page.keyboard.press("Alt+p")
     await shows(page, "document.querySelector('.notice:not([hidden]) span')?.textContent.startsWith('No tracking run')")
     assert not endpoint.received
 
@@ -148,10 +148,14 @@ async def test_people_are_changed_by_key_by_name_and_by_a_click(browser, endpoin
     page = await (await browser.new_context(viewport={"width": 1280, "height": 720})).new_page()
     await page.goto(address)
     await shows(page, "window.quadrille?.state.overlay?.frame === quadrille.state.shown.frame")
-    await page.keyboard.press("Shift+P")
+    chosen = page.locator("#people input:checked")
+    for key, person in (("p", 1), ("p", 0), ("Shift+P", 1), ("Shift+P", 0)):
+        await page.keyboard.press(key)
+        await shows(page, f"quadrille.state.state.person === {person}")
+        assert await chosen.input_value() == str(person)
+    await page.get_by_text("person 1", exact=True).first.click()
     await shows(page, "quadrille.state.state.person === 1")
-    assert await page.locator("#person").input_value() == "1"
-    await page.keyboard.press("Shift+P")
+    await page.keyboard.press("p")
     await shows(page, "quadrille.state.state.person === 0")
     await open_palette(page, "work on person 1")
     await page.keyboard.press("Enter")

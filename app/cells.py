@@ -1,0 +1,72 @@
+"""Cells of the timeline: what is said of each frame, of all people together and of each of several."""
+
+from collections.abc import Iterable, Mapping
+from itertools import takewhile
+
+from tracker.records import SOURCES, FrameRow
+
+_WORST_FIRST = ("lost", "doubtful", "good", "")
+
+
+class Cells:
+    """The cells of all frames that have poses. Not locked by itself: whoever changes them holds the screen's lock."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        """Know of no pose yet.
+
+        Args:
+            names: of the people.
+        """
+        self._all: dict[int, dict] = {}
+        names = list(names)
+        self._lanes: dict[str, dict[int, dict]] = {name: {} for name in names} if len(names) > 1 else {}
+        self._changed: dict[int, int] = {}  # frame -> version of the timeline it changed in last, latest last
+        self.version = 1
+        """Rises with every change of stored poses."""
+
+    def begin(self, rows: Mapping[int, Mapping[str, FrameRow]]) -> None:
+        """List all frames, from the rows of everybody who has a pose there."""
+        self._put(rows)
+
+    def change(self, frames: Iterable[int], rows: Mapping[int, Mapping[str, FrameRow]]) -> None:
+        """Bring some frames up to date; those without rows have no pose any more."""
+        changed = set(frames)
+        self.version += 1
+        for frame in changed:
+            for cells in (self._all, *self._lanes.values()):
+                cells.pop(frame, None)
+            self._changed.pop(frame, None)
+            self._changed[frame] = self.version
+        self._put({frame: people for frame, people in rows.items() if frame in changed})
+
+    def since(self, version: int, name: str | None = None) -> dict[int, dict | None]:
+        """Cells of the frames that changed after a version; all for 0.
+
+        Args:
+            version: of the timeline.
+            name: of one person among several; by default what is said of all together.
+        """
+        cells = self._all if name is None else self._lanes[name]
+        if version <= 0:
+            return dict(cells)
+        latest = takewhile(lambda change: change[1] > version, reversed(self._changed.items()))
+        return {frame: cells.get(frame) for frame, _ in latest}
+
+    def _put(self, rows: Mapping[int, Mapping[str, FrameRow]]) -> None:
+        self._all |= {frame: _cell(people) for frame, people in rows.items()}
+        for name, lane in self._lanes.items():
+            lane |= {frame: _cell({name: people[name]}) for frame, people in rows.items() if name in people}
+
+
+def _cell(rows: Mapping[str, FrameRow]) -> dict:
+    """What the timeline says of a frame: of several people the worst, and the source nearest to a person's hand."""
+    costs = [row.cost_px for row in rows.values() if row.cost_px is not None]
+    remarks = [row.remark if len(rows) == 1 else f"{name}: {row.remark}" for name, row in rows.items() if row.remark]
+    return {
+        "source": min((row.source for row in rows.values()), key=SOURCES.index),
+        "cost_px": round(max(costs), 3) if costs else None,
+        "keyframe": any(row.keyframe for row in rows.values()),
+        "status": min((row.status for row in rows.values()), key=_WORST_FIRST.index),
+        "remark": "; ".join(remarks),
+        "reviewed": all(row.reviewed for row in rows.values()),
+    }
