@@ -1,4 +1,9 @@
-/** What a drag is doing, and what else it could, said beside the pointer. */
+/**
+ * What a drag is doing, and what else it could, said at the foot of its pane.
+ *
+ * It stays there: what follows the pointer lies over what is being placed, and costs a picture of the page of its own
+ * with each move.
+ */
 
 /** @type {Record<import("./protocol.js").DragMode, string>} */
 const HINTS = {
@@ -9,6 +14,8 @@ const HINTS = {
 
 export class DragHint {
   #element = document.createElement("div");
+  /** @type {import("./protocol.js").DragMode | null} what it says now */
+  #mode = null;
 
   constructor() {
     this.#element.className = "drag-hint";
@@ -19,18 +26,22 @@ export class DragHint {
 
   /**
    * @param {import("./protocol.js").DragMode} mode
-   * @param {MouseEvent} event
+   * @param {HTMLElement} pane
    */
-  show(mode, { clientX, clientY }) {
+  show(mode, pane) {
+    if (mode === this.#mode) return;
+    this.#mode = mode;
     this.#element.textContent = HINTS[mode];
     this.#element.classList.toggle("is-quiet", mode === "move");
     this.#element.hidden = false;
-    const left = Math.min(clientX + 18, innerWidth - this.#element.offsetWidth - 8);
-    this.#element.style.transform = `translate(${left}px, ${Math.min(clientY + 22, innerHeight - 30)}px)`;
+    const { left, bottom, width } = pane.getBoundingClientRect();
+    this.#element.style.left = `${left + width / 2}px`;
+    this.#element.style.top = `${bottom - 8}px`;
   }
 
   hide() {
     this.#element.hidden = true;
+    this.#mode = null;
   }
 }
 

@@ -184,7 +184,7 @@ export class Gestures {
     } else if (this.#drag?.pointer === event.pointerId) {
       this.#drag.mode = modeOf(event);
       this.#dragTo(this.#drag, pane.locate(event));
-      if (this.#drag.begun) this.#hint.show(this.#drag.mode, event);
+      if (this.#drag.begun) this.#hint.show(this.#drag.mode, pane.element);
     } else if (!this.#drag && !this.#pan) {
       this.#hoverAt(pane, camera, pane.locate(event));
     }
