@@ -59,6 +59,10 @@ class _Eye:
     turned_away: bool = False
     """Whether it left the camera by its user's hand, who wants to go on from there."""
 
+    def is_back(self, report: _Report) -> bool:
+        """Whether it says that it is where it came from: a slow page says so late, when it has been sent on again."""
+        return self.before is not None and bool(np.linalg.norm(report.position - self.before.position) < _MOVED_M)
+
 
 class SnapView:
     """Keeps the view of every page at the camera that the state says."""
@@ -103,7 +107,7 @@ class SnapView:
             return
         if _is_at(report.position, report.wxyz, self._cameras[eye.camera]):
             eye.arrived = True
-        elif eye.arrived and self._controller.state.snapped == eye.camera:
+        elif eye.arrived and not eye.is_back(report) and self._controller.state.snapped == eye.camera:
             eye.turned_away = True
             self._controller.view_3d.snap(None)
 
