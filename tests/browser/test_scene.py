@@ -135,9 +135,12 @@ async def rested(page, condition=lambda _: True):
 
 async def snap(page, index, through=True):
     """Look through a camera, or no longer."""
-    pane = await page.locator(".pane").nth(index).bounding_box()
-    await page.mouse.move(pane["x"] + 20, pane["y"] + pane["height"] / 2)
-    await shows(page, f"quadrille.state.active === {index}", 30)
+    async with asyncio.timeout(30):
+        while (await state_of(page))["active"] != index:  # the panes may just be finding their places
+            pane = await page.locator(".pane").nth(index).bounding_box()
+            await page.mouse.move(pane["x"] + 20, pane["y"] + pane["height"] / 2)
+            await asyncio.sleep(0.1)
+            await page.mouse.move(pane["x"] + 24, pane["y"] + pane["height"] / 2)
     await page.keyboard.press("y")
     await shows(page, f"quadrille.state.state.snapped === {index if through else 'null'}", 30)
 
