@@ -35,12 +35,16 @@ export class JumpMenu {
     });
     // A click into the 3-D view reaches this page only as the loss of its focus.
     addEventListener("blur", () => this.#show(false));
-    this.#menu.addEventListener("keydown", (event) => {
-      if (event.key !== "Escape") return;
+    // Opened by the mouse it has no focus; Escape closes it all the same, and does nothing else.
+    const closes = (/** @type {KeyboardEvent} */ event) => {
+      if (event.key !== "Escape" || this.#menu.hidden) return;
       event.preventDefault();
+      event.stopPropagation();
+      const hadFocus = this.#menu.contains(document.activeElement);
       this.#show(false);
-      this.#open.focus();
-    });
+      if (hadFocus) this.#open.focus();
+    };
+    document.addEventListener("keydown", closes, true);
     store.subscribe((changed) => {
       if (["timeline", "disagreeing", "connected", "session"].some((f) => changed.has(/** @type {"timeline"} */ (f)))) {
         this.#count();

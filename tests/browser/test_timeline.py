@@ -169,6 +169,9 @@ async def test_timeline_and_curves_share_the_zoom(page):
 
 async def test_the_menu_counts_what_there_is_to_go_to(page):
     await page.locator("#show-jumps").click()
+    await page.keyboard.press("Escape")
+    assert await page.locator("#jump-menu").is_hidden()
+    await page.locator("#show-jumps").click()
     rows = page.locator("#jump-menu .jump-row")
     counts = {await r.locator("span").inner_text(): await r.locator("output").inner_text() for r in await rows.all()}
     assert counts == {
