@@ -69,4 +69,5 @@ def _cell(rows: Mapping[str, FrameRow]) -> dict:
         "status": min((row.status for row in rows.values()), key=_WORST_FIRST.index),
         "remark": "; ".join(remarks),
         "reviewed": all(row.reviewed for row in rows.values()),
+        "ambiguous": any(row.ambiguous for row in rows.values()),
     }

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.casting import Casting
+from app.choosing import Choosing
 from app.disagreements import Disagreements
 from app.flooring import Flooring
 from app.frames import Frames
@@ -77,6 +78,8 @@ class Controller:
         """Looks at the cost along one degree of freedom."""
         self.flooring = Flooring(self._screen, self.editing)
         """Sets the floor."""
+        self.choosing = Choosing(self._screen, self.editing)
+        """Takes other poses that are about as good."""
         self.casting = Casting(self._screen)
         """Whom the views show."""
         self.view_3d = Viewing(self._screen)

@@ -29,6 +29,7 @@ _NO_CELL: dict[str, Any] = {
     "status": "",
     "remark": "",
     "reviewed": False,
+    "ambiguous": False,
 }
 
 
@@ -68,7 +69,7 @@ def state(session: Session, state: State) -> dict[str, Any]:
         "person": state.person,
         "point": state.point,
         "people": [
-            {"source": p.source, "status": p.status, "shown": i not in state.cast.hidden}
+            {"source": p.source, "status": p.status, "shown": i not in state.cast.hidden, "others": len(p.others)}
             for i, p in enumerate(state.people)
         ],
         "solo": state.cast.solo,
@@ -180,7 +181,7 @@ def timeline(
         [
             [source.get(row["source"], _NO_POSE) for row in rows],
             [status[row["status"]] for row in rows],
-            [row["keyframe"] + 2 * row["reviewed"] for row in rows],
+            [row["keyframe"] + 2 * row["reviewed"] + 4 * row["ambiguous"] for row in rows],
         ],
         dtype=np.uint8,
     )

@@ -21,6 +21,7 @@ from tracker.silhouettes import Mask
 CANDIDATE_COLOR = "#ffffff"
 COMPARED_COLOR = "#ff9df2"
 PREVIEW_COLOR = "#5ce1ff"
+OTHER_COLOR = "#d8f25a"
 PART_EDGE_COLOR = "#9aa3ad"
 EPIPOLAR_COLOR = "#ffd54a"
 ACCEPTED_COLOR = "#35e0c8"
@@ -81,14 +82,17 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
     tried = state.job.candidate if state.job.running or state.look.replay is not None else None
-    drafted = _with_draft(state, bodies)
+    drafted, others = _with_draft(state, bodies), _others(state, bodies)
     ghosts = ((state.look.compared, COMPARED_COLOR), (state.look.preview, PREVIEW_COLOR))
     for index in sorted(view.cameras):
         camera = session.cameras[index].camera.pinhole
         if not view.layers.isdisjoint(("contours", "hidden")):
             out += _model(session, bodies, camera, index, view)
         if state.draft is not None:
-            out += _drafted(state.draft.person, drafted, camera, index)
+            out += _ghosts({state.draft.person}, drafted, camera, index, PREVIEW_COLOR)
+        if others:
+            changed = {i for i, (now, other) in enumerate(zip(bodies, others, strict=True)) if now is not other}
+            out += _ghosts(changed, others, camera, index, OTHER_COLOR)
         if "contours" in view.layers and tried is not None:
             out += _outlined(session, tried, camera, index, "candidate", CANDIDATE_COLOR)
         for ghost, color in ghosts:
@@ -161,11 +165,18 @@ def _with_draft(state: State, bodies: Sequence[Body]) -> list[Body]:
     return people
 
 
-def _drafted(person: int, people: Sequence[Body], camera: Camera, index: int) -> list[Path]:
-    """What one would see of the person whose sizes are being edited."""
+def _others(state: State, bodies: Sequence[Body]) -> list[Body]:
+    """Everybody in the poses shown, but for those of whom another is about as good: in the best of these."""
+    if not any(shown.others for shown in state.people):
+        return []
+    return [Body(b.model, s.others[0]) if s.others else b for b, s in zip(bodies, state.people, strict=True)]
+
+
+def _ghosts(chosen: Collection[int], people: Sequence[Body], camera: Camera, index: int, color: str) -> list[Path]:
+    """What one would see of some of the people, given by index, if everybody stood so."""
     contour = _traced(people, camera)
-    colors = [PREVIEW_COLOR] * len(people)
-    return [p for p in _by_person(people, contour, ~contour.hidden, index, "ghost", colors) if p.person == person]
+    found = _by_person(people, contour, ~contour.hidden, index, "ghost", [color] * len(people))
+    return [path for path in found if path.person in chosen]
 
 
 def _by_person(

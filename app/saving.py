@@ -19,6 +19,7 @@ from tracker.pins import ViewPin
 from tracker.rebody import rebodied
 from tracker.records import (
     SOURCES,
+    Alternative,
     Change,
     FrameNumbers,
     FrameRow,
@@ -111,7 +112,15 @@ class Saver:
         if record is None or not self.fits(person, record.model_revision):
             return None
         source, revision = _summary(record.sources), record.model_revision
-        return Shown(record.values, source, record.status, record.remark, record.parts_px, (), revision)
+        others = () if record.keyframe else tuple(a.values for a in self.alternatives(person, frame))
+        return Shown(record.values, source, record.status, record.remark, record.parts_px, (), revision, others)
+
+    def alternatives(self, person: int, frame: int) -> tuple[Alternative, ...]:
+        """Poses about as good as the stored one, best first; those of a body of other joints are passed over."""
+        name = self._session.people[person].name
+        waiting = self._writing.pose(name, frame)
+        kept = self._store.alternatives(name, frame) if waiting is None else waiting.alternatives
+        return tuple(a for a in kept if self.fits(person, a.model_revision))
 
     def pose_now(self, person: int, frame: int) -> Array | None:
         """The stored pose of a person, (n_values,), taken over into the present body where it was made with another."""

@@ -30,6 +30,8 @@ class Shown:
     """Where each value of a pose that is not stored yet comes from, (n_values,); empty: all from `source`."""
     revision: int | None = None
     """The body model that a stored pose belongs to; None for one as it is not stored."""
+    others: tuple[Array, ...] = ()
+    """Poses that its tracker found about as good, (n_values,) each, best first; none where a person vouches for it."""
 
 
 @dataclass(frozen=True)

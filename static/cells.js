@@ -22,6 +22,8 @@ export const STATUSES = /** @type {const} */ (["", "good", "doubtful", "lost"]);
 export const NO_POSE = 255;
 export const KEYFRAME = 1;
 export const REVIEWED = 2;
+/** Other poses are about as good, and nobody has vouched for this one. */
+export const AMBIGUOUS = 4;
 
 export class Cells {
   /** How many frames have a pose. */
@@ -35,7 +37,7 @@ export class Cells {
     this.sources = new Uint8Array(frames).fill(NO_POSE);
     /** Index into `STATUSES`. */
     this.statuses = new Uint8Array(frames);
-    /** `KEYFRAME` plus `REVIEWED`. */
+    /** `KEYFRAME` plus `REVIEWED` plus `AMBIGUOUS`. */
     this.marks = new Uint8Array(frames);
     /** Pixels; NaN where unknown. */
     this.costs = new Float32Array(frames).fill(NaN);
@@ -65,6 +67,7 @@ export class Cells {
       status: STATUSES[this.statuses[frame]],
       remark: this.#remarks.get(frame) ?? "",
       reviewed: (this.marks[frame] & REVIEWED) !== 0,
+      ambiguous: (this.marks[frame] & AMBIGUOUS) !== 0,
     };
   }
 
@@ -78,7 +81,7 @@ export class Cells {
       frame,
       cell ? Math.max(0, SOURCES.indexOf(cell.source)) : NO_POSE,
       cell ? STATUSES.indexOf(cell.status) : 0,
-      cell ? (cell.keyframe ? KEYFRAME : 0) | (cell.reviewed ? REVIEWED : 0) : 0,
+      cell ? (cell.keyframe ? KEYFRAME : 0) | (cell.reviewed ? REVIEWED : 0) | (cell.ambiguous ? AMBIGUOUS : 0) : 0,
       cell?.cost_px ?? NaN,
       cell?.remark ?? "",
     );
@@ -130,9 +133,19 @@ export class Cells {
   }
 }
 
+/**
+ * Frames that have a mark.
+ *
+ * @param {Cells} cells
+ * @param {number} mark
+ */
+export function framesWith(cells, mark) {
+  const found = [];
+  for (let frame = 0; frame < cells.frames; frame += 1) if (cells.marks[frame] & mark) found.push(frame);
+  return found;
+}
+
 /** @param {Cells} cells */
 export function keyframesOf(cells) {
-  const found = [];
-  for (let frame = 0; frame < cells.frames; frame += 1) if (cells.marks[frame] & KEYFRAME) found.push(frame);
-  return found;
+  return framesWith(cells, KEYFRAME);
 }

@@ -1,6 +1,6 @@
 /** What the tracker says of the shown frame: a line in the corner of the panes that opens to the cost of each part. */
 
-import { byId } from "./elements.js";
+import { button, byId } from "./elements.js";
 import { px } from "./text.js";
 
 const STORED_OPEN = "quadrille.parts-open";
@@ -13,10 +13,15 @@ export class FrameCard {
   #badge = byId("frame-status", HTMLElement);
   #remark = byId("frame-remark", HTMLElement);
   #parts = byId("frame-parts", HTMLElement);
+  #other;
 
-  /** @param {import("./store.js").Store} store */
-  constructor(store) {
+  /**
+   * @param {import("./store.js").Store} store
+   * @param {import("./posing.js").Posing} posing
+   */
+  constructor(store, posing) {
     this.#store = store;
+    this.#other = button("take-other", () => posing.takeOther());
     this.#card.open = localStorage.getItem(STORED_OPEN) === "yes";
     this.#card.addEventListener("toggle", () => {
       localStorage.setItem(STORED_OPEN, this.#card.open ? "yes" : "no");
@@ -30,7 +35,8 @@ export class FrameCard {
   #show() {
     const { state, session } = this.#store.facts;
     if (!state || !session) return;
-    const { status, remark, parts_px, person } = state;
+    const { status, remark, parts_px, person, people } = state;
+    this.#other.hidden = !people.some(({ others, shown }) => others > 0 && shown);
     this.#card.hidden = status === "" && parts_px.length === 0;
     this.#badge.className = `status-badge is-${status}`;
     this.#badge.textContent = status || "not judged";

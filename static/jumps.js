@@ -1,8 +1,8 @@
 /** Frames worth going to: by kind, how many there are, and the next of them in either direction. */
 
-import { KEYFRAME, NO_POSE, REVIEWED, STATUSES, keyframesOf } from "./cells.js";
+import { AMBIGUOUS, KEYFRAME, NO_POSE, REVIEWED, STATUSES, keyframesOf } from "./cells.js";
 
-/** @typedef {"doubt" | "unreviewed" | "disagreeing" | "keyframe" | "empty"} Kind */
+/** @typedef {"doubt" | "ambiguous" | "unreviewed" | "disagreeing" | "keyframe" | "empty"} Kind */
 
 /** @type {{kind: Kind, label: string, title: string, key: string, more: string}[]} */
 export const KINDS = [
@@ -12,6 +12,13 @@ export const KINDS = [
     title: "The tracker is not sure of them",
     key: "N",
     more: "doubtful or lost frame",
+  },
+  {
+    kind: "ambiguous",
+    label: "Two poses as good",
+    title: "The tracker cannot tell which of two poses is true: the other is drawn dashed, Shift+X takes it, K keeps this one",
+    key: "Alt A",
+    more: "frame with another pose as good",
   },
   {
     kind: "unreviewed",
@@ -115,6 +122,7 @@ export class Jumps {
 function tests({ sources, statuses, marks }) {
   return {
     doubt: (frame) => statuses[frame] >= DOUBT,
+    ambiguous: (frame) => (marks[frame] & AMBIGUOUS) !== 0,
     unreviewed: (frame) => sources[frame] !== NO_POSE && !(marks[frame] & REVIEWED),
     keyframe: (frame) => (marks[frame] & KEYFRAME) !== 0,
     empty: (frame) => sources[frame] === NO_POSE,

@@ -96,7 +96,7 @@ new Transport(store, navigation, playback, actions);
 new TrackBar(store, actions);
 new JumpMenu(store, jumps);
 new RangeBar(store, actions);
-new FrameCard(store);
+new FrameCard(store, posing);
 new PinBar(store, pinning);
 const drawer = new Drawer(store);
 new SearchPanel(store, actions, send);

@@ -157,6 +157,11 @@ export class Posing {
     this.#edit({ ...this.#head(), action: "mirror" });
   }
 
+  /** Take the other of two poses that are about as good; said again, go back. */
+  takeOther() {
+    this.#edit({ ...this.#head(), action: "other" });
+  }
+
   resetLimb() {
     this.#edit({ ...this.#head(), action: "reset", point: this.selected });
   }

@@ -41,6 +41,12 @@ export function posingBindings(posing, inspector, plain) {
       run: () => posing.toggleLock(posing.limb.dofs),
     },
     { keys: ["M"], label: "Mirror the pose left to right", matches: plain("m"), run: () => posing.mirror() },
+    {
+      keys: ["Shift X"],
+      label: "Take the other of two poses that are as good, or go back",
+      matches: plain("x", undefined, true),
+      run: () => posing.takeOther(),
+    },
     { keys: ["R"], label: "Reset the joint's limb to neutral", matches: plain("r"), run: () => posing.resetLimb() },
     { keys: ["Alt ,"], label: "Copy the pose of the previous frame", matches: alt("Comma"), run: () => posing.copyNeighbour(-1) },
     { keys: ["Alt ."], label: "Copy the pose of the next frame", matches: alt("Period"), run: () => posing.copyNeighbour(1) },

@@ -21,7 +21,7 @@
  *   "none"} RangeAction
  * @typedef {{point: number, views: number, marked: boolean, known: boolean, error_px: number | null, ready: boolean,
  *   why: string}} FloorPicking
- * @typedef {{source: string | null, status: Status, shown: boolean}} PersonState
+ * @typedef {{source: string | null, status: Status, shown: boolean, others: number}} PersonState
  * @typedef {{type: "state", frame: number, person: number, point: string | null, people: PersonState[], solo: boolean,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
  *   parts_px: (number | null)[], dofs: number[], locked: number[], other_sizes: boolean, job: Job, track: Track, range: RangeWork,
@@ -33,7 +33,7 @@
  * @typedef {{type: "history", entries: HistoryEntry[], later: boolean, earlier: boolean}} HistoryMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
  * @typedef {{source: string, cost_px: number | null, keyframe: boolean, status: Status, remark: string,
- *   reviewed: boolean}} Cell
+ *   reviewed: boolean, ambiguous: boolean}} Cell
  * @typedef {{type: "timeline", person: number | null, cells: Record<string, Cell | null>, replace: boolean}} TimelineMessage
  * @typedef {{person: number, name: string, dofs: string[], bound_rad: number | null, step_rad: number | null,
  *   bound_m: number | null, step_m: number | null, angles: number, lengths: number, own: boolean}} SearchLeaf
@@ -84,7 +84,7 @@
  * @typedef {{type: "pose", frame: number, person: number} & (
  *   {action: "set", dof: number, value: number} | {action: "turn", dof: number, by: number} |
  *   {action: "nudge", point: string | null, camera: number, right: number, up: number} |
- *   {action: "mirror"} | {action: "copy" | "copy_person", from: number} | {action: "reset", point: string | null} |
+ *   {action: "mirror" | "other"} | {action: "copy" | "copy_person", from: number} | {action: "reset", point: string | null} |
  *   {action: "lock", dofs: number[], locked: boolean})} PoseEdit
  * @typedef {{type: "seek", frame: number} |
  *   {type: "select", person: number, point: string | null} |

@@ -3,7 +3,7 @@
  * drag goes there; with Shift it marks a range of frames. It can be zoomed; the strip at the bottom is the whole recording.
  */
 
-import { keyframesOf } from "./cells.js";
+import { AMBIGUOUS, framesWith, keyframesOf } from "./cells.js";
 import { prepare } from "./drawing.js";
 import { FrameAxis } from "./frame_axis.js";
 import { zoomByWheel } from "./frame_window.js";
@@ -176,6 +176,7 @@ export class Timeline {
       if (!cells) continue; // it comes right behind
       drawing.drawSources(context, axis, cells, style, band);
       drawing.drawKeyframes(context, axis, keyframesOf(cells), band);
+      drawing.drawAmbiguous(context, axis, framesWith(cells, AMBIGUOUS), band);
     }
     drawing.drawReviewed(context, axis, timeline, style, review);
     drawing.drawStatuses(context, axis, timeline, style);
@@ -213,8 +214,8 @@ export class Timeline {
   #describeFrame(frame) {
     const cell = this.#store.facts.timeline.get(frame);
     if (!cell) return `Frame ${frame}: no pose`;
-    const { source, keyframe, status, remark, cost_px, reviewed } = cell;
-    const seen = keyframe ? "keyframe" : reviewed && "reviewed";
+    const { source, keyframe, status, remark, cost_px, reviewed, ambiguous } = cell;
+    const seen = keyframe ? "keyframe" : ambiguous ? "another pose is as good" : reviewed && "reviewed";
     const parts = [source, seen, status, px(cost_px)].filter(Boolean).join(", ") + this.#describeLanes(frame);
     const jumps = this.#store.facts.disagreeing.includes(frame) ? "\ndisagrees with the frames beside it" : "";
     return `Frame ${frame}: ${parts}${remark && `\n${remark}`}${jumps}`;

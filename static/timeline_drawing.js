@@ -136,6 +136,29 @@ export function drawKeyframes(context, axis, keyframes, { top, bottom }) {
 }
 
 /**
+ * Two rings, one over the other, where another pose is as good.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {Iterable<number>} frames
+ * @param {Band} lane
+ */
+export function drawAmbiguous(context, axis, frames, { top, bottom }) {
+  const middle = (top + bottom) / 2;
+  context.lineWidth = 1.25;
+  for (const x of placesOf(frames, axis)) {
+    for (const y of [middle - 2, middle + 2]) {
+      context.beginPath();
+      context.arc(x, y, 2, 0, 2 * Math.PI);
+      context.fillStyle = "#fff";
+      context.strokeStyle = "rgba(0, 0, 0, 0.7)";
+      context.fill();
+      context.stroke();
+    }
+  }
+}
+
+/**
  * Where keyframes are marked: of those that would cover each other only one, and none out of sight.
  *
  * @param {Iterable<number>} frames

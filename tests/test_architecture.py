@@ -85,6 +85,7 @@ ORDER = [
     ["app.bench_rows", "app.dofs", "app.floor_lines", "app.graspable", "app.pin_marks", "app.runs", "app.screen"],
     [
         "app.casting",
+        "app.choosing",
         "app.hand",
         "app.history",
         "app.locks",

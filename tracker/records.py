@@ -129,6 +129,8 @@ class FrameRow(NamedTuple):
     """What the tracker did on the frame."""
     reviewed: bool = False
     """Whether a person has looked at it, or set it."""
+    ambiguous: bool = False
+    """Whether other poses are about as good and nobody has vouched for this one."""
 
 
 class FrameNumbers(NamedTuple):

@@ -19,7 +19,10 @@ RECORD = (
     "e.author, e.time, e.program, c.views_px, c.parts_px, c.remark, c.reviewed"
 )
 """Columns that `record_of` reads; `e` is the edit, `t` what its program was told."""
-FRAME = "c.frame, c.sources, c.status, c.cost_px, c.keyframe, c.views_px, c.remark, c.reviewed"
+FRAME = (
+    "c.frame, c.sources, c.status, c.cost_px, c.keyframe, c.views_px, c.remark, c.reviewed, "
+    "EXISTS (SELECT 1 FROM alternatives a WHERE a.change = c.id)"
+)
 """Columns that `frame_of` reads."""
 NUMBERS = "c.frame, c.numbers, c.cost_px, c.views_px, c.model_revision"
 """Columns that `numbers_of` reads."""
@@ -44,9 +47,11 @@ def record_of(row: Sequence[Any]) -> PoseRecord:
 
 def frame_of(row: Sequence[Any]) -> FrameRow:
     """What a row of `FRAME` says in short."""
-    frame, sources, status, cost, keyframe, views, remark, seen = row
-    source = SOURCES[min(sources)]
-    return FrameRow(frame, source, status, cost, bool(keyframe), _costs(views), remark or "", bool(keyframe or seen))
+    frame, sources, status, cost, keyframe, views, remark, seen, others = row
+    return FrameRow(
+        frame, SOURCES[min(sources)], status, cost, bool(keyframe), _costs(views), remark or "", bool(keyframe or seen),
+        bool(others and not keyframe),
+    )  # fmt: skip
 
 
 def numbers_of(row: Sequence[Any]) -> FrameNumbers:

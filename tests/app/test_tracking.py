@@ -55,6 +55,7 @@ def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, sess
     assert placed.timeline()[4] == {
         "source": "tracked", "cost_px": 1.4, "keyframe": False, "status": "doubtful", "remark": shown.remark,
         "reviewed": False,
+        "ambiguous": False,
     }  # fmt: skip
     placed.undo()
     assert set(placed.timeline()) == {2}

@@ -46,6 +46,7 @@ NO_TRACK = {
     "lost": 0, "message": "",
 }  # fmt: skip
 DISAGREEING = [44, 45]
+AMBIGUOUS = (71, 72)
 NO_RANGE = {"running": False, "what": "", "done": 0, "total": 0, "message": ""}
 STAGES = ["torso_head", "arms", "legs"]
 PARTS = ["torso", "left_arm", "left_leg", "head", "right_leg", "right_arm", "pelvis"]
@@ -120,7 +121,7 @@ class FakeEndpoint:
             "source": "manual", "status": "", "remark": "", "parts_px": [], "job": self.idle_job(""), "replay": None,
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "dofs": [1.0, 2.0, 90.0, 30.0], "locked": [], "other_sizes": False, "solo": False,
-            "people": [{"source": "manual", "status": "", "shown": True} for _ in range(self.n_people)],
+            "people": [{"source": "manual", "status": "", "shown": True, "others": 0} for _ in range(self.n_people)],
             "snapped": None, "floor": None, "footage": {"listed": None, "error": None},
             "saved": True, "save_error": None,
         }  # fmt: skip
@@ -272,6 +273,7 @@ class FakeEndpoint:
                 "status": status_of(frame),
                 "remark": "",
                 "reviewed": False,
+                "ambiguous": False,
             }
             await self.broadcast({"type": "timeline", "person": None, "cells": {frame: cell}, "replace": False})
             if self.state["follow"]:
@@ -343,6 +345,7 @@ class FakeEndpoint:
                 "status": "" if k < 10 else status_of(k),
                 "remark": REMARK if k in (31, 32) else "",
                 "reviewed": k % 20 == 0 or k < 16,
+                "ambiguous": k in AMBIGUOUS,
             }
             for k in range(self.n_frames * 100 // N_FRAMES)
         }

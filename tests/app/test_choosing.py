@@ -1,0 +1,97 @@
+"""Two poses about as good: marked, drawn as a ghost, taken in place of each other, undone."""
+
+import numpy as np
+import pytest
+
+from app import overlays
+from app.layers import View
+from tracker.annotations import AnnotationStore
+from tracker.errors import TrackerError
+from tracker.records import Alternative, PoseChange, PoseRecord
+
+ANN, BOB = 0, 1
+VIEW = View(frozenset(("contours",)), (1, 1, 1, 1))
+
+
+@pytest.fixture
+def tracked(couple, session, opened):
+    """On frame 0 ann and bob may be each other, or bob's arm elsewhere; on frame 1 only that; on frame 2 all is clear."""
+    ann, bob = couple.state.poses
+    lifted = bob.copy()
+    lifted[couple.models[BOB].value_names.index("left_shoulder.elevation")] += 0.8
+    revisions = couple.state.revisions
+    store = AnnotationStore(session / "annotations.sqlite")
+
+    def found(person, frame, values, *others):
+        record = PoseRecord(values, ("tracked",) * len(values), revisions[person], status="doubtful", cost_px=2.0)
+        kept = tuple(Alternative(pose, revisions[person], cost_px) for pose, cost_px in others)
+        return PoseChange(("ann", "bob")[person], frame, record, kept)
+
+    here = [found(ANN, 0, ann, (bob, 2.25)), found(BOB, 0, bob, (lifted, 2.1), (ann, 2.25))]
+    later = [found(ANN, 1, ann), found(BOB, 1, bob, (lifted, 2.1)), found(ANN, 2, ann), found(BOB, 2, bob)]
+    store.commit("track", [*here, *later], by_program=True)
+    store.close()
+    return opened(), ann, bob, lifted
+
+
+def ghosts(controller):
+    paths = overlays.paths(controller.session, controller.state, VIEW, None)
+    return {p.person for p in paths if p.kind == "ghost" and len(p.segments_px)}
+
+
+def ambiguous(controller, person=None):
+    return [frame for frame, cell in controller.timeline(0, person).items() if cell["ambiguous"]]
+
+
+def test_frames_with_another_pose_are_marked_and_show_it(tracked):
+    controller, *_ = tracked
+    assert [ambiguous(controller, p) for p in (None, ANN, BOB)] == [[0, 1], [0], [0, 1]]
+    assert [len(p.others) for p in controller.state.people] == [1, 2]
+    assert ghosts(controller) == {ANN, BOB}
+    controller.casting.show(ANN, False)
+    assert ghosts(controller) == {BOB}
+    controller.seek(2)
+    assert ghosts(controller) == set()
+
+
+def test_the_other_pose_is_taken_vouched_for_and_left_again(tracked):
+    controller, _, bob, lifted = tracked
+    controller.seek(1)
+    controller.choosing.exchange(ANN)  # who has none: bob is meant
+    np.testing.assert_array_equal(controller.state.poses[BOB], lifted)
+    assert (controller.state.people[BOB].source, controller.state.people[ANN].source) == ("manual", "tracked")
+    assert controller.state.undo == "take the other pose of bob, frame 1"
+    assert controller.timeline(0, BOB)[1]["keyframe"]
+    assert (ambiguous(controller, BOB), ghosts(controller)) == ([0], set())
+    controller.choosing.exchange(BOB)
+    np.testing.assert_array_equal(controller.state.poses[BOB], bob)
+    controller.undo()
+    controller.undo()
+    assert (ambiguous(controller, BOB), ghosts(controller)) == ([0, 1], {BOB})
+    assert controller.state.people[BOB].source == "tracked"
+
+
+def test_people_who_may_be_each_other_are_exchanged_together(tracked):
+    controller, ann, bob, lifted = tracked
+    controller.choosing.exchange(ANN)
+    np.testing.assert_array_equal(controller.state.poses[ANN], bob)
+    np.testing.assert_array_equal(controller.state.poses[BOB], ann)
+    controller.undo()
+    controller.choosing.exchange(BOB)  # whose best other pose is another arm
+    np.testing.assert_array_equal(controller.state.poses[ANN], ann)
+    np.testing.assert_array_equal(controller.state.poses[BOB], lifted)
+
+
+def test_who_vouches_for_a_pose_has_chosen(tracked):
+    controller, *_ = tracked
+    controller.seek(1)
+    controller.select(BOB, None)
+    controller.ranges.toggle_keyframe()
+    assert (ambiguous(controller, BOB), ghosts(controller)) == ([0], set())
+
+
+def test_without_another_pose_there_is_nothing_to_take(tracked):
+    controller, *_ = tracked
+    controller.seek(2)
+    with pytest.raises(TrackerError, match="expected another pose to take on frame 2, found none"):
+        controller.choosing.exchange(ANN)
