@@ -15,7 +15,7 @@ VIEW = View(frozenset(("contours",)), (1, 1, 1, 1))
 
 @pytest.fixture
 def tracked(couple, session, opened):
-    """On frame 0 ann and bob may be each other, or bob's arm elsewhere; on frame 1 only that; on frame 2 all is clear."""
+    """On frame 0 ann and bob may be each other, or bob's arm elsewhere; on frame 1 only that; frame 2 is clear."""
     ann, bob = couple.state.poses
     lifted = bob.copy()
     lifted[couple.models[BOB].value_names.index("left_shoulder.elevation")] += 0.8
