@@ -25,9 +25,10 @@ def open_(
     port: int = 8080,
     allow_host: tuple[str, ...] = (),
     browser: bool = True,
+    sample: str | None = None,
     start_again: bool = False,
 ) -> None:
-    """Open a session in the page; without SESSION, a working copy of the bundled sample.
+    """Open a session in the page; without SESSION, a working copy of a bundled sample.
 
     Args:
         session: session folder.
@@ -35,11 +36,17 @@ def open_(
         port: port to listen at; 0 takes a free one.
         allow_host: names by which browsers may call this machine.
         browser: open the page in the default browser.
+        sample: which sample: tango, two people to be placed by hand (the default), or elbow_rotation, one person.
         start_again: throw away the working copy of the sample and make a new one.
     """
-    from app.workbench import Serving, open_session, sample_copy  # the other commands do without a web server
+    from app.workbench import DEFAULT_SAMPLE, Serving, open_session, sample_copy  # the others need no web server
 
-    folder = sample_copy(afresh=start_again) if session is None else session
+    if session is not None and (sample is not None or start_again):
+        raise TrackerError(
+            f"expected a session or a sample, found {session} and {'--sample' if sample else '--start-again'}; "
+            "leave one of them out"
+        )
+    folder = sample_copy(sample or DEFAULT_SAMPLE, start_again) if session is None else session
     open_session(folder, Serving(host, port, allow_host, browser), lambda line: print(line, flush=True))
 
 
@@ -150,8 +157,9 @@ def index(session: SessionArg, /, json: bool = False) -> None:
 def init(
     session: SessionArg,
     /,
-    joints: Path,
-    method: Literal["joints"] = "joints",
+    joints: Path | None = None,
+    poses: Path | None = None,
+    method: Literal["joints", "poses"] = "joints",
     frame: int = 0,
     person: str | None = None,
     fit_sizes: bool = False,
@@ -164,7 +172,8 @@ def init(
     Args:
         session: session folder.
         joints: TRC file of 3-D joints.
-        method: joints fits the pose to known joints.
+        poses: table of poses (CSV), as `simulate` writes it.
+        method: joints fits the pose to known joints; poses takes it from a table as it is.
         frame: frame to set.
         person: name; needed where there are several.
         fit_sizes: take the body's segment lengths from the joints of all frames too.
@@ -172,12 +181,20 @@ def init(
         axes: the file's axes in the session's order, such as x,-z,y.
         json: print one JSON object.
     """
+    from tracker.formats.pose_table import read_pose_table
     from tracker.references import read_joints
 
     at = commands.target(session, person, several=False)
     commands.frame_range(f"{frame}:{frame + 1}", at.session)
+    given = {"joints": joints, "poses": poses}[method]
+    if given is None:
+        raise TrackerError(f"expected --{method} FILE, found none; say where the {method} are")
 
-    found = commands.init_from_joints(at, frame, read_joints(joints, at.session.fps, joint_map, axes), fit_sizes)
+    if method == "poses":
+        found = commands.init_from_poses(at, frame, read_pose_table(given))
+        print(commands.as_json(found) if json else f"{found['person']}, frame {frame}: set from {given}")
+        return
+    found = commands.init_from_joints(at, frame, read_joints(given, at.session.fps, joint_map, axes), fit_sizes)
     residual = f"{found['mean_mm']:.1f} mm from {len(found['residual_mm'])} joints on average"
     print(commands.as_json(found) if json else f"{found['person']}, frame {frame}: {residual}")
 

@@ -34,7 +34,7 @@ _PACKAGES = ("numpy", "opencv-python-headless", "numba", "scipy", "av", "cma")
 def measure() -> Iterator[Row]:
     """Measure all rows, one after the other, OpenCV on one thread."""
     yardstick = Yardstick()
-    frame = read_frame(sample_copy())
+    frame = read_frame(sample_copy("elbow_rotation"))
     cones = frame.with_model("gavrila22_cones")
     with TemporaryDirectory() as folder, _one_thread():
         simulate(Path(folder) / "six", scene="exercise", n_cameras=6, n_frames=2)

@@ -18,11 +18,13 @@ from tracker.errors import SessionError, TrackerError
 from tracker.evaluate import Alignment, evaluate_joints, evaluate_poses
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import format_model
+from tracker.formats.pose_table import PoseTable
 from tracker.formats.trc import MarkerTable
 from tracker.joint_maps import LIMB_JOINTS
 from tracker.records import FrameRow, PoseChange, PoseRecord
 from tracker.references import Reference, stored_motion
-from tracker.session import Session, load_session, save_session
+from tracker.rigid import Array
+from tracker.session import Person, Session, load_session, save_session
 from tracker.session_lock import SessionLock
 from tracker.sizes import fit_sizes
 
@@ -135,18 +137,50 @@ def init_from_joints(at: Target, frame: int, joints: MarkerTable, sizes: bool) -
     if sizes:
         person = replace(person, model=fit_sizes(person.model, joints))
     fit = fit_to_points(person.model, limbs)
-    with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
+    with SessionLock(session.folder):
         if sizes:
             people = tuple(person if i == index else p for i, p in enumerate(session.people))
             save_session(replace(session, people=people))
-        revision = store.add_model_revision(person.name, format_model(person.model))
-        sources = ("imported",) * len(fit.values)
-        record = PoseRecord(fit.values, sources, revision, keyframe=True, settings={"method": "joints"})
-        store.commit(f"init from joints, frame {frame}", [PoseChange(person.name, frame, record)])
+        _store_keyframe(session, person, frame, fit.values, "joints")
     points = dict(zip(person.model.point_names, person.model.points_world(fit.values), strict=True))
     residuals = {n: float(1000 * np.linalg.norm(points[n] - p)) for n, p in limbs.items()}
     mean = float(np.mean(list(residuals.values())))
     return {"person": person.name, "frame": frame, "residual_mm": residuals, "mean_mm": mean}
+
+
+def init_from_poses(at: Target, frame: int, table: PoseTable) -> dict[str, Any]:
+    """Store one person's pose of a frame from a table of poses, as a keyframe.
+
+    Args:
+        at: the session and the person.
+        frame: where, in the session and in the table.
+        table: poses of a body with the person's degrees of freedom.
+
+    Raises:
+        TrackerError: the table has no such frame, or poses of another body.
+    """
+    session, (index,) = at
+    person = session.people[index]
+    values = table.values_for(person.model)
+    if values is None:
+        raise TrackerError(
+            f"expected poses of '{person.model.name}', the body of '{person.name}', found '{table.model}', which has "
+            "other degrees of freedom; make the session with that --model"
+        )
+    row = np.flatnonzero(table.frames == frame)
+    if not len(row):
+        raise TrackerError(f"expected a pose of frame {frame}, found frames {table.frames.tolist()[:8]} in the table")
+    with SessionLock(session.folder):
+        _store_keyframe(session, person, frame, values[row[0]], "poses")
+    return {"person": person.name, "frame": frame}
+
+
+def _store_keyframe(session: Session, person: Person, frame: int, values: Array, method: str) -> None:
+    with closing(AnnotationStore(session.annotations_path)) as store:
+        revision = store.add_model_revision(person.name, format_model(person.model))
+        sources = ("imported",) * len(values)
+        record = PoseRecord(values, sources, revision, keyframe=True, settings={"method": method})
+        store.commit(f"init from {method}, frame {frame}", [PoseChange(person.name, frame, record)])
 
 
 def evaluate(at: Target, reference: Reference, frames: str | None, align: Alignment) -> dict[str, Any]:

@@ -30,7 +30,7 @@ from tracker.recording import Recording
 from tracker.session import SESSION_FILE, load_session
 from tracker.session_lock import SessionLock
 
-DEFAULT_SAMPLE = "elbow_rotation"
+DEFAULT_SAMPLE = "tango"
 
 
 @dataclass(frozen=True)

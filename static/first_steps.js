@@ -16,7 +16,10 @@ export class FirstSteps {
       this.#close();
     });
     store.subscribe((changed) => {
-      if (changed.has("session") && localStorage.getItem(STORED) !== "seen") this.#card.hidden = false;
+      if (!changed.has("session")) return;
+      const isAlone = (store.facts.session?.people.length ?? 1) < 2;
+      byId("first-choose-person", HTMLElement).hidden = isAlone;
+      if (localStorage.getItem(STORED) !== "seen") this.#card.hidden = false;
     });
   }
 

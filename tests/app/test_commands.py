@@ -10,6 +10,8 @@ from command_line import SAMPLE, assert_refused, stored
 
 from app import headless
 from tracker.annotations import AnnotationStore
+from tracker.formats.model_toml import load_model
+from tracker.formats.pose_table import read_pose_table, write_pose_table
 from tracker.records import PoseChange
 from tracker.session import load_session
 
@@ -172,13 +174,46 @@ def test_simulate(run, tmp_path):
 def test_without_a_command_the_page_is_opened(run, monkeypatch):
     asked = []
     monkeypatch.setattr("app.workbench.open_session", lambda folder, serving, say: asked.append((folder, serving)))
-    monkeypatch.setattr("app.workbench.sample_copy", lambda afresh: Path("sample"))
+    monkeypatch.setattr("app.workbench.sample_copy", lambda name, afresh: Path(f"{name}, {afresh}"))
     assert run()[0] == 0
     assert run("some/session", "--port", "0", "--no-browser")[0] == 0
     assert run("open", "some/session")[0] == 0
-    assert [str(folder) for folder, _ in asked] == ["sample", "some/session", "some/session"]
+    assert [str(folder) for folder, _ in asked] == ["tango, False", "some/session", "some/session"]
     assert (asked[0][1].host, asked[0][1].port) == ("127.0.0.1", 8080)
     assert (asked[1][1].port, asked[1][1].browser) == (0, False)
+
+
+def test_init_takes_a_pose_from_a_table(run, session, tmp_path):
+    assert run("init", session, "--method", "poses", "--poses", SAMPLE / "truth.csv", "--frame", "3")[0] == 0
+    store = AnnotationStore(session / "annotations.sqlite", read_only=True)
+    record = store.pose("person", 3)
+    store.close()
+    assert record.keyframe
+    assert set(record.sources) == {"imported"}
+    assert np.allclose(record.values, read_pose_table(SAMPLE / "truth.csv").values[3])
+    other = load_model("gavrila31", 1.7)
+    write_pose_table(tmp_path / "other.csv", other, other.neutral()[None])
+    assert_refused(run("init", session, "--method", "poses", "--poses", tmp_path / "other.csv"), ["'gavrila31'"])
+    assert_refused(run("init", session, "--method", "poses"), ["--poses FILE"])
+    few = tmp_path / "few.csv"
+    few.write_text("\n".join((SAMPLE / "truth.csv").read_text().splitlines()[:6]) + "\n")
+    assert_refused(run("init", session, "--method", "poses", "--poses", few, "--frame", "3"), ["of frame 3", "[0, 1]"])
+
+
+def test_samples_are_opened_as_working_copies_by_name(run, monkeypatch, tmp_path):
+    asked = []
+    monkeypatch.setattr("app.workbench.open_session", lambda folder, serving, say: asked.append(folder))
+    monkeypatch.setattr("app.workbench.user_data_path", lambda *_, **__: tmp_path)
+    assert run("--sample", "elbow_rotation")[0] == 0
+    assert asked == [tmp_path / "samples" / "elbow_rotation"]
+    (asked[0] / "mine.txt").write_text("kept")
+    assert run("--sample", "elbow_rotation")[0] == 0
+    assert (asked[0] / "mine.txt").exists()
+    assert run("--sample", "elbow_rotation", "--start-again")[0] == 0
+    assert not (asked[0] / "mine.txt").exists()
+    assert_refused(run("--sample", "waltz"), ["elbow_rotation, tango", "waltz"])
+    assert_refused(run("some/session", "--sample", "tango"), ["some/session and --sample"])
+    assert_refused(run("some/session", "--start-again"), ["some/session and --start-again"])
 
 
 def test_poses_of_a_reference_that_is_a_session(run, session, tmp_path):

@@ -17,8 +17,8 @@ TRUNK = [name for name in LIMBS if name.endswith(("shoulder", "hip"))]
 class ScriptedUser:
     """What the user aims at on one frame, and how far off the body is, which only the test knows."""
 
-    def __init__(self, session, truth, frame, seed, views):
-        self.model = session.people[0].model
+    def __init__(self, session, truth, frame, seed, views, person=0):
+        self.model = session.people[person].model
         self.views = views
         joints = read_joints(truth, session.fps)
         self._places = dict(zip(joints.names, joints.points[frame], strict=True))

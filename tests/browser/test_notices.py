@@ -1,6 +1,8 @@
 """What the program says: notices, their log, what is not saved, the first card; against `fake_endpoint`."""
 
+import pytest
 from driving import shows, until
+from fake_endpoint import FakeEndpoint
 
 
 async def say(endpoint, text, level="error"):
@@ -79,6 +81,8 @@ async def test_the_first_card_is_put_away_for_good_and_found_again(browser, addr
     await page.goto(address)
     card = page.locator("#first-steps")
     await card.wait_for()
+    assert not await page.locator("#first-choose-person").is_visible()
+    assert "quadrille --sample elbow_rotation" in await card.inner_text()
     box, panes = await card.bounding_box(), await page.locator("#panes").bounding_box()
     assert box["x"] >= panes["x"] + panes["width"]
     assert box["y"] + box["height"] <= (await page.locator("#inspector").bounding_box())["y"]
@@ -93,3 +97,16 @@ async def test_the_first_card_is_put_away_for_good_and_found_again(browser, addr
     await page.keyboard.press("Escape")
     assert not await card.is_visible()
     await context.close()
+
+
+class TestSeveralPeople:
+    @pytest.fixture
+    def endpoint(self):
+        return FakeEndpoint(n_people=2)
+
+    async def test_the_first_card_begins_with_the_choice_of_a_person(self, page):
+        await page.keyboard.press("Control+k")
+        await page.keyboard.type("first steps")
+        await page.keyboard.press("Enter")
+        first = page.locator("#first-steps li:visible").first
+        assert "Choose a person" in await first.inner_text()
