@@ -282,6 +282,31 @@ async def test_a_range_is_worked_on_and_told(controller):
         assert "poses at both ends" in (await page.hear("notice"))["text"]
 
 
+@pytest.mark.parametrize(
+    ("kind", "fields"),
+    [
+        ("pin", {"frame": 2, "camera": 0, "person": 0, "point": "left_wrist", "u": 100.0, "live": True}),
+        ("pin", {"frame": "two", "camera": 0, "person": 0, "point": "left_wrist", "u": 1, "v": 1, "live": 1}),
+        ("pin", {"frame": 2, "camera": 0, "person": 0, "point": "left_wrist", "u": "NaN", "v": 1, "live": True}),
+        ("unpin", {"frame": 2, "person": 0, "point": "left_wrist"}),
+        ("unpin", {"frame": 2, "person": "ann", "point": None, "camera": None}),
+        ("fit", {}),
+        ("fit", {"frame": 2, "person": 7}),
+        ("search", {"action": "frame", "person": -1}),
+        ("people", {"action": "show", "person": 4, "shown": False}),
+        ("people", {"action": "dim"}),
+        ("pose", {"action": "copy_person", "frame": 2, "person": 0}),
+    ],
+)  # fmt: skip
+async def test_what_is_not_understood_is_refused_and_nothing_has_happened(controller, kind, fields):
+    before = controller.state
+    async with visiting(controller) as page:
+        await page.send(kind, **({"phase": "start"} if kind == "pin" else {}), **fields)
+        assert "not understood" in (await page.hear("notice"))["text"]
+    now = controller.state
+    assert (now.pins, now.people, now.undo, now.cast) == (before.pins, before.people, before.undo, before.cast)
+
+
 async def test_many_cells_travel_as_columns(controller, monkeypatch):
     controller.seek(6)
     controller.ranges.toggle_keyframe()

@@ -3,6 +3,8 @@
 import pytest
 from driving import dragging, shows, state_of, until
 
+from tracker.records import SOURCES
+
 LUMINANCE = """(color) => {
   const context = new OffscreenCanvas(1, 1).getContext('2d');
   context.fillStyle = color;
@@ -21,6 +23,7 @@ TEXT = [
 MARKS = [
     *((mark, "chrome") for mark in ("accent", "good", "bad", "status-good", "status-doubtful", "status-lost")),
     *((f"series-{i}", "plot") for i in range(8)),
+    *((f"source-{source}", "track") for source in SOURCES),
 ]
 
 
