@@ -43,10 +43,11 @@ async def until(condition, timeout_s=5.0):
             await asyncio.sleep(0.01)
 
 
-async def handle_of(page, camera, point):
+async def handle_of(page, camera, point, person=0):
     """Undistorted pixel of a joint, as last drawn."""
     handles = await page.evaluate("quadrille.state.overlay.handles")
-    return next((h["u"], h["v"]) for h in handles if h["camera"] == camera and h["point"] == point)
+    wanted = (camera, point, person)
+    return next((h["u"], h["v"]) for h in handles if (h["camera"], h["point"], h["person"]) == wanted)
 
 
 async def to_client(page, camera, u, v):
