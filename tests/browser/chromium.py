@@ -15,6 +15,7 @@ FLAGS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
+    "--disable-gpu-compositing",
     "--disable-dev-shm-usage",
     "--disable-background-networking",
 ]
