@@ -19,7 +19,7 @@ async def test_all_cameras_are_shown_with_names_and_costs(page):
     assert await page.locator(".pane-cost").all_inner_texts() == ["0.84 px", "1.10 px", "2.31 px", "–"]
     assert await page.locator("#cost").inner_text() == "1.47"
     assert await page.locator("#session-name").inner_text() == "elbow_rotation"
-    assert await page.locator("#person").is_hidden()
+    assert await page.locator("#people-group").is_hidden()
 
 
 async def test_image_and_vectors_are_drawn_where_the_maths_says(page, endpoint):
@@ -249,6 +249,6 @@ class TestPeople:
 
     async def test_six_cameras_and_two_people(self, page, endpoint):
         assert await page.locator(".pane:visible").count() == 6
-        await page.locator("#person").select_option("1")
+        await page.locator("#people input").nth(1).check(force=True)
         await until(lambda: endpoint.heard("select"))
         assert endpoint.heard("select") == [{"type": "select", "person": 1, "point": None}]
