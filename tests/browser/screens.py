@@ -1,8 +1,8 @@
 """Pictures of every state of the page: `python tests/browser/screens.py OUT`, to be looked at one by one.
 
-Runs the real program on the bundled sample and on sessions made for the purpose (one camera, eight, two people), in
-dark and light, for a laptop and for a large screen. `--only NAME` takes those whose name begins so, `--tutorial` those
-that docs/tutorial.md shows, as JPEG.
+Runs the real program on the bundled samples and on sessions made for the purpose (one camera, eight), in dark and
+light, for a laptop and for a large screen. `--only NAME` takes those whose name begins so, `--tutorial` those that
+docs/tutorial.md shows, as JPEG.
 """
 
 import argparse
@@ -23,12 +23,13 @@ from running import ROOT, Program
 from tracker.annotations import AnnotationStore
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import format_model
+from tracker.formats.pose_table import read_pose_table
 from tracker.records import PoseChange, PoseRecord
 from tracker.references import read_joints
 from tracker.session import Session, load_session, save_session
 from tracker.simulate.record import simulate
 
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
+SAMPLES = ROOT / "sample_sessions"
 LAPTOP, LARGE = (1280, 720), (1920, 1080)
 SETTLE_S = 3.0
 """The 3-D view draws slowly without a graphics card."""
@@ -146,6 +147,14 @@ async def history(page: Page) -> None:
     await page.keyboard.press("h")
 
 
+async def fitted(page: Page) -> None:
+    """Two people placed by hand, then fitted."""
+    await page.keyboard.press("g")
+    await shows(page, "/fit/i.test(quadrille.state.state.undo ?? '')", 60)
+    # What the 3-D view says of machines without a graphics card is no part of the picture.
+    await page.frame_locator("#scene").locator(".mantine-Notification-closeButton").first.click(timeout=60_000)
+
+
 async def filled(page: Page) -> None:
     await page.keyboard.press("1")
 
@@ -173,7 +182,8 @@ SCREENS = [
     Screen("one-camera", "one", nothing),
     Screen("eight-cameras", "eight", nothing),
     Screen("eight-cameras-large-light", "eight", nothing, LARGE, "light"),
-    Screen("two-people", "two", nothing),
+    Screen("two-people", "tango", nothing),
+    Screen("page", "tango", fitted, (1600, 900)),
 ]
 
 TUTORIAL = ("empty", "posing", "pins", "search-replay", "landscape", "curves", "palette")
@@ -186,30 +196,30 @@ def make_sessions(folder: Path, wanted: set[str]) -> dict[str, Path]:
         if name == "eight":
             simulate(at, "exercise", n_cameras=8, n_frames=4, size=(320, 240))
         else:
-            shutil.copytree(SAMPLE, at)
+            shutil.copytree(SAMPLES / ("tango" if name == "tango" else "elbow_rotation"), at)
         session = load_session(at)
         if name == "one":
             save_session(replace(session, cameras=session.cameras[:1]))
-        if name == "two":
-            first = session.people[0]
-            save_session(replace(session, people=(first, replace(first, name="partner", color="#4db6ff"))))
         if name != "fresh":
             place(load_session(at), near=name == "near")
     return made
 
 
 def place(session: Session, near: bool) -> None:
-    """Put everybody on frame 0 where the true joints are, a second person beside the first; near: arms a little off."""
-    joints = read_joints(session.folder / "truth.trc", session.fps)
-    places = dict(zip(joints.names, joints.points[0], strict=True))
+    """Put everybody on frame 0, where the true joints are or a hand has put the dancers; near: arms a little off."""
+    joints = None if len(session.people) > 1 else read_joints(session.folder / "truth.trc", session.fps)
     store = AnnotationStore(session.annotations_path)
-    for index, person in enumerate(session.people):
-        beside = {n: p + index * np.array([0.5, 0.6, 0.0]) for n, p in places.items()}
-        values = fit_to_points(person.model, {n: p for n, p in beside.items() if n in person.model.point_names}).values
+    for person in session.people:
+        model = person.model
+        if joints is None:
+            values = read_pose_table(session.folder / f"first_pose_{person.name}.csv").values_for(model)[0]
+        else:
+            places = dict(zip(joints.names, joints.points[0], strict=True))
+            values = fit_to_points(model, {n: p for n, p in places.items() if n in model.point_names}).values
         if near:
-            values = person.model.retract(values, np.where(np.arange(person.model.n_dofs) >= 6, 0.12, 0.02))
-            values = person.model.clip(values)
-        revision = store.add_model_revision(person.name, format_model(person.model))
+            values = model.retract(values, np.where(np.arange(model.n_dofs) >= 6, 0.12, 0.02))
+            values = model.clip(values)
+        revision = store.add_model_revision(person.name, format_model(model))
         pose = PoseRecord(values, ("manual",) * len(values), revision, keyframe=True)
         store.commit("place", [PoseChange(person.name, 0, pose)])
     store.close()
