@@ -29,7 +29,7 @@ const LINE_STYLES = {
   model: { width: 1.75, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
   hidden: { width: 1.25, dash: [4, 4], layer: "hidden", hasHalo: false, ofPerson: true },
   candidate: { width: 1.25, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
-  ghost: { width: 1.5, dash: [5, 4], layer: null, hasHalo: true },
+  ghost: { width: 1.5, dash: [5, 4], layer: null, hasHalo: true, ofPerson: true },
   part_edge: { width: 1, dash: [], layer: "part_edges", hasHalo: true },
   epipolar: { width: 1.25, dash: [6, 4], layer: "epipolar", hasHalo: true },
   // Thousands of short lines, which their halos would merge into one.

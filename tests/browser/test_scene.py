@@ -186,6 +186,23 @@ async def test_bodies_lie_on_their_images_at_any_size_of_the_canvas(live, index,
     await snap(live, index, through=False)
 
 
+async def test_a_click_on_a_part_works_on_its_joint(live):
+    await snap(live, 0)
+    await switch(live, "bodies")
+    filmed = await rested(live, lambda image: is_white(image).sum() > 600)
+    await switch(live, "bodies")
+    await rested(live, lambda image: is_white(image).sum() < 400)
+    scene = await live.locator("#scene").bounding_box()
+    rows, columns = np.nonzero(is_white(filmed))
+    in_head = rows < rows.min() + 12
+    model = load_model("gavrila22")
+    for part, chosen in (("head", in_head), ("torso", slice(None))):
+        x, y = columns[chosen].mean(), rows[chosen].mean()
+        await live.mouse.click(scene["x"] + x, scene["y"] + y - 6 * (part == "torso"))
+        await shows(live, f"quadrille.state.state.point === '{model.point_names[model.part_index[part]]}'", 30)
+    await snap(live, 0, through=False)
+
+
 async def test_the_image_follows_the_frame_and_a_turn_leaves_the_camera(live):
     await snap(live, 0)
     await switch(live, "bodies")
