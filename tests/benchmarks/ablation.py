@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from sections import put_section
 
 from tracker.assemble import DEFAULT_MODEL, assemble
 from tracker.body import BodyModel
@@ -149,7 +150,7 @@ def main() -> None:
                 rows.setdefault(variant, []).append(measure(clip, settings))
                 mm, lost, fps = rows[variant][-1]
                 print(f"{variant}, {clip.name}: {mm:.1f} mm, {lost} lost, {fps:.1f} frames/s", flush=True)
-        words.out.write_text(table(clips, rows), "utf-8")
+        put_section(words.out, table(clips, rows))
 
 
 if __name__ == "__main__":
