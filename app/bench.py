@@ -19,14 +19,14 @@ from rich.table import Table
 
 from app import bench_rows
 from app.bench_rows import Row, Yardstick
-from app.bench_scenes import read_frame
+from app.bench_scenes import FRAME, read_crowd, read_frame
 from app.workbench import sample_copy
 from tracker.errors import TrackerError
 from tracker.files import write_text_whole
 from tracker.simulate import simulate
 
 BASELINE = Path(__file__).with_name("bench_baseline.json")
-N_ROWS = 13
+N_ROWS = 17
 """Number of rows that `measure` gives where `cma` is installed."""
 _PACKAGES = ("numpy", "opencv-python-headless", "numba", "scipy", "av", "cma")
 
@@ -43,7 +43,10 @@ def measure() -> Iterator[Row]:
         yield from bench_rows.searches(frame, cones, yardstick)
         yield from bench_rows.iterations(cones, six, yardstick)
         yield from bench_rows.evolution(cones, yardstick)
-    yield from bench_rows.pipeline(frame, yardstick)
+        simulate(Path(folder) / "crowd", scene="crowd_of_three", n_frames=1)
+        yield from bench_rows.crowds(read_crowd(Path(folder) / "crowd", 0), yardstick)
+    yield bench_rows.pipeline(frame, yardstick)
+    yield bench_rows.pipeline_of_two(read_crowd(sample_copy("tango"), FRAME), yardstick)
 
 
 @contextmanager

@@ -45,9 +45,7 @@ class BenchFrame:
 
     def candidates(self, n: int) -> Array:
         """Poses spread around the fitted one by 10 degrees and 5 cm in every degree of freedom, (n, n_values)."""
-        spread = np.where(self.model.dof_is_length, 0.05, np.radians(10))
-        steps = spread * np.random.default_rng(_SEED).normal(size=(n, self.model.n_dofs))
-        return np.stack([self.model.clip(self.model.retract(self.values, step)) for step in steps])
+        return _spread(self.model, self.values, n)
 
     def hard_prediction(self) -> Array:
         """A prediction that is 10 cm off in place and 15 degrees off in one angle of the trunk and of every limb."""
@@ -65,6 +63,48 @@ class BenchFrame:
         off = np.where(self.model.dof_is_length, 0.01, np.radians(3))
         signs = np.random.default_rng(_SEED).choice((-1.0, 1.0), self.model.n_dofs)
         return self.model.clip(self.model.retract(self.values, off * signs))
+
+
+@dataclass(frozen=True, eq=False)
+class BenchCrowd:
+    """One frame of a session of several people, and the bodies where they stand in it."""
+
+    session: Session
+    joints: tuple[MarkerTable, ...]
+    """The true joints of all frames, of each person."""
+    views: tuple[ViewEvidence, ...]
+    """All edges of the frame."""
+    models: tuple[BodyModel, ...]
+    values: tuple[Array, ...]
+    """Poses fitted to the true joints, (n_values,) each."""
+
+    def cost(self, n: int) -> ChamferCost:
+        """The cost of the first few people around their fitted poses, on one thread."""
+        bodies = [Body(m, v) for m, v in zip(self.models[:n], self.values[:n], strict=True)]
+        return ChamferCost(self.views, bodies, threads=1)
+
+    def candidates(self, n: int) -> Array:
+        """Poses of the first person, as those of `BenchFrame`, (n, n_values)."""
+        return _spread(self.models[0], self.values[0], n)
+
+
+def _spread(model: BodyModel, values: Array, n: int) -> Array:
+    """Poses spread by 10 degrees and 5 cm in every degree of freedom, (n, n_values)."""
+    spread = np.where(model.dof_is_length, 0.05, np.radians(10))
+    steps = spread * np.random.default_rng(_SEED).normal(size=(n, model.n_dofs))
+    return np.stack([model.clip(model.retract(values, step)) for step in steps])
+
+
+def read_crowd(folder: Path, frame: int) -> BenchCrowd:
+    """Read a frame of a simulated session of several people."""
+    session = load_session(folder)
+    joints = tuple(read_joints(folder / f"truth_{p.name}.trc", session.fps) for p in session.people)
+    models = tuple(p.model for p in session.people)
+    with Recording(session.cameras) as recording:
+        views = Observer(session.cameras, recording).evidence(frame)
+    return BenchCrowd(
+        session, joints, views, models, tuple(pose_at(j, m, frame) for j, m in zip(joints, models, strict=True))
+    )
 
 
 def read_frame(folder: Path) -> BenchFrame:

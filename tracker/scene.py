@@ -156,11 +156,15 @@ class Scene:
             moved_m = 0.0
             for person, before in seen.items():
                 seen[person] = self._refined(person, before)
-                model, was, now = self._models[person], before.fit.values, seen[person].fit.values
-                moved = np.linalg.norm(model.points_world(now) - model.points_world(was), axis=1)
-                moved_m = max(moved_m, float(moved.max()))
+                moved_m = max(moved_m, self._moved_m(person, before, seen[person]))
             if moved_m < _STILL_M:
                 break
+
+    def _moved_m(self, person: int, was: _Seen, now: _Seen) -> float:
+        """How far the point of a person that moved farthest is from where it was, metres."""
+        model = self._models[person]
+        moved = model.points_world(now.fit.values) - model.points_world(was.fit.values)
+        return float(np.linalg.norm(moved, axis=1).max())
 
     def _recovered(self, person: int, seen: _Seen) -> _Seen:
         """Search what the refinement alone did not find, if anything, among all edges.
@@ -176,7 +180,7 @@ class Scene:
         model, free = memory.model, memory.free
         suspects = tuple(x for name in found.suspects for x in memory.limbs if x.name == name)  # not those locked
         priors = self._priors(person, suspects)
-        views = self._own([unfiltered(v) for v in self._views], person)
+        views = self._own([unfiltered(v) for v in self._views], person, everywhere=True)
         bodies, index = self._around(person)
         match = ContourMatch(views, bodies, index, settings.match, settings.theta_px, everywhere=True)
         judge = Judge(match, priors, Colors(views, bodies, index), memory.known, settings.recover, free)
@@ -309,11 +313,12 @@ class Scene:
         """The residuals of a person's contours, the others where they stand."""
         bodies, index = self._around(person)
         settings = self._settings
-        return ContourMatch(self._own(views, person), bodies, index, settings.match, settings.theta_px, everywhere)
+        own = self._own(views, person, everywhere)
+        return ContourMatch(own, bodies, index, settings.match, settings.theta_px, everywhere)
 
-    def _own(self, views: Sequence[ViewEvidence], person: int) -> Sequence[ViewEvidence]:
+    def _own(self, views: Sequence[ViewEvidence], person: int, everywhere: bool) -> Sequence[ViewEvidence]:
         """The evidence without what the others explain."""
-        return own_views(views, *self._around(person))
+        return own_views(views, *self._around(person), everywhere)
 
     def _around(self, person: int) -> tuple[list[Body], int]:
         """Who is in the scene for a person, and their index there."""

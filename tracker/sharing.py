@@ -25,24 +25,30 @@ _REACH = 2.0
 """Up to where distances are told apart, in outlier distances."""
 
 
-def own_views(views: Sequence[ViewEvidence], bodies: Sequence[Body], person: int) -> tuple[ViewEvidence, ...]:
+def own_views(
+    views: Sequence[ViewEvidence], bodies: Sequence[Body], person: int, everywhere: bool = False
+) -> tuple[ViewEvidence, ...]:
     """The evidence of each view without the edges and the silhouette's points that clearly are somebody else's.
 
     Args:
         views: the evidence, the same for all people; views whose edges have no direction stay as they are.
         bodies: everybody, where they stand as far as is known.
         person: whose evidence is wanted.
+        everywhere: whether poses far from the present one will be asked; else views in which nobody else is near stay
+            as they are, because nothing there is in reach.
     """
     if len(bodies) == 1:
         return tuple(views)
     people = contours.surfaces_of(tuple(b.model for b in bodies)).people
-    return tuple(_own_view(view, contours.trace(bodies, view.camera), people, person) for view in views)
+    return tuple(_own_view(v, contours.trace(bodies, v.camera), people, person, everywhere) for v in views)
 
 
-def _own_view(view: ViewEvidence, contour: contours.Contour, people: NDArray[np.int64], person: int) -> ViewEvidence:
+def _own_view(
+    view: ViewEvidence, contour: contours.Contour, people: NDArray[np.int64], person: int, everywhere: bool
+) -> ViewEvidence:
     owners, shown = people[contour.parts], ~contour.hidden
     mine, others = (contour.pieces_px[shown & of] for of in (owners == person, owners != person))
-    if view.segments is None or not len(others):
+    if view.segments is None or not (everywhere or _meet(mine, others, _REACH * view.theta_px)):
         return view
     theirs = _theirs(view.segments, mine, others, view.theta_px)
     if theirs.any():
@@ -52,6 +58,15 @@ def _own_view(view: ViewEvidence, contour: contours.Contour, people: NDArray[np.
     if view.silhouette is not None and len(view.silhouette.points_px):
         view = replace(view, silhouette=_own_silhouette(view.silhouette, mine, others, view.theta_px))
     return view
+
+
+def _meet(mine: FloatArray, others: FloatArray, reach_px: float) -> bool:
+    """Whether boxes around pieces, (M, 4) each, come as near to each other."""
+    if not (len(mine) and len(others)):
+        return False
+    boxes = [(p.reshape(-1, 2).min(axis=0), p.reshape(-1, 2).max(axis=0)) for p in (mine, others)]
+    (low, high), (other_low, other_high) = boxes
+    return bool(np.all(low - reach_px < other_high) and np.all(other_low - reach_px < high))
 
 
 def _own_silhouette(silhouette: Silhouette, mine: FloatArray, others: FloatArray, theta_px: float) -> Silhouette:

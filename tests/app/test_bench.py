@@ -8,7 +8,7 @@ from command_line import SAMPLE
 from app import bench, bench_rows
 from app.__main__ import main
 from app.bench_rows import Row, Yardstick
-from app.bench_scenes import read_frame
+from app.bench_scenes import read_crowd, read_frame
 from app.painting import PaintedCost
 from tracker.errors import TrackerError
 
@@ -57,9 +57,10 @@ def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
         *bench_rows.searches(frame, cones, Yardstick()),
         *bench_rows.iterations(cones, cones, Yardstick()),
         *bench_rows.evolution(cones, Yardstick()),
+        *bench_rows.crowds(read_crowd(SAMPLE.with_name("tango"), 25), Yardstick()),
     ]
     names = [r.name for r in rows]
-    assert len(set(names)) == len(names) == bench.N_ROWS - 1
+    assert len(set(names)) == len(names) == bench.N_ROWS - 2  # all but the pipelines
     assert {r.ratio for r in rows} == {2.0}
     assert all((r.must is None) == (r.aim is None) for r in rows)
     assert all(r.aim < r.must for r in rows if r.must is not None)

@@ -9,8 +9,9 @@ from scipy.spatial import cKDTree
 from tracker import contours
 from tracker.body import Body
 from tracker.cameras import Camera
-from tracker.evidence import view_evidence
+from tracker.evidence import Observer, view_evidence
 from tracker.formats.model_toml import parse_model
+from tracker.session import CameraSource
 
 SIZE = (640, 480)
 
@@ -123,6 +124,22 @@ SUIT = {
     "upper_arm": (250, 250, 240), "forearm": (220, 160, 130), "thigh": (30, 40, 140), "calf": (20, 20, 25),
 }  # fmt: skip
 """Colours by which all kinds of parts can be told."""
+
+
+class Film:
+    """Stands for a recording: pictures of figures in their clothes before a plain wall."""
+
+    def __init__(self, moments, cameras):
+        self.frames = [[painted(bodies, c, SUIT) for c in cameras] for bodies in moments]
+
+    def read(self, k):
+        return self.frames[k]
+
+
+def filmed(moments):
+    """Observer of a film; `moments` holds the bodies of each frame."""
+    cameras = cameras_around(4)
+    return Observer([CameraSource(c, footage=None) for c in cameras], Film(moments, cameras))
 
 
 def shaken(model, values, rng, sigma_rad, sigma_m):

@@ -56,9 +56,17 @@ def test_what_nobody_explains_is_everybodys():
     stranger = at(BALL, 0, 0, 0)
     view = seen([*bodies, stranger])
     for person in (0, 1):
-        (own,) = own_views([view], bodies, person)
+        (own,) = own_views([view], bodies, person, everywhere=True)
         assert (off_px(own.points_px, stranger) < 2).sum() > 20
         assert off_px(own.points_px, bodies[1 - person]).min() > 10
+
+
+def test_far_from_everybody_else_nothing_is_in_reach():
+    """Then nothing needs to be given away, unless poses far away are asked."""
+    bodies = [at(BALL, 0, -0.6, 0), at(BALL, 0, 0.6, 0)]
+    view = seen(bodies)
+    assert own_views([view], bodies, 0)[0] is view
+    assert len(own_views([view], bodies, 0, everywhere=True)[0].points_px) < 0.6 * len(view.points_px)
 
 
 def test_what_both_explain_stays_with_both():

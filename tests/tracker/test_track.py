@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from staging import SUIT, at, cameras_around, dressed, own_evidence, painted, posed, shaken, solid
+from staging import SUIT, at, cameras_around, dressed, filmed, own_evidence, posed, shaken, solid
 
 from tracker.assemble import assemble
 from tracker.body import Body
@@ -15,7 +15,6 @@ from tracker.recording import Recording
 from tracker.recover import Searched
 from tracker.references import read_joints
 from tracker.search import SearchSettings
-from tracker.session import CameraSource
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings, pose_cost, search_frame
 
@@ -181,21 +180,6 @@ def test_an_arm_that_jumps_is_searched_and_the_frame_says_so(gavrila):
     assert alone[3].remarks == ("left arm uncertain",)
 
 
-class Film:
-    """Stands for a recording: pictures of a figure in its clothes before a plain wall."""
-
-    def __init__(self, model, truth, cameras):
-        self.frames = [[painted([Body(model, v)], c, SUIT) for c in cameras] for v in truth]
-
-    def read(self, k):
-        return self.frames[k]
-
-
-def filmed(model, truth):
-    cameras = cameras_around(4)
-    return Observer([CameraSource(c, footage=None) for c in cameras], Film(model, truth, cameras))
-
-
 def test_two_people_who_might_as_well_be_each_other_are_in_doubt():
     """Two alike within reach of each other's prediction: both poses are kept, and nobody is called good."""
     rod = solid((0.03, 0.03, 0.3))
@@ -262,7 +246,9 @@ def test_a_keyframe_moves_what_is_locked_from_there_on(balls):
 def test_what_the_prediction_refused_is_looked_at_again(gavrila):
     """The prediction accepts no edge of an arm that jumps: it is found among all edges."""
     truth = dancing(gavrila, 5, jump_at=3)
-    found = list(track_chamfer(filmed(gavrila, truth), [gavrila], truth[:1], range(5), TrackSettings()))
+    found = list(
+        track_chamfer(filmed([[Body(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(5), TrackSettings())
+    )
     assert found[3].remarks == ("left arm searched anew",)
     for estimate, values in zip(found, truth, strict=True):
         assert off_m(gavrila, estimate.poses[0], values).max() < 0.02
@@ -271,7 +257,9 @@ def test_what_the_prediction_refused_is_looked_at_again(gavrila):
 def test_a_body_that_is_elsewhere_is_searched(gavrila):
     truth = dancing(gavrila, 3)
     truth[2, 1] += 0.6
-    *_, last = track_chamfer(filmed(gavrila, truth), [gavrila], truth[:1], range(3), TrackSettings())
+    *_, last = track_chamfer(
+        filmed([[Body(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(3), TrackSettings()
+    )
     assert "body searched anew" in last.remarks[0]
     assert last.evaluations > 100
     if off_m(gavrila, last.poses[0], truth[2]).max() > 0.1:  # so far it is beyond the reach of the search

@@ -1,0 +1,44 @@
+"""Three and four people at a time, a metre apart: nobody is mixed up with anybody."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from staging import filmed, posed
+
+from tracker.body import Body
+from tracker.predict import PredictSettings
+from tracker.track import track_chamfer
+from tracker.track_settings import TrackSettings
+
+N_FRAMES = 3
+APART_M = 1.0
+
+
+def crowd(model, n):
+    """Poses of n people at the corners of a square, each a little otherwise, walking 2 cm a frame, (n, frames, ...)."""
+    out = []
+    for i, (x, y) in enumerate([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)][:n]):
+        start = posed(model, 10 + i)
+        start[:2] = APART_M * x, APART_M * y
+        step = np.zeros(model.n_dofs)
+        step[:2] = 0.02 * np.cos(2.0 * i), 0.02 * np.sin(2.0 * i)
+        step[[n.endswith(("elbow.extension", "knee.extension")) for n in model.dof_names]] = np.radians(3)
+        out.append([model.clip(model.retract(start, k * step)) for k in range(N_FRAMES)])
+    return np.array(out)
+
+
+@pytest.mark.parametrize("n", [3, 4])
+def test_people_a_metre_apart_stay_who_they_are(gavrila, n):
+    truth = crowd(gavrila, n)
+    observer = filmed([[Body(gavrila, poses[k]) for poses in truth] for k in range(N_FRAMES)])
+    settings = replace(TrackSettings(), predict=PredictSettings(order=0), rounds=1)
+    found = list(track_chamfer(observer, [gavrila] * n, truth[:, 0], range(N_FRAMES), settings))
+    for k, estimate in enumerate(found):
+        points = np.array([gavrila.points_world(p) for p in estimate.poses])
+        true = np.array([gavrila.points_world(p) for p in truth[:, k]])
+        off_m = np.linalg.norm(points[:, None] - true, axis=-1)  # (n, n, points): of each to everybody
+        assert np.diagonal(off_m.mean(axis=-1)).max() < 0.05
+        np.testing.assert_array_equal(off_m.mean(axis=-1).argmin(axis=1), np.arange(n))
+        assert len(estimate.statuses) == len(estimate.alternatives) == n
+    assert all(o == () for o in found[-1].alternatives)
