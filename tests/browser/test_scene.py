@@ -203,19 +203,6 @@ async def test_a_click_on_a_part_works_on_its_joint(live):
     await snap(live, 0, through=False)
 
 
-async def test_a_trail_comes_and_goes(live):
-    before = await rested(live)
-
-    def changed(image):
-        """How many pixels look otherwise than before."""
-        return (np.abs(image.astype(int) - before).max(axis=-1) > 40).sum()
-
-    await switch(live, "left wrist")
-    await rested(live, lambda image: changed(image) > 60)
-    await switch(live, "left wrist")
-    await rested(live, lambda image: changed(image) < 10)
-
-
 async def test_the_image_follows_the_frame_and_a_turn_leaves_the_camera(live):
     await snap(live, 0)
     await switch(live, "bodies")
