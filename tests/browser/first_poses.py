@@ -1,8 +1,9 @@
 """Make the hand-made poses of frame 0 of a sample's people: `python tests/browser/first_poses.py SESSION`.
 
-A user by rule places each body with what the page's hand does (`tracker.posing`): from the pose in which it first
-stands, by moving the trunk, turning it upright by its slider, and dragging joints, in the two views that show each
-best. The user sees where the joints are, 3 px off, another 3 px each time, and knows nothing of the third dimension.
+A user by rule places each body with what the page's hand does (`tracker.posing`): upright in the middle at first, by
+moving the trunk, turning it by its slider, lifting the arms by theirs, and dragging joints in the two views that show
+each best. The user sees where the joints are, 3 px off, another 3 px each time, and knows nothing of the third
+dimension.
 """
 
 import sys
