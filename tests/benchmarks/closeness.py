@@ -34,12 +34,17 @@ from tracker.track_settings import TrackSettings
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "ablation.md"
 DEFAULT = TrackSettings()
+UNSEARCHED = replace(DEFAULT, recover=None)
 VARIANTS: Mapping[str, TrackSettings] = {
     "as it is": DEFAULT,
     "without mutual occlusion": replace(DEFAULT, occlusion=False),
     "without joint refinement": replace(DEFAULT, rounds=0),
     "without the penalty": replace(DEFAULT, apart=0.0),
     "without all three: each as if alone": replace(DEFAULT, occlusion=False, rounds=0, apart=0.0),
+    "without search for lost limbs": UNSEARCHED,
+    "nor mutual occlusion": replace(UNSEARCHED, occlusion=False),
+    "nor joint refinement": replace(UNSEARCHED, rounds=0),
+    "nor the penalty": replace(UNSEARCHED, apart=0.0),
 }
 DISTANCES = ("apart", "near", "touching", "overlapping")
 SEED = 3
