@@ -18,7 +18,7 @@ async def listening(app, port=0):
         await runner.cleanup()
 
 
-async def shows(page, expression, timeout_s=5.0):
+async def shows(page, expression, timeout_s=20.0):
     """Wait until a JavaScript expression holds and the page has drawn it.
 
     The page's policy forbids evaluating strings, which Playwright's own waiting does inside the page.
@@ -36,7 +36,7 @@ async def shows(page, expression, timeout_s=5.0):
         raise AssertionError(f"after {timeout_s} s the page still does not show: {expression}") from None
 
 
-async def until(condition, timeout_s=5.0):
+async def until(condition, timeout_s=20.0):
     """Wait until a condition of the fake endpoint holds."""
     async with asyncio.timeout(timeout_s):
         while not condition():
