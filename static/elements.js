@@ -50,12 +50,15 @@ export function keyCaps(keys) {
  * A small button with a sign in place of words.
  *
  * @param {string} path of the sign, in a box of 16 by 16
+ * @param {string} title what it does, and its key in parentheses; its name without the key
  * @param {() => void} run
  */
-export function iconButton(path, run) {
+export function iconButton(path, title, run) {
   const one = document.createElement("button");
   one.type = "button";
   one.className = "is-icon";
+  one.title = title;
+  one.setAttribute("aria-label", title.replace(/ \(.*\)$/, ""));
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
   svg.setAttribute("viewBox", "0 0 16 16");
   svg.setAttribute("aria-hidden", "true");

@@ -63,8 +63,8 @@ export class JumpMenu {
       number.setAttribute("aria-label", `Number of frames: ${label}`);
       const keyOf = (/** @type {boolean} */ back) => (key ? ` (${back ? formerKey(key) : key.replace(" ", "+")})` : "");
       const buttons = [
-        this.#arrow(PREVIOUS, `Former ${more}${keyOf(true)}`, () => this.#jumps.go(kind, -1)),
-        this.#arrow(NEXT, `Next ${more}${keyOf(false)}`, () => this.#jumps.go(kind, 1)),
+        iconButton(PREVIOUS, `Former ${more}${keyOf(true)}`, () => this.#jumps.go(kind, -1)),
+        iconButton(NEXT, `Next ${more}${keyOf(false)}`, () => this.#jumps.go(kind, 1)),
       ];
       const group = document.createElement("div");
       group.className = "group";
@@ -81,18 +81,6 @@ export class JumpMenu {
     this.#gap.title = "Go to the middle of the longest stretch without a keyframe: the best place for the next one (Q)";
     this.#gap.addEventListener("click", () => this.#jumps.toLongestGap());
     this.#menu.append(...rows, this.#gap);
-  }
-
-  /**
-   * @param {string} path
-   * @param {string} title
-   * @param {() => void} run
-   */
-  #arrow(path, title, run) {
-    const one = iconButton(path, run);
-    one.title = title;
-    one.setAttribute("aria-label", title);
-    return one;
   }
 
   /** @param {boolean} isShown */

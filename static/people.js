@@ -96,11 +96,12 @@ export class People {
     model.textContent = `${info.model}, ${info.height_m.toFixed(2)} m`;
     const told = document.createElement("span");
     told.className = "quiet";
-    const copy = iconButton(COPY, () => this.#posing.copyPerson(person));
-    copy.title = `Bend the person worked on as ${info.name}; place and turn stay`;
+    const bend = `Bend the person worked on as ${info.name}; place and turn stay`;
+    const copy = iconButton(COPY, bend, () => this.#posing.copyPerson(person));
     copy.setAttribute("aria-label", `Copy the pose of ${info.name}`);
-    const eye = iconButton(EYE, () => this.#actions.showPerson(person, !this.#store.facts.state?.people[person]?.shown));
-    eye.setAttribute("aria-label", `Show ${info.name}`);
+    const eye = iconButton(EYE, `Show ${info.name}`, () =>
+      this.#actions.showPerson(person, !this.#store.facts.state?.people[person]?.shown),
+    );
     row.append(/** @type {HTMLElement} */ (radio.parentElement), model, told, copy, eye);
     return { row, radio, eye, copy, told };
   }

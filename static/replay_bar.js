@@ -1,7 +1,7 @@
 /** Replays the run that is looked at, back and forth. The stored pose stays what it is. */
 
-import { byId } from "./elements.js";
-import { makeButton, makeIcon } from "./search_widgets.js";
+import { byId, iconButton } from "./elements.js";
+import { makeButton } from "./search_widgets.js";
 import { runLookedAt } from "./search_facts.js";
 
 const STEPS_PER_S = 12;
@@ -28,13 +28,13 @@ export class ReplayBar {
     this.#store = store;
     this.#send = send;
     const go = (/** @type {number} */ by) => () => this.#goTo(this.#at + by);
-    this.#play = makeIcon("M5 3v10l8-5z", "Replay the search from here, or from its start", () => this.#togglePlay());
+    this.#play = iconButton("M5 3v10l8-5z", "Replay the search from here, or from its start", () => this.#togglePlay());
     this.#buttons = [
-      makeIcon("M4 3.5v9M12.5 3.5 6.5 8l6 4.5z", "Start of the search", () => this.#goTo(-1)),
-      makeIcon("M10 3.5 5 8l5 4.5", "One step back", go(-1)),
+      iconButton("M4 3.5v9M12.5 3.5 6.5 8l6 4.5z", "Start of the search", () => this.#goTo(-1)),
+      iconButton("M10 3.5 5 8l5 4.5", "One step back", go(-1)),
       this.#play,
-      makeIcon("m6 3.5 5 4.5-5 4.5", "One step on", go(1)),
-      makeIcon("M12 3.5v9M3.5 3.5l6 4.5-6 4.5z", "Last step of the search", () => this.#goTo(Infinity)),
+      iconButton("m6 3.5 5 4.5-5 4.5", "One step on", go(1)),
+      iconButton("M12 3.5v9M3.5 3.5l6 4.5-6 4.5z", "Last step of the search", () => this.#goTo(Infinity)),
     ];
     const slider = this.#slider;
     slider.type = "range";

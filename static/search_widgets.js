@@ -20,27 +20,6 @@ export function makeButton(text, title, run) {
 }
 
 /**
- * A button with a drawing in place of words.
- *
- * @param {string} path of a 16 px symbol
- * @param {string} title
- * @param {() => void} run
- */
-export function makeIcon(path, title, run) {
-  const element = makeButton("", title, run);
-  element.className = "is-icon";
-  element.setAttribute("aria-label", title.replace(/ \(.*\)$/, ""));
-  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  svg.setAttribute("viewBox", "0 0 16 16");
-  svg.setAttribute("aria-hidden", "true");
-  const line = document.createElementNS("http://www.w3.org/2000/svg", "path");
-  line.setAttribute("d", path);
-  svg.append(line);
-  element.append(svg);
-  return element;
-}
-
-/**
  * A field for a number that may be empty. What is typed counts when it is entered; what the program says is shown unless
  * the field is being typed in.
  *

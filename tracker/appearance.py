@@ -35,8 +35,6 @@ _OPEN, _HIDDEN = -1, -2
 """What `_passed` says where it names no part."""
 _SPECK_M = 1e-6
 """Half axes of parts that are away."""
-COVER_M = 0.03
-"""What is so near behind somebody else may be hidden, by hair and clothes that no shape has."""
 _TWIN_SHARE = 0.2
 """Share of what is seen under a part's twin in what is expected under itself: sleeves are mostly alike."""
 _SAME = 0.25
@@ -123,13 +121,10 @@ class Colors:
             usual = _mean_by_part(ratios[parts, colors], parts, len(model.parts))[0]
         return PartColors(ratios, usual, seen, around)
 
-    def score(self, values: Array, known: PartColors, cover_m: float = 0.0) -> ColorScore:
-        """How well the colours under the person in a pose, (n_values,), go with what is known of its parts.
-
-        So near behind somebody else, metres, parts count as hidden.
-        """
+    def score(self, values: Array, known: PartColors) -> ColorScore:
+        """How well the colours under the person in a pose, (n_values,), go with what is known of its parts."""
         n_parts = known.log_ratios.shape[0]
-        parts, colors, views = self._samples(values, cover_m)
+        parts, colors, views = self._samples(values)
         nats = known.log_ratios[parts, colors]
         means, samples = _mean_by_part(nats, views * n_parts + parts, len(self._P) * n_parts)
         by_view = np.where(samples < _LEAST_SEEN, np.nan, means).reshape(-1, n_parts)
@@ -157,16 +152,8 @@ class Colors:
             )  # fmt: skip
         return total
 
-    def _samples(
-        self, values: Array, cover_m: float = 0.0
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    def _samples(self, values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
         """Part, colour and view of each visible sample, (n,) each."""
-        shapes = self._shapes
-        if cover_m:
-            shapes = [
-                s if i == self._person else _ellipsoids(b.model, cover_m)
-                for i, (s, b) in enumerate(zip(shapes, self._bodies, strict=True))
-            ]
         bodies = list(self._bodies)
         bodies[self._person] = Body(bodies[self._person].model, values)
         Ts = [b.model.kinematics(b.values).Ts_world_part for b in bodies]
@@ -176,7 +163,7 @@ class Colors:
         parts, colors, counts = [np.empty(0, np.int64)], [np.empty(0, np.int64)], []
         for P, eye, image in zip(self._P, self._eyes, self._images, strict=True):
             out = np.empty((room, 2), np.int64)
-            n = _look(P, eye, np.concatenate(Ts), np.concatenate(shapes), first, last, image, out)
+            n = _look(P, eye, np.concatenate(Ts), np.concatenate(self._shapes), first, last, image, out)
             parts.append(out[:n, 0])
             colors.append(out[:n, 1])
             counts.append(n)
@@ -211,10 +198,9 @@ def _twins(model: BodyModel) -> NDArray[np.int64]:
     return np.array([names.index(n) if n in names else i for i, n in enumerate(swapped)])
 
 
-def _ellipsoids(model: BodyModel, grown_m: float = 0.0) -> Array:
-    """Centre and half-axes of the ellipsoids that stand for the parts, grown by so much, (n_parts, 6), metres."""
-    half_axes = np.array([s.half_axes for s in model.shapes]) + grown_m
-    return np.concatenate([model.centers_part, half_axes], axis=1)
+def _ellipsoids(model: BodyModel) -> Array:
+    """Centre and half-axes of the ellipsoids that stand for the parts, (n_parts, 6), metres."""
+    return np.array([(*c, *s.half_axes) for c, s in zip(model.centers_part, model.shapes, strict=True)])
 
 
 @njit(nogil=True, cache=True)

@@ -15,7 +15,7 @@ import numpy as np
 
 from tracker import confidence
 from tracker.apart import KeepBodiesApart
-from tracker.appearance import COVER_M, Colors
+from tracker.appearance import Colors
 from tracker.body import Body
 from tracker.confidence import Limb, Quality, Status
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence, unfiltered
@@ -296,7 +296,7 @@ class Scene:
     def _quality(self, person: int, seen: _Seen) -> Quality:
         known, colors = self._memories[person].known, None
         if known is not None:
-            colors = self.colors(person).score(seen.fit.values, known, COVER_M), known
+            colors = self.colors(person).score(seen.fit.values, known), known
         trusts = np.array([0.0 if v.silhouette is None else v.silhouette.trust for v in self._views])
         model, values = self._models[person], seen.fit.values
         scale = px_per_m([v.camera for v in self._views], model, values)
