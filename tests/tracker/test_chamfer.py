@@ -18,6 +18,10 @@ CENTER = np.array([319.5, 239.5])
 # The outline of a sphere at the middle of the image is a circle.
 RADIUS_PX = 520 * np.tan(np.arcsin(0.3 / 4.0))
 
+ROUNDING = 1e-7
+"""What the sums of two kernels that do the same in single precision may differ by, as a share: compilers contract them
+in other ways, depending on what was read from the cache."""
+
 both_modes = pytest.mark.parametrize("outliers", ["truncated", "paper"])
 
 
@@ -128,8 +132,8 @@ def test_view_without_edges_has_no_say(gavrila):
     assert cost.views_px[[0, 2]].tolist() == all_three.views_px[[0, 2]].tolist()
     assert cost.total_px == pytest.approx(all_three.views_px[[0, 2]].mean())
     total, by_view = two.of_person(0, moved[None], [moved])
-    assert total[0] == cost.total_px
-    np.testing.assert_array_equal(by_view[0], cost.views_px)
+    assert total[0] == pytest.approx(cost.total_px, rel=ROUNDING)
+    np.testing.assert_allclose(by_view[0], cost.views_px, rtol=ROUNDING)
     none = ChamferCost([blind], [Body(gavrila, values)], THETA)
     assert none([moved]).total_px == THETA
     assert none.of_person(0, moved[None], [moved])[0].tolist() == [THETA]
@@ -148,8 +152,8 @@ def test_many_candidates_cost_the_same_as_one_by_one(gavrila, outliers):
         assert len(set(totals)) == 10
         for candidate, total, views_px in zip(candidates, totals, by_view, strict=True):
             alone = cost([candidate if i == person else p for i, p in enumerate(poses)])
-            assert alone.total_px == pytest.approx(total, rel=1e-12)
-            np.testing.assert_allclose(alone.views_px, views_px, rtol=1e-12)
+            assert alone.total_px == pytest.approx(total, rel=ROUNDING)
+            np.testing.assert_allclose(alone.views_px, views_px, rtol=ROUNDING)
 
 
 def test_costs_are_in_pixels_of_the_footage(gavrila):
