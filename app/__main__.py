@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypeVar
 import tyro
 from rich.console import Console
 
-from app import commands
+from app import commands, ending
 from app.commands import Reporter
 from tracker.errors import TrackerError
 
@@ -412,5 +412,10 @@ def main() -> None:
         sys.exit(130)
 
 
+def program() -> None:
+    """`main` as a process of its own."""
+    ending.run(main)
+
+
 if __name__ == "__main__":
-    main()
+    program()

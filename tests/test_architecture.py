@@ -114,6 +114,7 @@ ORDER = [
     ["app.panes", "app.scene"],
     ["app.workbench"],
     ["app.bench"],
+    ["app.ending"],
     ["app.__main__"],
 ]
 LEVEL = {module: level for level, row in enumerate(ORDER) for module in row}
