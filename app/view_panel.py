@@ -67,6 +67,7 @@ class ViewPanel:
             self._ghost = gui.add_markdown("")
             self._ghost.visible = False
             self._points = self._add_trails()
+        self._told: dict[str, object] = {}  # what the state last said of each control
         self._listen()
         latest = Latest(self._show, "view panel", _REST_S)
         controller.subscribe(latest.offer)
@@ -155,9 +156,18 @@ class ViewPanel:
             self._former_floor.disabled = not state.floor.former
             for field, control in self._controls.items():
                 value = getattr(view, field)
-                _set(control, _COLORS[value] if field == "colors" else value)
+                self._tell(field, control, _COLORS[value] if field == "colors" else value)
             for name, box in self._points.items():
-                _set(box, name in view.trail_points)
+                self._tell(name, box, name in view.trail_points)
+
+    def _tell(self, key: str, control: Any, value: object) -> None:
+        """Set a control where the state says another value than before.
+
+        What somebody has just chosen, and a state does not know yet that changed for another reason, stays.
+        """
+        if self._told.get(key) != value:
+            self._told[key] = value
+            _set(control, value)
 
 
 def _described(floor: FloorState) -> str:
