@@ -1,5 +1,7 @@
 """Tracking and the timeline against `fake_endpoint`: what buttons and keys send, and what is drawn of a run."""
 
+import asyncio
+
 import pytest
 from driving import dragging, shows, state_of, until
 from fake_endpoint import REMARK
@@ -114,7 +116,9 @@ async def test_a_range_is_marked_by_keys(page):
 @pytest.mark.parametrize("dark", [True, False])
 async def test_statuses_differ_by_colour_and_by_height(page, dark):
     await page.emulate_media(color_scheme="dark" if dark else "light")
-    await shows(page, "true")
+    async with asyncio.timeout(20):
+        while (await page.evaluate(STRIP, 15))[0] is None:  # drawn anew in the colours of the theme
+            await asyncio.sleep(0.05)
     found = {frame: await page.evaluate(STRIP, frame) for frame in (3, 15, 31, 50, 110)}
     assert found[3] == [None, 0]  # nobody has judged it
     assert found[110] == [None, 0]  # no pose
