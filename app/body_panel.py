@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import viser
@@ -104,15 +105,15 @@ class BodyPanel:
 
     def _listen(self, person: int, controls: _Folder, former: viser.GuiButtonHandle) -> None:
         sizing = self._sizing
-        self._on(controls.height, lambda: sizing.set_height(person, controls.height.value / 100))
-        self._on(controls.alike, lambda: sizing.couple(controls.alike.value))
+        self._on(controls.height, lambda cm: sizing.set_height(person, cm / 100))
+        self._on(controls.alike, sizing.couple)
         for name, row in controls.parts.items():
-            self._on(row, lambda name=name, row=row: self._set_part(person, name, row.value))  # type: ignore[misc]
+            self._on(row, partial(self._set_part, person, name))
         for name, number in controls.widths.items():
-            self._on(number, lambda n=name, w=number: sizing.set_width(person, n, w.value / 100))  # type: ignore[misc]
-        self._on(controls.apply, lambda: sizing.apply(person, controls.poses.value == _REFIT))
-        self._on(controls.discard, sizing.discard)
-        self._on(former, lambda: sizing.recall(person))
+            self._on(number, partial(self._set_width, person, name))
+        self._on(controls.apply, lambda _: sizing.apply(person, controls.poses.value == _REFIT))
+        self._on(controls.discard, lambda _: sizing.discard())
+        self._on(former, lambda _: sizing.recall(person))
 
     def _set_part(self, person: int, part: str, row_cm: tuple[float, float, float]) -> None:
         """Send what was entered; what was not, keeps the digits that the panel does not show."""
@@ -121,14 +122,22 @@ class BodyPanel:
         length, first, second = (own if shown == entered else entered / 100 for own, shown, entered in same)
         self._sizing.set_part(person, part, PartSizes(length, (first, second)))
 
-    def _on(self, control: Any, act: Callable[[], None]) -> None:
-        """Carry out what somebody did with a control; what is refused is said, and the control goes back."""
+    def _set_width(self, person: int, name: str, cm: float) -> None:
+        self._sizing.set_width(person, name, cm / 100)
+
+    def _on(self, control: Any, act: Callable[[Any], None]) -> None:
+        """Carry out what somebody did with a control; what is refused is said, and the control goes back.
+
+        Args:
+            control: a control of viser's.
+            act: is given what was entered, which a state from before would overwrite in the control.
+        """
 
         async def done(event: viser.GuiEvent[Any]) -> None:
             if event.client is None:  # the program set it
                 return
             try:
-                await asyncio.to_thread(act)
+                await asyncio.to_thread(act, control.value)
             except TrackerError as error:
                 event.client.add_notification("Body", str(error), color="red", auto_close_seconds=8.0)
                 self.show(self._controller.state)

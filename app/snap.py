@@ -56,6 +56,9 @@ class _Eye:
     shown: tuple[object, ...] = ()
     """Camera, frame and canvas of the image behind the bodies."""
     before: _Free | None = None
+    """Where it was before, kept when it has been sent back there."""
+    left: int | None = None
+    """The camera that it was sent back from."""
     turned_away: bool = False
     """Whether it left the camera by its user's hand, who wants to go on from there."""
 
@@ -123,7 +126,10 @@ class SnapView:
         if wanted == eye.shown or min(size) < _LEAST_PX or state.rests_3d:
             return
         camera = self._cameras[state.snapped]
-        if eye.camera is None:
+        # A slow page may still say that it is at the camera from which it has been sent back: it is on its way then.
+        if eye.camera is None and not (
+            eye.left is not None and _is_at(seen.position, seen.wxyz, self._cameras[eye.left])
+        ):
             eye.before = _Free(seen.position, seen.look_at, seen.up_direction, seen.fov)
         image = self._image(state.frame, state.snapped)
         with eye.client.atomic():
@@ -153,7 +159,10 @@ class SnapView:
             if before is not None and not eye.turned_away:
                 seen.position, seen.look_at, seen.up_direction = before.position, before.look_at, before.up
                 seen.fov = before.fov
-        eye.camera, eye.before, eye.shown, eye.arrived = None, None, (), False
+                eye.left = eye.camera
+            else:
+                eye.left = None
+        eye.camera, eye.shown, eye.arrived = None, (), False
 
     def _image(self, frame: int, camera: int) -> Image:
         image = self._controller.frames.images(frame)[camera]

@@ -38,11 +38,9 @@ class Page:
         return contextlib.nullcontext()
 
     def reports(self, position, wxyz):
-        """Say that the view is somewhere; what the program last said it should be stays what it is."""
-        now = self.camera.position, self.camera.wxyz
+        """Say that the view is somewhere: viser then takes that for where it is."""
         self.camera.position, self.camera.wxyz = position, wxyz
         asyncio.run(self._moved(None))
-        self.camera.position, self.camera.wxyz = now
 
 
 @pytest.fixture
@@ -94,3 +92,14 @@ def test_what_a_slow_page_says_late_is_no_turn(controller, page):
     assert settled(controller, page, pose_of(controller, 0)) == 0
     assert settled(controller, page, START) == 0
     assert page.background is not None
+
+
+def test_nor_is_what_it_says_before_it_is_snapped_again(controller, page):
+    snap(controller, page, 0)
+    assert settled(controller, page, pose_of(controller, 0)) == 0
+    snap(controller, page, None)
+    assert settled(controller, page, pose_of(controller, 0)) is None  # it has not heard yet that it was let go
+    snap(controller, page, 0)
+    assert settled(controller, page, START) == 0
+    snap(controller, page, None)
+    np.testing.assert_array_equal(page.camera.position, START[0])

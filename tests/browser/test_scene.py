@@ -6,7 +6,6 @@ with bodies where it is drawn; neither knows how the view was set up.
 """
 
 import asyncio
-import contextlib
 
 import cv2
 import numpy as np
@@ -143,12 +142,9 @@ async def snap(page, index, through=True):
             await asyncio.sleep(0.1)
             await page.mouse.move(pane["x"] + 24, pane["y"] + pane["height"] / 2)
     wanted = index if through else None
-    async with asyncio.timeout(60):
-        while (await state_of(page))["state"]["snapped"] != wanted:
-            await page.keyboard.press("y")
-            # A picture that is drawn slowly may answer to the former place, and so leave the camera: once more then.
-            with contextlib.suppress(AssertionError):
-                await shows(page, f"quadrille.state.state.snapped === {index if through else 'null'}", 5)
+    if (await state_of(page))["state"]["snapped"] != wanted:
+        await page.keyboard.press("y")
+        await shows(page, f"quadrille.state.state.snapped === {index if through else 'null'}")
 
 
 def outline_of(mask):
