@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from sections import put_section
+from sections import measured, put_section, table
 
 from tracker.assemble import DEFAULT_MODEL, assemble
 from tracker.body import BodyModel
@@ -114,7 +114,7 @@ def measure(clip: Clip, settings: TrackSettings) -> tuple[float, int, float]:
     return errors.mpjpe_mm, errors.lost_frames, len(found) / seconds
 
 
-def table(clips: Sequence[Clip], rows: Mapping[str, Sequence[tuple[float, int, float]]]) -> str:
+def section(clips: Sequence[Clip], rows: Mapping[str, Sequence[tuple[float, int, float]]]) -> str:
     """The results as Markdown."""
     lines = [
         "# What each piece of the chamfer tracker is good for",
@@ -125,12 +125,9 @@ def table(clips: Sequence[Clip], rows: Mapping[str, Sequence[tuple[float, int, f
         + ". All start from the pose fitted to the reference joints of frame 0, with the same settings but for what "
         "the row says.",
         "",
-        "| variant | " + " | ".join(c.name for c in clips) + " |",
-        "|---" * (len(clips) + 1) + "|",
     ]
-    for name, cells in rows.items():
-        lines.append(f"| {name} | " + " | ".join(f"{mm:.0f} / {lost} / {fps:.0f}" for mm, lost, fps in cells) + " |")
-    return "\n".join(lines) + "\n"
+    told = {name: [f"{mm:.0f} / {lost} / {fps:.0f}" for mm, lost, fps in cells] for name, cells in rows.items()}
+    return "\n".join([*lines, table([c.name for c in clips], told)])
 
 
 def main() -> None:
@@ -144,13 +141,8 @@ def main() -> None:
         folder = Path(name)
         clips = simulated(folder, words.frames) + (recorded(words.data, folder) if words.data else [])
         measure(replace(clips[0], frames=range(4)), DEFAULT)  # compiles the kernels
-        rows: dict[str, list[tuple[float, int, float]]] = {}
-        for variant, settings in VARIANTS.items():
-            for clip in clips:
-                rows.setdefault(variant, []).append(measure(clip, settings))
-                mm, lost, fps = rows[variant][-1]
-                print(f"{variant}, {clip.name}: {mm:.1f} mm, {lost} lost, {fps:.1f} frames/s", flush=True)
-        put_section(words.out, table(clips, rows))
+        rows = measured(VARIANTS, clips, measure, lambda cell: "{:.1f} mm, {} lost, {:.1f} frames/s".format(*cell))
+        put_section(words.out, section(clips, rows))
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from sections import put_section
+from sections import measured, put_section, table
 
 from tracker.assemble import DEFAULT_MODEL
 from tracker.body import BodyModel
@@ -110,7 +110,7 @@ def _owner(joints: MarkerTable, references: Sequence[MarkerTable], frame: int) -
     return int(np.argmin(errors))
 
 
-def table(couples: Sequence[Couple], rows: Mapping[str, Sequence[Cell]]) -> str:
+def section(couples: Sequence[Couple], rows: Mapping[str, Sequence[Cell]]) -> str:
     """The results as a section of Markdown."""
     lines = [
         "# Two people, by how near they are",
@@ -120,13 +120,12 @@ def table(couples: Sequence[Couple], rows: Mapping[str, Sequence[Cell]]) -> str:
         f"{len(couples[0].frames)} frames of each, their trunks' middles 1.5, 0.7, 0.45 and 0.25 m apart, and the "
         "tango's close hold, each from the poses fitted to the true joints of frame 0.",
         "",
-        "| variant | " + " | ".join(c.name.removeprefix("couple_") for c in couples) + " |",
-        "|---" * (len(couples) + 1) + "|",
     ]
-    for name, cells in rows.items():
-        told = " | ".join(f"{c.mpjpe_mm:.0f} / {c.lost_frames} / {c.swapped_frames}" for c in cells)
-        lines.append(f"| {name} | {told} |")
-    return "\n".join(lines) + "\n"
+    told = {
+        name: [f"{c.mpjpe_mm:.0f} / {c.lost_frames} / {c.swapped_frames}" for c in cells]
+        for name, cells in rows.items()
+    }
+    return "\n".join([*lines, table([c.name.removeprefix("couple_") for c in couples], told)])
 
 
 def main() -> None:
@@ -143,13 +142,8 @@ def main() -> None:
             if not (folder / scene).exists():
                 simulate(folder / scene, scene, n_frames=words.frames, seed=SEED)
         couples = [read_couple(folder / scene, words.frames) for scene in scenes]
-        rows: dict[str, list[Cell]] = {}
-        for variant, settings in VARIANTS.items():
-            for couple in couples:
-                rows.setdefault(variant, []).append(measure(couple, settings))
-                mm, lost, swapped = rows[variant][-1]
-                print(f"{variant}, {couple.name}: {mm:.1f} mm, {lost} lost, {swapped} swapped", flush=True)
-        put_section(words.out, table(couples, rows))
+        rows = measured(VARIANTS, couples, measure, lambda cell: "{:.1f} mm, {} lost, {} swapped".format(*cell))
+        put_section(words.out, section(couples, rows))
 
 
 if __name__ == "__main__":

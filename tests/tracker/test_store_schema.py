@@ -1,4 +1,5 @@
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -21,48 +22,43 @@ def xs(store):
     return {row.frame: store.pose("ann", row.frame).values[0] for row in store.frames("ann")}
 
 
+def written(path, script):
+    with closing(sqlite3.connect(path)) as db:
+        db.executescript(Path(__file__).with_name(script).read_text("utf-8"))
+    return path
+
+
+def upgraded(path, version, change):
+    """Bring a store to the next version, as the program of that version did, and change it there."""
+    with closing(sqlite3.connect(path)) as db:
+        for statement in (*store_schema._UPGRADES[version], change, f"PRAGMA user_version = {version + 1}"):
+            db.execute(statement)
+        db.commit()
+    return path
+
+
 @pytest.fixture
 def version_1(path):
     """A store as its version 1 was written: four edits, one amended and the last undone."""
-    db = sqlite3.connect(path)
-    db.executescript(Path(__file__).with_name("store_version_1.sql").read_text("utf-8"))
-    db.close()
-    return path
+    return written(path, "store_version_1.sql")
 
 
 @pytest.fixture
 def version_2(version_1):
     """The same store as the program of version 2 has left it, its poses with their settings."""
-    db = sqlite3.connect(version_1)
-    for statement in store_schema._UPGRADES[1]:
-        db.execute(statement)
-    db.execute("UPDATE pose_changes SET settings = '{\"step_deg\": 7}'")
-    db.execute("PRAGMA user_version = 2")
-    db.commit()
-    db.close()
-    return version_1
+    return upgraded(version_1, 1, "UPDATE pose_changes SET settings = '{\"step_deg\": 7}'")
 
 
 @pytest.fixture
 def version_3(path):
     """A store as its version 3 was written: a keyframe, two tracked frames, one cleared and brought back by undo."""
-    db = sqlite3.connect(path)
-    db.executescript(Path(__file__).with_name("store_version_3.sql").read_text("utf-8"))
-    db.close()
-    return path
+    return written(path, "store_version_3.sql")
 
 
 @pytest.fixture
 def version_4(version_3):
     """The same store as the program of version 4 has left it, one pose reviewed."""
-    db = sqlite3.connect(version_3)
-    for statement in store_schema._UPGRADES[3]:
-        db.execute(statement)
-    db.execute("UPDATE pose_changes SET reviewed = 1 WHERE frame = 3")
-    db.execute("PRAGMA user_version = 4")
-    db.commit()
-    db.close()
-    return version_3
+    return upgraded(version_3, 3, "UPDATE pose_changes SET reviewed = 1 WHERE frame = 3")
 
 
 @pytest.mark.parametrize("read_only", [False, True])
