@@ -17,7 +17,7 @@ run: install
 # Those of the page come by themselves, two at once: what they wait for would come late beside more.
 test: check
 	$(BIN)/python -m pytest --ignore tests/browser --numprocesses auto
-	$(BIN)/python -m pytest tests/browser --numprocesses 2 --dist loadfile
+	$(BIN)/python -m pytest tests/browser --numprocesses 2 --dist loadfile --no-loadscope-reorder
 
 # How fast it is here, beside what must hold and the ratios that are kept.
 bench: $(VENV)/.tested

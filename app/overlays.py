@@ -111,10 +111,11 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
     """The joints of everybody shown, in some views, given by index; those behind a camera are left out."""
     bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     points = [b.model.points_world(b.values) for b in bodies]
-    out = []
-    for index in sorted(cameras):
-        camera = session.cameras[index].camera.pinhole
-        hidden = occlusion.points_hidden(bodies, camera, np.concatenate(points))
+    seen = {index: session.cameras[index].camera.pinhole for index in sorted(cameras)}
+    if not seen:
+        return []
+    out, hidden_by_view = [], occlusion.points_hidden(bodies, list(seen.values()), np.concatenate(points))
+    for (index, camera), hidden in zip(seen.items(), hidden_by_view, strict=True):
         first = 0
         for person, body in enumerate(bodies):
             px = camera.project(points[person])

@@ -14,7 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker import rigid
-from tracker.kinematics import BALL, REVOLVE, TRANSLATE, IntArray, Kinematics, Tree, forward_kinematics
+from tracker.kinematics import (
+    BALL,
+    REVOLVE,
+    TRANSLATE,
+    IntArray,
+    Kinematics,
+    Tree,
+    forward_kinematics,
+    point_jacobian,
+)
 from tracker.rigid import Array
 from tracker.shapes import Ellipsoid, EllipticalCone, Shape, TaperedSuperquadric
 
@@ -306,11 +315,9 @@ class BodyModel:
         Returns:
             (N, 3, n_dofs), metres per radian or per metre.
         """
-        arms = points_world[:, None, :] - kinematics.origins_world  # (N, n_dofs, 3)
-        J = np.cross(kinematics.axes_world, arms)
-        J[:, self.dof_is_length] = kinematics.axes_world[self.dof_is_length]
-        J *= self.moves[:, parts].T[..., None]
-        return np.swapaxes(J, 1, 2)
+        J = np.empty((len(parts), 3, self.n_dofs))
+        point_jacobian(kinematics, self.dof_is_length, self.moves, parts, points_world, J)
+        return J
 
     def retract(self, values: Array, step: Array) -> Array:
         """Move a pose, (n_values,), by steps in its degrees of freedom, (..., n_dofs), to (..., n_values).

@@ -125,7 +125,7 @@ class ChamferCost:
             np.stack([contours.projection(v.camera) for v in views]),
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
-            np.concatenate([v.distance.ravel() for v in views]),
+            _distances(tuple(views)),
             np.concatenate([n.points for n in near], axis=1),
             stack_rows([n.rows for n in near]),
             np.concatenate([[0], np.cumsum([n.points.shape[1] for n in near])]).astype(np.int64),
@@ -217,6 +217,12 @@ class ChamferCost:
 def _helpers() -> ThreadPoolExecutor:
     """Threads that score besides the caller's; kernels let go of the interpreter's lock."""
     return ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="chamfer")
+
+
+@lru_cache(maxsize=1)  # a hand makes dozens of costs a second from the same views
+def _distances(views: tuple[ViewEvidence, ...]) -> FloatArray:
+    """The distance images, one after the other, row by row."""
+    return np.concatenate([v.distance.ravel() for v in views])
 
 
 def _near(view: ViewEvidence, contour: contours.Contour, theta: float) -> Sorted:

@@ -107,3 +107,26 @@ def forward_kinematics(values: Array, tree: Tree, Ts: Array, axes: Array, origin
                 Ts[part, i, k] = R[i, k]
             Ts[part, 3, i] = 0.0
         Ts[part, 3, 3] = 1.0
+
+
+@njit(nogil=True, cache=True)
+def point_jacobian(
+    kinematics: Kinematics,
+    is_length: NDArray[np.bool_],
+    moves: NDArray[np.bool_],
+    parts: IntArray,
+    points: Array,
+    out: Array,
+) -> None:
+    """Fill (N, 3, n_dofs) with the derivatives of points fixed to parts; see `BodyModel.point_jacobian`."""
+    axes, origins = kinematics.axes_world, kinematics.origins_world
+    for dof in range(axes.shape[0]):
+        ax, ay, az = axes[dof, 0], axes[dof, 1], axes[dof, 2]
+        for n in range(points.shape[0]):
+            if not moves[dof, parts[n]]:
+                out[n, 0, dof] = out[n, 1, dof] = out[n, 2, dof] = 0.0
+            elif is_length[dof]:
+                out[n, 0, dof], out[n, 1, dof], out[n, 2, dof] = ax, ay, az
+            else:
+                x, y, z = points[n, 0] - origins[dof, 0], points[n, 1] - origins[dof, 1], points[n, 2] - origins[dof, 2]
+                out[n, 0, dof], out[n, 1, dof], out[n, 2, dof] = ay * z - az * y, az * x - ax * z, ax * y - ay * x

@@ -10,6 +10,7 @@ from tracker import contours
 from tracker.body import Body
 from tracker.cameras import Camera
 from tracker.hiding import LANES, hide
+from tracker.kernels import FAST
 from tracker.rigid import Array
 from tracker.surfaces import N_RINGS, N_SECTORS, FloatArray
 
@@ -17,12 +18,12 @@ _LIFT_M = 0.012
 """How far a curve is lifted off the surfaces to see whether they hide it, metres."""
 
 
-def points_hidden(bodies: Sequence[Body], camera: Camera, points_world: Array) -> NDArray[np.bool_]:
-    """Whether a part hides each point, (n,); parts that hold the point itself, as around a joint, do not count.
+def points_hidden(bodies: Sequence[Body], cameras: Sequence[Camera], points_world: Array) -> NDArray[np.bool_]:
+    """Whether a part hides each point, (V, n); parts that hold the point itself, as around a joint, do not count.
 
     Args:
         bodies: everybody in the scene.
-        camera: the view.
+        cameras: the views.
         points_world: (n, 3), metres.
     """
     surfaces = contours.surfaces_of(tuple(b.model for b in bodies))
@@ -34,7 +35,7 @@ def points_hidden(bodies: Sequence[Body], camera: Camera, points_world: Array) -
             for shape, T, center in zip(shapes, Ts, surfaces.centers, strict=True)
         ]
     )
-    return _blocked(camera, Ts, surfaces, points_world.astype(np.float32), holds)
+    return np.stack([_blocked(c, Ts, surfaces, points_world, holds) for c in cameras])
 
 
 def part_edges(bodies: Sequence[Body], camera: Camera) -> FloatArray:
@@ -66,7 +67,7 @@ def part_edges(bodies: Sequence[Body], camera: Camera) -> FloatArray:
             towards = camera.center_world - points
             lifted = points + _LIFT_M * towards / np.linalg.norm(towards, axis=-1, keepdims=True)
             nothing = np.zeros((len(shapes), len(points)), dtype=bool)
-            shown.append(pieces[~_blocked(camera, Ts, surfaces, lifted.astype(np.float32), nothing)])
+            shown.append(pieces[~_blocked(camera, Ts, surfaces, lifted, nothing)])
     return np.concatenate(shown)
 
 
@@ -122,18 +123,39 @@ def _zero_line(f: FloatArray, g: FloatArray, segments: FloatArray) -> int:
 
 
 def _blocked(
-    camera: Camera, Ts: Array, surfaces: contours.Surfaces, points: FloatArray, ignored: NDArray[np.bool_]
+    camera: Camera, Ts: Array, surfaces: contours.Surfaces, points: Array, ignored: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """Whether some part lies before each point (n, 3), but for the parts ignored for it, (P, n)."""
-    hidden = np.zeros(len(points), dtype=bool)
-    Ts_part_world = np.swapaxes(Ts[:, :3, :3], 1, 2)
-    for part in range(len(Ts)):
-        center = surfaces.centers[part]
-        T = np.column_stack([Ts_part_world[part], -Ts_part_world[part] @ Ts[part, :3, 3] - center])
-        Q = np.column_stack([T, T @ (*camera.center_world, 1.0)]) / surfaces.half_axes[part][:, None]
-        seen = np.flatnonzero(~hidden & ~ignored[part])
-        by_part, shared = np.zeros(len(seen), dtype=bool), np.empty((2, len(seen) + LANES), np.float32)
-        mine = np.pad(points[seen].T, ((0, 0), (0, LANES)))
-        hide(part, surfaces.solids, Q.astype(np.float32), 0.0, mine, 0, len(seen), shared, by_part)
-        hidden[seen] |= by_part
-    return hidden
+    n = len(points)
+    room = np.zeros((3, n + LANES), np.float32)
+    room[:, :n] = points.T
+    hidden, by_part = np.zeros(n + LANES, dtype=bool), np.empty(n + LANES, dtype=bool)
+    shared, Q = np.empty((2, n + LANES), np.float32), np.empty((3, 5), np.float32)
+    _mark_blocked(
+        camera.center_world, Ts, surfaces.centers, surfaces.half_axes, surfaces.solids, ignored, Q, shared, by_part,
+        room, hidden,
+    )  # fmt: skip
+    return hidden[:n]
+
+
+@njit(**FAST)
+def _mark_blocked(
+    eye: Array, Ts: Array, centers: Array, half_axes: Array, solids: FloatArray, ignored: NDArray[np.bool_],
+    Q: FloatArray, shared: FloatArray, by_part: NDArray[np.bool_], points: FloatArray, hidden: NDArray[np.bool_],
+) -> None:  # fmt: skip
+    """Mark the points, (3, n and `LANES` more), before which a part lies; see `hide` for Q and shared."""
+    n = ignored.shape[1]
+    for part in range(Ts.shape[0]):
+        for i in range(3):
+            offset, sight = -centers[part, i], -centers[part, i]
+            for k in range(3):
+                offset -= Ts[part, k, i] * Ts[part, k, 3]
+                sight += Ts[part, k, i] * (eye[k] - Ts[part, k, 3])
+                Q[i, k] = Ts[part, k, i] / half_axes[part, i]
+            Q[i, 3] = offset / half_axes[part, i]
+            Q[i, 4] = sight / half_axes[part, i]
+        for j in range(n):
+            by_part[j] = hidden[j] or ignored[part, j]
+        hide(part, solids, Q, 0.0, points, 0, n, shared, by_part)
+        for j in range(n):
+            hidden[j] |= by_part[j] and not ignored[part, j]

@@ -55,12 +55,12 @@ def views_of(cameras, truths, person):
     points = dict(zip(model.point_names, model.points_world(values), strict=True))
     views = {}
     for name in LIMBS:
-        hidden = [bool(points_hidden(truths, camera, points[name][None])[0]) for camera in cameras]
+        hidden = points_hidden(truths, cameras, points[name][None])[:, 0]
         rays = [(points[name] - camera.center_world) for camera in cameras]
         rays = [ray / np.linalg.norm(ray) for ray in rays]
         pairs = [(a, b) for a in range(len(cameras)) for b in range(a)]
         views[name] = min(
-            pairs, key=lambda pair: (hidden[pair[0]] + hidden[pair[1]], abs(rays[pair[0]] @ rays[pair[1]]))
+            pairs, key=lambda pair: (int(hidden[pair[0]]) + int(hidden[pair[1]]), abs(rays[pair[0]] @ rays[pair[1]]))
         )
     return views
 

@@ -66,18 +66,38 @@ def test_points_hidden(gavrila):
     body = Body(gavrila, gavrila.neutral())
     place = dict(zip(gavrila.point_names, gavrila.points_world(body.values), strict=True))
     side = camera_at("side", (0.0, 4.0, 0.0))  # at the body's left
-    hidden = dict(zip(place, points_hidden([body], side, np.stack(list(place.values()))), strict=True))
+    hidden = dict(zip(place, points_hidden([body], [side], np.stack(list(place.values())))[0], strict=True))
     # The left side hides the right: the trunk its arm, the legs one another. The forearm hangs before the hip.
     assert [n for n, h in hidden.items() if n.startswith("left") and h] == ["left_hip"]
     assert hidden["right_shoulder"]
     assert hidden["right_knee"]
     assert hidden["right_wrist"]
     # A joint lies within the parts around it; those do not hide it.
-    assert not points_hidden([body], camera_at("front", (4.0, 0.0, 0.0)), np.stack(list(place.values()))).any()
+    assert not points_hidden([body], [camera_at("front", (4.0, 0.0, 0.0))], np.stack(list(place.values()))).any()
 
 
 def test_points_hidden_by_another_person():
     points = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.5, 0.0]])  # behind, before and beside
     screen = at(solid((0.05, 0.3, 0.3)), 1, 0, 0)
-    assert points_hidden([screen], FRONT, points).tolist() == [True, False, False]
-    assert points_hidden([at(screen.model, 6, 0, 0)], FRONT, points).tolist() == [False] * 3  # behind the camera
+    assert points_hidden([screen], [FRONT], points).tolist() == [[True, False, False]]
+    assert points_hidden([at(screen.model, 6, 0, 0)], [FRONT], points).tolist() == [[False] * 3]  # behind the camera
+
+
+def test_points_hidden_in_several_views_are_those_whose_sight_passes_a_part(gavrila):
+    rng = np.random.default_rng(4)
+    near = rng.normal(0.0, 0.2, gavrila.n_dofs)
+    bodies = [Body(gavrila, gavrila.clip(gavrila.retract(gavrila.neutral(), s * near))) for s in (1.0, -1.0)]
+    points = rng.uniform((-0.4, -0.4, -0.8), (0.4, 0.4, 0.8), (200, 3))
+    views = [FRONT, camera_at("side", (0.0, 4.0, 0.0))]
+    hidden = points_hidden(bodies, views, points)
+    for view, found in zip(views, hidden, strict=True):
+        # The sight as many places: whether one is within a part that does not hold the point.
+        sight = points + np.linspace(0.0, 1.0, 4000)[:, None, None] * (view.center_world - points)
+        wanted = np.zeros(len(points), bool)
+        for body in bodies:
+            Ts = body.model.kinematics(body.values).Ts_world_part
+            for T, center, shape in zip(Ts, body.model.centers_part, body.model.shapes, strict=True):
+                inside = shape.inside_outside((sight - T[:3, 3]) @ T[:3, :3] - center)
+                wanted |= (inside[0] >= 1.5) & (inside.min(axis=0) < 1.0)
+        assert 20 < wanted.sum() < 180
+        assert np.mean(found == wanted) > 0.96  # lines that graze a part may go either way
