@@ -206,8 +206,8 @@ class _Parts:
             [
                 server.scene.add_mesh_simple(
                     f"{root}/{person.name}/{part.name}",
-                    np.asarray(shape.mesh().vertices) + center,
-                    np.asarray(shape.mesh().faces),
+                    shape.triangles().vertices + center,
+                    shape.triangles().faces,
                     color=color or _rgb(part.color),
                     opacity=opacity,
                     cast_shadow=False,

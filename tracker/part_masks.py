@@ -58,11 +58,11 @@ def _mesh(models: tuple[BodyModel, ...]) -> _Mesh:
     parts = [(s, c) for m in models for s, c in zip(m.shapes, m.centers_part, strict=True)]
     assert len(parts) < 256, len(parts)
     for part, (shape, center) in enumerate(parts):
-        mesh = shape.mesh(_RINGS, _SECTORS)
-        corners = np.asarray(mesh.vertices) + center
+        vertices, corners_of = shape.triangles(_RINGS, _SECTORS)
+        corners = vertices + center
         points.append(corners)
         owners.append(np.full(len(corners), part, np.int32))
-        faces.append(np.asarray(mesh.faces, np.int32) + n)
+        faces.append(corners_of.astype(np.int32) + n)
         n += len(corners)
     return _Mesh(
         np.ascontiguousarray(np.concatenate(points).T, np.float32), np.concatenate(owners), np.concatenate(faces)

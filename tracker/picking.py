@@ -85,11 +85,11 @@ def place_on_part(body: Body, camera: Camera, part: int, pointer_px: Array) -> A
 @lru_cache(maxsize=256)
 def _surface(shape: Shape) -> Array:
     """Points on a shape, (n, 3), in its frame, metres."""
-    return np.asarray(shape.mesh(_RINGS, _SECTORS).vertices, dtype=np.float64)
+    return shape.triangles(_RINGS, _SECTORS).vertices
 
 
 @lru_cache(maxsize=256)
 def _triangles(shape: Shape) -> Array:
     """Corners of a shape's triangles, (n, 3, 3), in its frame, metres."""
-    mesh = shape.mesh()
-    return np.asarray(mesh.vertices, dtype=np.float64)[np.asarray(mesh.faces)]
+    vertices, faces = shape.triangles()
+    return vertices[faces]

@@ -356,6 +356,11 @@ def standing_pose(
     """
     R = np.eye(3) if R_world_up is None else R_world_up
     middle = viewed_point(cameras) + beside_m * _rightward(cameras[0], R[:, 2])
+    step = np.zeros(model.n_dofs)
+    step[:3] = middle
+    here = model.retract(model.neutral(), step)
+    if np.array_equal(R, np.eye(3)):
+        return here
     points = model.points_world(model.neutral()) @ R.T + middle
     return fit_to_points(model, dict(zip(model.point_names, points, strict=True))).values
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, qmc
+from scipy.special import ndtri
 
 from tracker.appearance import Colors, PartColors
 from tracker.body import BodyModel
@@ -204,7 +204,7 @@ def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSet
     low, high = model.limits[dofs].T
     low, high = np.maximum(low, -np.pi), np.minimum(high, np.pi)
     now = model.difference(values, model.neutral())[dofs]
-    near = norm.ppf(0.002 + 0.996 * even) * settings.reach_rad
+    near = ndtri(0.002 + 0.996 * even) * settings.reach_rad
     anywhere = low + even * (high - low) - now
     # Joints that people bend little stay near: a collarbone needs no search of its own.
     anywhere = np.where(np.isfinite(model.spreads[dofs]), near, anywhere)
@@ -235,4 +235,6 @@ def _moved(model: BodyModel, poses: Array, dofs: IntArray, steps: Array) -> Arra
 @lru_cache(maxsize=16)
 def _even(n: int, dims: int) -> Array:
     """Points that fill the unit cube evenly, the same ones each time, (n, dims)."""
+    from scipy.stats import qmc  # takes a third of a second, which who searches nothing need not wait
+
     return np.asarray(qmc.Sobol(dims, seed=7).random(n))

@@ -7,15 +7,27 @@ are solids of revolution, told by their profile alone.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
-import trimesh
+from numpy.typing import NDArray
 
 from tracker.rigid import Array
 
+if TYPE_CHECKING:
+    import trimesh
+
 _FLAT = 1e-6
 """How far the normal of a flat end points away from the axis: all but not at all, so that its slope is a number."""
+
+
+class Triangles(NamedTuple):
+    """A surface of triangles."""
+
+    vertices: Array
+    """(N, 3), metres."""
+    faces: NDArray[np.int64]
+    """Indices of the corners of each triangle, counter-clockwise seen from outside, (M, 3)."""
 
 
 class Profile(NamedTuple):
@@ -103,9 +115,13 @@ class TaperedSuperquadric:
         omega = np.arange(n_sectors) * (2 * np.pi / n_sectors) + np.pi / n_sectors
         return self.surface(*np.meshgrid(eta, omega, indexing="ij"))
 
-    def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> trimesh.Trimesh:
-        """Closed triangle mesh of the surface in the shape's frame."""
-        return _closed_mesh(self.grid(n_rings, n_sectors)[0], self.half_axes[2])
+    def triangles(self, n_rings: int = 24, n_sectors: int = 32) -> Triangles:
+        """Closed surface in the shape's frame."""
+        return _closed(self.grid(n_rings, n_sectors)[0], self.half_axes[2])
+
+    def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> "trimesh.Trimesh":
+        """The same as a mesh of trimesh."""
+        return _mesh(self.triangles(n_rings, n_sectors))
 
     @cached_property
     def girth_bound(self) -> float:
@@ -170,9 +186,13 @@ class EllipticalCone:
         normals = turned(away, along) / self.half_axes
         return turned(radii, heights) * self.half_axes, normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 
-    def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> trimesh.Trimesh:
-        """Closed triangle mesh of the surface in the shape's frame."""
-        return _closed_mesh(self.grid(n_rings, n_sectors)[0], self.half_axes[2])
+    def triangles(self, n_rings: int = 24, n_sectors: int = 32) -> Triangles:
+        """Closed surface in the shape's frame."""
+        return _closed(self.grid(n_rings, n_sectors)[0], self.half_axes[2])
+
+    def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> "trimesh.Trimesh":
+        """The same as a mesh of trimesh."""
+        return _mesh(self.triangles(n_rings, n_sectors))
 
     def profile(self, tolerance_m: float) -> Profile:
         """The profile in unit coordinates: two points of one slope, so that the contour has two straight rulings."""
@@ -201,9 +221,13 @@ class Ellipsoid:
         """Points and normals `(n_rings, n_sectors, 3)` on closed rings from the -z to the +z end."""
         return self._superquadric.grid(n_rings, n_sectors)
 
-    def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> trimesh.Trimesh:
-        """Closed triangle mesh of the surface in the shape's frame."""
-        return self._superquadric.mesh(n_rings, n_sectors)
+    def triangles(self, n_rings: int = 24, n_sectors: int = 32) -> Triangles:
+        """Closed surface in the shape's frame."""
+        return self._superquadric.triangles(n_rings, n_sectors)
+
+    def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> "trimesh.Trimesh":
+        """The same as a mesh of trimesh."""
+        return _mesh(self.triangles(n_rings, n_sectors))
 
     def profile(self, tolerance_m: float) -> Profile | None:
         """The profile in unit coordinates, thinned to chords within a tolerance."""
@@ -253,8 +277,8 @@ def _chords(curve: Array, tolerance: float) -> list[int]:
     return kept
 
 
-def _closed_mesh(rings: Array, end: float) -> trimesh.Trimesh:
-    """Mesh of closed rings of points (n_rings, n_sectors, 3) with a pole at z = -end and z = end."""
+def _closed(rings: Array, end: float) -> Triangles:
+    """Surface through closed rings of points (n_rings, n_sectors, 3) with a pole at z = -end and z = end."""
     n_rings, n_sectors, _ = rings.shape
     vertices = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, -end], [0.0, 0.0, end]]])
     ring, sector = np.meshgrid(np.arange(n_rings - 1), np.arange(n_sectors), indexing="ij")
@@ -271,4 +295,10 @@ def _closed_mesh(rings: Array, end: float) -> trimesh.Trimesh:
             np.stack([np.full(n_sectors, top), last, np.roll(last, -1)], axis=-1),
         ]
     )
-    return trimesh.Trimesh(vertices, faces, process=False)
+    return Triangles(vertices, faces)
+
+
+def _mesh(triangles: Triangles) -> "trimesh.Trimesh":
+    import trimesh  # takes half a second, which who asks for no mesh need not wait
+
+    return trimesh.Trimesh(*triangles, process=False)

@@ -21,10 +21,10 @@ class PartsFigure:
         """Vertices of each part in its frame, and the triangles over all of them."""
         vertices, faces, first = [], [], 0
         for shape, center in zip(self.model.shapes, self.model.centers_part, strict=True):
-            mesh = shape.mesh()
-            vertices.append(np.asarray(mesh.vertices) + center)
-            faces.append(np.asarray(mesh.faces) + first)
-            first += len(mesh.vertices)
+            own, corners = shape.triangles()
+            vertices.append(own + center)
+            faces.append(corners + first)
+            first += len(own)
         return vertices, np.concatenate(faces)
 
     @property
