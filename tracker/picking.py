@@ -39,13 +39,14 @@ def part_outlines(bodies: Sequence[Body], camera: Camera) -> list[PartOutline]:
     """
     out = []
     for b, body in enumerate(bodies):
-        Ts = body.model.kinematics(body.values).Ts_world_part
-        for p, (shape, center) in enumerate(zip(body.model.shapes, body.model.centers_part, strict=True)):
-            points = rigid.apply(Ts[p], _surface(shape) + center)
-            if camera.depths(points).min() < _NEAREST_M:
-                continue
-            hull = cv2.convexHull(camera.project(points).astype(np.float32)).reshape(-1, 2)
-            out.append(PartOutline(b, p, float(camera.depths(rigid.apply(Ts[p], center))), hull.astype(np.float64)))
+        Ts, centers = body.model.kinematics(body.values).Ts_world_part, body.model.centers_part
+        # The centre of each part comes first, then its surface, (n_parts, n, 3).
+        of_part = np.stack([np.vstack([c, _surface(s) + c]) for s, c in zip(body.model.shapes, centers, strict=True)])
+        points = of_part @ np.swapaxes(Ts[:, :3, :3], 1, 2) + Ts[:, None, :3, 3]
+        depths, px = camera.depths(points), camera.project(points[:, 1:]).astype(np.float32)
+        for part in np.flatnonzero(depths[:, 1:].min(axis=1) >= _NEAREST_M):
+            hull = cv2.convexHull(px[part]).reshape(-1, 2).astype(np.float64)
+            out.append(PartOutline(b, int(part), float(depths[part, 0]), hull))
     return out
 
 
