@@ -18,7 +18,7 @@ _LOG = logging.getLogger(__name__)
 _IMAGE_BYTES = 48 * 2**20
 """What undistorted images may take: of four 640x480 views some dozen frames; decoded ones are kept by the recording."""
 _EVIDENCE_BYTES = 96 * 2**20
-_REST_S = 0.08
+_REST_S = 0.2
 """A frame has evidence after it has been shown for so long: pictures go out first, and who scrubs by wants no more."""
 _WAIT_S = 1.0
 """Evidence waits no longer than this for pictures that are being made."""

@@ -143,7 +143,8 @@ class VideoFile:
         if not self._container.streams.video:
             raise RecordingError(f"{self._where}: expected a video, found a file without a video stream")
         self._stream = self._container.streams.video[0]
-        self._stream.thread_type = "AUTO"
+        # Threads by frame would hold back as many frames as there are; cameras are decoded side by side anyway.
+        self._stream.thread_type = "SLICE"
         self._tick_s = float(self._stream.time_base or 0)
         self._frames = self._decode(self._container.demux(self._stream))
         self._next = 0
