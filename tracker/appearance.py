@@ -16,7 +16,8 @@ from scipy.ndimage import gaussian_filter
 from tracker.body import Body, BodyModel
 from tracker.contours import FloatArray, projection
 from tracker.evidence import ViewEvidence
-from tracker.kinematics import Tree, forward_kinematics
+from tracker.kernels import BORROW, helpers
+from tracker.kinematics import Kinematics, Tree, forward_kinematics
 from tracker.rigid import Array
 from tracker.silhouettes import Image
 
@@ -135,22 +136,31 @@ class Colors:
     ) -> Array:
         """A quick look at one limb in many poses, (C, n_values): how good it seems, (C,), more is better.
 
-        At samples along the axes of its parts, where no other part hides them, the colours speak, and the edges at
-        both sides: near ones for it, none against it. Where the limb is hidden nothing is said. Parts that are `away`
-        hide nothing.
+        The poses differ in the limb alone. At samples along the axes of its parts, where no other part hides them, the
+        colours speak, and the edges at both sides: near ones for it, none against it. Where the limb is hidden nothing
+        is said. Parts that are `away` hide nothing.
         """
         model = self._bodies[self._person].model
         Ts = np.concatenate([b.model.kinematics(b.values).Ts_world_part for b in self._bodies])
         first = sum(len(b.model.parts) for b in self._bodies[: self._person])
         ratios = np.zeros((len(model.parts), BINS**3)) if known is None else known.log_ratios
-        total, shapes = np.zeros(len(candidates)), np.concatenate(self._shapes)
+        Ts[first : first + len(model.parts)] = model.kinematics(candidates[0]).Ts_world_part
+        shapes = np.concatenate(self._shapes)
         shapes[first + np.array(away, dtype=np.int64), 3:] = _SPECK_M
-        for P, eye, image, (distance, theta) in zip(self._P, self._eyes, self._images, self._distances, strict=True):
+        limb_Ts = np.empty((len(candidates), len(limb), 4, 4))
+        _place_limb(candidates, model.tree, model.kinematics(candidates[0]), limb, limb_Ts)
+
+        def look(view: tuple[Array, Array, Image, tuple[FloatArray, float]]) -> Array:
+            P, eye, image, (distance, theta) = view
+            seen = np.zeros(len(candidates))
             _look_along(
-                P, eye, candidates, model.tree, model.n_dofs, Ts, shapes, first, limb, image, distance, theta, ratios,
-                total,
+                P, eye, limb_Ts, Ts, shapes, first, len(model.parts), limb, image, distance, theta, ratios, seen,
+                *_room(len(Ts)),
             )  # fmt: skip
-        return total
+            return seen
+
+        views = zip(self._P, self._eyes, self._images, self._distances, strict=True)
+        return np.sum(list(helpers().map(look, views)), axis=0, initial=0.0) + np.zeros(len(candidates))
 
     def _samples(self, values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
         """Part, colour and view of each visible sample, (n,) each."""
@@ -161,9 +171,10 @@ class Colors:
         last = first + len(Ts[self._person])
         room = (last - first) * _ALONG * _ACROSS
         parts, colors, counts = [np.empty(0, np.int64)], [np.empty(0, np.int64)], []
+        all_Ts, shapes = np.concatenate(Ts), np.concatenate(self._shapes)
         for P, eye, image in zip(self._P, self._eyes, self._images, strict=True):
             out = np.empty((room, 2), np.int64)
-            n = _look(P, eye, np.concatenate(Ts), np.concatenate(self._shapes), first, last, image, out)
+            n = _look(P, eye, all_Ts, shapes, first, last, image, out, *_room(len(all_Ts)))
             parts.append(out[:n, 0])
             colors.append(out[:n, 1])
             counts.append(n)
@@ -203,48 +214,62 @@ def _ellipsoids(model: BodyModel) -> Array:
     return np.array([(*c, *s.half_axes) for c, s in zip(model.centers_part, model.shapes, strict=True)])
 
 
-@njit(nogil=True, cache=True)
-def _passed(eye: Array, X: Array, own: int, Ts: Array, shapes: Array) -> int:
+def _room(n_parts: int) -> tuple[Array, Array, Array]:
+    """Room for what kernels work out: a row of each part, see `_place_before`, and two points."""
+    return np.empty((n_parts, 13)), np.empty(3), np.empty(3)
+
+
+@njit(**BORROW)
+def _place_before(eye: Array, T: Array, shape: Array, sight: Array) -> None:
+    """Fill what `_passed` asks of a part, (13,): what turns directions into the coordinates in which the part is the
+    unit ball, the eye in these, and the square of its distance from the ball."""
+    C = -1.0
+    for i in range(3):
+        o = -shape[i]
+        for k in range(3):
+            o += T[k, i] * (eye[k] - T[k, 3])
+            sight[3 * i + k] = T[k, i] / shape[3 + i]
+        o /= shape[3 + i]
+        sight[9 + i] = o
+        C += o * o
+    sight[12] = C
+
+
+@njit(**BORROW)
+def _passed(eye: Array, X: Array, own: int, sights: Array) -> int:
     """What the sight of a point X on the axis of a part passes besides: the index of a part behind the point, `_OPEN`
     where there is none, and `_HIDDEN` where another part lies before the point."""
     behind = _OPEN
-    for p in range(Ts.shape[0]):
-        if p == own:
-            continue
-        A, B, C = 0.0, 0.0, -1.0
-        for i in range(3):
-            o, d = -shapes[p, i], 0.0
-            for k in range(3):
-                o += Ts[p, k, i] * (eye[k] - Ts[p, k, 3])
-                d += Ts[p, k, i] * (X[k] - eye[k])
-            o /= shapes[p, 3 + i]
-            d /= shapes[p, 3 + i]
-            A += d * d
-            B += o * d
-            C += o * o
-        discriminant = B * B - A * C
+    x, y, z = X[0] - eye[0], X[1] - eye[1], X[2] - eye[2]
+    for p in range(sights.shape[0]):
+        d0 = sights[p, 0] * x + sights[p, 1] * y + sights[p, 2] * z
+        d1 = sights[p, 3] * x + sights[p, 4] * y + sights[p, 5] * z
+        d2 = sights[p, 6] * x + sights[p, 7] * y + sights[p, 8] * z
+        A = d0 * d0 + d1 * d1 + d2 * d2
+        B = sights[p, 9] * d0 + sights[p, 10] * d1 + sights[p, 11] * d2
         # Where the middle of the chord lies beyond the point, the point is before or just within the other part.
-        if discriminant > 0.0 and B < 0.0:
+        if B * B - A * sights[p, 12] > 0.0 and B < 0.0 and p != own:
             if -B < A:
                 return _HIDDEN
             behind = p
     return behind
 
 
-@njit(nogil=True, cache=True)
-def _seen_on_axis(P: Array, eye: Array, Ts: Array, shapes: Array, part: int, sample: int, X: Array, side: Array) -> int:
+@njit(**BORROW)
+def _seen_on_axis(
+    P: Array, eye: Array, T: Array, shape: Array, sights: Array, part: int, sample: int, X: Array, side: Array
+) -> int:
     """What a sample on the axis of a part is seen before, see `_passed`; fills its place X and the unit vector across
     axis and sight."""
-    z = shapes[part, 2] + shapes[part, 5] * 0.8 * (2.0 * sample / (_ALONG - 1) - 1.0)
+    z = shape[2] + shape[5] * 0.8 * (2.0 * sample / (_ALONG - 1) - 1.0)
     for i in range(3):
-        X[i] = Ts[part, i, 0] * shapes[part, 0] + Ts[part, i, 1] * shapes[part, 1] + Ts[part, i, 2] * z
-        X[i] += Ts[part, i, 3]
+        X[i] = T[i, 0] * shape[0] + T[i, 1] * shape[1] + T[i, 2] * z + T[i, 3]
     behind = _HIDDEN
     if P[2, 0] * X[0] + P[2, 1] * X[1] + P[2, 2] * X[2] + P[2, 3] >= 0.05:
-        behind = _passed(eye, X, part, Ts, shapes)
+        behind = _passed(eye, X, part, sights)
     if behind == _HIDDEN:
         return behind
-    ax, ay, az = Ts[part, 0, 2], Ts[part, 1, 2], Ts[part, 2, 2]
+    ax, ay, az = T[0, 2], T[1, 2], T[2, 2]
     vx, vy, vz = X[0] - eye[0], X[1] - eye[1], X[2] - eye[2]
     side[0], side[1], side[2] = ay * vz - az * vy, az * vx - ax * vz, ax * vy - ay * vx
     norm = np.sqrt(side[0] ** 2 + side[1] ** 2 + side[2] ** 2) + 1e-9
@@ -252,7 +277,7 @@ def _seen_on_axis(P: Array, eye: Array, Ts: Array, shapes: Array, part: int, sam
     return behind
 
 
-@njit(nogil=True, cache=True)
+@njit(**BORROW)
 def _pixel_beside(P: Array, X: Array, side: Array, offset: float) -> tuple[int, int]:
     """Column and row of the pixel that shows the place at an offset from X, metres, to the side."""
     x, y, w = X[0] + offset * side[0], X[1] + offset * side[1], X[2] + offset * side[2]
@@ -263,21 +288,32 @@ def _pixel_beside(P: Array, X: Array, side: Array, offset: float) -> tuple[int, 
 
 
 @njit(nogil=True, cache=True)
-def _look_along(
-    P: Array, eye: Array, candidates: Array, tree: Tree, n_dofs: int, Ts: Array, shapes: Array, first: int,
-    limb: NDArray[np.int64], image: Image, distance: FloatArray, theta: float, ratios: Array, total: Array,
-) -> None:  # fmt: skip
-    """Add to the totals (C,) what one view says of each candidate's limb."""
-    height, width = distance.shape
-    all_Ts, axes, origins = Ts.copy(), np.empty((n_dofs, 3)), np.empty((n_dofs, 3))
-    n_parts = tree.parents.shape[0]
-    X, side = np.empty(3), np.empty(3)
+def _place_limb(candidates: Array, tree: Tree, room: Kinematics, limb: NDArray[np.int64], out: Array) -> None:
+    """Fill the poses of the parts of one limb, (C, n, 4, 4), in each of many poses of a body."""
     for c in range(candidates.shape[0]):
-        forward_kinematics(candidates[c], tree, all_Ts[first : first + n_parts], axes, origins)
-        for part in limb:
+        forward_kinematics(candidates[c], tree, room.Ts_world_part, room.axes_world, room.origins_world)
+        for i in range(limb.shape[0]):
+            out[c, i] = room.Ts_world_part[limb[i]]
+
+
+@njit(**BORROW)
+def _look_along(
+    P: Array, eye: Array, limb_Ts: Array, Ts: Array, shapes: Array, first: int, n_parts: int,
+    limb: NDArray[np.int64], image: Image, distance: FloatArray, theta: float, ratios: Array, total: Array,
+    sights: Array, X: Array, side: Array,
+) -> None:  # fmt: skip
+    """Add to the totals (C,) what one view says of each candidate's limb; the last three are room to work in."""
+    height, width = distance.shape
+    for p in range(Ts.shape[0]):
+        _place_before(eye, Ts[p], shapes[p], sights[p])
+    for c in range(limb_Ts.shape[0]):
+        for i in range(limb.shape[0]):
+            _place_before(eye, limb_Ts[c, i], shapes[first + limb[i]], sights[first + limb[i]])
+        for i in range(limb.shape[0]):
+            part = limb[i]
             p = first + part
             for a in range(_ALONG):
-                behind = _seen_on_axis(P, eye, all_Ts, shapes, p, a, X, side)
+                behind = _seen_on_axis(P, eye, limb_Ts[c, i], shapes[p], sights, p, a, X, side)
                 if behind == _HIDDEN:
                     continue
                 # What would be seen there without the limb: to show its colour again says nothing for the limb.
@@ -293,14 +329,14 @@ def _look_along(
                         total[c] += ratios[part, color] - (ratios[behind - first, color] if own else 0.0)
 
 
-@njit(nogil=True, cache=True)
+@njit(**BORROW)
 def _bin_of(image: Image, v: int, u: int) -> int:
     """Index of a pixel's colour."""
     r, g, b = image[v, u, 0] * BINS // 256, image[v, u, 1] * BINS // 256, image[v, u, 2] * BINS // 256
     return (r * BINS + g) * BINS + b
 
 
-@njit(nogil=True, cache=True)
+@njit(**BORROW)
 def _look(
     P: Array,
     eye: Array,
@@ -310,15 +346,19 @@ def _look(
     last: int,
     image: Image,
     out: NDArray[np.int64],
+    sights: Array,
+    X: Array,
+    side: Array,
 ) -> int:
     """List part and colour of the visible samples of the parts from first to last in one view; their number."""
     height, width = image.shape[0], image.shape[1]
-    X, side = np.empty(3), np.empty(3)
+    for p in range(Ts.shape[0]):
+        _place_before(eye, Ts[p], shapes[p], sights[p])
     n = 0
     for part in range(first, last):
         radius = 0.45 * min(shapes[part, 3], shapes[part, 4])
         for a in range(_ALONG):
-            if _seen_on_axis(P, eye, Ts, shapes, part, a, X, side) == _HIDDEN:
+            if _seen_on_axis(P, eye, Ts[part], shapes[part], sights, part, a, X, side) == _HIDDEN:
                 continue
             for s in range(_ACROSS):
                 u, v = _pixel_beside(P, X, side, radius * (s - (_ACROSS - 1) / 2))

@@ -8,7 +8,6 @@ averaged over the views. Costs are in undistorted pixels of the footage; images 
 import os
 import threading
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from itertools import pairwise
 from typing import Literal, NamedTuple
@@ -21,7 +20,7 @@ from tracker import contours
 from tracker.body import Body, BodyModel
 from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence
-from tracker.kernels import FAST
+from tracker.kernels import FAST, helpers
 from tracker.kinematics import Tree, forward_kinematics
 from tracker.nearest import Segments, Sorted, nearest_segment, segment_buffer, sort_points, stack_rows
 from tracker.rigid import Array
@@ -172,7 +171,7 @@ class ChamferCost:
         if self._threads > 1 and len(candidates) >= _WORTH_SHARING:
             shares = np.linspace(0, len(candidates), self._threads + 1).astype(int)
             slices = [slice(a, b) for a, b in pairwise(shares)]
-            others = [_helpers().submit(score, s) for s in slices[1:]]
+            others = [helpers().submit(score, s) for s in slices[1:]]
             score(slices[0])
             for other in others:
                 other.result()
@@ -211,12 +210,6 @@ class ChamferCost:
         if not self._seen.any():
             return np.full(views_px.shape[:-1], np.mean(self._scene.thetas / self._scales))
         return views_px[..., self._seen].mean(axis=-1)
-
-
-@lru_cache(maxsize=1)
-def _helpers() -> ThreadPoolExecutor:
-    """Threads that score besides the caller's; kernels let go of the interpreter's lock."""
-    return ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="chamfer")
 
 
 @lru_cache(maxsize=1)  # a hand makes dozens of costs a second from the same views

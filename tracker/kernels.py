@@ -1,5 +1,8 @@
-"""How kernels that other kernels call are compiled: options for numba's njit."""
+"""How kernels are compiled that other kernels call (options for numba's njit), and threads for kernels to run in."""
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 from typing import Any
 
 BORROW: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy", "_nrt": False}
@@ -7,3 +10,9 @@ BORROW: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy", 
 each array at every call and every slice, which cost more than the work of these kernels themselves."""
 FAST: dict[str, Any] = BORROW | {"fastmath": {"contract", "reassoc", "nsz", "arcp"}}
 """The same in any order of arithmetic, which lets loops run on whole vectors; infinite numbers keep their meaning."""
+
+
+@lru_cache(maxsize=1)
+def helpers() -> ThreadPoolExecutor:
+    """Threads that work besides the caller's; kernels let go of the interpreter's lock."""
+    return ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="kernels")
