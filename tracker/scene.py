@@ -40,6 +40,8 @@ _MOST_EXCESS = 60.0
 """What two people's predictions may speak against their exchange for it to be tried: more no image makes good."""
 _STILL_M = 0.002
 """The joint refinement ends when nobody moves farther, metres."""
+_SHARED_M = 0.01
+"""Evidence is shared out anew when somebody has moved farther, metres."""
 
 
 class Found(NamedTuple):
@@ -67,6 +69,10 @@ class _Seen(NamedTuple):
 
     match: ContourMatch
     """The evidence that they were fitted to."""
+    own: Sequence[ViewEvidence]
+    """That evidence by view, without what is clearly somebody else's."""
+    shared: tuple[Array, ...]
+    """The poses of everybody for which it was shared out, (n_values,) each."""
     fit: Fit
     anew: tuple[Limb, ...] | None = None
     """Limbs whose prediction is not trusted, where the person was searched anew; None where that was not needed."""
@@ -113,7 +119,10 @@ class Scene:
 
     def held(self, person: int) -> Found:
         """Judge nobody: a pose that was given is taken as it is."""
-        n, costs = self._models[person].n_dofs, self._match(person, self._views).part_costs(self.poses[person])
+        n, costs = (
+            self._models[person].n_dofs,
+            self._match(person, self._own(self._views, person)).part_costs(self.poses[person]),
+        )
         return Found("good", "", self._parts_px(costs), np.zeros((n, n)), 0, None)
 
     def estimate(self, people: Sequence[int]) -> dict[int, Found]:
@@ -133,22 +142,29 @@ class Scene:
 
     def _searched(self, person: int) -> _Seen:
         """Search a person by best-first search alone."""
-        match = self._match(person, self._views)
+        own, shared = self._own(self._views, person), tuple(self.poses)
+        match = self._match(person, own)
         evaluations = self._search(person, self._settings.search)
         blocks = [match, *self._priors(person)]
         fit = solve(self._models[person], self.poses[person], blocks, self._memories[person].free, max_iterations=0)
-        return _Seen(match, fit, evaluations=evaluations)
+        return _Seen(match, own, shared, fit, evaluations=evaluations)
 
     def _refined(self, person: int, before: _Seen | None = None) -> _Seen:
         """Refine a person from where they stand, as they were seen before if they were."""
         anew = None if before is None else before.anew
-        views = self._views if anew is None else [unfiltered(v) for v in self._views]
-        match = self._match(person, views, everywhere=anew is not None)
+        if before is not None and self._stands(before.shared):
+            own, shared = before.own, before.shared
+        else:
+            views = self._views if anew is None else [unfiltered(v) for v in self._views]
+            own, shared = self._own(views, person, everywhere=anew is not None), tuple(self.poses)
+        match = self._match(person, own, everywhere=anew is not None)
         blocks = [match, *self._priors(person, anew or ())]
         model, free = self._models[person], self._memories[person].free
         fit = solve(model, self.poses[person], blocks, free, _ITERATIONS, _TOLERANCE)
         self.poses[person] = fit.values
-        return _Seen(match, fit) if before is None else before._replace(match=match, fit=fit, quality=None)
+        if before is None:
+            return _Seen(match, own, shared, fit)
+        return before._replace(match=match, own=own, shared=shared, fit=fit, quality=None)
 
     def _refine_together(self, seen: dict[int, _Seen]) -> None:
         """Refine people again and again, each with the others where they were found, until nobody moves."""
@@ -156,15 +172,20 @@ class Scene:
             moved_m = 0.0
             for person, before in seen.items():
                 seen[person] = self._refined(person, before)
-                moved_m = max(moved_m, self._moved_m(person, before, seen[person]))
+                moved_m = max(moved_m, self._moved_m(person, before.fit.values, seen[person].fit.values))
             if moved_m < _STILL_M:
                 break
 
-    def _moved_m(self, person: int, was: _Seen, now: _Seen) -> float:
-        """How far the point of a person that moved farthest is from where it was, metres."""
+    def _moved_m(self, person: int, was: Array, now: Array) -> float:
+        """How far apart the points of a person are in two poses, (n_values,), at most, metres."""
         model = self._models[person]
-        moved = model.points_world(now.fit.values) - model.points_world(was.fit.values)
-        return float(np.linalg.norm(moved, axis=1).max())
+        return float(np.linalg.norm(model.points_world(now) - model.points_world(was), axis=1).max())
+
+    def _stands(self, poses: Sequence[Array]) -> bool:
+        """Whether everybody still stands as in some poses, so that evidence is shared alike."""
+        return all(
+            self._moved_m(i, was, now) < _SHARED_M for i, (was, now) in enumerate(zip(poses, self.poses, strict=True))
+        )
 
     def _recovered(self, person: int, seen: _Seen) -> _Seen:
         """Search what the refinement alone did not find, if anything, among all edges.
@@ -180,10 +201,10 @@ class Scene:
         model, free = memory.model, memory.free
         suspects = tuple(x for name in found.suspects for x in memory.limbs if x.name == name)  # not those locked
         priors = self._priors(person, suspects)
-        views = self._own([unfiltered(v) for v in self._views], person, everywhere=True)
+        own, shared = self._own([unfiltered(v) for v in self._views], person, everywhere=True), tuple(self.poses)
         bodies, index = self._around(person)
-        match = ContourMatch(views, bodies, index, settings.match, settings.theta_px, everywhere=True)
-        judge = Judge(match, priors, Colors(views, bodies, index), memory.known, settings.recover, free)
+        match = self._match(person, own, everywhere=True)
+        judge = Judge(match, priors, Colors(own, bodies, index), memory.known, settings.recover, free)
         fit = solve(model, seen.fit.values, [match, *priors], free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
         remarks: list[str] = []
         evaluations = 0
@@ -199,7 +220,9 @@ class Scene:
             if turned[limb.dofs].max() > _ANEW_RAD:
                 remarks.append(f"{confidence.spoken(limb.name)} searched anew")
         self.poses[person] = better.values
-        return _Seen(match, better, suspects, None, evaluations, tuple(remarks), tuple(r.values for r in rivals))
+        return _Seen(
+            match, own, shared, better, suspects, None, evaluations, tuple(remarks), tuple(r.values for r in rivals)
+        )
 
     def _judged(self, person: int, seen: _Seen) -> Found:
         """Put a person in the pose that was found, with the judgement of it."""
@@ -309,14 +332,13 @@ class Scene:
         far = np.nansum(costs.forward_px * costs.length_px / scales[:, None] ** 2, axis=0)
         return np.divide(far, length, out=np.full_like(length, np.nan), where=length > 0)
 
-    def _match(self, person: int, views: Sequence[ViewEvidence], everywhere: bool = False) -> ContourMatch:
-        """The residuals of a person's contours, the others where they stand."""
+    def _match(self, person: int, own: Sequence[ViewEvidence], everywhere: bool = False) -> ContourMatch:
+        """The residuals of a person's contours against evidence of their own, the others where they stand."""
         bodies, index = self._around(person)
         settings = self._settings
-        own = self._own(views, person, everywhere)
         return ContourMatch(own, bodies, index, settings.match, settings.theta_px, everywhere)
 
-    def _own(self, views: Sequence[ViewEvidence], person: int, everywhere: bool) -> Sequence[ViewEvidence]:
+    def _own(self, views: Sequence[ViewEvidence], person: int, everywhere: bool = False) -> Sequence[ViewEvidence]:
         """The evidence without what the others explain."""
         return own_views(views, *self._around(person), everywhere)
 
