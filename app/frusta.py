@@ -74,8 +74,7 @@ class Frusta:
             time.sleep(_REST_S)
             now = self._controller.state
             # Without a graphics card the browser has no time for them beside a tracker.
-            is_slow = now.track.running and bool(now.holding_3d)
-            if now.frame != wanted or now.drag is not None or is_slow:
+            if now.frame != wanted or now.drag is not None or now.spares_3d:
                 return  # the state that follows asks again
         self._shown = wanted
         images = [None] * len(self._cameras) if wanted is None else self._controller.frames.images(wanted)

@@ -9,7 +9,7 @@ import viser
 
 from app.body_panel import BodyPanel
 from app.controller import Controller
-from app.jobs import Latest
+from app.jobs import Latest, Pace
 from app.settings_panel import SettingsPanel
 from app.state import State
 from tracker.body import BodyModel
@@ -37,6 +37,7 @@ class Panels:
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Build the panels and follow the controller's state."""
         self._server, self._controller = server, controller
+        self._pace = Pace()
         self._edits = Latest(self._apply, "sliders")
         self._sliders: list[list[viser.GuiSliderHandle[float]]] = []
         self._folders: list[viser.GuiFolderHandle] = []
@@ -88,7 +89,7 @@ class Panels:
         self._show(self._controller.state)
 
     def _show(self, state: State) -> None:
-        if state.rests_3d:
+        if state.rests_3d or not self._pace.is_due(state.spares_3d):
             return
         with self._server.atomic():
             self._settings.show(state.settings)

@@ -1,6 +1,5 @@
 """State to viser's 3-D scene: bodies, the ghost of the prediction, trails, floor, cameras."""
 
-import time
 from collections.abc import Sequence
 from functools import partial
 
@@ -11,7 +10,7 @@ from app.controller import Controller
 from app.expected import prediction
 from app.floor_picks import FloorState
 from app.frusta import Frusta
-from app.jobs import Latest
+from app.jobs import Latest, Pace
 from app.snap import SnapView
 from app.state import State
 from app.trails import Trails
@@ -27,8 +26,6 @@ from tracker.session import Session
 
 _REST_S = 0.08
 """Time between updates: drawing the scene costs the browser more than drawing the panes, which go first."""
-_SLOW_REST_S = 1.0
-"""The same while a tracker runs and a page draws the scene without a graphics card."""
 _CELL_RGB, _SECTION_RGB = (112, 116, 122), (140, 145, 152)
 """Lines of the floor, legible before black, white and an image."""
 _GHOST_RGB = (150, 158, 172)
@@ -43,7 +40,7 @@ class Scene:
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Build the scene and follow the controller's state."""
         self._server, self._controller, self._session = server, controller, controller.session
-        self._shown_at = 0.0
+        self._pace = Pace()
         self._posed: tuple[object, ...] = ()
         self._expected: tuple[object, ...] = ()
         self._trailed: tuple[object, ...] = ()
@@ -65,10 +62,8 @@ class Scene:
 
     def _show(self, state: State) -> None:
         state = state.drawn
-        is_slow = state.track.running and bool(state.holding_3d)
-        if state.rests_3d or (is_slow and time.monotonic() < self._shown_at + _SLOW_REST_S):
+        if state.rests_3d or not self._pace.is_due(state.spares_3d):
             return
-        self._shown_at = time.monotonic()
         with self._server.atomic():
             self._frusta.show(state)
             self._show_bodies(state)

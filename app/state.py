@@ -255,7 +255,7 @@ class State:
     drag_seqs: tuple[tuple[int, int], ...] = ()
     """For each page that drags: its number, and the last of its drag messages that this state takes in."""
     holding_3d: frozenset[int] = frozenset()
-    """Numbers of the pages that want the 3-D view to rest during a drag."""
+    """Numbers of the pages that draw the 3-D view without a graphics card, and want it to rest during a drag."""
     view_3d: View3d = field(default_factory=View3d)
     floor: FloorState = field(default_factory=FloorState)
     footage: FootageState = field(default_factory=FootageState)
@@ -275,6 +275,11 @@ class State:
     def rests_3d(self) -> bool:
         """Whether the 3-D view and its panels wait for the end of a drag."""
         return self.in_hand and bool(self.holding_3d)
+
+    @property
+    def spares_3d(self) -> bool:
+        """Whether the 3-D view and its panels are drawn but once in a while: who is at work needs the processor."""
+        return (self.track.running or self.job.running) and bool(self.holding_3d)
 
     @property
     def in_hand(self) -> bool:
