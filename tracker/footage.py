@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from av.packet import Packet
 from av.video.frame import VideoFrame
+from av.video.reformatter import VideoReformatter
 from numpy.typing import NDArray
 
 from tracker import footage_index, footage_listing
@@ -61,6 +62,7 @@ class VideoFile:
         self.path, self._indices = path, indices
         self._where = f"camera '{camera}': video {path}"
         self._lock = threading.Lock()
+        self._converter = VideoReformatter()
         self._grown = threading.Condition()  # guards the four below
         self._listed = Listed(Index(np.empty(0, np.int64), {}, np.empty(0, np.int64)), 0.0)
         self._is_listed, self._closed = False, False
@@ -126,7 +128,7 @@ class VideoFile:
                 raise RecordingError(
                     f"{self._where} cannot be read any more: {error.strerror}; check the disk"
                 ) from error
-            return None if frame is None else _to_rgb(frame)
+            return None if frame is None else self._to_rgb(frame)
 
     def close(self) -> None:
         """Release the file; reading is over."""
@@ -148,6 +150,12 @@ class VideoFile:
         self._tick_s = float(self._stream.time_base or 0)
         self._frames = self._decode(self._container.demux(self._stream))
         self._next = 0
+
+    def _to_rgb(self, frame: VideoFrame) -> Image:
+        # One converter for all frames: to prepare one takes longer than to convert.
+        image = self._converter.reformat(frame, format="rgb24").to_ndarray()
+        # The display rotation is counter-clockwise, as rot90 turns.
+        return np.ascontiguousarray(np.rot90(image, frame.rotation // 90))
 
     def _decode_frame(self, k: int) -> VideoFrame | None:
         """Frame k, or None where it is damaged."""
@@ -380,9 +388,3 @@ def _read_image_or_none(path: Path, where: str) -> Image | None:
 def _natural(path: Path) -> list[tuple[int, int | str]]:
     """Sorting key that takes runs of digits as numbers."""
     return [(0, int(t)) if t.isdigit() else (1, t) for t in re.split(r"(\d+)", path.name) if t]
-
-
-def _to_rgb(frame: VideoFrame) -> Image:
-    image = frame.to_ndarray(format="rgb24")
-    # The display rotation is counter-clockwise, as rot90 turns.
-    return np.ascontiguousarray(np.rot90(image, frame.rotation // 90))
