@@ -14,10 +14,10 @@ install: $(VENV)/.installed
 run: install
 	$(BIN)/quadrille
 
-# Those of the page come by themselves, two at once: what they wait for would come late beside more.
+# Those of the page have the machine to themselves: what they wait for would come late beside others.
 test: check
 	$(BIN)/python -m pytest --ignore tests/browser --numprocesses auto
-	$(BIN)/python -m pytest tests/browser --numprocesses 2 --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest tests/browser
 
 # How fast it is here, beside what must hold and the ratios that are kept.
 bench: $(VENV)/.tested

@@ -8,6 +8,7 @@ import viser
 
 from app.controller import Controller
 from app.jobs import Latest
+from app.pace import Pace
 from app.state import State
 from tracker import rigid
 from tracker.pose_edits import joint_of
@@ -52,7 +53,7 @@ class Gizmos:
                 "/gizmos/joint", _JOINT_SCALE, disable_axes=True, disable_sliders=True, depth_test=False, visible=False
             ),
         }
-        self._pulls = Latest(self._apply, "gizmos")
+        self._pulls, self._pace = Latest(self._apply, "gizmos"), Pace(controller)
         for which, handle in self._handles.items():
             self._listen(which, handle)
         latest = Latest(self._show, "gizmo places", _REST_S)
@@ -80,8 +81,10 @@ class Gizmos:
             self._show(self._controller.state)  # a joint may not have been able to follow
 
     def _show(self, state: State) -> None:
-        if state.rests_3d:
+        due = self._pace.due(state)
+        if due is None:
             return
+        state = due
         model, values = state.models[state.person], state.poses[state.person]
         joint = joint_of(model, state.point)
         places = model.kinematics(values).Ts_world_part

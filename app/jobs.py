@@ -116,21 +116,6 @@ class Job(Generic[T]):
             self._wake.clear()
 
 
-class Pace:
-    """Says when what is costly to draw may be drawn again."""
-
-    def __init__(self, seldom_s: float = 2.0) -> None:
-        """Nothing has been drawn yet; `seldom_s` is the least time between two drawings where the costs are felt."""
-        self._seldom_s, self._drawn_at = seldom_s, float("-inf")
-
-    def is_due(self, seldom: bool) -> bool:
-        """Whether to draw now, which then counts as done."""
-        if seldom and time.monotonic() < self._drawn_at + self._seldom_s:
-            return False
-        self._drawn_at = time.monotonic()
-        return True
-
-
 class Latest(Generic[T]):
     """Hands values to a slow consumer in a thread of its own: per key only the newest that waits, in order of offer."""
 

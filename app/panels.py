@@ -9,7 +9,8 @@ import viser
 
 from app.body_panel import BodyPanel
 from app.controller import Controller
-from app.jobs import Latest, Pace
+from app.jobs import Latest
+from app.pace import Pace
 from app.settings_panel import SettingsPanel
 from app.state import State
 from tracker.body import BodyModel
@@ -37,7 +38,7 @@ class Panels:
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Build the panels and follow the controller's state."""
         self._server, self._controller = server, controller
-        self._pace = Pace()
+        self._pace = Pace(controller)
         self._edits = Latest(self._apply, "sliders")
         self._sliders: list[list[viser.GuiSliderHandle[float]]] = []
         self._folders: list[viser.GuiFolderHandle] = []
@@ -89,8 +90,10 @@ class Panels:
         self._show(self._controller.state)
 
     def _show(self, state: State) -> None:
-        if state.rests_3d or not self._pace.is_due(state.spares_3d):
+        due = self._pace.due(state)
+        if due is None:
             return
+        state = due
         with self._server.atomic():
             self._settings.show(state.settings)
             self._body.show(state)

@@ -10,7 +10,8 @@ from app.controller import Controller
 from app.expected import prediction
 from app.floor_picks import FloorState
 from app.frusta import Frusta
-from app.jobs import Latest, Pace
+from app.jobs import Latest
+from app.pace import Pace
 from app.snap import SnapView
 from app.state import State
 from app.trails import Trails
@@ -40,7 +41,7 @@ class Scene:
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Build the scene and follow the controller's state."""
         self._server, self._controller, self._session = server, controller, controller.session
-        self._pace = Pace()
+        self._pace = Pace(controller)
         self._posed: tuple[object, ...] = ()
         self._expected: tuple[object, ...] = ()
         self._trailed: tuple[object, ...] = ()
@@ -61,9 +62,10 @@ class Scene:
         SnapView(server, controller)
 
     def _show(self, state: State) -> None:
-        state = state.drawn
-        if state.rests_3d or not self._pace.is_due(state.spares_3d):
+        due = self._pace.due(state)
+        if due is None:
             return
+        state = due.drawn
         with self._server.atomic():
             self._frusta.show(state)
             self._show_bodies(state)

@@ -4,7 +4,6 @@ import time
 import pytest
 from hands import wait_for
 
-from app import jobs
 from app.jobs import Job
 from tracker.errors import TrackerError
 
@@ -82,14 +81,3 @@ def test_a_job_that_fails_hands_its_error_on():
     wait_for(lambda: watched.ended)
     assert watched.done == [1]
     assert str(watched.ended[0]) == "no light"
-
-
-def test_what_is_costly_is_drawn_at_once_and_then_but_once_in_a_while(monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr(jobs.time, "monotonic", lambda: now[0])
-    pace = jobs.Pace(2.0)
-    due = []
-    for seconds, seldom in ((0, True), (1.9, True), (2.1, True), (2.2, True), (2.3, False), (4.2, True), (4.4, True)):
-        now[0] = 100.0 + seconds
-        due.append(pace.is_due(seldom))
-    assert due == [True, False, True, False, True, False, True]
