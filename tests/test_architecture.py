@@ -98,6 +98,7 @@ ORDER = [
     ["app.flooring", "app.viewing"],
     ["app.landscape", "app.pinning", "app.sizing", "app.ranges", "app.replay", "app.search_settings"],
     ["app.controller", "app.messages", "app.headless", "app.indexing"],
+    ["app.pace"],
     [
         "app.body_panel",
         "app.frusta",
