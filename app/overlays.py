@@ -112,8 +112,6 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
     bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     points = [b.model.points_world(b.values) for b in bodies]
     seen = {index: session.cameras[index].camera.pinhole for index in sorted(cameras)}
-    if not seen:
-        return []
     out, hidden_by_view = [], occlusion.points_hidden(bodies, list(seen.values()), np.concatenate(points))
     for (index, camera), hidden in zip(seen.items(), hidden_by_view, strict=True):
         first = 0

@@ -144,11 +144,12 @@ class Colors:
         Ts = np.concatenate([b.model.kinematics(b.values).Ts_world_part for b in self._bodies])
         first = sum(len(b.model.parts) for b in self._bodies[: self._person])
         ratios = np.zeros((len(model.parts), BINS**3)) if known is None else known.log_ratios
-        Ts[first : first + len(model.parts)] = model.kinematics(candidates[0]).Ts_world_part
+        room = model.kinematics(candidates[0])
+        Ts[first : first + len(model.parts)] = room.Ts_world_part
         shapes = np.concatenate(self._shapes)
         shapes[first + np.array(away, dtype=np.int64), 3:] = _SPECK_M
         limb_Ts = np.empty((len(candidates), len(limb), 4, 4))
-        _place_limb(candidates, model.tree, model.kinematics(candidates[0]), limb, limb_Ts)
+        _place_limb(candidates, model.tree, room, limb, limb_Ts)
 
         def look(view: tuple[Array, Array, Image, tuple[FloatArray, float]]) -> Array:
             P, eye, image, (distance, theta) = view
@@ -160,7 +161,10 @@ class Colors:
             return seen
 
         views = zip(self._P, self._eyes, self._images, self._distances, strict=True)
-        return np.sum(list(helpers().map(look, views)), axis=0, initial=0.0) + np.zeros(len(candidates))
+        total = np.zeros(len(candidates))
+        for seen in helpers().map(look, views):
+            total += seen
+        return total
 
     def _samples(self, values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
         """Part, colour and view of each visible sample, (n,) each."""

@@ -35,7 +35,8 @@ def points_hidden(bodies: Sequence[Body], cameras: Sequence[Camera], points_worl
             for shape, T, center in zip(shapes, Ts, surfaces.centers, strict=True)
         ]
     )
-    return np.stack([_blocked(c, Ts, surfaces, points_world, holds) for c in cameras])
+    hidden = [_blocked(c, Ts, surfaces, points_world, holds) for c in cameras]
+    return np.array(hidden, dtype=bool).reshape(len(cameras), len(points_world))
 
 
 def part_edges(bodies: Sequence[Body], camera: Camera) -> FloatArray:

@@ -64,15 +64,21 @@ def _in_doubt(found: Found, remark: str, others: Sequence[tuple[Array, ...]]) ->
     return found._replace(status=status, remark=remarks, others=(*found.others, *others))
 
 
+class _Share(NamedTuple):
+    """The evidence of one person, without what is clearly somebody else's."""
+
+    views: Sequence[ViewEvidence]
+    poses: tuple[Array, ...]
+    """Those of everybody for which it was shared out, (n_values,) each."""
+
+
 class _Seen(NamedTuple):
     """One person as far as they are found."""
 
     match: ContourMatch
     """The evidence that they were fitted to."""
-    own: Sequence[ViewEvidence]
-    """That evidence by view, without what is clearly somebody else's."""
-    shared: tuple[Array, ...]
-    """The poses of everybody for which it was shared out, (n_values,) each."""
+    own: _Share
+    """What of the evidence that was made of."""
     fit: Fit
     anew: tuple[Limb, ...] | None = None
     """Limbs whose prediction is not trusted, where the person was searched anew; None where that was not needed."""
@@ -119,10 +125,8 @@ class Scene:
 
     def held(self, person: int) -> Found:
         """Judge nobody: a pose that was given is taken as it is."""
-        n, costs = (
-            self._models[person].n_dofs,
-            self._match(person, self._own(self._views, person)).part_costs(self.poses[person]),
-        )
+        match, n = self._match(person, self._own(self._views, person)), self._models[person].n_dofs
+        costs = match.part_costs(self.poses[person])
         return Found("good", "", self._parts_px(costs), np.zeros((n, n)), 0, None)
 
     def estimate(self, people: Sequence[int]) -> dict[int, Found]:
@@ -142,29 +146,29 @@ class Scene:
 
     def _searched(self, person: int) -> _Seen:
         """Search a person by best-first search alone."""
-        own, shared = self._own(self._views, person), tuple(self.poses)
+        own = self._own(self._views, person)
         match = self._match(person, own)
         evaluations = self._search(person, self._settings.search)
         blocks = [match, *self._priors(person)]
         fit = solve(self._models[person], self.poses[person], blocks, self._memories[person].free, max_iterations=0)
-        return _Seen(match, own, shared, fit, evaluations=evaluations)
+        return _Seen(match, own, fit, evaluations=evaluations)
 
     def _refined(self, person: int, before: _Seen | None = None) -> _Seen:
         """Refine a person from where they stand, as they were seen before if they were."""
         anew = None if before is None else before.anew
-        if before is not None and self._stands(before.shared):
-            own, shared = before.own, before.shared
+        if before is not None and self._stands(before.own.poses):
+            own = before.own
         else:
             views = self._views if anew is None else [unfiltered(v) for v in self._views]
-            own, shared = self._own(views, person, everywhere=anew is not None), tuple(self.poses)
+            own = self._own(views, person, everywhere=anew is not None)
         match = self._match(person, own, everywhere=anew is not None)
         blocks = [match, *self._priors(person, anew or ())]
         model, free = self._models[person], self._memories[person].free
         fit = solve(model, self.poses[person], blocks, free, _ITERATIONS, _TOLERANCE)
         self.poses[person] = fit.values
         if before is None:
-            return _Seen(match, own, shared, fit)
-        return before._replace(match=match, own=own, shared=shared, fit=fit, quality=None)
+            return _Seen(match, own, fit)
+        return before._replace(match=match, own=own, fit=fit, quality=None)
 
     def _refine_together(self, seen: dict[int, _Seen]) -> None:
         """Refine people again and again, each with the others where they were found, until nobody moves."""
@@ -201,10 +205,10 @@ class Scene:
         model, free = memory.model, memory.free
         suspects = tuple(x for name in found.suspects for x in memory.limbs if x.name == name)  # not those locked
         priors = self._priors(person, suspects)
-        own, shared = self._own([unfiltered(v) for v in self._views], person, everywhere=True), tuple(self.poses)
+        own = self._own([unfiltered(v) for v in self._views], person, everywhere=True)
         bodies, index = self._around(person)
         match = self._match(person, own, everywhere=True)
-        judge = Judge(match, priors, Colors(own, bodies, index), memory.known, settings.recover, free)
+        judge = Judge(match, priors, Colors(own.views, bodies, index), memory.known, settings.recover, free)
         fit = solve(model, seen.fit.values, [match, *priors], free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
         remarks: list[str] = []
         evaluations = 0
@@ -220,9 +224,7 @@ class Scene:
             if turned[limb.dofs].max() > _ANEW_RAD:
                 remarks.append(f"{confidence.spoken(limb.name)} searched anew")
         self.poses[person] = better.values
-        return _Seen(
-            match, own, shared, better, suspects, None, evaluations, tuple(remarks), tuple(r.values for r in rivals)
-        )
+        return _Seen(match, own, better, suspects, None, evaluations, tuple(remarks), tuple(r.values for r in rivals))
 
     def _judged(self, person: int, seen: _Seen) -> Found:
         """Put a person in the pose that was found, with the judgement of it."""
@@ -332,15 +334,15 @@ class Scene:
         far = np.nansum(costs.forward_px * costs.length_px / scales[:, None] ** 2, axis=0)
         return np.divide(far, length, out=np.full_like(length, np.nan), where=length > 0)
 
-    def _match(self, person: int, own: Sequence[ViewEvidence], everywhere: bool = False) -> ContourMatch:
+    def _match(self, person: int, own: _Share, everywhere: bool = False) -> ContourMatch:
         """The residuals of a person's contours against evidence of their own, the others where they stand."""
         bodies, index = self._around(person)
         settings = self._settings
-        return ContourMatch(own, bodies, index, settings.match, settings.theta_px, everywhere)
+        return ContourMatch(own.views, bodies, index, settings.match, settings.theta_px, everywhere)
 
-    def _own(self, views: Sequence[ViewEvidence], person: int, everywhere: bool = False) -> Sequence[ViewEvidence]:
+    def _own(self, views: Sequence[ViewEvidence], person: int, everywhere: bool = False) -> _Share:
         """The evidence without what the others explain."""
-        return own_views(views, *self._around(person), everywhere)
+        return _Share(own_views(views, *self._around(person), everywhere), tuple(self.poses))
 
     def _around(self, person: int) -> tuple[list[Body], int]:
         """Who is in the scene for a person, and their index there."""

@@ -141,10 +141,8 @@ async def snap(page, index, through=True):
             await page.mouse.move(pane["x"] + 20, pane["y"] + pane["height"] / 2)
             await asyncio.sleep(0.1)
             await page.mouse.move(pane["x"] + 24, pane["y"] + pane["height"] / 2)
-    wanted = index if through else None
-    if (await state_of(page))["state"]["snapped"] != wanted:
-        await page.keyboard.press("y")
-        await shows(page, f"quadrille.state.state.snapped === {index if through else 'null'}")
+    await page.keyboard.press("y")
+    await shows(page, f"quadrille.state.state.snapped === {index if through else 'null'}", 30)
 
 
 def outline_of(mask):

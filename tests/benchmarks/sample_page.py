@@ -1,0 +1,37 @@
+"""The program on a copy of the sample, and its page in Chromium, for benchmarks of the page."""
+
+import asyncio
+import contextlib
+import shutil
+import sys
+import tempfile
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+from playwright.async_api import Page, async_playwright
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tests" / "browser")]
+
+from chromium import FLAGS, chromium_path  # noqa: E402
+from driving import shows  # noqa: E402
+from running import Program  # noqa: E402
+
+
+@contextlib.asynccontextmanager
+async def sample_page() -> AsyncIterator[Page]:
+    """The page, at rest with the real 3-D view beside its panes."""
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary) / "session"
+        shutil.copytree(ROOT / "sample_sessions" / "elbow_rotation", folder)
+        program = Program(folder)
+        await program.start()
+        async with async_playwright() as playwright:
+            browser = await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
+            page = await browser.new_page(viewport={"width": 1440, "height": 900})
+            await page.goto(program.address)
+            await shows(page, "window.quadrille?.state.overlay && window.quadrille.state.state.cost_px", 120)
+            await asyncio.sleep(6)  # the 3-D view has its first picture
+            yield page
+            await browser.close()
+        await program.stop()
