@@ -7,13 +7,14 @@ outline in the images this is what tells that one of them belongs elsewhere.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body import Body, BodyModel
-from tracker.fit import Normal, normal_of
+from tracker.fit import Normal
 from tracker.kinematics import IntArray, Kinematics
 from tracker.rigid import Array
 from tracker.surfaces import surfaces_of
@@ -37,15 +38,8 @@ class KeepApart:
 
     def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `fit.Block`."""
-        depths, points, normals, own, other = _contacts(
-            (model,), kinematics.Ts_world_part, may_touch(model, self.softness), self.softness
-        )
-        if not len(depths):
-            return _nothing(model)
-        # The two parts move against each other at the point where they touch.
-        relative = model.point_jacobian(kinematics, own, points) - model.point_jacobian(kinematics, other, points)
-        weight = 1 / (self.sigma_m * np.sqrt(_SAMPLES))
-        return normal_of(weight * depths, -weight * np.einsum("ni,nik->nk", normals, relative))
+        contacts = _contacts((model,), kinematics.Ts_world_part, may_touch(model, self.softness), self.softness)
+        return _pushed(contacts, model, kinematics, 0, _weight(self.sigma_m))
 
 
 class KeepBodiesApart:
@@ -73,31 +67,42 @@ class KeepBodiesApart:
         mine = np.zeros(len(self._Ts), dtype=bool)
         mine[self._own] = True
         self._apart = mine[:, None] != mine
-        self._weight, self._softness = np.sqrt(weight) / (sigma_m * np.sqrt(_SAMPLES)), softness
+        self._weight, self._softness = np.sqrt(weight) * _weight(sigma_m), softness
 
     def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `fit.Block`."""
-        self._Ts[self._own] = kinematics.Ts_world_part
-        depths, points, normals, parts, others = _contacts(self._models, self._Ts, self._apart, self._softness)
-        if not len(depths):
-            return _nothing(model)
-        # Of each pair one part is the person's: that of the point, which leaves along the normal, or the other.
-        first, last = self._own.start, self._own.stop
-        of_point = (parts >= first) & (parts < last)
-        outward = np.where(of_point[:, None], normals, -normals)
-        moves = model.point_jacobian(kinematics, np.where(of_point, parts, others) - first, points)
-        return normal_of(self._weight * depths, -self._weight * np.einsum("ni,nik->nk", outward, moves))
+        Ts = self._Ts.copy()  # several threads may ask
+        Ts[self._own] = kinematics.Ts_world_part
+        contacts = _contacts(self._models, Ts, self._apart, self._softness)
+        return _pushed(contacts, model, kinematics, self._own.start, self._weight)
 
 
-def _nothing(model: BodyModel) -> Normal:
+class _Contacts(NamedTuple):
+    """Where points on the axes of parts lie within other parts."""
+
+    rows: Array
+    """Depth, the point and the outward normal of the other part there, in the world, (n, 7), metres."""
+    parts: IntArray
+    """Index of the part of the point, and that of the other, (n, 2)."""
+
+
+def _weight(sigma_m: float) -> float:
+    """Weight of the depth of one point, per metre."""
+    return float(1 / (sigma_m * np.sqrt(_SAMPLES)))
+
+
+def _pushed(contacts: _Contacts, model: BodyModel, kinematics: Kinematics, first: int, weight: float) -> Normal:
+    """Normal equations of weighted depths for a body whose first part has an index; the parts of others stand."""
     n = model.n_dofs
-    return Normal(0.0, np.zeros(n), np.zeros((n, n)))
+    gradient, hessian = np.zeros(n), np.zeros((n, n))
+    cost = 0.0
+    if len(contacts.rows):
+        cost = _push(*contacts, first, weight, kinematics, model.dof_is_length, model.moves, gradient, hessian)
+    return Normal(cost, gradient, hessian)
 
 
-def _contacts(
-    models: tuple[BodyModel, ...], Ts: Array, apart: NDArray[np.bool_], softness: float
-) -> tuple[Array, Array, Array, IntArray, IntArray]:
-    """Depth (n,), place and outward normal in the world (n, 3), and the two parts (n,) of each contact.
+def _contacts(models: tuple[BodyModel, ...], Ts: Array, apart: NDArray[np.bool_], softness: float) -> _Contacts:
+    """List what lies within what.
 
     Args:
         models: all bodies.
@@ -109,14 +114,14 @@ def _contacts(
     rows, parts = np.empty((room, 7)), np.empty((room, 2), np.int64)
     surfaces = surfaces_of(models)
     n = _touch(Ts, surfaces.centers, surfaces.half_axes, apart, softness, rows, parts)
-    return rows[:n, 0], rows[:n, 1:4], rows[:n, 4:], parts[:n, 0], parts[:n, 1]
+    return _Contacts(rows[:n], parts[:n])
 
 
 @lru_cache(maxsize=32)
 def may_touch(model: BodyModel, softness: float) -> NDArray[np.bool_]:
     """Which parts are apart in a body that stands at ease: neither adjoining nor overlapping then, (P, P)."""
     everything = ~np.eye(len(model.parts), dtype=bool)
-    *_, own, other = _contacts((model,), model.kinematics(model.neutral()).Ts_world_part, everything, softness)
+    own, other = _contacts((model,), model.kinematics(model.neutral()).Ts_world_part, everything, softness).parts.T
     for part, parent in enumerate(model.parents):
         if parent >= 0:
             everything[part, parent] = everything[parent, part] = False
@@ -166,3 +171,42 @@ def _touch(
                 parts[n, 0], parts[n, 1] = own, other
                 n += 1
     return n
+
+
+@njit(nogil=True, cache=True)
+def _push(
+    rows: Array, parts: IntArray, first: int, weight: float, kinematics: Kinematics, is_length: NDArray[np.bool_],
+    moves: NDArray[np.bool_], gradient: Array, hessian: Array,
+) -> float:  # fmt: skip
+    """Add up the normal equations of weighted depths, (n_dofs,) and (n_dofs, n_dofs); returns half their squares.
+
+    A point X in a part moves by a rotation about a through o as a x (X - o), so along the normal n by a . (X - o) x n.
+    The two parts move against each other there; what moves both alike changes nothing.
+    """
+    n_dofs, n_parts, cost = moves.shape[0], moves.shape[1], 0.0
+    row, felt = np.empty(n_dofs), np.empty(n_dofs, np.int64)
+    for c in range(rows.shape[0]):
+        r = weight * rows[c, 0]
+        cost += 0.5 * r * r
+        x, y, z, nx, ny, nz = rows[c, 1], rows[c, 2], rows[c, 3], rows[c, 4], rows[c, 5], rows[c, 6]
+        own, other, n = parts[c, 0] - first, parts[c, 1] - first, 0
+        for k in range(n_dofs):
+            sign = 0.0
+            if 0 <= own < n_parts and moves[k, own]:
+                sign -= 1.0
+            if 0 <= other < n_parts and moves[k, other]:
+                sign += 1.0
+            if sign == 0.0:
+                continue
+            a, o = kinematics.axes_world[k], kinematics.origins_world[k]
+            slope = a[0] * nx + a[1] * ny + a[2] * nz
+            if not is_length[k]:
+                dx, dy, dz = x - o[0], y - o[1], z - o[2]
+                slope = a[0] * (dy * nz - dz * ny) + a[1] * (dz * nx - dx * nz) + a[2] * (dx * ny - dy * nx)
+            row[n], felt[n] = sign * weight * slope, k
+            n += 1
+        for i in range(n):
+            gradient[felt[i]] += r * row[i]
+            for j in range(n):
+                hessian[felt[i], felt[j]] += row[i] * row[j]
+    return cost

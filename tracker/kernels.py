@@ -11,8 +11,11 @@ each array at every call and every slice, which cost more than the work of these
 FAST: dict[str, Any] = BORROW | {"fastmath": {"contract", "reassoc", "nsz", "arcp"}}
 """The same in any order of arithmetic, which lets loops run on whole vectors; infinite numbers keep their meaning."""
 
+N_HELPERS = os.cpu_count() or 1
+"""Threads that work side by side."""
+
 
 @lru_cache(maxsize=1)
 def helpers() -> ThreadPoolExecutor:
     """Threads that work besides the caller's; kernels let go of the interpreter's lock."""
-    return ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="kernels")
+    return ThreadPoolExecutor(N_HELPERS, thread_name_prefix="kernels")

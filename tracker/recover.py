@@ -7,9 +7,9 @@ together.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from functools import lru_cache, partial
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,12 @@ from tracker.appearance import Colors, PartColors
 from tracker.body import BodyModel
 from tracker.confidence import Limb
 from tracker.fit import Block, Fit, solve
+from tracker.kernels import N_HELPERS, helpers
 from tracker.kinematics import IntArray
 from tracker.refine import WORTH_A_STEP, ContourMatch
 from tracker.rigid import Array
+
+T = TypeVar("T")
 
 _APART_M, _SAME_M = 0.12, 0.06
 """How far apart the places are that are improved; poses nearer to each other than the second lead to the same one."""
@@ -71,13 +74,34 @@ class Judge:
     free: NDArray[np.bool_] | None = None
     """The degrees of freedom that may move, (n_dofs,); None: all. Limbs are given without the others."""
 
+    @property
+    def blocks(self) -> list[Block]:
+        """What `fit.solve` is to minimize."""
+        return [self.match, *self.priors]
+
+    @cached_property
+    def _for_threads(self) -> list["Judge"]:
+        return [replace(self, match=self.match.twin()) for _ in range(N_HELPERS)]
+
+    def each(self, work: Callable[["Judge", Array], T], poses: Sequence[Array] | Array) -> list[T]:
+        """What some work makes of each of several poses, (n_values,) each, in threads side by side, each with a judge
+        of its own."""
+
+        def share(i: int, judge: Judge) -> list[T]:
+            return [work(judge, pose) for pose in poses[i::N_HELPERS]]
+
+        shares = list(helpers().map(share, range(N_HELPERS), self._for_threads))
+        return [shares[i % N_HELPERS][i // N_HELPERS] for i in range(len(poses))]
+
     def cost(self, fit: Fit) -> float:
         """Cost of a refined pose with its colours."""
         return fit.cost + self._of_colors(fit.values)
 
     def costs(self, candidates: Array) -> Array:
         """Costs of poses, (n, n_values), without refinement, (n,); priors are left to the refinement."""
-        return self.match.costs(candidates) + np.array([self._of_colors(v) for v in candidates])
+        return np.array(
+            self.each(lambda judge, v: float(judge.match.costs(v[None])[0]) + judge._of_colors(v), candidates)
+        )
 
     def _of_colors(self, values: Array) -> float:
         if self.known is None:
@@ -129,15 +153,15 @@ def _search_limb(
     model: BodyModel, limb: Limb, away: list[int], here: Fit, others: Sequence[Array], judge: Judge, iterations: int
 ) -> list[Fit]:
     """The best poses of one limb, refined with the whole body; parts that are `away` hide nothing at first."""
-    settings, blocks = judge.settings, [judge.match, *judge.priors]
-    alone = [
-        solve(model, candidate, blocks, limb.dofs, max_iterations=4, tolerance=1e-2, gain=WORTH_A_STEP)
-        for candidate in _candidates(model, limb, away, here, others, judge)
-    ]
-    return [
-        solve(model, start.values, blocks, judge.free, iterations, tolerance=1e-3)
-        for start in _distinct(model, alone, judge, settings.finished)
-    ]
+
+    def alone(judge: Judge, pose: Array) -> Fit:
+        return solve(model, pose, judge.blocks, limb.dofs, max_iterations=4, tolerance=1e-2, gain=WORTH_A_STEP)
+
+    def whole(judge: Judge, pose: Array) -> Fit:
+        return solve(model, pose, judge.blocks, judge.free, iterations, tolerance=1e-3)
+
+    fits = judge.each(alone, _candidates(model, limb, away, here, others, judge))
+    return judge.each(whole, [f.values for f in _distinct(model, fits, judge, judge.settings.finished)])
 
 
 def _candidates(

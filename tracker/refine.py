@@ -14,6 +14,7 @@ whatever the shapes of the parts.
 """
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -126,12 +127,22 @@ class ContourMatch:
             np.array([weights if len(v.points_px) else 0 * weights for v in views]),
         )
         widest = max((v.camera for v in views), key=lambda camera: camera.width)
-        room, n_points = contours.contour_room(widest, len(bodies)), self._scene.points.shape[1]
-        n_parts = len(self._Ts)
-        self._scratch = scratch_for(self._surfaces, room, n_points)
+        self._most_pieces = contours.contour_room(widest, len(bodies))
+        self._make_room()
+
+    def _make_room(self) -> None:
+        n_parts, n_views = len(self._Ts), len(self._scene.sizes)
+        self._scratch = scratch_for(self._surfaces, self._most_pieces, self._scene.points.shape[1])
         self._sums = Sums(
-            np.empty((n_parts, 6, 6)), np.empty((n_parts, 6)), np.empty((len(views), n_parts, 3)), np.empty(len(views))
+            np.empty((n_parts, 6, 6)), np.empty((n_parts, 6)), np.empty((n_views, n_parts, 3)), np.empty(n_views)
         )
+
+    def twin(self) -> "ContourMatch":
+        """The same for another thread: the evidence is shared, the room to work in is not."""
+        out = copy(self)
+        out._Ts = self._Ts.copy()
+        out._make_room()
+        return out
 
     def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `fit.Block`."""

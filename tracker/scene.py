@@ -209,7 +209,7 @@ class Scene:
         bodies, index = self._around(person)
         match = self._match(person, own, everywhere=True)
         judge = Judge(match, priors, Colors(own.views, bodies, index), memory.known, settings.recover, free)
-        fit = solve(model, seen.fit.values, [match, *priors], free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
+        fit = solve(model, seen.fit.values, judge.blocks, free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
         remarks: list[str] = []
         evaluations = 0
         if found.body_lost:
@@ -300,8 +300,9 @@ class Scene:
         for start in (predicted, memory.last_good):
             self.poses[person] = held(memory.model, start, predicted, memory.free)
             evaluations += self._search(person, BEFORE_REFINEMENT)
-            blocks, here = [judge.match, *judge.priors], self.poses[person]
-            refined = solve(memory.model, here, blocks, memory.free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
+            refined = solve(
+                memory.model, self.poses[person], judge.blocks, memory.free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP
+            )
             if judge.cost(refined) < judge.cost(best):
                 best = refined
         self.poses[person] = best.values

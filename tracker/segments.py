@@ -75,18 +75,27 @@ def accept(segments: Segments, pieces_px: FloatArray, threshold_px: float) -> ND
     return np.asarray(total <= threshold_px * count)
 
 
-def distances(segments: Segments, pieces_px: FloatArray, reach_px: float) -> NDArray[np.float64]:
-    """Mean distance of each segment, (S,), px, to contours as `accept` takes it, each pixel's cut off at a reach."""
-    total, count = _summed(segments, pieces_px, reach_px)
-    return total / np.maximum(count, 1)
+def distances(
+    segments: Segments, pieces_px: FloatArray, reach_px: float, asked: NDArray[np.bool_] | None = None
+) -> NDArray[np.float64]:
+    """Mean distance of each segment, (S,), px, to contours as `accept` takes it, each pixel's cut off at a reach.
+
+    That of segments that are not `asked`, (S,), is the reach.
+    """
+    total, count = _summed(segments, pieces_px, reach_px, asked)
+    return np.divide(total, count, out=np.full(len(total), float(reach_px)), where=count > 0)
 
 
-def _summed(segments: Segments, pieces_px: FloatArray, reach_px: float) -> tuple[FloatArray, IntArray]:
+def _summed(
+    segments: Segments, pieces_px: FloatArray, reach_px: float, asked: NDArray[np.bool_] | None = None
+) -> tuple[FloatArray, IntArray]:
     """Summed distances of the pixels of each segment that are asked, (S,), px, and their number, (S,)."""
     n = len(segments.firsts) - 1
     total, count = np.empty(n, np.float32), np.empty(n, np.int64)
     if n:
-        _sum_distances(segments, np.ascontiguousarray(pieces_px, np.float32), reach_px, MAX_ANGLE_RAD, total, count)
+        pieces, everything = np.ascontiguousarray(pieces_px, np.float32), np.ones(n, np.bool_)
+        wanted = everything if asked is None else asked
+        _sum_distances(segments, pieces, reach_px, MAX_ANGLE_RAD, wanted, total, count)
     return total, count
 
 
@@ -187,8 +196,9 @@ def _cut(points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_], fir
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _sum_distances(
-    segments: Segments, pieces: FloatArray, reach: float, max_angle: float, totals: FloatArray, counts: IntArray
-) -> None:
+    segments: Segments, pieces: FloatArray, reach: float, max_angle: float, asked: NDArray[np.bool_],
+    totals: FloatArray, counts: IntArray,
+) -> None:  # fmt: skip
     """See `_summed`. Pieces are filed by cells as large as the largest distance that counts."""
     points, normals, firsts = segments.points_px, segments.normals, segments.firsts
     far = np.float32(reach)
@@ -207,7 +217,7 @@ def _sum_distances(
     for s in range(totals.shape[0]):
         first, last = firsts[s], firsts[s + 1]
         total, count = np.float32(0.0), 0
-        for i in range(first, last, _STRIDE):
+        for i in range(first, last if asked[s] else first, _STRIDE):
             u, v, nu, nv = points[i, 0], points[i, 1], normals[i, 0], normals[i, 1]
             c, r = int((u - low_u) / far), int((v - low_v) / far)
             best = far * far

@@ -16,6 +16,7 @@ from tracker import contours
 from tracker.body import Body
 from tracker.contours import FloatArray
 from tracker.evidence import ACCEPTED_SHARE, Silhouette, ViewEvidence, with_segments
+from tracker.kernels import helpers
 from tracker.rigid import Array
 from tracker.segments import Segments, distances
 
@@ -40,7 +41,11 @@ def own_views(
     if len(bodies) == 1:
         return tuple(views)
     people = contours.surfaces_of(tuple(b.model for b in bodies)).people
-    return tuple(_own_view(v, contours.trace(bodies, v.camera), people, person, everywhere) for v in views)
+
+    def of_view(view: ViewEvidence) -> ViewEvidence:
+        return _own_view(view, contours.trace(bodies, view.camera), people, person, everywhere)
+
+    return tuple(helpers().map(of_view, views))
 
 
 def _own_view(
@@ -50,11 +55,10 @@ def _own_view(
     mine, others = (contour.pieces_px[shown & of] for of in (owners == person, owners != person))
     if view.segments is None or not (everywhere or _meet(mine, others, _REACH * view.theta_px)):
         return view
-    theirs = _theirs(view.segments, mine, others, view.theta_px)
+    known = np.ones(len(view.segments.firsts) - 1, np.bool_) if view.accepted is None else view.accepted
+    theirs = _theirs(view.segments, known, mine, others, view.theta_px)
     if theirs.any():
-        known = np.ones(len(theirs), np.bool_) if view.accepted is None else view.accepted
-        if (known & theirs).any():
-            view = with_segments(view, known & ~theirs)
+        view = with_segments(view, known & ~theirs)
     if view.silhouette is not None and len(view.silhouette.points_px):
         view = replace(view, silhouette=_own_silhouette(view.silhouette, mine, others, view.theta_px))
     return view
@@ -72,12 +76,16 @@ def _meet(mine: FloatArray, others: FloatArray, reach_px: float) -> bool:
 def _own_silhouette(silhouette: Silhouette, mine: FloatArray, others: FloatArray, theta_px: float) -> Silhouette:
     points, normals = silhouette.points_px, silhouette.normals
     each = Segments(points, normals, np.arange(len(points) + 1))
-    kept = ~_theirs(each, mine, others, theta_px)
+    kept = ~_theirs(each, np.ones(len(points), np.bool_), mine, others, theta_px)
     return replace(silhouette, points_px=points[kept], normals=normals[kept])
 
 
-def _theirs(segments: Segments, mine: FloatArray, others: FloatArray, theta_px: float) -> NDArray[np.bool_]:
-    """Which segments, (S,), run along the others' pieces, (M, 4), and clearly not along one's own."""
+def _theirs(
+    segments: Segments, asked: NDArray[np.bool_], mine: FloatArray, others: FloatArray, theta_px: float
+) -> NDArray[np.bool_]:
+    """Which of the segments that are asked, (S,), run along the others' pieces, (M, 4), and clearly not along one's
+    own."""
     reach = _REACH * theta_px
-    to_others: Array = distances(segments, others, reach)
-    return (to_others <= ACCEPTED_SHARE * theta_px) & (to_others < _CLEARLY * distances(segments, mine, reach))
+    to_others: Array = distances(segments, others, reach, asked)
+    near = asked & (to_others <= ACCEPTED_SHARE * theta_px)
+    return near & (to_others < _CLEARLY * distances(segments, mine, reach, near))
