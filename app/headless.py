@@ -14,6 +14,7 @@ from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
 from tracker.evidence import Observer
 from tracker.formats.model_toml import format_model
+from tracker.locks import free_of, kept_locks
 from tracker.recording import Recording
 from tracker.records import PoseChange
 from tracker.rigid import Array
@@ -32,8 +33,8 @@ _UNFINISHED = "unfinished track"
 def track(at: Target, frames: Sequence[int], settings: TrackSettings, progress: Reporter) -> dict[str, Any]:
     """Track people with the chamfer tracker and store what is found.
 
-    Keyframes stay as they are and tracking goes on from them. Interrupted, it keeps what is done, and the same call
-    again goes on from there.
+    Keyframes stay as they are and tracking goes on from them; what is locked stays as it was. Interrupted, it keeps
+    what is done, and the same call again goes on from there.
 
     Args:
         at: the session and whom to track.
@@ -89,6 +90,8 @@ class _Run:
         self._revisions = [store.add_model_revision(p.name, format_model(p.model)) for p in people]
         self._past = [_past(store, p, frames, i in at.people) for i, p in enumerate(people)]
         self._fixed = keyframes_of(store, people, set(frames))
+        locks = kept_locks(people, store.setting)
+        self._free = [free_of(p.model, locked) for p, locked in zip(people, locks, strict=True)]
         self._waiting: list[PoseChange] = []
         self._edit: int | None = None
         self.done = 0
@@ -97,8 +100,9 @@ class _Run:
 
     def estimates(self, observer: Observer) -> Iterator[PoseEstimate]:
         """Track the frames one by one."""
-        models = [p.model for p in self._at.session.people]
-        return track_chamfer(observer, models, self._past, self._frames, self._settings, self._fixed, self._at.people)
+        models, at = [p.model for p in self._at.session.people], self._at
+        fixed, free = self._fixed, self._free
+        return track_chamfer(observer, models, self._past, self._frames, self._settings, fixed, at.people, free)
 
     def take(self, found: PoseEstimate) -> None:
         """Keep what was found on a frame; on disk with the next save."""

@@ -5,29 +5,21 @@ from contextlib import AbstractContextManager
 
 from app.screen import Screen
 from tracker.body import BodyModel
-
-_KEY = "locked"
-"""Setting of the session: by name of the person the names of the degrees of freedom."""
+from tracker.locks import SETTING, kept_locks, to_keep
 
 
 class Locks:
     """The locks of everybody in the session."""
 
     def __init__(self, screen: Screen, editing: Callable[[], AbstractContextManager[None]]) -> None:
-        """Take over the locks that are kept with the session; names that a model has no more are passed over.
+        """Take over the locks that are kept with the session.
 
         Args:
             screen: holds the state.
             editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
         """
         self._screen, self._editing = screen, editing
-        kept = screen.saver.setting(_KEY, {})
-        screen.set(
-            locked=tuple(
-                frozenset(i for i, name in enumerate(p.model.dof_names) if name in kept.get(p.name, ()))
-                for p in screen.session.people
-            )
-        )
+        screen.set(locked=kept_locks(screen.session.people, screen.saver.setting))
 
     def set(self, person: int, dofs: Collection[int], locked: bool) -> None:
         """Lock or unlock degrees of freedom of a person, each ball joint as a whole; on disk when this returns.
@@ -43,11 +35,7 @@ class Locks:
             if now == before[person]:
                 return
             everybody = (*before[:person], now, *before[person + 1 :])
-            people = self._screen.session.people
-            kept = {
-                p.name: [p.model.dof_names[i] for i in sorted(dofs)] for p, dofs in zip(people, everybody, strict=True)
-            }
-            self._screen.saver.keep_setting(_KEY, kept)
+            self._screen.saver.keep_setting(SETTING, to_keep(self._screen.session.people, everybody))
             self._screen.set(locked=everybody)
 
 

@@ -15,6 +15,7 @@ from app.state import Shown, State, finite_or_none
 from tracker import posing
 from tracker.body import BodyModel
 from tracker.fit import held
+from tracker.locks import free_of
 from tracker.pins import ViewPin
 from tracker.rebody import rebodied
 from tracker.rigid import Array
@@ -68,7 +69,7 @@ class Screen:
 
     def free(self, person: int) -> NDArray[np.bool_]:
         """The degrees of freedom of a person that may move, (n_dofs,): those that are not locked."""
-        return ~np.isin(np.arange(self.present[person].n_dofs), list(self.state.locked[person]))
+        return free_of(self.present[person], self.state.locked[person])
 
     def within_locks(self, poses: Sequence[Array]) -> tuple[Array, ...]:
         """Poses, (n_values,) of each person, with what is locked as it is shown."""

@@ -55,7 +55,7 @@ ORDER = [
     # The session keeps its cameras and models in files of these formats, so it reads and writes by them; a format
     # knows cameras, bodies and tables, never a session.
     ["tracker.session", "tracker.proxy"],
-    ["tracker.recording", "tracker.references"],
+    ["tracker.locks", "tracker.recording", "tracker.references"],
     ["tracker.assemble", "tracker.evidence", "tracker.simulate"],
     ["tracker.matching"],
     ["tracker.chamfer", "tracker.predict", "tracker.appearance", "tracker.refine", "tracker.apart"],

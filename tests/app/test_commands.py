@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +88,18 @@ def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
     assert store.undo() == "track frames 0:4"  # one entry, however many frames
     assert [row.frame for row in store.frames("person")] == [0, 2]
     store.close()
+
+
+def test_tracking_leaves_what_is_locked(run, session):
+    run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
+    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+        store.set_setting("locked", {"person": ["left_elbow.extension", "no_joint.twist"], "nobody": ["torso.x"]})
+    names = load_session(session).people[0].model.value_names
+    assert run("track", session, "--frames", "0:4")[0] == 0
+    elbow = np.array([p.values[names.index("left_elbow.extension")] for p in stored(session).values()])
+    knee = np.array([p.values[names.index("left_knee.extension")] for p in stored(session).values()])
+    np.testing.assert_array_equal(elbow, elbow[0])
+    assert len(np.unique(knee)) == 4
 
 
 def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
