@@ -1,5 +1,6 @@
 """The command line: `quadrille COMMAND ...`; without a command, the page on the bundled sample."""
 
+import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -403,6 +404,7 @@ def main() -> None:
         words = ["open", *words]
     try:
         _app.cli(prog="quadrille", args=words)
+        sys.stdout.flush()
     except TrackerError as error:
         Console(stderr=True).print(
             f"quadrille: {error}", style="bold red", markup=False, highlight=False, soft_wrap=True
@@ -410,6 +412,9 @@ def main() -> None:
         sys.exit(1)
     except KeyboardInterrupt:
         sys.exit(130)
+    except BrokenPipeError:  # as in `quadrille evaluate S | head -1`: who read has read enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is still held back goes nowhere
+        sys.exit(141)
 
 
 def program() -> None:

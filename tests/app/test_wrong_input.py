@@ -217,3 +217,12 @@ def test_a_busy_port(session):
     # viser says on standard output that it stopped; what went wrong is said on standard error alone.
     assert_refused((done.returncode, "", done.stderr), [str(port), "--port"])
     assert not (session / "lock.json").exists()
+
+
+def test_a_reader_that_has_read_enough():
+    """As `quadrille info S | head -1` where head is gone before the program writes."""
+    words = [sys.executable, "-m", "app", "info", str(SAMPLE)]
+    program = subprocess.Popen(words, cwd=SAMPLE.parents[1], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    program.stdout.close()
+    assert program.stderr.read() == ""
+    assert program.wait(timeout=120) == 141
