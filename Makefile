@@ -7,16 +7,21 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 PYTHON_FILES := app tracker tests
 
-.PHONY: install run test bench check lint format clean
+.PHONY: install run test test-library test-page bench check lint format clean
 
 install: $(VENV)/.installed
 
 run: install
 	$(BIN)/quadrille
 
-# Those of the page have the machine to themselves: what they wait for would come late beside others.
+# The library's tests take what those of the page leave: these wait a lot, but what they wait for must not come late.
 test: check
-	$(BIN)/python -m pytest --ignore tests/browser --numprocesses auto
+	$(MAKE) --jobs 2 $(if $(filter output-sync,$(.FEATURES)),--output-sync) test-library test-page
+
+test-library: $(VENV)/.tested
+	nice -n 19 $(BIN)/python -m pytest --ignore tests/browser --numprocesses auto
+
+test-page: $(VENV)/.tested
 	$(BIN)/python -m pytest tests/browser
 
 # How fast it is here, beside what must hold and the ratios that are kept.
