@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.kernels import BORROW
 from tracker.rigid import Array
 
 IntArray = NDArray[np.int64]
@@ -38,75 +39,147 @@ class Kinematics(NamedTuple):
     """A point on each rotation axis, (n_dofs, 3), metres."""
 
 
-@njit(nogil=True, cache=True)
-def forward_kinematics(values: Array, tree: Tree, Ts: Array, axes: Array, origins: Array) -> None:  # noqa: C901
+@njit(**BORROW)
+def forward_kinematics(values: Array, tree: Tree, Ts: Array, axes: Array, origins: Array) -> None:
     """Fill the arrays of a `Kinematics` from the values of a pose, (n_values,)."""
-    parents, offsets, ops = tree.parents, tree.offsets, tree.ops
     op, dof, value = 0, 0, 0
-    R, step, parent_R = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    n_ops = ops.shape[0]
-    for part in range(parents.shape[0]):
-        parent = parents[part]
-        for i in range(3):
-            for j in range(3):
-                parent_R[i, j] = Ts[parent, i, j] if parent >= 0 else (1.0 if i == j else 0.0)
-                R[i, j] = parent_R[i, j]
-        x, y, z = offsets[part, 0], offsets[part, 1], offsets[part, 2]
-        for i in range(3):
-            base = Ts[parent, i, 3] if parent >= 0 else 0.0
-            Ts[part, i, 3] = base + parent_R[i, 0] * x + parent_R[i, 1] * y + parent_R[i, 2] * z
-        first_dof = dof
-        while op < n_ops and ops[op, 1] == part:
-            kind = ops[op, 0]
-            if kind == 0:
-                for k in range(3):
-                    Ts[part, k, 3] += values[value + k]
-                    for i in range(3):
-                        axes[dof + k, i] = 1.0 if i == k else 0.0
-                dof += 3
-                value += 3
-            else:
-                if kind == 1:
-                    ax, ay, az = tree.axes[op, 0], tree.axes[op, 1], tree.axes[op, 2]
-                    for i in range(3):
-                        axes[dof, i] = R[i, 0] * ax + R[i, 1] * ay + R[i, 2] * az
-                    half = 0.5 * values[value]
-                    s = np.sin(half)
-                    qw, qx, qy, qz = np.cos(half), s * ax, s * ay, s * az
-                    dof += 1
-                    value += 1
-                else:
-                    qw, qx, qy, qz = values[value], values[value + 1], values[value + 2], values[value + 3]
-                    norm = np.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
-                    qw, qx, qy, qz = qw / norm, qx / norm, qy / norm, qz / norm
-                    value += 4
-                step[0, 0] = 1 - 2 * (qy * qy + qz * qz)
-                step[0, 1] = 2 * (qx * qy - qw * qz)
-                step[0, 2] = 2 * (qx * qz + qw * qy)
-                step[1, 0] = 2 * (qx * qy + qw * qz)
-                step[1, 1] = 1 - 2 * (qx * qx + qz * qz)
-                step[1, 2] = 2 * (qy * qz - qw * qx)
-                step[2, 0] = 2 * (qx * qz - qw * qy)
-                step[2, 1] = 2 * (qy * qz + qw * qx)
-                step[2, 2] = 1 - 2 * (qx * qx + qy * qy)
-                for i in range(3):
-                    a, b, c = R[i, 0], R[i, 1], R[i, 2]
-                    for k in range(3):
-                        R[i, k] = a * step[0, k] + b * step[1, k] + c * step[2, k]
-                if kind == 2:  # the three dofs of a ball turn about the axes of its child
-                    for k in range(3):
-                        for i in range(3):
-                            axes[dof + k, i] = R[i, k]
-                    dof += 3
+    for part in range(tree.parents.shape[0]):
+        op, dof, value = _place_part(
+            part, op, dof, value, values, tree.parents, tree.offsets, tree.ops, tree.axes, Ts, axes, origins
+        )
+
+
+def chain_poses(tree: Tree, rest: Kinematics, chain: IntArray, poses: Array) -> Array:
+    """Place one chain of parts in many poses that differ in its joints alone; nothing else is computed anew.
+
+    Args:
+        tree: the joint tree.
+        rest: where one of the poses, or another with the same rest, puts everything.
+        chain: indices of the parts, each the child of the one before, (n,).
+        poses: (C, n_values).
+
+    Returns:
+        Poses of these parts, (C, n, 4, 4), metres.
+    """
+    out = np.empty((len(poses), len(chain), 4, 4))
+    unread = np.empty((len(rest.axes_world), 3))
+    _place_chain(poses, tree, _starts(tree), rest.Ts_world_part.copy(), unread, chain, out)
+    return out
+
+
+@njit(**BORROW)
+def _place_chain(
+    poses: Array, tree: Tree, starts: IntArray, Ts: Array, unread: Array, chain: IntArray, out: Array
+) -> None:
+    """Fill the poses of the parts of a chain; see `chain_poses`. Its rows of `Ts` (n_parts, 4, 4) are worked in."""
+    for c in range(poses.shape[0]):
+        for i in range(chain.shape[0]):
+            p = chain[i]
+            _place_part(
+                p, starts[p, 0], starts[p, 1], starts[p, 2], poses[c], tree.parents, tree.offsets, tree.ops, tree.axes,
+                Ts, unread, unread,
+            )  # fmt: skip
+            for k in range(4):
+                for m in range(4):
+                    out[c, i, k, m] = Ts[p, k, m]
+
+
+@njit(nogil=True, cache=True)
+def _starts(tree: Tree) -> IntArray:
+    """The first operation, degree of freedom and value of each part's joint, (n_parts, 3)."""
+    out = np.zeros((tree.parents.shape[0], 3), np.int64)
+    op, dof, value = 0, 0, 0
+    for part in range(out.shape[0]):
+        out[part] = op, dof, value
+        while op < tree.ops.shape[0] and tree.ops[op, 1] == part:
+            kind = tree.ops[op, 0]
+            dof += 1 if kind == REVOLVE else 3
+            value += 1 if kind == REVOLVE else 3 if kind == TRANSLATE else 4
             op += 1
-        for k in range(first_dof, dof):
-            for i in range(3):
-                origins[k, i] = Ts[part, i, 3]
-        for i in range(3):
+    return out
+
+
+@njit(inline="always", **BORROW)
+def _place_part(  # noqa: C901
+    part: int, op: int, dof: int, value: int, values: Array, parents: IntArray, offsets: Array, ops: IntArray,
+    op_axes: Array, Ts: Array, axes: Array, origins: Array,
+) -> tuple[int, int, int]:  # fmt: skip
+    """Place a part whose parent stands, and the axes of its joint.
+
+    Args:
+        part: which.
+        op: index of the first operation of its joint.
+        dof: index of its first degree of freedom.
+        value: index of its first value.
+        values: the pose, (n_values,).
+        parents: of all parts, see `Tree`.
+        offsets: see `Tree`.
+        ops: see `Tree`.
+        op_axes: axes of the operations, see `Tree`.
+        Ts: poses of all parts, see `Kinematics`; that of this part is filled in.
+        axes: see `Kinematics`; those of the joint are filled in.
+        origins: the same.
+
+    Returns:
+        The first operation, degree of freedom and value of the next part.
+    """
+    parent, T = parents[part], Ts[part]
+    for i in range(3):
+        for j in range(3):
+            T[i, j] = Ts[parent, i, j] if parent >= 0 else (1.0 if i == j else 0.0)
+    x, y, z = offsets[part, 0], offsets[part, 1], offsets[part, 2]
+    for i in range(3):
+        base = Ts[parent, i, 3] if parent >= 0 else 0.0
+        T[i, 3] = base + T[i, 0] * x + T[i, 1] * y + T[i, 2] * z
+    first_dof = dof
+    while op < ops.shape[0] and ops[op, 1] == part:
+        kind = ops[op, 0]
+        if kind == TRANSLATE:
             for k in range(3):
-                Ts[part, i, k] = R[i, k]
-            Ts[part, 3, i] = 0.0
-        Ts[part, 3, 3] = 1.0
+                T[k, 3] += values[value + k]
+                for i in range(3):
+                    axes[dof + k, i] = 1.0 if i == k else 0.0
+            dof += 3
+            value += 3
+        else:
+            if kind == REVOLVE:
+                ax, ay, az = op_axes[op, 0], op_axes[op, 1], op_axes[op, 2]
+                for i in range(3):
+                    axes[dof, i] = T[i, 0] * ax + T[i, 1] * ay + T[i, 2] * az
+                half = 0.5 * values[value]
+                s = np.sin(half)
+                qw, qx, qy, qz = np.cos(half), s * ax, s * ay, s * az
+                dof += 1
+                value += 1
+            else:
+                qw, qx, qy, qz = values[value], values[value + 1], values[value + 2], values[value + 3]
+                norm = np.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
+                qw, qx, qy, qz = qw / norm, qx / norm, qy / norm, qz / norm
+                value += 4
+            _turn(T, qw, qx, qy, qz)
+            if kind == BALL:  # the three dofs of a ball turn about the axes of its child
+                for k in range(3):
+                    for i in range(3):
+                        axes[dof + k, i] = T[i, k]
+                dof += 3
+        op += 1
+    for k in range(first_dof, dof):
+        for i in range(3):
+            origins[k, i] = T[i, 3]
+    T[3, 0] = T[3, 1] = T[3, 2] = 0.0
+    T[3, 3] = 1.0
+    return op, dof, value
+
+
+@njit(inline="always", **BORROW)
+def _turn(T: Array, w: float, x: float, y: float, z: float) -> None:
+    """Multiply the rotation of a pose (4, 4) with that of a unit quaternion, from the right."""
+    xx, xy, xz = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
+    yx, yy, yz = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+    zx, zy, zz = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+    for i in range(3):
+        a, b, c = T[i, 0], T[i, 1], T[i, 2]
+        T[i, 0], T[i, 1], T[i, 2] = a * xx + b * yx + c * zx, a * xy + b * yy + c * zy, a * xz + b * yz + c * zz
 
 
 @njit(nogil=True, cache=True)

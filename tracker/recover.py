@@ -6,12 +6,13 @@ go through the costs that all poses go through, and the cheapest are refined. Li
 together.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import NamedTuple, TypeVar
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
@@ -20,7 +21,7 @@ from tracker.body import BodyModel
 from tracker.confidence import Limb
 from tracker.fit import Block, Fit, solve
 from tracker.kernels import N_HELPERS, helpers
-from tracker.kinematics import IntArray
+from tracker.kinematics import IntArray, chain_poses
 from tracker.refine import WORTH_A_STEP, ContourMatch
 from tracker.rigid import Array
 
@@ -134,34 +135,43 @@ def search_limbs(
         judge: compares poses.
         iterations: most steps of a refinement of the whole body.
     """
-    kept = [here]
+    start = _Found(here, judge.cost(here))
+    kept = [start]
     for limb in suspects:
-        enough = judge.cost(kept[0]) + judge.settings.margin
-        kept = [fit for fit in kept if judge.cost(fit) < enough]
+        enough = kept[0].cost + judge.settings.margin
+        kept = [x for x in kept if x.cost < enough]
         away = [p for x in suspects if x is not limb for p in x.parts]
-        found = [fit for start in kept for fit in _search_limb(model, limb, away, start, others, judge, iterations)]
-        kept = _distinct(model, [*kept, *found], judge, judge.settings.kept)
-    best = kept[0] if judge.cost(kept[0]) < judge.cost(here) - LEAST_GAIN else here
-    enough = judge.cost(best) + LEAST_GAIN
-    order = sorted((fit for fit in (*kept, here) if judge.cost(fit) < enough), key=judge.cost)
-    places = [best, *(fit for fit in order if fit is not best)]
-    rivals = _apart(lambda i: model.points_world(places[i].values), range(len(places)), judge.settings.kept, _APART_M)
-    return Searched(best, tuple(places[i] for i in rivals[1:]))
+        found = [x for k in kept for x in _search_limb(model, limb, away, k.fit, others, judge, iterations)]
+        kept = _distinct(model, [*kept, *found], judge.settings.kept, _SAME_M)
+    best = kept[0] if kept[0].cost < start.cost - LEAST_GAIN else start
+    rivals = [x for x in (*kept, start) if x is not best and x.cost < best.cost + LEAST_GAIN]
+    places = _distinct(model, [best._replace(cost=-np.inf), *rivals], judge.settings.kept, _APART_M)
+    return Searched(best.fit, tuple(x.fit for x in places[1:]))
+
+
+class _Found(NamedTuple):
+    """A refined pose."""
+
+    fit: Fit
+    cost: float
+    """With its colours."""
 
 
 def _search_limb(
     model: BodyModel, limb: Limb, away: list[int], here: Fit, others: Sequence[Array], judge: Judge, iterations: int
-) -> list[Fit]:
+) -> list[_Found]:
     """The best poses of one limb, refined with the whole body; parts that are `away` hide nothing at first."""
 
-    def alone(judge: Judge, pose: Array) -> Fit:
-        return solve(model, pose, judge.blocks, limb.dofs, max_iterations=4, tolerance=1e-2, gain=WORTH_A_STEP)
+    def alone(judge: Judge, pose: Array) -> _Found:
+        fit = solve(model, pose, judge.blocks, limb.dofs, max_iterations=4, tolerance=1e-2, gain=WORTH_A_STEP)
+        return _Found(fit, judge.cost(fit))
 
-    def whole(judge: Judge, pose: Array) -> Fit:
-        return solve(model, pose, judge.blocks, judge.free, iterations, tolerance=1e-3)
+    def whole(judge: Judge, pose: Array) -> _Found:
+        fit = solve(model, pose, judge.blocks, judge.free, iterations, tolerance=1e-3)
+        return _Found(fit, judge.cost(fit))
 
-    fits = judge.each(alone, _candidates(model, limb, away, here, others, judge))
-    return judge.each(whole, [f.values for f in _distinct(model, fits, judge, judge.settings.finished)])
+    tried = judge.each(alone, _candidates(model, limb, away, here, others, judge))
+    return judge.each(whole, [x.fit.values for x in _distinct(model, tried, judge.settings.finished, _SAME_M)])
 
 
 def _candidates(
@@ -169,7 +179,7 @@ def _candidates(
 ) -> Array:
     """The few poses of a limb that are worth a refinement, (n, n_values)."""
     settings = judge.settings
-    look = partial(judge.colors.along_limb, limb=limb.parts, known=judge.known, away=away)
+    look = judge.colors.look(here.values, limb.parts, judge.known, away)
     proposals = _proposals(model, limb, here.values, settings)
     best = _best_apart(model, limb, proposals, look(proposals), settings.scored, _APART_M)
     for round_, spread_rad in enumerate(settings.shakes_rad):
@@ -186,33 +196,46 @@ def _best_apart(model: BodyModel, limb: Limb, poses: Array, scores: Array, n: in
     Args:
         model: the body.
         limb: the one whose joints are compared.
-        poses: (m, n_values).
+        poses: (m, n_values); they differ in the limb alone, as far as it matters.
         scores: of each, (m,); more is better.
         n: how many are wanted.
         apart_m: least distance of the joint that is farthest from its place in the other pose, metres.
     """
-    points = np.isin(model.point_parts, limb.parts)
-    return poses[_apart(lambda i: model.points_world(poses[i])[points], np.argsort(-scores), n, apart_m)]
+    points = np.flatnonzero(np.isin(model.point_parts, limb.parts))
+    Ts = chain_poses(model.tree, model.kinematics(poses[0]), limb.parts, poses)
+    Ts = Ts[:, np.searchsorted(limb.parts, model.point_parts[points])]
+    places = np.einsum("mkij,kj->mki", Ts[..., :3, :3], model.points_part[points]) + Ts[..., :3, 3]
+    return poses[_apart(places, np.argsort(-scores), n, apart_m)]
 
 
-def _distinct(model: BodyModel, fits: Sequence[Fit], judge: Judge, n: int) -> list[Fit]:
-    """The cheapest of several poses, no two of them the same but for centimetres, cheapest first."""
-    order = np.argsort([judge.cost(fit) for fit in fits], kind="stable")
-    return [fits[i] for i in _apart(lambda i: model.points_world(fits[i].values), order, n, _SAME_M)]
+def _distinct(model: BodyModel, found: Sequence[_Found], n: int, apart_m: float) -> list[_Found]:
+    """The cheapest of several poses, no two of them nearer to each other than that, cheapest first."""
+    places = np.array([model.points_world(x.fit.values) for x in found])
+    order = np.argsort([x.cost for x in found], kind="stable")
+    return [found[i] for i in _apart(places, order, n, apart_m)]
 
 
-def _apart(place: Callable[[int], Array], order: Iterable[int], n: int, apart_m: float) -> list[int]:
-    """The first few of some indices whose places, (m, 3) each, differ by more than `apart_m` in some point."""
-    kept: list[int] = []
-    places: list[Array] = []
+@njit(nogil=True, cache=True)
+def _apart(places: Array, order: IntArray, n: int, apart_m: float) -> IntArray:
+    """The first few indices, in an order, of places (m, k, 3) that all differ by more than `apart_m` in some point."""
+    kept = np.empty(min(n, len(order)), np.int64)
+    n_kept = 0
     for i in order:
-        here = place(i)
-        if not places or np.linalg.norm(np.array(places) - here, axis=-1).max(axis=1).min() > apart_m:
-            kept.append(i)
-            places.append(here)
-            if len(kept) == n:
+        if n_kept == len(kept):
+            break
+        alone = True
+        for j in kept[:n_kept]:
+            farthest = 0.0
+            for k in range(places.shape[1]):
+                x, y, z = places[i, k] - places[j, k]
+                farthest = max(farthest, x * x + y * y + z * z)
+            if farthest <= apart_m * apart_m:
+                alone = False
                 break
-    return kept
+        if alone:
+            kept[n_kept] = i
+            n_kept += 1
+    return kept[:n_kept]
 
 
 def _with_limb(model: BodyModel, values: Array, other: Array, limb: Limb) -> Array:

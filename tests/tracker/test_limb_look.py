@@ -1,0 +1,153 @@
+"""The look at a limb against a plain one that asks each sample of each pose of all parts, one at a time."""
+
+import numpy as np
+import pytest
+from staging import SUIT, at, camera_at, cameras_around, dressed, posed, solid
+
+from tracker.appearance import Colors
+from tracker.body import Body
+from tracker.confidence import limbs
+from tracker.contours import projection
+
+BINS, SAMPLES = 12, 7
+
+
+def middle_depths(eye, ray, bodies):
+    """For each part of each body, how many rays long the way is to the middle of the chord it shares with a ray."""
+    out = []
+    for body in bodies:
+        model = body.model
+        Ts = model.kinematics(body.values).Ts_world_part
+        for T, center, shape in zip(Ts, model.centers_part, model.shapes, strict=True):
+            half = np.array(shape.half_axes)
+            o = (T[:3, :3].T @ (eye - T[:3, 3]) - center) / half
+            d = T[:3, :3].T @ ray / half
+            A, B, C = d @ d, o @ d, o @ o - 1
+            out.append(-B / A if B < 0 and B * B > A * C else np.inf)
+    return np.array(out)
+
+
+def plain_samples(views, bodies, person, values, limb, away=()):
+    """Of each sample of a limb: its view and part, whether it is hidden, the part behind it, the pixels across it."""
+    model = bodies[person].model
+    bodies = [Body(model, values) if i == person else b for i, b in enumerate(bodies)]
+    first = sum(len(b.model.parts) for b in bodies[:person])
+    Ts = model.kinematics(values).Ts_world_part
+    for view in views:
+        eye, P = view.camera.center_world, projection(view.camera)
+        for part in limb:
+            T, center, half = Ts[part], model.centers_part[part], model.shapes[part].half_axes
+            for share in np.linspace(-0.8, 0.8, SAMPLES):
+                X = T[:3, :3] @ (center + np.array([0, 0, share * half[2]])) + T[:3, 3]
+                depths = middle_depths(eye, X - eye, bodies)
+                depths[[first + part, *(first + p for p in away)]] = np.inf
+                side = np.cross(T[:3, 2], X - eye)
+                side /= np.linalg.norm(side)
+                across = [P @ [*(X + 0.5 * s * half[0] * side), 1] for s in range(-2, 3)]
+                pixels = [np.floor(h[:2] / h[2] + 0.5).astype(int) for h in across]
+                without = depths.copy()
+                without[[first + p for p in limb]] = np.inf
+                own = slice(first, first + len(model.parts))
+                behind = without.argmin() - first if without.min() < np.inf else -1
+                yield view, part, depths.min() < 1, behind if behind in range(own.stop - first) else -1, pixels
+
+
+def plain_look(views, bodies, person, values, limb, ratios, away=()):
+    """What `LimbLook` says of one pose, by its definition."""
+    nats = 0.0
+    for view, part, hidden, behind, pixels in plain_samples(views, bodies, person, values, limb, away):
+        for i, (u, v) in enumerate(pixels):
+            if hidden:
+                continue
+            if not (0 <= u < view.camera.width and 0 <= v < view.camera.height):
+                nats -= 0.25
+            elif i in (0, 4):
+                nats += 1.5 * (0.3 - min(view.distance[v, u] / view.theta_px, 1))
+            else:
+                r, g, b = (view.colors[v, u].astype(int) * BINS) // 256
+                color = (r * BINS + g) * BINS + b
+                nats += ratios[part, color] - (ratios[behind, color] if behind >= 0 else 0)
+    return nats
+
+
+@pytest.fixture(scope="module")
+def couple(gavrila):
+    """Two figures close together, the second one is looked at; views of them in their clothes."""
+    bodies = [Body(gavrila, gavrila.retract(posed(gavrila, s), np.pad(move, (0, gavrila.n_dofs - 3))))
+              for s, move in ((1, [0.3, 0.1, 0.0]), (2, [-0.1, -0.1, 0.0]))]  # fmt: skip
+    views = dressed(bodies, cameras_around(3), SUIT)
+    return views, bodies, Colors(views, bodies, 1).learn()
+
+
+def moved(model, values, limb, n, seed=0):
+    """Poses with the limb anywhere near."""
+    steps = np.random.default_rng(seed).normal(0, 0.6, (n, model.n_dofs)) * limb.dofs
+    return model.clip(model.retract(values, steps))
+
+
+@pytest.mark.parametrize("name", ["left_forearm", "right_calf"])
+def test_a_look_is_what_its_definition_says(gavrila, couple, name):
+    """All but a sample here and there at the border of what hides it, where cells of the image are coarser."""
+    views, bodies, known = couple
+    limb = next(x for x in limbs(gavrila) if x.name == name)
+    poses = moved(gavrila, bodies[1].values, limb, 25)
+    away = [p for x in limbs(gavrila) if x.name == name.replace("left", "?").replace("right", "left") for p in x.parts]
+    for gone in ([], away):
+        found = Colors(views, bodies, 1).look(bodies[1].values, limb.parts, known, gone)(poses)
+        wanted = [plain_look(views, bodies, 1, v, limb.parts, known.log_ratios, gone) for v in poses]
+        assert np.std(wanted) > 20
+        assert np.median(np.abs(found - wanted)) < 2
+        assert np.corrcoef(found, wanted)[0, 1] > 0.995
+        assert np.argmax(found) == np.argmax(wanted)
+
+
+def test_a_limb_in_the_open(gavrila, couple):
+    """An arm held out, where nothing hides it: the same but for a pixel; of no known colours the edges alone speak."""
+    views, _, known = couple
+    pose = np.array(gavrila.neutral())
+    pose[gavrila.dof_names.index("left_shoulder.abduction")] = np.pi / 2
+    bodies = [Body(gavrila, pose)]
+    arm = np.array([gavrila.part_index[n] for n in ("left_upper_arm", "left_forearm")])
+    for ratios in (None, known):
+        found = Colors(views, bodies).look(pose, arm, ratios)(pose[None])
+        table = np.zeros_like(known.log_ratios) if ratios is None else ratios.log_ratios
+        assert found[0] == pytest.approx(plain_look(views, bodies, 0, pose, arm, table), abs=0.5)
+
+
+def test_what_hides_a_limb_beside_the_image_is_known_too():
+    """A ball behind a wall says nothing, also where the image ends; beside the wall there it says a little against."""
+    ball, wall = solid((0.1, 0.1, 0.2)), solid((0.1, 0.4, 1.0))
+    camera = camera_at("front", (4.0, 0.0, 0.0))
+    bodies = [
+        at(ball, 0, 0, 0),
+        at(wall, 1.0, 2.3, 0),
+    ]  # 320 px of 520 px at 3 m are 1.85 m: it stands out of the image
+    colors = Colors(dressed(bodies, [camera], {"solid": (200, 0, 0)}), bodies)
+    part = np.array([0])
+    hidden, beside = (at(ball, 0, y, 0).values for y in (3.1, -3.1))
+    assert colors.look(hidden, part, None)(hidden[None]) == 0
+    assert colors.look(beside, part, None)(beside[None]) == pytest.approx(-0.25 * 5 * SAMPLES)
+
+
+@pytest.mark.parametrize("distance", [0.05, 0.3, 0.9])
+def test_a_limb_and_others_that_reach_the_cameras_plane(gavrila, distance):
+    """Nothing has a bounded image there; what is said is still what the definition says, of samples that are seen."""
+    stand = gavrila.neutral()
+    bodies = [Body(gavrila, stand)]
+    arm = next(x for x in limbs(gavrila) if x.name == "left_forearm")
+    place = gavrila.points_world(stand)[gavrila.point_names.index("left_shoulder")]
+    camera = camera_at("near", place + np.array([distance, 0.1, 0.3]), place)
+    views = dressed(bodies, [camera_at("far", (4, 0, 0.5))], SUIT)
+    colors = Colors(views, bodies)
+    known = colors.learn()
+    near = dressed(
+        [at(solid((0.2, 0.2, 0.2)), *(place - np.array([2.0, 0.0, 0.0])))], [camera], {"solid": SUIT["forearm"]}
+    )
+    poses = moved(gavrila, stand, arm, 20, 1)
+    found = Colors(near, bodies).look(stand, arm.parts, known)(poses)
+    assert np.isfinite(found).all()
+    for pose, nats in zip(poses, found, strict=True):
+        P = projection(camera)
+        T = gavrila.kinematics(pose).Ts_world_part[arm.parts]
+        if (P[2, :3] @ T[:, :3, 3].T + P[2, 3] > 0.4).all():
+            assert nats == pytest.approx(plain_look(near, bodies, 0, pose, arm.parts, known.log_ratios), abs=15)

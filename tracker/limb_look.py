@@ -1,0 +1,278 @@
+"""A quick look at one limb in thousands of poses: does what the images show along it go with it?
+
+All but the limb stands still. What stands is drawn once for each view, as far as the limb reaches: in each cell of the
+image the nearest part and its depth. A sample of a limb then finds at one place whether something hides it, and what
+would be seen there without the limb; only the limb's own parts are asked by themselves.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tracker.body import BodyModel
+from tracker.contours import FloatArray
+from tracker.kernels import BORROW, helpers
+from tracker.kinematics import IntArray, Kinematics, chain_poses
+from tracker.rigid import Array
+from tracker.sights import ALONG, BINS, NEAREST_M, along_axis, bin_of, hidden, pixel_on_axis, place_before, see_axis
+from tracker.silhouettes import Image
+
+_STEP_PX = 2
+"""Size of a cell, matched px."""
+_BESIDE_PX = 3.0
+"""Room about all places that the limb may reach, px."""
+_OPEN = -1
+"""Index of no part: nothing stands there."""
+_OFF_NATS = -0.25
+"""What a pixel that is not in the image says: little against the limb, for nobody sees it."""
+_EDGE_NATS, _EDGE_EVEN = 1.5, 0.3
+"""Weight of an edge beside the limb, and the distance of an edge that says nothing, in outlier distances."""
+
+
+class ColorView(NamedTuple):
+    """What a look is told of one view."""
+
+    P: Array
+    """Projection matrix of matched pixels, (3, 4)."""
+    eye: Array
+    """Centre of the camera in the world, (3,), metres."""
+    image: Image
+    """Colours, (H, W, 3)."""
+    distance: FloatArray
+    """Distance to the nearest edge, (H, W), matched px."""
+    theta_px: float
+    """Outlier distance, matched px."""
+
+
+class Standing(NamedTuple):
+    """Whatever may hide a limb or be seen without it."""
+
+    Ts_world_unit: Array
+    """From the coordinates in which each part is the unit ball to the world, (S, 4, 4), metres."""
+    owners: IntArray
+    """Index of each part in the body that is looked at, (S,); -1 for parts of other bodies."""
+
+
+class _Backdrop(NamedTuple):
+    """What stands in one view, as far as a limb reaches."""
+
+    depths: NDArray[np.float32]
+    """Depth of the middle of the nearest part along the line of sight, (h, w), metres; infinite in the open."""
+    owners: NDArray[np.int16]
+    """Index of that part in the body that is looked at, (h, w); -1 for parts of other bodies and in the open."""
+    corner_px: IntArray
+    """Pixel at the middle of the first cell, u and v, (2,)."""
+
+
+class LimbLook:
+    """A look at one limb of a body that stands still otherwise: prepared once, asked of many poses."""
+
+    def __init__(
+        self, views: Sequence[ColorView], model: BodyModel, rest: Kinematics, limb: IntArray, standing: Standing,
+        shapes: Array, log_ratios: Array | None,
+    ) -> None:  # fmt: skip
+        """Draw what stands.
+
+        Args:
+            views: the views that show colours.
+            model: the body whose limb it is.
+            rest: where it stands; the limb may be anywhere.
+            limb: indices of the limb's parts, from the trunk outwards, (n,).
+            standing: what stands besides.
+            shapes: ellipsoids of all parts of the body, (n_parts, 6), metres.
+            log_ratios: what is known of the colours of the body's parts, see `PartColors`; None: nothing.
+        """
+        self._views, self._model, self._rest, self._limb = list(views), model, rest, limb
+        self._shapes = np.ascontiguousarray(shapes[limb])
+        self._ratios = np.zeros((len(shapes), BINS**3)) if log_ratios is None else log_ratios
+        reach = _reach(model, limb, self._shapes)
+        root = rest.Ts_world_part[limb[0], :3, 3]
+        self._backdrops = list(helpers().map(lambda view: _backdrop(view, standing, root, reach), self._views))
+
+    def __call__(self, poses: Array) -> Array:
+        """How good the limb seems in many poses, (C, n_values), that differ in it alone, (C,), nats; more is better.
+
+        At samples along the axes of its parts, where nothing hides them, the colours speak, and the edges at both
+        sides: near ones for it, none against it. Where the limb is hidden nothing is said.
+        """
+        Ts = chain_poses(self._model.tree, self._rest, self._limb, poses)
+
+        def look(view: ColorView, backdrop: _Backdrop) -> Array:
+            nats = np.zeros(len(poses))
+            room = np.arange(len(self._limb)), np.empty((len(self._limb), 13)), np.empty((4, 3))
+            _look_along(*view, *backdrop, Ts, self._shapes, self._limb, self._ratios, *room, nats)
+            return nats
+
+        total = np.zeros(len(poses))
+        for nats in helpers().map(look, self._views, self._backdrops):
+            total += nats
+        return total
+
+
+def _reach(model: BodyModel, limb: IntArray, shapes: Array) -> float:
+    """How far the samples of a limb can be from its first joint, metres."""
+    lengths = np.linalg.norm(model.tree.offsets[limb], axis=1)
+    lengths[0] = 0.0
+    return float((np.cumsum(lengths) + np.linalg.norm(shapes[:, :3], axis=1) + shapes[:, 5]).max())
+
+
+def _backdrop(view: ColorView, standing: Standing, root: Array, reach: float) -> _Backdrop:
+    """Draw what stands within reach, metres, of a place, (3,)."""
+    bounds, ball = np.empty(4), np.diag([reach, reach, reach, 1.0])
+    ball[:3, 3] = root
+    _bounds(view.P @ ball, bounds)
+    # Farther beside an image than its own size nobody needs to know what hides a limb.
+    size = np.array(view.distance.shape[::-1])
+    low = np.clip(np.floor(bounds[:2] - _BESIDE_PX), -size, 2 * size).astype(np.int64)
+    high = np.clip(np.ceil(bounds[2:] + _BESIDE_PX), -size, 2 * size).astype(np.int64)
+    columns, rows = np.maximum(0, (high - low) // _STEP_PX + 1)
+    depths, owners = np.full((rows, columns), np.inf, np.float32), np.full((rows, columns), _OPEN, np.int16)
+    Ts_unit_world = np.linalg.inv(standing.Ts_world_unit)
+    rays = Ts_unit_world[:, :3, :3] @ np.linalg.inv(view.P[:, :3])
+    eyes = Ts_unit_world[:, :3] @ np.append(view.eye, 1.0)
+    _draw(view.P @ standing.Ts_world_unit, rays, eyes, standing.owners, low, depths, owners, bounds)
+    return _Backdrop(depths, owners, low)
+
+
+@njit(**BORROW)
+def _draw(
+    to_px: Array, rays: Array, eyes: Array, own: IntArray, corner: IntArray, depths: NDArray[np.float32],
+    owners: NDArray[np.int16], bounds: Array,
+) -> None:  # fmt: skip
+    """Draw parts into a backdrop.
+
+    Args:
+        to_px: from the coordinates in which each part is the unit ball to homogeneous pixels, (S, 3, 4).
+        rays: from pixels to directions of depth 1 in these coordinates, (S, 3, 3).
+        eyes: the eye in them, (S, 3).
+        own: owners of the parts, see `Standing`.
+        corner: see `_Backdrop`.
+        depths: what is filled, see `_Backdrop`.
+        owners: the same.
+        bounds: room, (4,).
+    """
+    for p in range(len(to_px)):
+        _bounds(to_px[p], bounds)
+        left, right = (bounds[0] - corner[0]) / _STEP_PX, (bounds[2] - corner[0]) / _STEP_PX
+        top, bottom = (bounds[1] - corner[1]) / _STEP_PX, (bounds[3] - corner[1]) / _STEP_PX
+        left, right = max(0.0, np.ceil(left)), min(depths.shape[1] - 1.0, np.floor(right))
+        top, bottom = max(0.0, np.ceil(top)), min(depths.shape[0] - 1.0, np.floor(bottom))
+        if left > right or top > bottom:  # what is infinite would not fit an integer
+            continue
+        N, x, y, z = rays[p], eyes[p, 0], eyes[p, 1], eyes[p, 2]
+        C, owner = x * x + y * y + z * z - 1.0, np.int16(own[p])
+        for row in range(int(top), int(bottom) + 1):
+            v = corner[1] + _STEP_PX * row
+            bx, by, bz = N[0, 1] * v + N[0, 2], N[1, 1] * v + N[1, 2], N[2, 1] * v + N[2, 2]
+            for column in range(int(left), int(right) + 1):
+                u = corner[0] + _STEP_PX * column
+                dx, dy, dz = N[0, 0] * u + bx, N[1, 0] * u + by, N[2, 0] * u + bz
+                A = dx * dx + dy * dy + dz * dz
+                B = x * dx + y * dy + z * dz
+                if B < 0.0 and B * B > A * C and A * depths[row, column] > -B:
+                    depths[row, column] = -B / A
+                    owners[row, column] = owner
+
+
+@njit(**BORROW)
+def _bounds(to_px: Array, bounds: Array) -> None:
+    """Fill the bounds u0, v0, u1, v1 of a ball in an image, px, (4,); all are infinite where it reaches the camera's
+    plane, and nothing lies within them where it is behind.
+
+    Args:
+        to_px: from the coordinates in which it is the unit ball to homogeneous pixels, (3, 4).
+        bounds: what is filled.
+    """
+    ww = _touch(to_px, 2, 2)
+    for i in range(2):
+        if ww >= 0.0:
+            bounds[i], bounds[i + 2] = -np.inf, np.inf
+        elif to_px[2, 3] <= 0.0:
+            bounds[i], bounds[i + 2] = np.inf, -np.inf
+        else:
+            uw = _touch(to_px, i, 2)
+            root = np.sqrt(max(0.0, uw * uw - _touch(to_px, i, i) * ww))
+            bounds[i], bounds[i + 2] = (uw + root) / ww, (uw - root) / ww
+
+
+@njit(**BORROW)
+def _touch(to_px: Array, i: int, j: int) -> float:
+    """An entry of the dual conic of a ball's outline: a line l touches it where l^T C l = 0."""
+    near = to_px[i, 0] * to_px[j, 0] + to_px[i, 1] * to_px[j, 1] + to_px[i, 2] * to_px[j, 2]
+    return float(near - to_px[i, 3] * to_px[j, 3])
+
+
+@njit(**BORROW)
+def _look_along(
+    P: Array, eye: Array, image: Image, distance: FloatArray, theta_px: float,
+    depths: NDArray[np.float32], owners: NDArray[np.int16], corner: IntArray,
+    Ts: Array, shapes: Array, limb: IntArray, ratios: Array, all_parts: IntArray, sights: Array,
+    axis: Array, nats: Array,
+) -> None:  # fmt: skip
+    """Fill what one view says of the limb in each pose, (C,).
+
+    Args:
+        P: the view, as the following four see `ColorView`.
+        eye: of the view.
+        image: of the view.
+        distance: of the view.
+        theta_px: of the view.
+        depths: what stands there, as the following two see `_Backdrop`.
+        owners: of what stands.
+        corner: of what stands.
+        Ts: poses of the limb's parts, (C, n, 4, 4), metres.
+        shapes: their ellipsoids, (n, 6), metres.
+        limb: their indices, (n,).
+        ratios: log ratios of all parts of the body.
+        all_parts: 0 to n - 1, (n,).
+        sights: room, (n, 13).
+        axis: room, (4, 3).
+        nats: what is filled.
+    """
+    for c in range(Ts.shape[0]):
+        for i in range(limb.shape[0]):
+            place_before(eye, Ts[c, i], shapes[i], sights[i])
+        total = 0.0
+        for i in range(limb.shape[0]):
+            see_axis(P, eye, Ts[c, i], shapes[i], axis)
+            for sample in range(ALONG):
+                z = along_axis(shapes[i], sample)
+                depth = axis[1, 2] + z * axis[2, 2]
+                if depth < NEAREST_M or hidden(Ts[c, i], axis, z, i, sights, all_parts, limb.shape[0]):
+                    continue
+                behind = _OPEN
+                u, v, du, dv = pixel_on_axis(axis, z)
+                column = int(np.floor((u - corner[0]) * (1.0 / _STEP_PX) + 0.5))
+                row = int(np.floor((v - corner[1]) * (1.0 / _STEP_PX) + 0.5))
+                if 0 <= row < depths.shape[0] and 0 <= column < depths.shape[1]:
+                    if depths[row, column] < depth:
+                        continue
+                    behind = owners[row, column]
+                step = 0.5 * shapes[i, 3]
+                total += _sample_nats(u, v, du * step, dv * step, image, distance, theta_px, ratios, limb[i], behind)
+        nats[c] = total
+
+
+@njit(**BORROW)
+def _sample_nats(
+    u: float, v: float, du: float, dv: float, image: Image, distance: FloatArray, theta_px: float, ratios: Array,
+    part: int, behind: int,
+) -> float:  # fmt: skip
+    """What the pixels across a part say, two steps to either side of a place along its axis."""
+    height, width = distance.shape
+    nats, per_theta = 0.0, 1.0 / theta_px
+    for s in range(-2, 3):
+        x, y = int(np.floor(u + s * du + 0.5)), int(np.floor(v + s * dv + 0.5))
+        if x < 0 or y < 0 or x >= width or y >= height:
+            nats += _OFF_NATS
+        elif s == -2 or s == 2:
+            nats += _EDGE_NATS * (_EDGE_EVEN - min(distance[y, x] * per_theta, 1.0))
+        else:
+            color = bin_of(image, y, x)
+            nats += ratios[part, color]
+            if behind >= 0:  # To show again the colour of what would be seen without the limb says nothing for it.
+                nats -= ratios[behind, color]
+    return nats

@@ -1,0 +1,122 @@
+"""Lines of sight past the parts of posed bodies, and what lies under the axes of parts in images.
+
+An ellipsoid stands for each part: quick to ask, and near enough where only samples along the axes of parts are.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tracker.body import BodyModel
+from tracker.kernels import BORROW
+from tracker.rigid import Array
+from tracker.silhouettes import Image
+
+ALONG = 7
+"""Samples along the axis of each part."""
+BINS = 12
+"""Bins of colours along each channel."""
+NEAREST_M = 0.05
+"""What comes nearer to the camera's plane is not seen, metres."""
+
+
+def ellipsoids(model: BodyModel) -> Array:
+    """Centre and half-axes of the ellipsoids that stand for the parts, (n_parts, 6), metres."""
+    return np.array([(*c, *s.half_axes) for c, s in zip(model.centers_part, model.shapes, strict=True)])
+
+
+def unit_balls(shapes: Array) -> Array:
+    """From the coordinates in which ellipsoids (N, 6) are the unit ball to the frames of their parts, (N, 4, 4)."""
+    out = np.zeros((len(shapes), 4, 4))
+    out[:, range(3), range(3)], out[:, :3, 3], out[:, 3, 3] = shapes[:, 3:], shapes[:, :3], 1.0
+    return out
+
+
+@njit(**BORROW)
+def place_before(eye: Array, T: Array, shape: Array, sight: Array) -> None:
+    """Fill what lines of sight ask of a part, (13,): what turns directions into the coordinates in which the part is
+    the unit ball, the eye in these, and the square of its distance from the ball."""
+    C = -1.0
+    for i in range(3):
+        o = -shape[i]
+        for k in range(3):
+            o += T[k, i] * (eye[k] - T[k, 3])
+            sight[3 * i + k] = T[k, i] / shape[3 + i]
+        o /= shape[3 + i]
+        sight[9 + i] = o
+        C += o * o
+    sight[12] = C
+
+
+@njit(**BORROW)
+def hides(sight: Array, x: float, y: float, z: float) -> bool:
+    """Whether a part lies before a point, which is at (x, y, z) from the eye: the middle of the chord that the line of
+    sight shares with it is nearer than the point."""
+    d0 = sight[0] * x + sight[1] * y + sight[2] * z
+    d1 = sight[3] * x + sight[4] * y + sight[5] * z
+    d2 = sight[6] * x + sight[7] * y + sight[8] * z
+    A = d0 * d0 + d1 * d1 + d2 * d2
+    B = sight[9] * d0 + sight[10] * d1 + sight[11] * d2
+    return B < 0.0 and -B < A and B * B - A * sight[12] > 0.0
+
+
+@njit(**BORROW)
+def along_axis(shape: Array, sample: int) -> float:
+    """Place of a sample along the axis of a part, from its centre, metres."""
+    return shape[5] * 0.8 * (2.0 * sample / (ALONG - 1) - 1.0)
+
+
+@njit(**BORROW)
+def see_axis(P: Array, eye: Array, T: Array, shape: Array, axis: Array) -> None:
+    """Fill where the axis of a part is from the eye and in the image, (4, 3): its centre from the eye, metres; its
+    centre, the change for a metre along the axis and for a metre across axis and sight in homogeneous pixels."""
+    for i in range(3):
+        axis[0, i] = T[i, 0] * shape[0] + T[i, 1] * shape[1] + T[i, 2] * shape[2] + T[i, 3] - eye[i]
+    x, y, z = axis[0, 0], axis[0, 1], axis[0, 2]
+    ax, ay, az = T[0, 2], T[1, 2], T[2, 2]
+    sx, sy, sz = ay * z - az * y, az * x - ax * z, ax * y - ay * x
+    norm = np.sqrt(sx * sx + sy * sy + sz * sz) + 1e-9
+    for i in range(3):
+        axis[1, i] = P[i, 0] * (x + eye[0]) + P[i, 1] * (y + eye[1]) + P[i, 2] * (z + eye[2]) + P[i, 3]
+        axis[2, i] = P[i, 0] * ax + P[i, 1] * ay + P[i, 2] * az
+        axis[3, i] = (P[i, 0] * sx + P[i, 1] * sy + P[i, 2] * sz) / norm
+
+
+@njit(**BORROW)
+def hidden(
+    T: Array, axis: Array, along_m: float, own: int, sights: Array, among: NDArray[np.int64], n_among: int
+) -> bool:
+    """Whether another part lies before a place along the axis of one.
+
+    Args:
+        T: pose of the part, (4, 4), metres.
+        axis: see `see_axis`.
+        along_m: from the centre of the part, metres.
+        own: index of the part.
+        sights: of all parts, see `place_before`, (P, 13).
+        among: indices of the parts that may hide it, (room,).
+        n_among: their number.
+    """
+    x, y, z = axis[0, 0] + along_m * T[0, 2], axis[0, 1] + along_m * T[1, 2], axis[0, 2] + along_m * T[2, 2]
+    for i in range(n_among):
+        p = among[i]
+        if p != own and hides(sights[p], x, y, z):
+            return True
+    return False
+
+
+@njit(**BORROW)
+def pixel_on_axis(axis: Array, along_m: float) -> tuple[float, float, float, float]:
+    """Where a place along the axis of a part is in an image, px, and how that changes to the side, px per metre; see
+    `see_axis`. So near the axis the image is as good as linear."""
+    near = 1.0 / (axis[1, 2] + along_m * axis[2, 2])
+    u = (axis[1, 0] + along_m * axis[2, 0]) * near
+    v = (axis[1, 1] + along_m * axis[2, 1]) * near
+    return u, v, (axis[3, 0] - u * axis[3, 2]) * near, (axis[3, 1] - v * axis[3, 2]) * near
+
+
+@njit(**BORROW)
+def bin_of(image: Image, v: int, u: int) -> int:
+    """Index of a pixel's colour."""
+    r, g, b = image[v, u, 0] * BINS // 256, image[v, u, 1] * BINS // 256, image[v, u, 2] * BINS // 256
+    return (r * BINS + g) * BINS + b
