@@ -114,17 +114,16 @@ def test_a_limb_in_the_open(gavrila, couple):
         assert found[0] == pytest.approx(plain_look(views, bodies, 0, pose, arm, table), abs=0.5)
 
 
-def test_what_hides_a_limb_beside_the_image_is_known_too():
+@pytest.mark.parametrize("way", [1, -1])
+def test_what_hides_a_limb_beside_the_image_is_known_too(way):
     """A ball behind a wall says nothing, also where the image ends; beside the wall there it says a little against."""
     ball, wall = solid((0.1, 0.1, 0.2)), solid((0.1, 0.4, 1.0))
     camera = camera_at("front", (4.0, 0.0, 0.0))
-    bodies = [
-        at(ball, 0, 0, 0),
-        at(wall, 1.0, 2.3, 0),
-    ]  # 320 px of 520 px at 3 m are 1.85 m: it stands out of the image
+    # 320 px of 520 px at 3 m are 1.85 m: the wall begins beyond them.
+    bodies = [at(ball, 0, 0, 0), at(wall, 1.0, 2.3 * way, 0)]
     colors = Colors(dressed(bodies, [camera], {"solid": (200, 0, 0)}), bodies)
     part = np.array([0])
-    hidden, beside = (at(ball, 0, y, 0).values for y in (3.1, -3.1))
+    hidden, beside = (at(ball, 0, y, 0).values for y in (3.1 * way, -3.1 * way))
     assert colors.look(hidden, part, None)(hidden[None]) == 0
     assert colors.look(beside, part, None)(beside[None]) == pytest.approx(-0.25 * 5 * SAMPLES)
 
