@@ -21,15 +21,17 @@ Status = Literal["good", "doubtful", "lost"]
 
 _LEAST_SAMPLES = 12
 """Colours of fewer samples say nothing about a part."""
+_LEAST_PX = 5.0
+"""Contours shorter than this explain as little as one of this length."""
 _LEAST_TRUST = 0.5
 """Silhouettes trusted less have no say."""
 _MOST_UNEXPLAINED = 0.07
 """A silhouette of whose contour more than this is explained by no part shows a limb that is elsewhere."""
-_WEIGHTS = np.array([-1.995, 0.469, 4.15, 14.652, 24.962, -9.377])
+_WEIGHTS = np.array([-1.459, 0.753, 2.404, 11.344, 8.074, -3.76, -2.929, -6.672])
 """Of the evidence in `evidence`, in its order; the last is the constant."""
-_DOUBTFUL, _SUSPECT, _LOST = -3.8, -2.5, 0.0
+_DOUBTFUL, _SUSPECT, _LOST = -4.0, -3.0, 0.0
 """Log odds that a limb is lost from which on the frame is doubtful, the limb is searched for, and the frame is lost.
-Few limbs are lost, and a lost one that is called good is the costlier error: doubt begins at 1 to 45."""
+Few limbs are lost, and a lost one that is called good is the costlier error: doubt begins at 1 to 55."""
 _LOST_FORWARD = 0.6
 """Of a body whose contours are farther than this from all edges, in outlier distances, nothing holds."""
 
@@ -56,6 +58,12 @@ class LimbFigures(NamedTuple):
     """How much less that is than where the colours were learnt, in the view in which it is most, nats per sample."""
     spread_px: float
     """Standard deviation of its end, matched px where the body stands."""
+    forward: float
+    """Mean cut-off distance of its visible contour to the edges, in outlier distances; 0 where nothing is visible."""
+    shown: float
+    """Length of its visible contour in all views, as a share of what it would be seen from the side."""
+    explained: float
+    """Points of edges and silhouette that it explains, for each pixel of its visible contour."""
 
 
 class Quality(NamedTuple):
@@ -89,13 +97,15 @@ class Quality(NamedTuple):
 
 
 def evidence(found: Quality, limb: LimbFigures) -> Array:
-    """What the log odds of a limb are made of, (5,)."""
+    """What the log odds of a limb are made of, (7,)."""
     return np.array([
         np.clip(limb.color, -2, 1),
         np.clip(limb.worst_drop, -0.5, 3),
         np.log(np.clip(limb.spread_px, 0.5, 50)),
         min(found.unexplained, _MOST_UNEXPLAINED),
-        found.forward,
+        limb.forward,
+        np.log(np.clip(limb.shown, 0.02, 2)),
+        min(limb.explained, 1),
     ])  # fmt: skip
 
 
@@ -143,7 +153,8 @@ def quality(
         colors: of its parts; None where there are none.
     """
     chains = limbs(model)
-    far = np.nansum(costs.forward_px / thetas_px[:, None] * costs.length_px)
+    far = np.nan_to_num(costs.forward_px) / thetas_px[:, None] * costs.length_px
+    beside_px = 2.0 * px_per_m * len(thetas_px) * np.array([2.0 * s.half_axes[2] for s in model.shapes])
     color, worst_drop = np.full(len(model.parts), np.inf), np.zeros(len(model.parts))
     if colors is not None:
         score, known = colors
@@ -151,14 +162,31 @@ def quality(
         worst_drop = np.nan_to_num(known.usual - score.views, nan=-np.inf).max(axis=0, initial=-np.inf)
     spreads = px_per_m * _end_spreads(model, fit)
     return Quality(
-        float(far / max(1e-9, costs.length_px.sum())),
+        float(far.sum() / max(1e-9, costs.length_px.sum())),
         int(np.count_nonzero(costs.length_px.sum(axis=1) > 0)),
         _second_largest(1.0 - costs.outline[trusts > _LEAST_TRUST]),
         tuple(
-            LimbFigures(c.name, float(color[c.parts].min()), float(worst_drop[c.parts].max()), float(spread))
+            LimbFigures(
+                c.name, float(color[c.parts].min()), float(worst_drop[c.parts].max()), float(spread),
+                *_of_contour(costs, far, beside_px, c.parts),
+            )
             for c, spread in zip(chains, spreads, strict=True)
         ),
-    )
+    )  # fmt: skip
+
+
+def _of_contour(costs: PartCosts, far: Array, beside_px: Array, parts: NDArray[np.int64]) -> tuple[float, float, float]:
+    """The figures `forward`, `shown` and `explained` of some parts.
+
+    Args:
+        costs: of all parts.
+        far: summed distance of their contours, (V, n_parts), px times outlier distances.
+        beside_px: length of their contours seen from the side, in all views together, (n_parts,), px.
+        parts: which are asked.
+    """
+    length = float(costs.length_px[:, parts].sum())
+    forward = float(far[:, parts].sum()) / max(1e-9, length)
+    return forward, length / float(beside_px[parts].sum()), float(costs.points[:, parts].sum()) / max(_LEAST_PX, length)
 
 
 def _second_largest(shares: Array) -> float:

@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,21 +32,36 @@ from tracker.references import read_joints
 from tracker.rigid import Array
 from tracker.session import load_session
 from tracker.simulate import simulate
-from tracker.track import track_chamfer
+from tracker.track import PoseEstimate, track_chamfer
 from tracker.track_settings import TrackSettings
 
 VGA, SMALL = (640, 480), (320, 240)
+
+
+class Scene(NamedTuple):
+    """A simulated scene."""
+
+    name: str
+    seed: int
+    cameras: int = 4
+    size: tuple[int, int] = VGA
+
+    @property
+    def of_several(self) -> bool:
+        """Whether it shows more than one person."""
+        return self.name == "tango" or self.name.startswith("couple")
+
+
 FIT = (
-    ("exercise", 1, 4, VGA), ("exercise", 2, 4, VGA), ("dance", 1, 4, VGA), ("dance", 2, 4, VGA), ("dance", 3, 4, VGA),
-    ("leaving", 1, 4, VGA), ("leaving", 2, 4, VGA), ("reach_and_cross", 1, 4, VGA), ("reach_and_cross", 3, 4, VGA),
+    *(Scene(n, s) for n, s in (("exercise", 1), ("exercise", 2), ("dance", 1), ("dance", 2), ("dance", 3))),
+    *(Scene(n, s) for n, s in (("leaving", 1), ("leaving", 2), ("reach_and_cross", 1), ("reach_and_cross", 3))),
+    Scene("couple_near", 1), Scene("couple_touching", 2), Scene("couple_overlapping", 3), Scene("tango", 4),
 )  # fmt: skip
 CHECK = (
-    ("exercise", 11, 4, VGA), ("exercise", 12, 4, VGA), ("dance", 11, 4, VGA), ("dance", 12, 4, VGA),
-    ("leaving", 11, 4, VGA), ("leaving", 12, 4, VGA), ("reach_and_cross", 11, 4, VGA),
-    ("reach_and_cross", 12, 4, VGA), ("exercise", 31, 4, VGA), ("dance", 31, 4, VGA), ("leaving", 31, 4, VGA),
-    ("reach_and_cross", 31, 4, VGA), ("dance", 13, 3, SMALL), ("exercise", 13, 6, SMALL),
+    *(Scene(n, s) for n in ("exercise", "dance", "leaving", "reach_and_cross") for s in (11, 12, 31)),
+    Scene("dance", 13, 3, SMALL), Scene("exercise", 13, 6, SMALL),
+    Scene("couple_overlapping", 41), Scene("couple_touching", 42), Scene("tango", 44),
 )  # fmt: skip
-"""Scene, seed, cameras, image size."""
 LOST_M = 0.15
 UNSEARCHED_WEIGHT = 0.3
 """What a frame counts that was tracked without search: more is lost there, but not as it is lost with search."""
@@ -61,32 +76,43 @@ class Limbs:
         self.evidence: list[Array] = []
         self.lost: list[bool] = []
         self.searched: list[bool] = []
-        self.frames: list[int] = []
+        self.frames: list[tuple[int, int]] = []  # person and frame
         self.statuses: list[Status] = []
 
     def add(self, scene: Path, settings: TrackSettings) -> None:
         """Track a scene and note what there is to know of each limb."""
         session = load_session(scene)
-        model = load_model(DEFAULT_MODEL, session.people[0].model.height_m)
-        truth = read_joints(scene / "truth.trc", session.fps)
-        columns = [truth.names.index(n) for n in LIMB_JOINTS]
-        start = fit_to_points(model, dict(zip(LIMB_JOINTS, truth.points[0][columns], strict=True))).values
+        alone = len(session.people) == 1
+        models = [load_model(DEFAULT_MODEL, p.model.height_m) for p in session.people]
+        truths = [
+            read_joints(scene / ("truth.trc" if alone else f"truth_{p.name}.trc"), session.fps) for p in session.people
+        ]
+        limb_joints = [t.points[:, [t.names.index(n) for n in LIMB_JOINTS]] for t in truths]
+        starts = [
+            fit_to_points(m, dict(zip(LIMB_JOINTS, j[0], strict=True))).values
+            for m, j in zip(models, limb_joints, strict=True)
+        ]
         with Recording(session.cameras) as recording:
             observer, frames = Observer(session.cameras, recording), range(session.n_frames)
-            for found in track_chamfer(observer, [model], [start], frames, settings, {0: {0: start}}):
-                (quality,), (pose,), (status,) = found.qualities, found.poses, found.statuses
-                if quality is None:
-                    continue
-                joints = model.points_world(pose)[[model.point_names.index(n) for n in LIMB_JOINTS]]
-                off = np.linalg.norm(joints - truth.points[found.frame][columns], axis=-1) > LOST_M
-                for limb in quality.limbs:
-                    of_limb = _joints(model, limb.name)
-                    if of_limb.any():
-                        self.evidence.append(confidence.evidence(quality, limb))
-                        self.lost.append(bool(off[of_limb].any()))
-                        self.searched.append(settings.recover is not None)
-                        self.frames.append(found.frame)
-                        self.statuses.append(status)
+            for found in track_chamfer(observer, models, starts, frames, settings, {0: dict(enumerate(starts))}):
+                for person, (model, joints) in enumerate(zip(models, limb_joints, strict=True)):
+                    self._add_person(person, model, joints[found.frame], found, settings.recover is not None)
+
+    def _add_person(self, person: int, model: BodyModel, truth: Array, found: PoseEstimate, searched: bool) -> None:
+        """Note what there is to know of the limbs of a person, whose true limb joints are (12, 3), on a frame."""
+        quality = found.qualities[person]
+        if quality is None:
+            return
+        joints = model.points_world(found.poses[person])[[model.point_names.index(n) for n in LIMB_JOINTS]]
+        off = np.linalg.norm(joints - truth, axis=-1) > LOST_M
+        for limb in quality.limbs:
+            of_limb = _joints(model, limb.name)
+            if of_limb.any():
+                self.evidence.append(confidence.evidence(quality, limb))
+                self.lost.append(bool(off[of_limb].any()))
+                self.searched.append(searched)
+                self.frames.append((person, found.frame))
+                self.statuses.append(found.statuses[person])
 
 
 def _joints(model: BodyModel, limb: str) -> NDArray[np.bool_]:
@@ -114,9 +140,10 @@ def fitted(scenes: Sequence[Limbs]) -> Array:
 
 
 def by_frame(scene: Limbs, values: NDArray[Any], merge: Callable[[NDArray[Any]], Any]) -> NDArray[Any]:
-    """One figure for each frame that was tracked as the tracker does, from one for each of its limbs."""
+    """One figure for each person and frame that was tracked as the tracker does, from one for each of their limbs."""
     frames, searched = np.array(scene.frames), np.array(scene.searched)
-    return np.array([merge(values[(frames == k) & searched]) for k in np.unique(frames[searched])])
+    each = np.unique(frames[searched], axis=0)
+    return np.array([merge(values[(frames == k).all(axis=1) & searched]) for k in each])
 
 
 def share(of: NDArray[np.bool_]) -> float:
@@ -142,15 +169,16 @@ def main() -> None:
         folder = words.scenes or Path(name)
         tracked = {}
         for spec in FIT + CHECK:
-            scene, seed, n_cameras, size = spec
-            path = folder / f"{scene}_{seed}"
+            path = folder / f"{spec.name}_{spec.seed}"
             if not path.exists():
-                simulate(path, scene, n_cameras, words.frames, seed, size)
+                # Two people are two persons' frames, and take longer.
+                n_frames = words.frames // 2 if spec.of_several else words.frames
+                simulate(path, spec.name, spec.cameras, n_frames, spec.seed, spec.size)
             tracked[spec] = limbs = Limbs()
             limbs.add(path, TrackSettings())
             if spec in FIT:
                 limbs.add(path, replace(TrackSettings(), recover=None))
-            print(f"{scene} {seed}: {sum(limbs.lost)} limbs of {len(limbs.lost)} lost", flush=True)
+            print(f"{spec.name} {spec.seed}: {sum(limbs.lost)} limbs of {len(limbs.lost)} lost", flush=True)
     fit = [tracked[s] for s in FIT]
     print("weights:", np.round(fitted(fit), 3).tolist())
     weights = [fitted(fit[:i] + fit[i + 1 :]) for i in range(len(fit))]
@@ -158,11 +186,12 @@ def main() -> None:
     lost = np.concatenate([by_frame(x, np.array(x.lost), np.any) for x in fit])
     for threshold in THRESHOLDS:
         print(f"left out one by one, doubt from {threshold}:", report(np.concatenate(odds) > threshold, lost))
-    for size in (VGA, SMALL):
-        check = [tracked[s] for s in CHECK if s[3] == size]
+    for size, of_several in ((VGA, False), (SMALL, False), (VGA, True)):
+        check = [tracked[s] for s in CHECK if s.size == size and s.of_several == of_several]
         flags = np.concatenate([by_frame(x, np.array([s != "good" for s in x.statuses]), np.any) for x in check])
         lost = np.concatenate([by_frame(x, np.array(x.lost), np.any) for x in check])
-        print(f"as called, on other scenes, {size[0]}x{size[1]}:", report(flags, lost))
+        whose = "two people" if of_several else "one person"
+        print(f"as called, on other scenes, {whose}, {size[0]}x{size[1]}:", report(flags, lost))
 
 
 if __name__ == "__main__":

@@ -73,13 +73,19 @@ figures = st.builds(
     color=st.floats(-3, 3),
     worst_drop=st.floats(-3, 6),
     spread_px=st.floats(0.1, 80),
+    forward=st.floats(0, 1),
+    shown=st.floats(0, 1.2),
+    explained=st.floats(0, 1.5),
 )
-CLEAR = LimbFigures("leg", 1.0, 0.0, 1.2)
+CLEAR = LimbFigures("leg", 1.0, 0.0, 1.2, 0.05, 0.6, 0.5)
+ASTRAY = (0.3, 0.2, 0.1)
+"""Contours far from edges, hardly seen, that explain little."""
 
 
-@given(before=figures, worse=st.tuples(*[st.floats(0, 3)] * 3), body=st.tuples(*[st.floats(0, 0.1)] * 2))
+@given(before=figures, worse=st.tuples(*[st.floats(0, 3)] * 6), body=st.tuples(*[st.floats(0, 0.1)] * 2))
 def test_worse_figures_never_clear_a_limb(before, worse, body):
-    after = LimbFigures("arm", before.color - worse[0], before.worst_drop + worse[1], before.spread_px + worse[2])
+    signs = (-1, 1, 1, 1, -1, -1)
+    after = LimbFigures("arm", *(b + s * w for b, s, w in zip(before[1:], signs, worse, strict=True)))
     better = Quality(0.05, 3, 0.0, (before, CLEAR))
     worst_of = Quality(0.05 + body[0], 3, body[1], (after, CLEAR))
     assert (worst_of.log_odds >= better.log_odds).all()
@@ -89,7 +95,7 @@ def test_worse_figures_never_clear_a_limb(before, worse, body):
 
 
 def test_what_is_plain():
-    undressed, vague = LimbFigures("x", -2.0, 3.0, 4.0), LimbFigures("y", 0.2, 1.0, 40.0)
+    undressed, vague = LimbFigures("x", -2.0, 3.0, 4.0, *ASTRAY), LimbFigures("y", 0.2, 1.0, 40.0, *ASTRAY)
     assert judge(Quality(0.05, 3, 0.0, (CLEAR, CLEAR))) == "good"
     for limb in (undressed, vague):
         found = Quality(0.15, 3, 0.03, (CLEAR, CLEAR, limb))
@@ -107,8 +113,8 @@ def test_what_is_plain():
     ("found", "words"),
     [
         (Quality(0.05, 3, 0.0, (CLEAR, CLEAR)), ""),
-        (Quality(0.15, 3, 0.03, (CLEAR, LimbFigures("left_forearm", -2.0, 3.0, 4.0))), "left arm uncertain"),
-        (Quality(0.15, 3, 0.03, (LimbFigures("right_calf", -2.0, 3.0, 4.0), CLEAR)), "right leg uncertain"),
+        (Quality(0.15, 3, 0.03, (CLEAR, LimbFigures("left_forearm", -2.0, 3.0, 4.0, *ASTRAY))), "left arm uncertain"),
+        (Quality(0.15, 3, 0.03, (LimbFigures("right_calf", -2.0, 3.0, 4.0, *ASTRAY), CLEAR)), "right leg uncertain"),
         (Quality(0.02, 3, 0.2, (CLEAR, CLEAR)), "part of the silhouette unexplained"),
         (Quality(1.0, 3, 0.0, (CLEAR, CLEAR)), "no edges near the body"),
         (Quality(0.0, 0, 0.0, ()), "no view shows the body"),
@@ -142,6 +148,9 @@ def test_quality_of_a_pose_and_of_a_lost_arm(gavrila, colors):
     assert right.forward < 0.05 < wrong.forward
     arm = [x.name for x in wrong.limbs].index("left_forearm")
     assert wrong.log_odds[arm] > right.log_odds[arm]
+    assert wrong.limbs[arm].forward > right.limbs[arm].forward + 0.1
+    assert wrong.limbs[arm].explained < right.limbs[arm].explained
+    assert all(0.1 < x.shown < 1.2 for x in right.limbs)
     assert (right.unexplained, wrong.unexplained) == (0, 0)
     assert all(0 < x.spread_px < 10 for x in right.limbs)
     if colors:
