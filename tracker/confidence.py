@@ -29,9 +29,9 @@ _MOST_UNEXPLAINED = 0.07
 """A silhouette of whose contour more than this is explained by no part shows a limb that is elsewhere."""
 _WEIGHTS = np.array([-1.459, 0.753, 2.404, 11.344, 8.074, -3.76, -2.929, -6.672])
 """Of the evidence in `evidence`, in its order; the last is the constant."""
-_DOUBTFUL, _SUSPECT, _LOST = -4.0, -3.0, 0.0
+_DOUBTFUL, _SUSPECT, _LOST = -3.8, -3.0, 0.0
 """Log odds that a limb is lost from which on the frame is doubtful, the limb is searched for, and the frame is lost.
-Few limbs are lost, and a lost one that is called good is the costlier error: doubt begins at 1 to 55."""
+Few limbs are lost, and a lost one that is called good is the costlier error: doubt begins at 1 to 45."""
 _LOST_FORWARD = 0.6
 """Of a body whose contours are farther than this from all edges, in outlier distances, nothing holds."""
 
@@ -61,7 +61,7 @@ class LimbFigures(NamedTuple):
     forward: float
     """Mean cut-off distance of its visible contour to the edges, in outlier distances; 0 where nothing is visible."""
     shown: float
-    """Length of its visible contour in all views, as a share of what it would be seen from the side."""
+    """Length of its visible contour in the views that see the body, as a share of what it would be from the side."""
     explained: float
     """Points of edges and silhouette that it explains, for each pixel of its visible contour."""
 
@@ -154,7 +154,8 @@ def quality(
     """
     chains = limbs(model)
     far = np.nan_to_num(costs.forward_px) / thetas_px[:, None] * costs.length_px
-    beside_px = 2.0 * px_per_m * len(thetas_px) * np.array([2.0 * s.half_axes[2] for s in model.shapes])
+    views = int(np.count_nonzero(costs.length_px.sum(axis=1) > 0))
+    beside_px = 2.0 * px_per_m * max(1, views) * np.array([2.0 * s.half_axes[2] for s in model.shapes])
     color, worst_drop = np.full(len(model.parts), np.inf), np.zeros(len(model.parts))
     if colors is not None:
         score, known = colors
@@ -163,7 +164,7 @@ def quality(
     spreads = px_per_m * _end_spreads(model, fit)
     return Quality(
         float(far.sum() / max(1e-9, costs.length_px.sum())),
-        int(np.count_nonzero(costs.length_px.sum(axis=1) > 0)),
+        views,
         _second_largest(1.0 - costs.outline[trusts > _LEAST_TRUST]),
         tuple(
             LimbFigures(
@@ -181,7 +182,7 @@ def _of_contour(costs: PartCosts, far: Array, beside_px: Array, parts: NDArray[n
     Args:
         costs: of all parts.
         far: summed distance of their contours, (V, n_parts), px times outlier distances.
-        beside_px: length of their contours seen from the side, in all views together, (n_parts,), px.
+        beside_px: length of their contours if they were seen from the side, in all views together, (n_parts,), px.
         parts: which are asked.
     """
     length = float(costs.length_px[:, parts].sum())
