@@ -100,9 +100,10 @@ class _Run:
 
     def estimates(self, observer: Observer) -> Iterator[PoseEstimate]:
         """Track the frames one by one."""
-        models, at = [p.model for p in self._at.session.people], self._at
-        fixed, free = self._fixed, self._free
-        return track_chamfer(observer, models, self._past, self._frames, self._settings, fixed, at.people, free)
+        models = [p.model for p in self._at.session.people]
+        return track_chamfer(
+            observer, models, self._past, self._frames, self._settings, self._fixed, self._at.people, self._free
+        )
 
     def take(self, found: PoseEstimate) -> None:
         """Keep what was found on a frame; on disk with the next save."""

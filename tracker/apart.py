@@ -95,9 +95,7 @@ def _pushed(contacts: _Contacts, model: BodyModel, kinematics: Kinematics, first
     """Normal equations of weighted depths for a body whose first part has an index; the parts of others stand."""
     n = model.n_dofs
     gradient, hessian = np.zeros(n), np.zeros((n, n))
-    cost = 0.0
-    if len(contacts.rows):
-        cost = _push(*contacts, first, weight, kinematics, model.dof_is_length, model.moves, gradient, hessian)
+    cost = _push(*contacts, first, weight, kinematics, model.dof_is_length, model.moves, gradient, hessian)
     return Normal(cost, gradient, hessian)
 
 

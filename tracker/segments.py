@@ -93,8 +93,7 @@ def _summed(
     n = len(segments.firsts) - 1
     total, count = np.empty(n, np.float32), np.empty(n, np.int64)
     if n:
-        pieces, everything = np.ascontiguousarray(pieces_px, np.float32), np.ones(n, np.bool_)
-        wanted = everything if asked is None else asked
+        pieces, wanted = np.ascontiguousarray(pieces_px, np.float32), np.ones(n, np.bool_) if asked is None else asked
         _sum_distances(segments, pieces, reach_px, MAX_ANGLE_RAD, wanted, total, count)
     return total, count
 

@@ -13,17 +13,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 from sections import measured, put_section, table
+from true_starts import read_simulated, start_of
 
-from tracker.assemble import DEFAULT_MODEL, assemble
+from tracker.assemble import assemble
 from tracker.body import BodyModel
 from tracker.evaluate import evaluate_joints, joints_of_poses
 from tracker.evidence import Observer
-from tracker.fit import fit_to_points
-from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
-from tracker.joint_maps import LIMB_JOINTS
 from tracker.predict import PredictSettings
 from tracker.recording import Recording
 from tracker.references import read_joints
@@ -75,9 +72,8 @@ def simulated(folder: Path, n_frames: int) -> list[Clip]:
     clips = []
     for scene, seed in SCENES:
         session = simulate(folder / scene, scene, n_frames=n_frames, seed=seed)
-        model = load_model(DEFAULT_MODEL, session.people[0].model.height_m)
-        reference = read_joints(session.folder / "truth.trc", session.fps)
-        clips.append(Clip(scene, session.cameras, model, reference, range(n_frames), session.fps))
+        true = read_simulated(session.folder)
+        clips.append(Clip(scene, session.cameras, true.models[0], true.references[0], range(n_frames), session.fps))
     return clips
 
 
@@ -101,9 +97,7 @@ def recorded(data: Path, folder: Path) -> list[Clip]:
 
 def measure(clip: Clip, settings: TrackSettings) -> tuple[float, int, float]:
     """Mean error in mm, lost frames, frames per second."""
-    row = clip.reference.points[np.flatnonzero(clip.reference.frames == 0)[0]]
-    places = dict(zip(clip.reference.names, row, strict=True))
-    start = fit_to_points(clip.model, {n: places[n] for n in LIMB_JOINTS}).values
+    start = start_of(clip.model, clip.reference)
     with Recording(clip.cameras) as recording:
         observer = Observer(clip.cameras, recording)
         began = time.perf_counter()

@@ -18,20 +18,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
+from true_starts import read_simulated
 
 from tracker import confidence
-from tracker.assemble import DEFAULT_MODEL
 from tracker.body import BodyModel
 from tracker.confidence import Status
 from tracker.evidence import Observer
-from tracker.fit import fit_to_points
-from tracker.formats.model_toml import load_model
 from tracker.joint_maps import LIMB_JOINTS
 from tracker.recording import Recording
-from tracker.references import read_joints
 from tracker.rigid import Array
-from tracker.session import load_session
 from tracker.simulate import simulate
+from tracker.simulate.scenes import cast_of
 from tracker.track import PoseEstimate, track_chamfer
 from tracker.track_settings import TrackSettings
 
@@ -49,7 +46,7 @@ class Scene(NamedTuple):
     @property
     def of_several(self) -> bool:
         """Whether it shows more than one person."""
-        return self.name == "tango" or self.name.startswith("couple")
+        return len(cast_of(self.name, self.seed)) > 1
 
 
 FIT = (
@@ -81,17 +78,8 @@ class Limbs:
 
     def add(self, scene: Path, settings: TrackSettings) -> None:
         """Track a scene and note what there is to know of each limb."""
-        session = load_session(scene)
-        alone = len(session.people) == 1
-        models = [load_model(DEFAULT_MODEL, p.model.height_m) for p in session.people]
-        truths = [
-            read_joints(scene / ("truth.trc" if alone else f"truth_{p.name}.trc"), session.fps) for p in session.people
-        ]
+        session, models, truths, starts = read_simulated(scene)
         limb_joints = [t.points[:, [t.names.index(n) for n in LIMB_JOINTS]] for t in truths]
-        starts = [
-            fit_to_points(m, dict(zip(LIMB_JOINTS, j[0], strict=True))).values
-            for m, j in zip(models, limb_joints, strict=True)
-        ]
         with Recording(session.cameras) as recording:
             observer, frames = Observer(session.cameras, recording), range(session.n_frames)
             for found in track_chamfer(observer, models, starts, frames, settings, {0: dict(enumerate(starts))}):

@@ -15,19 +15,15 @@ from typing import NamedTuple
 
 import numpy as np
 from sections import measured, put_section, table
+from true_starts import read_simulated
 
-from tracker.assemble import DEFAULT_MODEL
 from tracker.body import BodyModel
 from tracker.evaluate import evaluate_joints, joints_of_poses
 from tracker.evidence import Observer
-from tracker.fit import fit_to_points
-from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
-from tracker.joint_maps import LIMB_JOINTS
 from tracker.recording import Recording
-from tracker.references import read_joints
 from tracker.rigid import Array
-from tracker.session import Session, load_session
+from tracker.session import Session
 from tracker.simulate import simulate
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings
@@ -76,15 +72,9 @@ class Cell(NamedTuple):
 
 def read_couple(folder: Path, n_frames: int) -> Couple:
     """Read the first frames of a simulated session of several people."""
-    session = load_session(folder)
-    models = tuple(load_model(DEFAULT_MODEL, p.model.height_m) for p in session.people)
-    references = tuple(read_joints(folder / f"truth_{p.name}.trc", session.fps) for p in session.people)
-    starts = []
-    for model, reference in zip(models, references, strict=True):
-        places = dict(zip(reference.names, reference.points[0], strict=True))
-        starts.append(fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).values)
+    session, models, references, starts = read_simulated(folder)
     frames = range(min(n_frames, session.n_frames))
-    return Couple(folder.name, session, models, references, frames, tuple(starts))
+    return Couple(folder.name, session, models, references, frames, starts)
 
 
 def measure(couple: Couple, settings: TrackSettings) -> Cell:
