@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body import Body, BodyModel
+from tracker.body import Body, BodyModel, parts_of
 from tracker.fit import Normal
 from tracker.kinematics import IntArray, Kinematics
 from tracker.rigid import Array
@@ -62,8 +62,7 @@ class KeepBodiesApart:
         """
         self._models = tuple(b.model for b in bodies)
         self._Ts = np.concatenate([b.model.kinematics(b.values).Ts_world_part for b in bodies])
-        first = sum(len(m.parts) for m in self._models[:person])
-        self._own = slice(first, first + len(self._models[person].parts))
+        self._own = parts_of(self._models, person)
         mine = np.zeros(len(self._Ts), dtype=bool)
         mine[self._own] = True
         self._apart = mine[:, None] != mine

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from tracker.body import Body, BodyModel
+from tracker.body import Body, BodyModel, parts_of
 from tracker.contours import part_poses, projection
 from tracker.evidence import ViewEvidence
 from tracker.kernels import BORROW
@@ -95,7 +95,7 @@ class Colors:
         ]
         self._bodies, self._person = list(bodies), person
         self._shapes = np.concatenate([ellipsoids(b.model) for b in bodies])
-        self._first = sum(len(b.model.parts) for b in bodies[:person])
+        self._own = parts_of([b.model for b in bodies], person)
 
     def learn(self, before: PartColors | None = None, share: float = 1.0) -> PartColors:
         """Remember the colours under the parts where the bodies stand; left and right parts share some of theirs.
@@ -162,11 +162,6 @@ class Colors:
             Standing(self._Ts(rest)[standing] @ unit_balls(self._shapes[standing]), owners[standing]),
             self._shapes[self._own], None if known is None else known.log_ratios,
         )  # fmt: skip
-
-    @property
-    def _own(self) -> slice:
-        """The parts of the person among those of everybody."""
-        return slice(self._first, self._first + len(self._bodies[self._person].model.parts))
 
     def _Ts(self, own: Kinematics) -> Array:
         """Poses of all parts where the person stands somewhere, (P, 4, 4), metres."""

@@ -5,7 +5,7 @@ w, x, y, z). Steps, Jacobians and limits live in the *degrees of freedom* (dofs)
 a rotation vector in the frame of its child part. Where a model has no ball joint, values and dofs coincide.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -379,6 +379,12 @@ class Body:
     model: BodyModel
     values: Array
     """Pose, (n_values,)."""
+
+
+def parts_of(models: Sequence[BodyModel], person: int) -> slice:
+    """Which of everybody's parts, one body after the other, are one person's."""
+    first = sum(len(m.parts) for m in models[:person])
+    return slice(first, first + len(models[person].parts))
 
 
 def _clip_ball(wxyz: Array, cone: float, twist: float) -> Array:

@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker import contours
-from tracker.body import Body, BodyModel
+from tracker.body import Body, BodyModel, parts_of
 from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence
 from tracker.kernels import FAST, helpers
@@ -157,7 +157,7 @@ class ChamferCost:
             The total costs, (C,), and those of each view, (C, V), px of the footage; NaN for views without edges.
         """
         model = self.models[person]
-        first = sum(len(m.parts) for m in self.models[:person])
+        first = parts_of(self.models, person).start
         directed = np.empty((len(candidates), len(self._seen), 2))
         poses_of = np.ascontiguousarray(candidates, dtype=np.float64)
         Ts, paper = self._part_poses(poses), self.outliers == "paper"

@@ -84,6 +84,11 @@ class Quality(NamedTuple):
         return _log_odds(self)
 
     @property
+    def doubted(self) -> tuple[str, ...]:
+        """Names of limbs that seem lost themselves."""
+        return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if odds > _SUSPECT)
+
+    @property
     def suspects(self) -> tuple[str, ...]:
         """Names of limbs worth a search, likeliest first; all where the image shows what no part explains."""
         odds, everyone = self.log_odds, self.unexplained > _MOST_UNEXPLAINED

@@ -183,9 +183,13 @@ def unfiltered(view: ViewEvidence) -> ViewEvidence:
     """The same view with all edges but the room's: a wrong prediction may have refused what it missed."""
     if view.segments is None or view.accepted is None or view.accepted.all():
         return view
-    everything = np.ones(len(view.accepted), np.bool_) if view.still is None else ~view.still
-    seen = with_segments(view, everything)
+    seen = with_segments(view, findable(view.segments, view.still))
     return replace(seen, accepted=None) if view.still is None else seen
+
+
+def findable(segments: Segments, still: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+    """Which segments may be a person's, (S,): all but those that are known to stand `still`, (S,)."""
+    return np.ones(len(segments.firsts) - 1, np.bool_) if still is None else ~still
 
 
 def with_segments(view: ViewEvidence, chosen: NDArray[np.bool_]) -> ViewEvidence:
@@ -284,11 +288,6 @@ class Observer:
     def matched_cameras(self) -> tuple[Camera, ...]:
         """The views as they are matched, whole: without lens distortion, at the scale of matching."""
         return tuple(v.camera for v in self._views)
-
-    def image(self, k: int, camera: int) -> Image | None:
-        """Frame k of one camera, by its index, in undistorted pixels, (H, W, 3) RGB; None where it is damaged."""
-        image = self.recording.read_view(camera, k)
-        return None if image is None else self.cameras[camera].camera.undistort_image(image)
 
     def prefetch(self, k: int) -> None:
         """Begin to decode frame k, and to do with it what needs no region; `evidence` will find it done.

@@ -3,6 +3,7 @@
 All image work is done in the region around the predicted bodies (GD96 Sect. 4.2); the rest is never computed.
 """
 
+from functools import cached_property
 from typing import Any
 
 import cv2
@@ -69,23 +70,38 @@ class MatchedView:
     scale: float
     """Matched pixels per pixel of the footage, at most 1."""
 
-    def __init__(self, source: Camera) -> None:
-        """Compute the maps of all pixels once; a region takes its part of them."""
-        self.source = source
-        self.scale = match_scale(source)
+    def __init__(self, source: Camera, scale: float | None = None, beyond: int = cv2.BORDER_REPLICATE) -> None:
+        """Compute the map of all pixels once; a region takes its part of it.
+
+        Args:
+            source: the camera as calibrated.
+            scale: another than that of matching, at most 1.
+            beyond: OpenCV's name for what lies beside the footage. That its border goes on there is for edges: a black
+                frame around the image would have some.
+        """
+        self.source, self._beyond = source, beyond
+        self.scale = match_scale(source) if scale is None else scale
         self.camera = source.pinhole.scaled(self.scale)
         # Larger footage is first reduced by a whole factor, averaging areas, which is fast; the map does the rest.
         self._reduction = int(1 / self.scale)
         self._plain = source.is_pinhole and self.scale == 1
         if self._plain:
             return
-        u, v = cv2.initUndistortRectifyMap(
-            source.K, source.distortion, np.eye(3), self.camera.K, self.camera.size, cv2.CV_32FC1
-        )
-        self._nearest, self._no_fractions = cv2.convertMaps(u, v, cv2.CV_16SC2, nninterpolation=True)
-        f = self._reduction
-        u, v = ((m + np.float32(0.5)) / np.float32(f) - np.float32(0.5) for m in (u, v))
+        f = np.float32(self._reduction)
+        u, v = ((m + np.float32(0.5)) / f - np.float32(0.5) for m in self._map())
         self._cells, self._fractions = cv2.convertMaps(u, v, cv2.CV_16SC2)
+
+    def _map(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Where each matched pixel lies in the footage, u and v, (H, W) each, px."""
+        source, camera = self.source, self.camera
+        return cv2.initUndistortRectifyMap(  # type: ignore[return-value]
+            source.K, source.distortion, np.eye(3), camera.K, camera.size, cv2.CV_32FC1
+        )
+
+    @cached_property
+    def _nearest(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """The same as OpenCV takes it for the nearest pixel."""
+        return cv2.convertMaps(*self._map(), cv2.CV_16SC2, nninterpolation=True)
 
     @property
     def whole(self) -> Region:
@@ -104,8 +120,7 @@ class MatchedView:
             part = frame[top * f : bottom * f, left * f : right * f]
             frame = np.asarray(cv2.resize(part, (right - left, bottom - top), interpolation=cv2.INTER_AREA), np.uint8)
             cells = cells - np.array([left, top], np.int16)
-        # Beyond the footage its border goes on: a black frame around the image would have edges.
-        out = cv2.remap(frame, cells, fractions, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        out = cv2.remap(frame, cells, fractions, cv2.INTER_LINEAR, borderMode=self._beyond)
         return np.asarray(out, np.uint8)
 
     def mask(self, mask: NDArray[np.uint8], region: Region) -> Mask:
@@ -113,7 +128,8 @@ class MatchedView:
         u0, v0, u1, v1 = region
         if self._plain:
             return mask[v0:v1, u0:u1] > 0
-        return np.asarray(cv2.remap(mask, self._nearest[v0:v1, u0:u1], self._no_fractions, cv2.INTER_NEAREST)) > 0
+        cells, no_fractions = self._nearest
+        return np.asarray(cv2.remap(mask, cells[v0:v1, u0:u1], no_fractions, cv2.INTER_NEAREST)) > 0
 
     @staticmethod
     def _needed(cells: NDArray[Any], width: int, height: int) -> Region:

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 from tracker import confidence
 from tracker.appearance import Colors, PartColors
 from tracker.body import BodyModel
-from tracker.confidence import Limb, Status
+from tracker.confidence import Limb, Quality, Status
 from tracker.fit import held
 from tracker.predict import PredictSettings, predict
 from tracker.rigid import Array
 
-_LONGEST_PAUSE = 8
-"""A limb that seems lost and is not found is searched at least every so many frames."""
+_LONGEST_PAUSE, _LONGEST_UNDOUBTED = 8, 64
+"""A limb that seems lost and is not found is searched at least every so many frames; one of several people that nothing
+speaks against but what no part explains, which may be anybody's, every so many."""
 _LEARN_FRAMES, _TRACKED_SHARE, _GIVEN_SHARE = 3, 0.15, 0.5
 """Every so many frames the colours of the parts are brought up to date, and what such a frame counts; what a keyframe
 counts against the frames before it."""
@@ -45,20 +46,40 @@ class Memory:
         self.known: PartColors | None = None
         """The colours of their parts; None before the first frame."""
         self._frames = 0
-        self._pauses: dict[str, tuple[int, int]] = {}  # per limb: when it may be searched again, and the last pause
+        self._pauses: dict[str, tuple[int, int]] = {}  # per limb: when it was searched, and the pause after that
 
     def expected(self, settings: PredictSettings) -> Array:
         """The predicted pose of the next frame."""
         return held(self.model, predict(self.model, self.past, settings), self.past[-1], self.free)
 
-    def may_search(self, limb: Limb) -> bool:
-        """Whether a limb is due: one that was searched in vain waits longer each time."""
-        return self._frames >= self._pauses.get(limb.name, (0, 0))[0]
+    def suspects(self, found: Quality) -> list[Limb]:
+        """Limbs worth a search that may move, likeliest to be lost first."""
+        return [x for name in found.suspects for x in self.limbs if x.name == name]
+
+    def due(self, found: Quality, alone: bool) -> list[Limb]:
+        """Those of them whose turn it is: one that was searched in vain waits longer each time.
+
+        Of several people nobody knows whose it is what no part explains: it makes nobody's limb due while another of
+        theirs seems lost itself, and those that it does wait longer.
+
+        Args:
+            found: what the evidence says of the pose.
+            alone: whether there is nobody else.
+        """
+        suspects = self.suspects(found)
+        doubted = [] if alone else [x for x in suspects if x.name in found.doubted]
+        longest = _LONGEST_PAUSE if alone or doubted else _LONGEST_UNDOUBTED
+
+        def rested(limb: Limb) -> bool:
+            last, pause = self._pauses.get(limb.name, (-1, 0))
+            return self._frames > last + min(pause, longest)
+
+        return [x for x in doubted or suspects if rested(x)]
 
     def searched(self, limb: Limb, found: bool) -> None:
         """Note how the search for a limb went."""
-        pause = 0 if found else min(_LONGEST_PAUSE, 2 * self._pauses.get(limb.name, (0, 0))[1] + 1)
-        self._pauses[limb.name] = (self._frames + pause + 1, pause)
+        pause = 0 if found else min(_LONGEST_UNDOUBTED, 2 * self._pauses.get(limb.name, (0, 0))[1] + 1)
+        self._pauses[limb.name] = (self._frames, pause)
 
     def update(self, pose: Array, colors: Colors, status: Status, given: bool) -> None:
         """Take in what a frame brought.

@@ -50,6 +50,8 @@ _REACHED_M = 0.002
 """A point this near to where it should be has followed the pointer."""
 _BEND_RAD = 0.35
 """How far the last joint of a chain is bent to leave a straight limb's dead point."""
+_STRETCHED = 0.999
+"""A chain has its full length when the point is this share of it away: an elbow bends by 5 degrees there."""
 
 _STRAIGHT_DOWN = 0.1
 """A camera whose axis has a smaller level component than this looks from above, or from below."""
@@ -261,7 +263,8 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
     ]
     fit = solve(model, values, blocks, free=hand.free, **_QUICK)
     joint, first = model.dof_joint[hand.free][[-1, 0]]
-    if joint == first or np.linalg.norm(hand.place_world(fit.values) - target) < _REACHED_M:
+    missed_m = np.linalg.norm(hand.place_world(fit.values) - target)
+    if joint == first or missed_m < _REACHED_M or _is_stretched(hand, fit.values, int(first), target):
         return fit.values
     # A straight limb cannot see that bending would bring the point nearer: begin with its joint bent, either way.
     for bend in (_BEND_RAD, -_BEND_RAD):
@@ -269,6 +272,19 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
         bent = solve(model, start, blocks, free=hand.free, **_QUICK)
         fit = bent if bent.cost < fit.cost else fit
     return fit.values
+
+
+def _is_stretched(hand: Grab, values: Array, first: int, target_world: Array) -> bool:
+    """Whether the chain from a joint on is stretched to its full length, and what it should reach is farther away."""
+    model, part = hand.model, hand.part
+    places = [hand.place_world(values)]
+    Ts_world_part = model.kinematics(values).Ts_world_part
+    while part != first:
+        places.append(Ts_world_part[part, :3, 3])
+        part = int(model.parents[part])
+    places.append(Ts_world_part[first, :3, 3])
+    length = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    return bool(min(np.linalg.norm(p - places[-1]) for p in (places[0], target_world)) > _STRETCHED * length)
 
 
 def hold_anew(hand: Grab, values: Array, pointer_px: Array) -> Grab:

@@ -42,8 +42,10 @@ class RecoverSettings:
     """Poses of a limb that are looked at; a power of two, so that they fill the space evenly."""
     reach_rad: float = float(np.radians(35))
     """Spread of those proposals that lie around the pose, rad; half of them lie anywhere within the joint limits."""
+    improved: int = 48
+    """Of these, how many are improved."""
     scored: int = 48
-    """Of these, how many are improved, and have their contours scored."""
+    """Of those, how many have their contours scored."""
     shakes: int = 16
     """Steps that are tried around each of them in a round."""
     shakes_rad: tuple[float, ...] = tuple(np.radians([16.0, 11.0, 7.0, 4.0]).tolist())
@@ -54,6 +56,10 @@ class RecoverSettings:
     """Of these, how many go through a refinement of the whole body."""
     kept: int = 3
     """Poses that are kept while the next limb is searched, at most."""
+    anew: bool = True
+    """Whether places for that limb are looked for anew from each of them; else once, and scored with each."""
+    gain: float = 0.0
+    """Decrease of the cost that is worth another step of a refinement of the whole body."""
     margin: float = 40.0
     """What they may cost more than the best: more than another limb can make good."""
     colors: float = 0.2
@@ -119,6 +125,15 @@ class Searched(NamedTuple):
     """Poses about as good, with a limb elsewhere, cheapest first."""
 
 
+def for_several(settings: RecoverSettings) -> RecoverSettings:
+    """The same with half the work in each search: limbs of people who hide each other are searched several times as
+    often, and who is found is refined again with the others where they are.
+
+    (Where 86 searches on three recordings found something better, it was always among the 32 that looked best.)
+    """
+    return replace(settings, scored=min(32, settings.scored), anew=False, gain=WORTH_A_STEP)
+
+
 def search_limbs(
     model: BodyModel, suspects: Sequence[Limb], here: Fit, others: Sequence[Array], judge: Judge, iterations: int
 ) -> Searched:
@@ -141,7 +156,9 @@ def search_limbs(
         enough = kept[0].cost + judge.settings.margin
         kept = [x for x in kept if x.cost < enough]
         away = [p for x in suspects if x is not limb for p in x.parts]
-        found = [x for k in kept for x in _search_limb(model, limb, away, k.fit, others, judge, iterations)]
+        poses = [x.fit.values for x in kept]
+        together = [[pose] for pose in poses] if judge.settings.anew else [poses]
+        found = [x for some in together for x in _search_limb(model, limb, away, some, others, judge, iterations)]
         kept = _distinct(model, [*kept, *found], judge.settings.kept, _SAME_M)
     best = kept[0] if kept[0].cost < start.cost - LEAST_GAIN else start
     rivals = [x for x in (*kept, start) if x is not best and x.cost < best.cost + LEAST_GAIN]
@@ -158,35 +175,45 @@ class _Found(NamedTuple):
 
 
 def _search_limb(
-    model: BodyModel, limb: Limb, away: list[int], here: Fit, others: Sequence[Array], judge: Judge, iterations: int
-) -> list[_Found]:
-    """The best poses of one limb, refined with the whole body; parts that are `away` hide nothing at first."""
+    model: BodyModel, limb: Limb, away: list[int], kept: Sequence[Array], others: Sequence[Array], judge: Judge,
+    iterations: int,
+) -> list[_Found]:  # fmt: skip
+    """The best poses of one limb, refined with the whole body; parts that are `away` hide nothing at first.
+
+    Places are looked for around the first of the poses that are `kept`, (n_values,) each. They differ in limbs that are
+    away, so that the places are as good for all of them; which go together their contours tell.
+    """
 
     def alone(judge: Judge, pose: Array) -> _Found:
         fit = solve(model, pose, judge.blocks, limb.dofs, max_iterations=4, tolerance=1e-2, gain=WORTH_A_STEP)
         return _Found(fit, judge.cost(fit))
 
     def whole(judge: Judge, pose: Array) -> _Found:
-        fit = solve(model, pose, judge.blocks, judge.free, iterations, tolerance=1e-3)
+        fit = solve(model, pose, judge.blocks, judge.free, iterations, tolerance=1e-3, gain=judge.settings.gain)
         return _Found(fit, judge.cost(fit))
 
-    tried = judge.each(alone, _candidates(model, limb, away, here, others, judge))
+    poses = _candidates(model, limb, away, kept[0], others, judge)
+    if len(kept) > 1:
+        poses = np.array([*poses, *(_with_limb(model, k, pose, limb) for k in kept[1:] for pose in poses)])
+        poses = poses[np.argsort(judge.costs(poses), kind="stable")[: judge.settings.refined]]
+    tried = judge.each(alone, poses)
     return judge.each(whole, [x.fit.values for x in _distinct(model, tried, judge.settings.finished, _SAME_M)])
 
 
 def _candidates(
-    model: BodyModel, limb: Limb, away: list[int], here: Fit, others: Sequence[Array], judge: Judge
+    model: BodyModel, limb: Limb, away: list[int], here: Array, others: Sequence[Array], judge: Judge
 ) -> Array:
     """The few poses of a limb that are worth a refinement, (n, n_values)."""
     settings = judge.settings
-    look = judge.colors.look(here.values, limb.parts, judge.known, away)
-    proposals = _proposals(model, limb, here.values, settings)
-    best = _best_apart(model, limb, proposals, look(proposals), settings.scored, _APART_M)
+    look = judge.colors.look(here, limb.parts, judge.known, away)
+    proposals = _proposals(model, limb, here, settings)
+    best = _best_apart(model, limb, proposals, look(proposals), settings.improved, _APART_M)
     for round_, spread_rad in enumerate(settings.shakes_rad):
         around = _shaken(model, limb, best, settings.shakes, spread_rad, round_)
         of_each = look(around.reshape(-1, best.shape[1])).reshape(len(best), -1).argmax(axis=1)
         best = around[np.arange(len(best)), of_each]
-    best = np.array([*best, *(_with_limb(model, here.values, other, limb) for other in others)])
+    best = best[np.argsort(-look(best), kind="stable")[: settings.scored]]
+    best = np.array([*best, *(_with_limb(model, here, other, limb) for other in others)])
     return _best_apart(model, limb, best, -judge.costs(best), settings.refined, _SAME_M)
 
 

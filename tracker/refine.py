@@ -23,7 +23,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker import contours
-from tracker.body import Body, BodyModel
+from tracker.body import Body, BodyModel, parts_of
 from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence
 from tracker.fit import Normal
@@ -103,7 +103,7 @@ class ContourMatch:
         settings = settings or MatchSettings()
         self._settings = settings
         self._model = bodies[person].model
-        self._first = sum(len(b.model.parts) for b in bodies[:person])
+        self._own = parts_of([b.model for b in bodies], person)
         self._surfaces = contours.surfaces_of(tuple(b.model for b in bodies))
         self._Ts = contours.part_poses(bodies)
         thetas = [v.outlier_px(theta_px) for v in views]
@@ -147,7 +147,7 @@ class ContourMatch:
     def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `fit.Block`."""
         assert model is self._model
-        own = slice(self._first, self._first + len(model.parts))
+        own = self._own
         cost = self._gather(kinematics)
         gradient, hessian = np.empty(model.n_dofs), np.empty((model.n_dofs, model.n_dofs))
         to_dofs(
@@ -163,18 +163,17 @@ class ContourMatch:
     def part_costs(self, values: Array) -> PartCosts:
         """How well each part of the person fits, at a pose."""
         self._gather(self._model.kinematics(values), derive=False)
-        own = slice(self._first, self._first + len(self._model.parts))
-        length, distance, points = np.moveaxis(self._sums.parts[:, own], -1, 0).copy()
+        length, distance, points = np.moveaxis(self._sums.parts[:, self._own], -1, 0).copy()
         forward = np.divide(distance, length, out=np.full_like(length, np.nan), where=length > 0)
         total = self._outline_points
         outline = np.divide(self._sums.outline, total, out=np.full(len(total), np.nan), where=total > 0)
         return PartCosts(length, forward, points, outline)
 
     def _gather(self, kinematics: Kinematics, derive: bool = True) -> float:
-        own, settings = slice(self._first, self._first + len(self._model.parts)), self._settings
+        own, settings = self._own, self._settings
         self._Ts[own] = kinematics.Ts_world_part
         return gather(
-            self._Ts, self._first, own.stop, self._surfaces, self._scene, settings.scale, settings.turn, derive,
+            self._Ts, own.start, own.stop, self._surfaces, self._scene, settings.scale, settings.turn, derive,
             self._scratch, self._sums,
         )  # fmt: skip
 

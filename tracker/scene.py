@@ -18,15 +18,15 @@ from tracker.apart import KeepBodiesApart
 from tracker.appearance import Colors
 from tracker.body import Body
 from tracker.confidence import Limb, Quality, Status
-from tracker.evidence import ACCEPTED_SHARE, ViewEvidence, unfiltered
+from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.fit import Block, Fit, covariance, held, solve
 from tracker.memory import Memory
-from tracker.recover import LEAST_GAIN, Judge, search_limbs
+from tracker.recover import LEAST_GAIN, Judge, for_several, search_limbs
 from tracker.refine import WORTH_A_STEP, ContourMatch, PartCosts
 from tracker.rigid import Array
 from tracker.scenery import Scenery
 from tracker.search import BEFORE_REFINEMENT, SearchSettings
-from tracker.sharing import own_views
+from tracker.sharing import Shares, Sharing
 from tracker.surroundings import px_per_m, visible_outline
 from tracker.track_settings import TrackSettings, prior_blocks, search_frame
 
@@ -39,7 +39,7 @@ _MOVED_RAD, _ANEW_RAD = 0.05, 0.3
 _MOST_EXCESS = 60.0
 """What two people's predictions may speak against their exchange for it to be tried: more no image makes good."""
 _STILL_M = 0.002
-"""The joint refinement ends when nobody moves farther, metres."""
+"""In the joint refinement a person is refined anew when another has moved farther since, metres."""
 _SHARED_M = 0.01
 """Evidence is shared out anew when somebody has moved farther, metres."""
 
@@ -64,26 +64,18 @@ def _in_doubt(found: Found, remark: str, others: Sequence[tuple[Array, ...]]) ->
     return found._replace(status=status, remark=remarks, others=(*found.others, *others))
 
 
-class _Share(NamedTuple):
-    """The evidence of one person, without what is clearly somebody else's."""
-
-    views: Sequence[ViewEvidence]
-    poses: tuple[Array, ...]
-    """Those of everybody for which it was shared out, (n_values,) each."""
-
-
 class _Seen(NamedTuple):
     """One person as far as they are found."""
 
     match: ContourMatch
     """The evidence that they were fitted to."""
-    own: _Share
-    """What of the evidence that was made of."""
+    poses: tuple[Array, ...]
+    """Where everybody stood when that was made, (n_values,) each."""
     fit: Fit
     anew: tuple[Limb, ...] | None = None
     """Limbs whose prediction is not trusted, where the person was searched anew; None where that was not needed."""
-    quality: Quality | None = None
-    """What the evidence says of the fit, where that has been asked."""
+    told: tuple[Quality, PartCosts] | None = None
+    """What the evidence says of the fit, and the costs of its parts, where that has been asked."""
     evaluations: int = 0
     """Poses that the best-first search scored."""
     remarks: tuple[str, ...] = ()
@@ -110,6 +102,7 @@ class Scene:
         """Where each person stands so far, (n_values,)."""
         self._views, self._settings = views, settings
         self._memories, self._models, self._predicted = memories, [m.model for m in memories], tuple(poses)
+        self._sharing, self._shares = Sharing(views), list[Shares]()
         self._thetas = np.array([v.outlier_px(settings.theta_px) for v in views])
 
     def teach(self, scenery: Sequence[Scenery]) -> None:
@@ -125,7 +118,7 @@ class Scene:
 
     def held(self, person: int) -> Found:
         """Judge nobody: a pose that was given is taken as it is."""
-        match, n = self._match(person, self._own(self._views, person)), self._models[person].n_dofs
+        match, n = self._match(person), self._models[person].n_dofs
         costs = match.part_costs(self.poses[person])
         return Found("good", "", self._parts_px(costs), np.zeros((n, n)), 0, None)
 
@@ -146,38 +139,33 @@ class Scene:
 
     def _searched(self, person: int) -> _Seen:
         """Search a person by best-first search alone."""
-        own = self._own(self._views, person)
-        match = self._match(person, own)
+        match = self._match(person)
         evaluations = self._search(person, self._settings.search)
         blocks = [match, *self._priors(person)]
         fit = solve(self._models[person], self.poses[person], blocks, self._memories[person].free, max_iterations=0)
-        return _Seen(match, own, fit, evaluations=evaluations)
+        return _Seen(match, tuple(self.poses), fit, evaluations=evaluations)
 
     def _refined(self, person: int, before: _Seen | None = None) -> _Seen:
         """Refine a person from where they stand, as they were seen before if they were."""
         anew = None if before is None else before.anew
-        if before is not None and self._stands(before.own.poses):
-            own = before.own
-        else:
-            views = self._views if anew is None else [unfiltered(v) for v in self._views]
-            own = self._own(views, person, everywhere=anew is not None)
-        match = self._match(person, own, everywhere=anew is not None)
+        match = self._match(person, everywhere=anew is not None)
         blocks = [match, *self._priors(person, anew or ())]
         model, free = self._models[person], self._memories[person].free
-        fit = solve(model, self.poses[person], blocks, free, _ITERATIONS, _TOLERANCE)
+        gain = WORTH_A_STEP if len(self._models) > 1 else 0.0  # who moves a little is refined again with the others
+        poses, fit = tuple(self.poses), solve(model, self.poses[person], blocks, free, _ITERATIONS, _TOLERANCE, gain)
         self.poses[person] = fit.values
         if before is None:
-            return _Seen(match, own, fit)
-        return before._replace(match=match, own=own, fit=fit, quality=None)
+            return _Seen(match, poses, fit)
+        return before._replace(match=match, poses=poses, fit=fit, told=None)
 
     def _refine_together(self, seen: dict[int, _Seen]) -> None:
-        """Refine people again and again, each with the others where they were found, until nobody moves."""
+        """Refine people again and again, each with the others where they were found, until nobody needs it."""
         for _ in range(self._settings.rounds if len(self._models) > 1 else 0):
-            moved_m = 0.0
+            again = False
             for person, before in seen.items():
-                seen[person] = self._refined(person, before)
-                moved_m = max(moved_m, self._moved_m(person, before.fit.values, seen[person].fit.values))
-            if moved_m < _STILL_M:
+                if not self._stand(before.poses, np.where(np.arange(len(self.poses)) == person, _SHARED_M, _STILL_M)):
+                    seen[person], again = self._refined(person, before), True
+            if not again:
                 break
 
     def _moved_m(self, person: int, was: Array, now: Array) -> float:
@@ -185,10 +173,10 @@ class Scene:
         model = self._models[person]
         return float(np.linalg.norm(model.points_world(now) - model.points_world(was), axis=1).max())
 
-    def _stands(self, poses: Sequence[Array]) -> bool:
-        """Whether everybody still stands as in some poses, so that evidence is shared alike."""
+    def _stand(self, poses: Sequence[Array], within_m: Array) -> bool:
+        """Whether everybody stands as in some poses, (n_values,) each, each within some metres, (K,)."""
         return all(
-            self._moved_m(i, was, now) < _SHARED_M for i, (was, now) in enumerate(zip(poses, self.poses, strict=True))
+            self._moved_m(i, was, now) < within_m[i] for i, (was, now) in enumerate(zip(poses, self.poses, strict=True))
         )
 
     def _recovered(self, person: int, seen: _Seen) -> _Seen:
@@ -197,25 +185,26 @@ class Scene:
         The prediction may have refused the right ones.
         """
         memory, settings = self._memories[person], self._settings
-        found = self._quality(person, seen)
-        seen = seen._replace(quality=found)
+        told = self._told(person, seen)
+        found, seen = told[0], seen._replace(told=told)
         blind = not any(len(v.points_px) for v in self._views)  # then there is nothing to search in
-        if settings.recover is None or blind or not (found.suspects or found.body_lost):
+        alone = len(self._models) == 1
+        suspects, due = tuple(memory.suspects(found)), memory.due(found, alone)[:_AT_ONCE]
+        worth = found.suspects if alone else found.doubted or due
+        if settings.recover is None or blind or not (worth or found.body_lost):
             return seen
         model, free = memory.model, memory.free
-        suspects = tuple(x for name in found.suspects for x in memory.limbs if x.name == name)  # not those locked
         priors = self._priors(person, suspects)
-        own = self._own([unfiltered(v) for v in self._views], person, everywhere=True)
-        bodies, index = self._around(person)
-        match = self._match(person, own, everywhere=True)
-        judge = Judge(match, priors, Colors(own.views, bodies, index), memory.known, settings.recover, free)
+        colors = Colors(self._own(person, everywhere=True), *self._around(person))
+        match, poses = self._match(person, everywhere=True), tuple(self.poses)
+        how = settings.recover if alone else for_several(settings.recover)
+        judge = Judge(match, priors, colors, memory.known, how, free)
         fit = solve(model, seen.fit.values, judge.blocks, free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
         remarks: list[str] = []
         evaluations = 0
         if found.body_lost:
             evaluations, fit = self._search_body(person, fit, judge)
             remarks.append("body searched anew")
-        due = [x for x in suspects if memory.may_search(x)][:_AT_ONCE]
         others = (memory.past[-1], self._predicted[person])
         better, rivals = search_limbs(model, due, fit, others, judge, _ITERATIONS)
         turned = np.abs(model.difference(better.values, fit.values))
@@ -224,13 +213,12 @@ class Scene:
             if turned[limb.dofs].max() > _ANEW_RAD:
                 remarks.append(f"{confidence.spoken(limb.name)} searched anew")
         self.poses[person] = better.values
-        return _Seen(match, own, better, suspects, None, evaluations, tuple(remarks), tuple(r.values for r in rivals))
+        return _Seen(match, poses, better, suspects, None, evaluations, tuple(remarks), tuple(r.values for r in rivals))
 
     def _judged(self, person: int, seen: _Seen) -> Found:
         """Put a person in the pose that was found, with the judgement of it."""
         self.poses[person] = seen.fit.values
-        found = seen.quality or self._quality(person, seen)
-        costs = seen.match.part_costs(seen.fit.values)
+        found, costs = seen.told or self._told(person, seen)
         out = Found(
             confidence.judge(found), ", ".join(seen.remarks) or confidence.reason(found), self._parts_px(costs),
             covariance(self._models[person], seen.fit), seen.evaluations, found,
@@ -319,14 +307,15 @@ class Scene:
         self.poses[person] = held(self._models[person], self.poses[person], start, free)
         return evaluations
 
-    def _quality(self, person: int, seen: _Seen) -> Quality:
+    def _told(self, person: int, seen: _Seen) -> tuple[Quality, PartCosts]:
         known, colors = self._memories[person].known, None
         if known is not None:
             colors = self.colors(person).score(seen.fit.values, known), known
         trusts = np.array([0.0 if v.silhouette is None else v.silhouette.trust for v in self._views])
         model, values = self._models[person], seen.fit.values
         scale = px_per_m([v.camera for v in self._views], model, values)
-        return confidence.quality(model, seen.fit, seen.match.part_costs(values), self._thetas, trusts, scale, colors)
+        costs = seen.match.part_costs(values)
+        return confidence.quality(model, seen.fit, costs, self._thetas, trusts, scale, colors), costs
 
     def _parts_px(self, costs: PartCosts) -> Array:
         """Mean distance of each part's contour to the edges, (n_parts,), px of the footage."""
@@ -335,15 +324,20 @@ class Scene:
         far = np.nansum(costs.forward_px * costs.length_px / scales[:, None] ** 2, axis=0)
         return np.divide(far, length, out=np.full_like(length, np.nan), where=length > 0)
 
-    def _match(self, person: int, own: _Share, everywhere: bool = False) -> ContourMatch:
+    def _match(self, person: int, everywhere: bool = False) -> ContourMatch:
         """The residuals of a person's contours against evidence of their own, the others where they stand."""
         bodies, index = self._around(person)
-        settings = self._settings
-        return ContourMatch(own.views, bodies, index, settings.match, settings.theta_px, everywhere)
+        views, settings = self._own(person, everywhere), self._settings
+        return ContourMatch(views, bodies, index, settings.match, settings.theta_px, everywhere)
 
-    def _own(self, views: Sequence[ViewEvidence], person: int, everywhere: bool = False) -> _Share:
-        """The evidence without what the others explain."""
-        return _Share(own_views(views, *self._around(person), everywhere), tuple(self.poses))
+    def _own(self, person: int, everywhere: bool = False) -> tuple[ViewEvidence, ...]:
+        """The evidence without what the others explain, as it was shared out when everybody stood about here."""
+        bodies, index = self._around(person)
+        for shares in reversed(self._shares if len(bodies) > 1 else ()):
+            if self._stand(shares.poses, np.full(len(bodies), _SHARED_M)):
+                return shares.own(index, everywhere)
+        self._shares.append(Shares(self._sharing, bodies))
+        return self._shares[-1].own(index, everywhere)
 
     def _around(self, person: int) -> tuple[list[Body], int]:
         """Who is in the scene for a person, and their index there."""

@@ -12,6 +12,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.kernels import FAST
+from tracker.nearest import LANES, Sorted, cells_within, sort_points
+
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 
@@ -23,8 +26,11 @@ STRAYS = 3
 """As many pixels in a row must stray: single ones are noise."""
 MAX_ANGLE_RAD = np.radians(45.0)
 """Largest angle between an edge and a contour that it may belong to."""
-_STRIDE = 2  # distances change little from one pixel of a segment to the next
+_STRIDE = 2  # of the pixels that are sampled
 _NONE_LEFT = -10
+_ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernel's arithmetic into float64
+_SHORT2 = np.float32(1e-6)
+"""A piece is as long at least, px^2."""
 
 
 class Segments(NamedTuple):
@@ -71,31 +77,40 @@ def accept(segments: Segments, pieces_px: FloatArray, threshold_px: float) -> ND
     Returns:
         (S,) bool.
     """
-    total, count = _summed(segments, pieces_px, 2.0 * threshold_px)
-    return np.asarray(total <= threshold_px * count)
+    samples = sampled(segments)
+    return np.asarray(samples.means(samples.distances(pieces_px, 2.0 * threshold_px)) <= threshold_px)
 
 
-def distances(
-    segments: Segments, pieces_px: FloatArray, reach_px: float, asked: NDArray[np.bool_] | None = None
-) -> NDArray[np.float64]:
-    """Mean distance of each segment, (S,), px, to contours as `accept` takes it, each pixel's cut off at a reach.
+class Samples(NamedTuple):
+    """Pixels of segments, every other one: distances change little from one to the next."""
 
-    That of segments that are not `asked`, (S,), is the reach.
-    """
-    total, count = _summed(segments, pieces_px, reach_px, asked)
-    return np.divide(total, count, out=np.full(len(total), float(reach_px)), where=count > 0)
+    pixels: Sorted
+    """u and v, the normal's u and v, and the index of the segment, sorted for `distances`; n pixels."""
+    counts: IntArray
+    """Number of them in each segment, (S,)."""
+
+    def distances(self, pieces_px: FloatArray, reach_px: float) -> FloatArray:
+        """Distance of each to the nearest piece of contour, (M, 4), that runs more or less as its edge, (n,), px; none
+        is longer than the reach."""
+        out = np.empty(self.pixels.points.shape[1], np.float32)
+        pieces = np.ascontiguousarray(pieces_px, np.float32)
+        _nearest_alongside(self.pixels.points, self.pixels.rows, pieces, reach_px, MAX_ANGLE_RAD, out)
+        return out[: self.pixels.n_points]
+
+    def means(self, distances: FloatArray) -> NDArray[np.float64]:
+        """The mean of each segment's pixels, (n,) to (S,)."""
+        of = self.pixels.points[4, : self.pixels.n_points].astype(np.intp)
+        return np.bincount(of, distances, len(self.counts)) / self.counts
 
 
-def _summed(
-    segments: Segments, pieces_px: FloatArray, reach_px: float, asked: NDArray[np.bool_] | None = None
-) -> tuple[FloatArray, IntArray]:
-    """Summed distances of the pixels of each segment that are asked, (S,), px, and their number, (S,)."""
-    n = len(segments.firsts) - 1
-    total, count = np.empty(n, np.float32), np.empty(n, np.int64)
-    if n:
-        pieces, wanted = np.ascontiguousarray(pieces_px, np.float32), np.ones(n, np.bool_) if asked is None else asked
-        _sum_distances(segments, pieces, reach_px, MAX_ANGLE_RAD, wanted, total, count)
-    return total, count
+def sampled(segments: Segments) -> Samples:
+    """Sample segments, from the first pixel of each on."""
+    lengths = np.diff(segments.firsts)
+    of = np.repeat(np.arange(len(lengths)), lengths)
+    kept = (np.arange(len(of)) - segments.firsts[of]) % _STRIDE == 0
+    points = np.column_stack([segments.points_px[kept], segments.normals[kept], of[kept]]).astype(np.float32)
+    width, height = 1 + np.max(points[:, :2].astype(np.intp), axis=0, initial=0)
+    return Samples(sort_points(points, (width, height)), -(-lengths // _STRIDE))
 
 
 def pixels_of(segments: Segments, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -193,47 +208,35 @@ def _cut(points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_], fir
     return count
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def _sum_distances(
-    segments: Segments, pieces: FloatArray, reach: float, max_angle: float, asked: NDArray[np.bool_],
-    totals: FloatArray, counts: IntArray,
-) -> None:  # fmt: skip
-    """See `_summed`. Pieces are filed by cells as large as the largest distance that counts."""
-    points, normals, firsts = segments.points_px, segments.normals, segments.firsts
-    far = np.float32(reach)
-    across = np.float32(np.sin(max_angle) ** 2)
-    low_u, low_v = points[:, 0].min() - far, points[:, 1].min() - far
-    columns = int((points[:, 0].max() + far - low_u) / far) + 1
-    rows = int((points[:, 1].max() + far - low_v) / far) + 1
-    heads, following = np.full((rows, columns), -1, np.int64), np.empty(pieces.shape[0], np.int64)
+@njit(**FAST)
+def _nearest_alongside(
+    pixels: FloatArray, rows: IntArray, pieces: FloatArray, reach: float, max_angle: float, out: FloatArray
+) -> None:
+    """Distance of each pixel, (5, N) as in `Samples`, to the nearest piece, (M, 4), that runs its way, up to a reach.
+
+    As in `nearest.nearest_segment`, pieces are held only against the pixels nearby.
+    """
+    far, across = np.float32(reach), np.float32(np.sin(max_angle) ** 2)
+    u, v, nu, nv = pixels[0], pixels[1], pixels[2], pixels[3]
+    out[:] = far * far
     for k in range(pieces.shape[0]):
-        # Pieces are short: their middle tells the cell, and the search goes one cell further.
-        c = int(np.floor((0.5 * (pieces[k, 0] + pieces[k, 2]) - low_u) / far))
-        r = int(np.floor((0.5 * (pieces[k, 1] + pieces[k, 3]) - low_v) / far))
-        if 0 <= r < rows and 0 <= c < columns:
-            following[k] = heads[r, c]
-            heads[r, c] = k
-    for s in range(totals.shape[0]):
-        first, last = firsts[s], firsts[s + 1]
-        total, count = np.float32(0.0), 0
-        for i in range(first, last if asked[s] else first, _STRIDE):
-            u, v, nu, nv = points[i, 0], points[i, 1], normals[i, 0], normals[i, 1]
-            c, r = int((u - low_u) / far), int((v - low_v) / far)
-            best = far * far
-            for row in range(max(0, r - 1), min(rows, r + 2)):
-                for column in range(max(0, c - 1), min(columns, c + 2)):
-                    k = heads[row, column]
-                    while k >= 0:
-                        x, y = pieces[k, 0], pieces[k, 1]
-                        dx, dy = pieces[k, 2] - x, pieces[k, 3] - y
-                        length2 = max(dx * dx + dy * dy, np.float32(1e-6))
-                        along = nu * dx + nv * dy
-                        if along * along <= across * length2:
-                            t = ((u - x) * dx + (v - y) * dy) / length2
-                            t = min(max(t, np.float32(0.0)), np.float32(1.0))
-                            off_u, off_v = u - x - t * dx, v - y - t * dy
-                            best = min(best, off_u * off_u + off_v * off_v)
-                        k = following[k]
-            total += np.sqrt(best)
-            count += 1
-        totals[s], counts[s] = total, count
+        x, y, x1, y1 = pieces[k, 0], pieces[k, 1], pieces[k, 2], pieces[k, 3]
+        dx, dy = x1 - x, y1 - y
+        length2 = max(dx * dx + dy * dy, _SHORT2)
+        inverse, widest = _ONE / length2, across * length2
+        left, right, top, bottom = cells_within(x, y, x1, y1, far, rows)
+        for strip in range(left, right + 1):
+            first, last = np.uint64(rows[strip, top]), np.uint64(rows[strip, bottom])
+            for j in range((last - first + np.uint64(LANES - 1)) // np.uint64(LANES) * np.uint64(LANES)):
+                i = first + j
+                from_u, from_v = u[i] - x, v[i] - y
+                t = (from_u * dx + from_v * dy) * inverse
+                t = t if t > _ZERO else _ZERO
+                t = t if t < _ONE else _ONE
+                off_u, off_v = from_u - t * dx, from_v - t * dy
+                turned = nu[i] * dx + nv[i] * dy
+                squared = off_u * off_u + off_v * off_v
+                squared = squared if turned * turned <= widest else out[i]
+                out[i] = squared if squared < out[i] else out[i]
+    for k in range(out.shape[0]):
+        out[k] = np.sqrt(out[k])

@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tracker import rigid
+from tracker.body import parts_of
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 
 BALLS = """
@@ -252,3 +253,10 @@ def test_spreads_are_known_of_what_bends_little():
     balls = MODELS["balls"]
     assert balls.spreads.shape == (balls.n_dofs,)
     assert np.isinf(balls.spreads).all()
+
+
+def test_parts_of_several_bodies_follow_one_another(gavrila):
+    models = [gavrila, load_model("gavrila31"), gavrila]
+    whose = np.repeat(range(3), [len(m.parts) for m in models])
+    for person in range(3):
+        np.testing.assert_array_equal(np.arange(len(whose))[parts_of(models, person)], np.flatnonzero(whose == person))

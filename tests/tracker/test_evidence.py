@@ -138,8 +138,6 @@ def test_a_damaged_frame_has_no_edges():
     view = observe(camera, None)
     assert view.points_px.shape == (0, 2)
     assert len(np.unique(view.distance)) == 1
-    observer = Observer([source(camera)], Frames(None))
-    assert observer.image(0, 0) is None
 
 
 @pytest.fixture(scope="module")
@@ -213,16 +211,6 @@ def test_an_empty_mask_says_that_nobody_is_there(sample, tmp_path):
     cameras = [replace(first, masks=tmp_path), *session.cameras[1:]]
     views = Observer(cameras, recording).evidence(25)
     assert [bool(len(v.points_px)) for v in views] == [False, True, True, True]
-
-
-def test_images_are_undistorted(sample):
-    session, recording = sample
-    raw = recording.read(3)
-    observer = Observer(session.cameras, recording)
-    shown = [observer.image(3, camera) for camera in range(len(raw))]
-    for source_, before, after in zip(session.cameras, raw, shown, strict=True):
-        np.testing.assert_array_equal(after, source_.camera.undistort_image(before))
-        assert not np.array_equal(after, before)
 
 
 def test_a_background_of_another_size(sample, tmp_path):

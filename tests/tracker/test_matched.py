@@ -64,6 +64,19 @@ def test_no_black_frame_where_the_lens_leaves_the_picture():
     assert (seen == 200).all()
 
 
+@pytest.mark.parametrize("lens", [np.zeros(0), LENS], ids=["pinhole", "lens"])
+@pytest.mark.parametrize("scale", [1.0, 0.61, 0.5, 0.23])
+def test_another_scale_shows_the_undistorted_image_reduced(lens, scale):
+    source = replace(camera_at("c", (4, 0, 0)), distortion=lens)
+    view = MatchedView(source, scale, cv2.BORDER_CONSTANT)
+    frame = smooth_picture((640, 480))
+    seen = view.image(frame, view.whole).astype(float)
+    simple = cv2.resize(source.undistort_image(frame), view.camera.size, interpolation=cv2.INTER_AREA)
+    assert view.scale == scale
+    assert np.abs(seen - simple).mean() < 3
+    assert np.abs(seen[:, 8:] - simple[:, :-8]).mean() > 10  # a shift would show
+
+
 boxes = st.tuples(*[st.integers(-900, 900)] * 4)
 
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from staging import camera_at, cameras_around, shaken
 
-from tracker import rigid
+from tracker import posing, rigid
 from tracker.body import Body
+from tracker.fit import solve
 from tracker.formats.model_toml import load_model
 from tracker.picking import part_outlines
 from tracker.posing import UP_ROTATIONS, drag, grab, grab_part, hold_anew, minor_points, push, standing_pose, turn
@@ -152,6 +153,25 @@ def test_out_of_reach_the_limb_points_at_the_pointer(gavrila, pose):
     reach = np.linalg.norm(arm)
     assert reach > 0.98 * (0.162 + 0.1545) * gavrila.height_m
     assert np.degrees(np.arccos(arm @ (goal - shoulder) / reach / np.linalg.norm(goal - shoulder))) < 5
+
+
+def test_a_limb_that_is_stretched_to_what_is_out_of_reach_is_not_tried_bent(gavrila, pose, monkeypatch):
+    camera = camera_at("ahead", (4.0, 0.0, 0.3), (0.0, 0.0, 0.3))
+    start = camera.project(place(gavrila, pose, "left_wrist"))
+    hand = grab(gavrila, pose, camera, "left_wrist", start)
+    way = camera.project(place(gavrila, pose, "left_shoulder")) + np.array([300, 0]) - start
+    values = pose
+    for share in np.linspace(0, 1, 20)[1:]:
+        values = drag(hand, start + share * way, values)
+    solved = []
+    monkeypatch.setattr(posing, "solve", lambda *args, **how: solved.append(0) or solve(*args, **how))
+    quick = drag(hand, start + way + (5, 5), values)
+    assert len(solved) == 1
+    monkeypatch.setattr(posing, "_is_stretched", lambda *_: False)
+    tried = drag(hand, start + way + (5, 5), values)
+    assert len(solved) == 4
+    wrists = [place(gavrila, v, "left_wrist") for v in (quick, tried)]
+    np.testing.assert_allclose(*wrists, atol=0.001)
 
 
 @pytest.mark.parametrize("seed", range(5))

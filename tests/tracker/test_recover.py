@@ -11,7 +11,7 @@ from tracker.body import Body
 from tracker.confidence import limbs
 from tracker.fit import StayNear, solve
 from tracker.formats.model_toml import load_model
-from tracker.recover import Judge, RecoverSettings, search_limbs
+from tracker.recover import Judge, RecoverSettings, for_several, search_limbs
 from tracker.refine import ContourMatch
 
 
@@ -97,7 +97,8 @@ def test_a_lost_leg_is_found(gavrila):
     assert staged.off_m(staged.search(leg), leg.parts) < 0.03
 
 
-def test_limbs_that_are_lost_together(gavrila):
+@pytest.mark.parametrize("settings", [RecoverSettings(), for_several(RecoverSettings())])
+def test_limbs_that_are_lost_together(gavrila, settings):
     """An arm on a leg that went elsewhere: neither finds its place while the other is in the way."""
     n_found = 0
     for seed in (1, 2, 3):
@@ -106,9 +107,26 @@ def test_limbs_that_are_lost_together(gavrila):
         staged = Staged(gavrila, truth, wrong)
         suspects = [limb_of(gavrila, n) for n in ("left_forearm", "left_calf")]
         assert all(staged.off_m(staged.here, x.parts) > 0.15 for x in suspects)
-        found = search_limbs(gavrila, suspects, staged.here, (), staged.judge, 15).best
+        judge = replace(staged.judge, settings=settings)
+        found = search_limbs(gavrila, suspects, staged.here, (), judge, 15).best
         n_found += all(staged.off_m(found, x.parts) < 0.03 for x in suspects)
     assert n_found >= 2
+
+
+def test_for_several_places_are_looked_for_once(gavrila, monkeypatch):
+    """However many poses the first limb leaves; from each of them where there is one person."""
+    truth, looked = posed(gavrila, 1), []
+    staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["60 degrees off"]))
+    candidates = recover._candidates
+    monkeypatch.setattr(recover, "_candidates", lambda *a: looked.append(a) or candidates(*a))
+    suspects, n_looked = [limb_of(gavrila, n) for n in ("left_forearm", "left_calf")], []
+    for settings in (RecoverSettings(), for_several(RecoverSettings())):
+        looked.clear()
+        staged.judge = replace(staged.judge, settings=replace(settings, margin=1e6))
+        found = search_limbs(gavrila, suspects, staged.here, (), staged.judge, 15).best
+        assert staged.off_m(found, suspects[0].parts) < 0.03
+        n_looked.append(len(looked))
+    assert n_looked[0] > n_looked[1] == 2
 
 
 def test_best_places_apart(gavrila):
@@ -183,7 +201,7 @@ def test_other_poses_are_tried_as_they_are(gavrila):
     truth = posed(gavrila, 1)
     arm = limb_of(gavrila, "left_forearm")
     staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["inside the trunk"]))
-    few = RecoverSettings(proposals=2, reach_rad=1e-3, scored=2, shakes_rad=(1e-3,))
+    few = RecoverSettings(proposals=2, reach_rad=1e-3, improved=2, shakes_rad=(1e-3,))
     staged.judge = Judge(staged.judge.match, staged.judge.priors, staged.judge.colors, staged.judge.known, few)
     assert staged.search(arm, [staged.here.values]) is staged.here
     before = turned(gavrila, truth, left_knee__extension=100, right_hip__elevation=60)

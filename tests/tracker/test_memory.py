@@ -1,0 +1,80 @@
+import numpy as np
+import pytest
+
+from tracker.confidence import LimbFigures, Quality
+from tracker.memory import Memory
+
+CLEAR, ASTRAY = (1.0, 0.0, 1.2, 0.05, 0.6, 0.5), (-2.0, 3.0, 4.0, 0.3, 0.2, 0.1)
+
+
+class NoColors:
+    """Stands for the colours of a frame that shows none."""
+
+    def learn(self, *_):
+        return None
+
+
+def seen(memory, unexplained=0.0, astray=()):
+    """What the evidence says where some limbs are astray and the others clear."""
+    limbs = [LimbFigures(x.name, *(ASTRAY if x.name in astray else CLEAR)) for x in memory.limbs]
+    return Quality(0.05, 4, unexplained, tuple(limbs))
+
+
+def searched_at(memory, found, n_frames, alone=False):
+    """The frames in which the first limb that is due is searched, in vain each time."""
+    out = []
+    for frame in range(n_frames):
+        for limb in memory.due(found, alone)[:1]:
+            memory.searched(limb, found=False)
+            out.append(frame)
+        memory.update(memory.past[-1], NoColors(), "doubtful", given=False)
+    return out
+
+
+@pytest.fixture
+def memory(gavrila):
+    free = ~np.array([name.startswith(("left_shoulder", "left_elbow")) for name in gavrila.dof_names])
+    return Memory(gavrila, gavrila.neutral(), free)
+
+
+def test_what_is_locked_is_not_due(memory):
+    assert {x.name for x in memory.limbs} == {"right_forearm", "left_calf", "right_calf"}
+    assert {x.name for x in memory.due(seen(memory, unexplained=0.2), alone=False)} == {x.name for x in memory.limbs}
+    assert memory.due(seen(memory), alone=False) == memory.suspects(seen(memory)) == []
+
+
+def test_limbs_that_seem_lost_go_before_those_that_do_not(memory):
+    """What no part explains makes all suspect, but it is theirs first; and theirs alone while they wait."""
+    found = seen(memory, unexplained=0.2, astray=("left_calf",))
+    assert memory.suspects(found)[0].name == "left_calf"
+    assert len(memory.suspects(found)) == 3
+    (limb,) = memory.due(found, alone=False)
+    assert limb.name == "left_calf"
+    memory.searched(limb, found=False)
+    assert memory.due(found, alone=False) == []
+
+
+def test_pauses_grow_with_each_search_in_vain(memory):
+    """Of a limb that seems lost up to eight frames; of one that does not they go on growing."""
+    assert np.diff(searched_at(memory, seen(memory, astray=("left_calf",)), 40)).tolist() == [2, 4, 8, 9, 9]
+    memory.searched(next(x for x in memory.limbs if x.name == "left_calf"), found=True)
+    assert memory.due(seen(memory, astray=("left_calf",)), alone=False) == []
+    memory.update(memory.past[-1], NoColors(), "good", given=False)
+    assert len(memory.due(seen(memory, astray=("left_calf",)), alone=False)) == 1
+
+
+def test_limbs_that_nothing_speaks_against_wait_longer(gavrila):
+    memory = Memory(gavrila, gavrila.neutral())
+    everything = seen(memory, unexplained=0.2)
+    frames = []
+    for _ in range(100):
+        due = memory.due(everything, alone=False)
+        frames.append(len(due))
+        for limb in due:
+            memory.searched(limb, found=False)
+        memory.update(memory.past[-1], NoColors(), "doubtful", given=False)
+    assert np.flatnonzero(frames).tolist() == [0, 2, 6, 14, 30, 62]
+    assert set(frames) == {0, 4}
+    # Once it seems lost itself it is due at once.
+    (limb,) = memory.due(seen(memory, astray=("right_calf",)), alone=False)
+    assert limb.name == "right_calf"
