@@ -264,6 +264,7 @@ class Controller:
         """Stop and save what is at hand; the controller is done."""
         with self.editing():
             self.history.save()
+        self.hand.close()
         self._disagreements.close()
         self._listing.close()
         self.landscape.close()

@@ -6,17 +6,25 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import lru_cache
+
+import cv2
 
 from app import pictures
 from app.recent import Recent
 from tracker.errors import RecordingError
 from tracker.evidence import Observer, ViewEvidence
+from tracker.matched import MatchedView
 from tracker.proxy import Proxy
 from tracker.silhouettes import Image
 
 _LOG = logging.getLogger(__name__)
-_IMAGE_BYTES = 48 * 2**20
-"""What undistorted images may take: of four 640x480 views some dozen frames; decoded ones are kept by the recording."""
+_IMAGE_BYTES = 16 * 2**20
+"""What undistorted images may take: of four 640x480 views some four frames; decoded ones are kept by the recording."""
+_PICTURE_BYTES = 16 * 2**20
+"""What pictures of them may take: of four panes some hundred and fifty frames."""
+_SIZES = 64
+"""Sizes of pictures of which it is kept where their pixels lie in the footage."""
 _EVIDENCE_BYTES = 96 * 2**20
 _REST_S = 0.2
 """A frame has evidence after it has been shown for so long: pictures go out first, and who scrubs by wants no more."""
@@ -37,6 +45,8 @@ class Frames:
         """
         self.observer, self._proxies = observer, proxies
         self._images = Recent(self._look, _IMAGE_BYTES)
+        self._pictures = Recent(self._picture, _PICTURE_BYTES)
+        self._ways = lru_cache(_SIZES)(self._way)
         self._evidence = Recent(observer.evidence, _EVIDENCE_BYTES)
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="evidence")
         self._wanted: int | None = None
@@ -113,11 +123,10 @@ class Frames:
         self._wanted = None
         self._pool.shutdown(wait=True, cancel_futures=True)
 
-    def image(self, frame: int, camera: int, reduction: int = 1) -> bytes:
+    def image(self, frame: int, camera: int, reduction: float = 1) -> bytes:
         """The undistorted image of one view as JPEG; `reduction` pixels of it, along either side, become one."""
         with self._somebody_looks():
-            image = self._images.get((frame, camera))
-            return pictures.footage(image, self.observer.cameras[camera].camera.size, reduction)
+            return self._pictures.get((frame, camera, reduction))
 
     @contextmanager
     def _somebody_looks(self) -> Iterator[None]:
@@ -130,14 +139,26 @@ class Frames:
                 self._looking -= 1
                 self._idle.notify_all()
 
+    def _picture(self, key: tuple[int, int, float]) -> bytes:
+        """The picture of a frame, camera and reduction: resampled once, at its size."""
+        frame, camera, reduction = key
+        image, way = self._read(frame, camera), self._ways(camera, reduction)
+        return pictures.footage(None if image is None else way.image(image, way.whole), way.camera.size)
+
+    def _way(self, camera: int, reduction: float) -> MatchedView:
+        return MatchedView(self.observer.cameras[camera].camera, 1 / reduction, cv2.BORDER_CONSTANT)
+
     def _look(self, key: tuple[int, int]) -> Image | None:
-        """Undistorted image of a frame and camera, from its proxy where there is one that goes so far."""
-        frame, camera = key
-        source, proxy = self.observer.cameras[camera], self._proxy_of(frame, camera)
+        """Undistorted image of a frame and camera."""
+        image = self._read(*key)
+        return None if image is None else self.observer.cameras[key[1]].camera.undistort_image(image)
+
+    def _read(self, frame: int, camera: int) -> Image | None:
+        """A frame of a camera as filmed, from its proxy where there is one that goes so far."""
+        proxy = self._proxy_of(frame, camera)
         if proxy is None:
-            return self.observer.image(frame, camera)
-        image = proxy.read(frame + source.offset)
-        return None if image is None else source.camera.undistort_image(image)
+            return self.observer.recording.read_view(camera, frame)
+        return proxy.read(frame + self.observer.cameras[camera].offset)
 
     def _proxy_of(self, frame: int, camera: int) -> Proxy | None:
         """The proxy of a camera, where there is one that goes so far."""

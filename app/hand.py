@@ -7,12 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.jobs import Latest
 from app.screen import Screen, spoken
-from app.state import DragState
+from app.state import DragState, State
 from tracker import posing
 
 _CHECKPOINT_S = 1.0
 """A long drag is on disk at least this often."""
+_REST_S, _HEAD_START_S = 0.15, 0.02
+"""Time between two costs of what a hand moves, and how far a pose is ahead of its own: a hand waits for poses alone."""
 
 
 class Hand:
@@ -29,6 +32,11 @@ class Hand:
         self._grab: posing.Grab | None = None  # as the gesture began
         self._hold: posing.Grab | None = None  # as its present mode began
         self._grab_page = 0
+        self._costs = Latest(self._cost, "cost in hand", _REST_S)
+
+    def close(self) -> None:
+        """End the thread."""
+        self._costs.close()
 
     def begin_drag(
         self,
@@ -94,7 +102,9 @@ class Hand:
                 drag = replace(drag, mode=mode)
             values = ways[mode](self._hold, np.array(pointer_px), before)
             seqs = (*(s for s in self._screen.state.drag_seqs if s[0] != page), (page, seq))[-16:]
-            self._screen.pose(drag.person, values, drag=replace(drag, pointer_px=pointer_px), drag_seqs=seqs)
+            people = self._screen.posed(drag.person, values)
+            self._screen.set(people=people, drag=replace(drag, pointer_px=pointer_px), drag_seqs=seqs)
+            self._costs.offer(self._screen.state)
             if time.monotonic() - self._screen.last_save > _CHECKPOINT_S:
                 self._screen.save(f"drag {spoken(drag.point)}", "manual", self._grab)
 
@@ -121,4 +131,13 @@ class Hand:
         if not np.array_equal(hand.values, self._screen.state.poses[drag.person]) or self._screen.edit_of is hand:
             self._screen.save(f"drag {spoken(drag.point)}", "manual", hand)
         self._grab = self._hold = self._screen.edit_of = None
-        self._screen.set(drag=None)
+        self._screen.set(drag=None, **self._screen.costs(self._screen.state.poses))
+
+    def _cost(self, _: State) -> None:
+        """Work out what the pose in hand costs, unless it has changed by then, or been let go: others know its cost."""
+        time.sleep(_HEAD_START_S)
+        state = self._screen.state
+        costs = self._screen.costs(state.poses) if state.drag is not None else {}
+        with self._screen.lock:
+            if costs and self._screen.state.drag is not None and self._screen.state.people is state.people:
+                self._screen.set(**costs)

@@ -25,7 +25,7 @@ class View:
 
     layers: frozenset[str]
     """Names of the layers shown."""
-    reductions: tuple[int, ...]
+    reductions: tuple[float, ...]
     """By camera: how many pixels of the image, along either side, a picture may have for one; 0 for a pane not seen."""
     by_part: bool = False
     """Whether contours have the colours of the parts instead of those of the people."""
@@ -51,9 +51,9 @@ def view_of(message: Mapping[str, Any], n_cameras: int) -> View:
     Raises:
         KeyError, TypeError, ValueError: the message is not understood.
     """
-    layers, reductions = frozenset(message["layers"]), tuple(int(r) for r in message["reductions"])
+    layers, reductions = frozenset(message["layers"]), tuple(float(r) for r in message["reductions"])
     if not layers.issubset(LAYERS):
         raise ValueError(f"no layers are called {', '.join(sorted(map(str, layers.difference(LAYERS))))}")
-    if len(reductions) != n_cameras or not all(0 <= r <= _MOST_REDUCED for r in reductions):
-        raise ValueError(f"expected a reduction from 0 to {_MOST_REDUCED} for each of {n_cameras} cameras")
+    if len(reductions) != n_cameras or not all(r == 0 or 1 <= r <= _MOST_REDUCED for r in reductions):
+        raise ValueError(f"expected 0 or a reduction from 1 to {_MOST_REDUCED} for each of {n_cameras} cameras")
     return View(layers, reductions, bool(message["by_part"]))

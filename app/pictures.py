@@ -20,21 +20,14 @@ _FAST = 1
 """Masks are large even areas: zlib's least effort makes them as small as its best, in a fraction of the time."""
 
 
-def footage(image: Image | None, size: tuple[int, int], reduction: int) -> bytes:
+def footage(image: Image | None, size: tuple[int, int]) -> bytes:
     """An image of the footage as JPEG.
 
     Args:
         image: undistorted, (H, W, 3) RGB; None where the frame is damaged.
-        size: width and height of the image, px.
-        reduction: pixels of the image, along either side, for one of the picture.
+        size: width and height of the picture that then stands in, px.
     """
-    if image is None:
-        image = _blank(size, "frame damaged")
-    if reduction > 1:
-        height, width = image.shape[:2]
-        smaller = (max(1, round(width / reduction)), max(1, round(height / reduction)))
-        image = np.asarray(cv2.resize(image, smaller, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-    return _jpeg(image)
+    return _jpeg(_blank(size, "frame damaged") if image is None else image)
 
 
 def distance(view: ViewEvidence) -> bytes:
@@ -66,7 +59,7 @@ def labels(parts: NDArray[np.uint8], colors: Sequence[str]) -> bytes:
     return _png(parts, parts.shape[1], 8, colors)
 
 
-def parts(bodies: Sequence[Body], camera: Camera, colors: Sequence[str], reduction: int) -> bytes:
+def parts(bodies: Sequence[Body], camera: Camera, colors: Sequence[str], reduction: float) -> bytes:
     """What the parts of the bodies cover, each in its colour, as PNG.
 
     Args:

@@ -143,10 +143,15 @@ class Screen:
         }
 
     def pose(self, person: int, values: Array, **changes: object) -> None:
-        """Show a pose that a hand gave one person."""
+        """Show a pose that somebody gave one person, with its cost."""
+        people = self.posed(person, values)
+        self.set(people=people, **self.costs(tuple(p.values for p in people)), **changes)
+
+    def posed(self, person: int, values: Array) -> tuple[Shown, ...]:
+        """Everybody as they are shown, one of them in a pose that somebody gave, (n_values,)."""
         people = list(self.state.people)
         people[person] = Shown(values, "manual")
-        self.set(people=tuple(people), **self.costs(tuple(p.values for p in people)), **changes)
+        return tuple(people)
 
     def go_to(self, frame: int | None) -> None:
         """Show the frame that the user saw, which a tracker may have left meanwhile; None for the one shown."""

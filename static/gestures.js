@@ -1,11 +1,13 @@
 /**
  * The pointer in a pane. On a joint it drags the joint, anywhere else (or with the middle button) it moves the view.
  *
- * A drag keeps the distance between pointer and joint, begins after a few pixels (a click only selects), and sends at most
- * one message per animation frame.
+ * A drag keeps the distance between pointer and joint, begins after a few pixels (a click only selects), and sends about one
+ * message per animation frame: as soon as the pointer moves, not when the browser gets to the next frame.
  */
 
 const DRAG_THRESHOLD = 3;
+/** A mouse may tell its moves a thousand times a second; no more often than this they are told on. */
+const LEAST_INTERVAL_MS = 12;
 /** By so much a joint of the person worked on is nearer than it looks: hands that touch are told apart by whose they are. */
 const YIELD_PX = 4;
 
@@ -34,7 +36,7 @@ export class Gestures {
   #pan = null;
   #hint = new DragHint();
   #seq = 0;
-  #moveScheduled = false;
+  #movesSent = -Infinity;
 
   /**
    * @param {import("./store.js").Store} store
@@ -62,6 +64,12 @@ export class Gestures {
     const surface = pane.surface;
     surface.addEventListener("pointerdown", (event) => this.#down(event, pane, camera));
     surface.addEventListener("pointermove", (event) => this.#move(event, pane, camera));
+    // Where the browser tells them; elsewhere the moves of each frame come as one.
+    surface.addEventListener("pointerrawupdate", (event) => {
+      if (this.#drag?.pointer === /** @type {PointerEvent} */ (event).pointerId && this.#drag.begun) {
+        this.#dragTo(this.#drag, /** @type {PointerEvent} */ (event), LEAST_INTERVAL_MS);
+      }
+    });
     for (const kind of ["pointerenter", "pointerdown"]) {
       surface.addEventListener(kind, () => this.#store.facts.active !== camera && this.#store.set({ active: camera }));
     }
@@ -183,7 +191,7 @@ export class Gestures {
       [this.#pan.x, this.#pan.y] = [event.clientX, event.clientY];
     } else if (this.#drag?.pointer === event.pointerId) {
       this.#drag.mode = modeOf(event);
-      this.#dragTo(this.#drag, pane.locate(event));
+      this.#dragTo(this.#drag, event);
       if (this.#drag.begun) this.#hint.show(this.#drag.mode, pane.element);
     } else if (!this.#drag && !this.#pan) {
       this.#hoverAt(pane, camera, pane.locate(event));
@@ -191,25 +199,25 @@ export class Gestures {
   }
 
   /**
+   * Take what is held to where a pointer is.
+   *
    * @param {Drag} drag
-   * @param {{x: number, y: number}} at
+   * @param {PointerEvent} event
+   * @param {number} intervalMs since the last message, or else this one waits for the next move
    */
-  #dragTo(drag, at) {
+  #dragTo(drag, event, intervalMs = 0) {
+    const at = drag.pane.locate(event);
     if (!drag.begun) {
       if (Math.hypot(at.x - drag.start.x, at.y - drag.start.y) < DRAG_THRESHOLD) return;
       drag.begun = true;
       this.#message("start", drag.grabbed);
     }
-    const { u, v } = drag.pane.view.toImage(at.x, at.y);
-    drag.at = { u: u + drag.offset.u, v: v + drag.offset.v };
-    if (this.#moveScheduled) return;
-    this.#moveScheduled = true;
-    const moved = performance.now();
-    requestAnimationFrame(() => {
-      this.#moveScheduled = false;
-      if (this.#drag !== drag) return;
-      this.#latency.sent(this.#message("move", drag.at), moved);
-    });
+    const pointer = drag.pane.view.toImage(at.x, at.y);
+    const { u, v } = { u: pointer.u + drag.offset.u, v: pointer.v + drag.offset.v };
+    if ((u === drag.at.u && v === drag.at.v) || performance.now() < this.#movesSent + intervalMs) return;
+    drag.at = { u, v };
+    this.#movesSent = performance.now();
+    this.#latency.sent(this.#message("move", drag.at), event.timeStamp);
   }
 
   /** @param {PointerEvent} event */

@@ -38,6 +38,7 @@ import { reasonsOf } from "./reasons.js";
 import { RecentImages } from "./recent_images.js";
 import { Receiver } from "./receiver.js";
 import { SavedMark } from "./saved_mark.js";
+import { SceneRest } from "./scene_rest.js";
 import { followScheme } from "./scene_scheme.js";
 import { SearchPanel } from "./search_panel.js";
 import { Snap } from "./snap.js";
@@ -132,9 +133,12 @@ scene.addEventListener("load", () => {
   watchTyping(scene.contentDocument);
   keys.listen(scene.contentDocument, table, { viser: true, isDragging, say });
 });
-followScheme(scene);
+const inSoftware = drawsInSoftware();
+if (inSoftware) new SceneRest(scene, store);
+// The panes come first: viser's program is large, and would hold their first pictures up.
+store.onceKnown("shown", () => followScheme(scene));
 
-const connection = new Connection(receiver, drawsInSoftware() ? { type: "hold_3d", hold: true } : null);
+const connection = new Connection(receiver, inSoftware ? { type: "hold_3d", hold: true } : null);
 
 Object.assign(window, {
   quadrille: {

@@ -113,6 +113,7 @@ export class PaneGrid {
   #update(changed) {
     if (changed.has("session")) this.#build();
     if (changed.has("filled")) this.#layOut();
+    if (changed.has("target")) this.#ask(this.panes.map((pane) => pane.reduction));
     if (changed.has("active") || changed.has("session")) this.#markActive();
     const withPictures = PICTURED.some((fact) => changed.has(fact));
     // A new state comes with every move of a drag; only its choice of what to draw concerns the vectors.

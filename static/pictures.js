@@ -17,7 +17,6 @@ export function keyOf(layer, camera) {
 
 export class PictureAssembler {
   #onShow;
-  #onSet;
   /** @type {Arrived[]} of one set */
   #arriving = [];
   /** @type {{frame: number, pictures: Map<string, Arrived>} | null} complete sets of the newest frame that wait for the decoder */
@@ -27,11 +26,9 @@ export class PictureAssembler {
 
   /**
    * @param {(frame: number, pictures: Pictures) => void} onShow takes over the bitmaps
-   * @param {(frame: number, arrived: Map<string, Arrived>) => void} onSet hears of each complete set, before it is decoded
    */
-  constructor(onShow, onSet) {
+  constructor(onShow) {
     this.#onShow = onShow;
-    this.#onSet = onSet;
   }
 
   /**
@@ -47,7 +44,6 @@ export class PictureAssembler {
     if (this.#waiting?.frame !== header.frame) this.#waiting = { frame: header.frame, pictures: new Map() };
     for (const one of this.#arriving) this.#waiting.pictures.set(keyOf(one.header.layer, one.header.camera), one);
     this.#arriving = [];
-    this.#onSet(header.frame, this.#waiting.pictures);
     void this.#decode();
   }
 

@@ -6,6 +6,7 @@ import { mergeCandidates, mergeSteps, takeLandscape, takeRuns } from "./search_f
 import { mergeCurves } from "./series.js";
 
 const MOST_EARLY = 8;
+const PICTURE_LAYERS = /** @type {const} */ (["image", "silhouette", "distance", "parts"]);
 
 export class Receiver {
   #store;
@@ -100,11 +101,14 @@ export class Receiver {
   }
 
   /**
-   * Vectors never lie over the image of another frame: they wait for theirs.
+   * Vectors never lie over the image of another frame: they wait for theirs, where any layer has one.
    *
    * @param {import("./protocol.js").Overlay} overlay
    */
   #takeOverlay(overlay) {
+    const { layers, shown } = this.#store.facts;
+    const isBare = !PICTURE_LAYERS.some((layer) => layers.shown[layer]);
+    if (isBare && shown?.frame !== overlay.frame) this.#show(overlay.frame, new Map());
     if (this.#store.facts.shown?.frame === overlay.frame) {
       this.#store.set({ overlay });
       return;
@@ -118,10 +122,7 @@ export class Receiver {
   /** @param {import("./protocol.js").SessionMessage} session */
   #begin(session) {
     this.#pictures?.close();
-    this.#pictures = new PictureAssembler(
-      (frame, pictures) => this.#show(frame, pictures),
-      (frame, arrived) => this.#recent.keep(frame, arrived),
-    );
+    this.#pictures = new PictureAssembler((frame, pictures) => this.#show(frame, pictures));
     this.#early.clear();
     this.#recent.clear(); // the footage may have changed while the program was away
     const former = this.#store.facts.session?.cameras;
@@ -144,6 +145,7 @@ export class Receiver {
     }
     for (const [key, picture] of pictures) kept.set(key, picture);
     this.#store.set({ shown: { frame, pictures: kept } });
+    this.#recent.keep(frame, pictures);
     const overlay = this.#early.get(frame);
     if (overlay) {
       this.#store.set({ overlay });
@@ -154,7 +156,7 @@ export class Receiver {
   /** The program sends a layer anew when it is shown again: until then what is kept may have become wrong. */
   #forgetHidden() {
     const { shown, layers, session } = this.#store.facts;
-    for (const layer of /** @type {const} */ (["image", "silhouette", "distance", "parts"])) {
+    for (const layer of PICTURE_LAYERS) {
       if (layers.shown[layer]) continue;
       for (const camera of session?.cameras.keys() ?? []) {
         shown?.pictures.get(keyOf(layer, camera))?.bitmap.close();

@@ -1,12 +1,18 @@
-/** The images of the frames that came last, as they came: compressed, outside of the page's heap, bounded in bytes. */
+/**
+ * The images of the frames that came last, reduced and ready to be drawn, bounded in bytes: to decode them anew would take as long as
+ * whoever waits for a frame can be kept waiting.
+ */
 
 import { keyOf } from "./pictures.js";
 
-/** Of four 640x480 views some three hundred frames. */
+/** Of four panes in a window of 1280x720 some hundred frames. */
 const MOST_BYTES = 64 * 2 ** 20;
+const BYTES_PER_PIXEL = 4;
+/** Of the size that they are shown at, along either side: enough to find one's way. */
+const SHARE = 0.6;
 
 export class RecentImages {
-  /** @type {Map<number, {images: Map<number, Blob>, bytes: number}>} images by camera, by frame, the latest last */
+  /** @type {Map<number, {images: Map<number, OffscreenCanvas>, bytes: number}>} images by camera, by frame, the latest last */
   #frames = new Map();
   #bytes = 0;
 
@@ -14,20 +20,21 @@ export class RecentImages {
    * Keep the images among the pictures of a frame.
    *
    * @param {number} frame
-   * @param {Map<string, import("./pictures.js").Arrived>} arrived
+   * @param {import("./pictures.js").Pictures} pictures
    */
-  keep(frame, arrived) {
+  keep(frame, pictures) {
     const kept = this.#frames.get(frame) ?? { images: new Map(), bytes: 0 };
-    for (const { header, blob } of arrived.values()) {
-      if (header.layer !== "image") continue;
-      const change = blob.size - (kept.images.get(header.camera)?.size ?? 0);
-      kept.images.set(header.camera, blob);
+    for (const [key, { bitmap }] of pictures) {
+      const [layer, camera] = key.split(" ");
+      if (layer !== "image") continue;
+      const image = reduced(bitmap);
+      const change = bytesOf(image) - bytesOf(kept.images.get(Number(camera)));
+      kept.images.set(Number(camera), image);
       kept.bytes += change;
       this.#bytes += change;
     }
     if (kept.images.size === 0) return;
-    this.#frames.delete(frame);
-    this.#frames.set(frame, kept);
+    this.#touch(frame, kept);
     for (const [oldest, { bytes }] of this.#frames) {
       if (this.#bytes <= MOST_BYTES || oldest === frame) break;
       this.#frames.delete(oldest);
@@ -57,18 +64,42 @@ export class RecentImages {
   }
 
   /**
-   * Decode the images of a frame; whoever asks closes the bitmaps.
+   * The images of a frame, which are kept longer than all others from now on.
    *
    * @param {number} frame
-   * @param {number[]} cameras
-   * @returns {Promise<import("./pictures.js").Pictures>}
+   * @returns {import("./store.js").StandInPictures}
    */
-  async decode(frame, cameras) {
-    const images = this.#frames.get(frame)?.images;
-    const decoded = cameras.map(async (camera) => {
-      const bitmap = await createImageBitmap(/** @type {Blob} */ (images?.get(camera)));
-      return /** @type {[string, import("./pictures.js").Picture]} */ ([keyOf("image", camera), { bitmap, limitPx: null }]);
-    });
-    return new Map(await Promise.all(decoded));
+  of(frame) {
+    const kept = this.#frames.get(frame);
+    if (!kept) return new Map();
+    this.#touch(frame, kept);
+    return new Map([...kept.images].map(([camera, bitmap]) => [keyOf("image", camera), { bitmap, limitPx: null }]));
   }
+
+  /**
+   * @param {number} frame
+   * @param {{images: Map<number, OffscreenCanvas>, bytes: number}} kept
+   */
+  #touch(frame, kept) {
+    this.#frames.delete(frame);
+    this.#frames.set(frame, kept);
+  }
+}
+
+/** @param {OffscreenCanvas | undefined} image */
+function bytesOf(image) {
+  return image ? image.width * image.height * BYTES_PER_PIXEL : 0;
+}
+
+/**
+ * A canvas, since Chromium takes seconds for whatever comes after some two hundred bitmaps where no graphics card draws them.
+ *
+ * @param {ImageBitmap} bitmap
+ */
+function reduced(bitmap) {
+  const [width, height] = [bitmap.width, bitmap.height].map((n) => Math.max(1, Math.round(SHARE * n)));
+  const canvas = new OffscreenCanvas(width, height);
+  const context = /** @type {OffscreenCanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: true }));
+  context.drawImage(bitmap, 0, 0, width, height);
+  return canvas;
 }

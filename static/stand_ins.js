@@ -3,14 +3,14 @@
  * a hand could take. Frames that come at once, as in playing, need none.
  */
 
-const PATIENCE_MS = 25;
+/** So far a frame may be away and so long take before another stands in: it may be decoded already. */
+const [STEP, PATIENCE_MS] = [2, 25];
 
 export class StandIns {
   #store;
   #recent;
   /** @type {number | null} the frame that is waited for */
   #awaited = null;
-  #busy = false;
 
   /**
    * @param {import("./store.js").Store} store
@@ -35,42 +35,21 @@ export class StandIns {
     const late = this.#late;
     if (late === this.#awaited) return;
     this.#awaited = late;
-    if (late === null) this.#show(null);
-    // A hand that scrubs on sees the next one at once; who has just set out may have the true one before this.
-    else if (this.#store.facts.standIn) void this.#stand();
-    else setTimeout(() => void this.#stand(), PATIENCE_MS);
+    if (late === null) this.#store.facts.standIn && this.#store.set({ standIn: null });
+    // A hand that scrubs on sees the next one at once, and so does who goes far: the true one takes its time.
+    else if (this.#store.facts.standIn || Math.abs(late - (this.#store.facts.shown?.frame ?? late)) > STEP) this.#stand();
+    else setTimeout(() => this.#stand(), PATIENCE_MS);
   }
 
-  /** Let the nearest frame stand in; where the wish has changed by the time that it is decoded, the next one follows it. */
-  async #stand() {
-    while (!this.#busy && this.#awaited !== null) {
-      const target = this.#awaited;
-      const { shown, reductions } = this.#store.facts;
-      const cameras = [...reductions.keys()].filter((camera) => reductions[camera] > 0);
-      const nearest = this.#recent.nearest(target, cameras);
-      if (nearest === null || !shown || Math.abs(nearest - target) >= Math.abs(shown.frame - target)) {
-        this.#show({ frame: shown?.frame ?? 0, target, pictures: null });
-        return;
-      }
-      this.#busy = true;
-      const pictures = await this.#recent.decode(nearest, cameras).finally(() => (this.#busy = false));
-      const awaited = this.#awaited;
-      if (awaited !== null) this.#show({ frame: nearest, target: awaited, pictures });
-      else close(pictures);
-      if (awaited === target) return;
-    }
+  /** Let the nearest frame stand in. */
+  #stand() {
+    const { shown, reductions } = this.#store.facts;
+    const target = this.#awaited;
+    if (target === null) return;
+    const cameras = [...reductions.keys()].filter((camera) => reductions[camera] > 0);
+    const nearest = this.#recent.nearest(target, cameras);
+    const isNearer = nearest !== null && shown && Math.abs(nearest - target) < Math.abs(shown.frame - target);
+    if (isNearer) this.#store.set({ standIn: { frame: nearest, target, pictures: this.#recent.of(nearest) } });
+    else this.#store.set({ standIn: { frame: shown?.frame ?? 0, target, pictures: null } });
   }
-
-  /** @param {import("./store.js").StandIn | null} standIn */
-  #show(standIn) {
-    const former = this.#store.facts.standIn;
-    if (former === standIn) return;
-    this.#store.set({ standIn });
-    close(former?.pictures);
-  }
-}
-
-/** @param {import("./pictures.js").Pictures | null | undefined} pictures */
-function close(pictures) {
-  for (const { bitmap } of pictures?.values() ?? []) bitmap.close();
 }

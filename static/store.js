@@ -10,7 +10,8 @@ import { usualLayers } from "./layers.js";
  * @typedef {{camera: number, person: number, point: string}} Joint
  * @typedef {{frame: number, pictures: import("./pictures.js").Pictures}} Shown
  *
- * @typedef {{frame: number, target: number, pictures: import("./pictures.js").Pictures | null}} StandIn pictures: those of `frame`,
+ * @typedef {Map<string, {bitmap: OffscreenCanvas, limitPx: null}>} StandInPictures as `Pictures`, which may have all layers
+ * @typedef {{frame: number, target: number, pictures: StandInPictures | null}} StandIn pictures: those of `frame`,
  *   without vectors; null where `frame` is the one shown anyway
  *
  * @typedef {object} Facts
@@ -125,6 +126,19 @@ export class Store {
   /** @param {(changed: Set<keyof Facts>) => void} view */
   subscribe(view) {
     this.#views.push(view);
+  }
+
+  /**
+   * @param {keyof Facts} fact
+   * @param {() => void} act done once, when the fact is there
+   */
+  onceKnown(fact, act) {
+    let isDone = false;
+    this.subscribe(() => {
+      if (isDone || this.facts[fact] === null) return;
+      isDone = true;
+      act();
+    });
   }
 
   #flush() {

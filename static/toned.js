@@ -3,7 +3,7 @@
 import { isPlain, toneCurve } from "./looks.js";
 
 export class TonedImage {
-  /** @type {ImageBitmap | null} */
+  /** @type {ImageBitmap | OffscreenCanvas | null} */
   #source = null;
   /** @type {import("./looks.js").Look | null} */
   #look = null;
@@ -11,7 +11,7 @@ export class TonedImage {
   #canvas = null;
 
   /**
-   * @param {ImageBitmap} bitmap
+   * @param {ImageBitmap | OffscreenCanvas} bitmap
    * @param {import("./looks.js").Look | undefined} look
    * @returns {CanvasImageSource & {width: number, height: number}} the bitmap itself where the look is plain
    */
@@ -28,7 +28,7 @@ export class TonedImage {
 }
 
 /**
- * @param {ImageBitmap} bitmap
+ * @param {ImageBitmap | OffscreenCanvas} bitmap
  * @param {Uint8ClampedArray} curve
  */
 function toned(bitmap, curve) {

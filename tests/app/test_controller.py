@@ -41,6 +41,29 @@ def test_the_cost_follows_a_drag(opened):
     assert len(controller.state.view_costs_px) == 4
 
 
+def test_a_hand_that_holds_still_sees_what_the_pose_costs(opened):
+    controller = opened()
+    before = controller.state.cost_px
+    start = pixel_of(controller, "torso")
+    controller.hand.begin_drag(PAGE, FRONT, 0, "torso", tuple(start))
+    for seq, way in enumerate((10.0, 60.0, 120.0)):
+        controller.hand.move_drag(PAGE, (start[0] + way, start[1]), seq)
+    shown = controller.state.poses
+    wait_for(lambda: controller.state.cost_px != before)
+    wait_for(lambda: controller.state.cost_px == controller._screen.costs(shown)["cost_px"])
+    assert controller.state.drag is not None
+    controller.hand.cancel_drag(PAGE)
+    assert controller.state.cost_px == before
+
+
+def test_the_cost_of_what_has_been_let_go_is_not_touched(opened):
+    controller = opened()
+    drag(controller, "torso", (120.0, 0.0))
+    controller._screen.set(cost_px=1.4)  # as a tracker knows it
+    time.sleep(0.1)
+    assert controller.state.cost_px == 1.4
+
+
 def test_a_cancelled_drag_leaves_nothing(opened):
     controller = opened()
     values = controller.state.poses[0]

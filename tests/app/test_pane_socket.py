@@ -336,7 +336,7 @@ async def test_many_cells_travel_as_columns(controller, monkeypatch):
 async def test_pictures_of_a_frame_come_as_sets_of_the_size_asked_for(controller):
     async with visiting(controller) as page:
         await page.hear("timeline")
-        await page.shows("image", "distance", "silhouette", "parts", reductions=(1, 2, 0, 4))
+        await page.shows("image", "distance", "silhouette", "parts", reductions=(1, 1.6, 0, 4))
         await page.send("seek", frame=5)
         told = [await page.hear("image", lambda m: m["frame"] == 5)]
         told += [await page.hear("image") for _ in range(11)]
@@ -347,10 +347,10 @@ async def test_pictures_of_a_frame_come_as_sets_of_the_size_asked_for(controller
         assert sets == [[("image", 6), ("parts", 6)], [("distance", 6), ("silhouette", 6)]]
         sizes = {(m["layer"], m["camera"]): size_of(m["payload"]) for m in told}
         assert {key: size for key, size in sizes.items() if key[0] == "image"} == {
-            ("image", 0): (640, 480), ("image", 1): (320, 240), ("image", 3): (160, 120),
+            ("image", 0): (640, 480), ("image", 1): (400, 300), ("image", 3): (160, 120),
         }  # fmt: skip
         assert sizes["distance", 3] == sizes["silhouette", 3] == (640, 480)  # as they are matched
-        assert sizes["parts", 1] == (320, 240)
+        assert sizes["parts", 1] == (400, 300)
         limits = {m["layer"]: m["limit_px"] for m in told}
         assert limits == {"image": None, "silhouette": None, "parts": None, "distance": pytest.approx(2 * 0.03 * 640)}
 
@@ -404,6 +404,8 @@ async def test_a_view_that_is_not_understood_is_a_notice(controller):
         assert "no layers are called x-rays" in (await page.hear("notice"))["text"]
         await page.shows("image", reductions=(1, 1))
         assert "for each of 4 cameras" in (await page.hear("notice"))["text"]
+        await page.shows("image", reductions=(1, 1, 0.5, float("nan")))
+        assert "expected 0 or a reduction from 1 to" in (await page.hear("notice"))["text"]
 
 
 def size_of(picture):

@@ -31,7 +31,7 @@ async def sample_page() -> AsyncIterator[Page]:
             page = await browser.new_page(viewport={"width": 1440, "height": 900})
             await page.goto(program.address)
             await shows(page, "window.quadrille?.state.overlay && window.quadrille.state.state.cost_px", 120)
-            await asyncio.sleep(6)  # the 3-D view has its first picture
+            await asyncio.sleep(9)  # the 3-D view has faded in
             yield page
             await browser.close()
         await program.stop()

@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import av
+import cv2
 import numpy as np
 from playwright.async_api import async_playwright
 
@@ -31,9 +32,12 @@ from running import Program  # noqa: E402
 from app import pictures  # noqa: E402
 from app.commands import Reporter  # noqa: E402
 from app.indexing import index  # noqa: E402
+from tracker.matched import MatchedView  # noqa: E402
 from tracker.recording import Recording  # noqa: E402
 from tracker.session import load_session, save_session  # noqa: E402
 
+REDUCTION = 1.7
+"""Pixels of the footage, along either side, for one of a pane, with four of them in a window of 1280x720."""
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 GO = """async (frame) => {
   const box = document.querySelector("#frame");
@@ -112,9 +116,7 @@ async def opened(folder: Path, browser, work):
     start_s = time.monotonic() - began
     page = await browser.new_page(viewport={"width": 1280, "height": 720})
     await page.goto(program.address)
-    await shows(
-        page, "window.quadrille?.state.shown?.pictures !== undefined || quadrille.state.shown?.frame === 0", 120
-    )
+    await shows(page, "window.quadrille?.state.shown.frame === 0 && quadrille.state.overlay", 120)
     page_s = time.monotonic() - began
     found = await work(page, program)
     await page.close()
@@ -169,15 +171,16 @@ def steps(folder: Path, n: int) -> None:
     """Print what making the pictures of a frame takes on its thread, step by step, of all four views together."""
     session = load_session(folder)
     rng, spent = np.random.default_rng(7), {"decode": 0.0, "undistort": 0.0, "JPEG": 0.0}
+    ways = [MatchedView(c.camera, 1 / REDUCTION, cv2.BORDER_CONSTANT) for c in session.cameras]
     with Recording(session.cameras) as recording:
         for k in rng.integers(0, recording.n_frames, n):
             for i, source in enumerate(session.cameras):
                 times = [time.process_time()]  # the decoder has threads of its own
                 image = recording.read_view(i, int(k))
                 times.append(time.process_time())
-                undistorted = source.camera.undistort_image(image)
+                undistorted = ways[i].image(image, ways[i].whole)
                 times.append(time.process_time())
-                pictures.footage(undistorted, source.camera.size, 1)
+                pictures.footage(undistorted, source.camera.size)
                 times.append(time.process_time())
                 for name, span in zip(spent, np.diff(times), strict=True):
                     spent[name] += 1000 * span / n

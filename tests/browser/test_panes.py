@@ -1,5 +1,7 @@
 """Panes against `fake_endpoint`: what is drawn where, and what a hand in a pane sends."""
 
+import asyncio
+
 import pytest
 from driving import dragging, handle_of, shows, state_of, to_client, until
 from fake_endpoint import FakeEndpoint, project
@@ -58,6 +60,19 @@ async def test_a_drag_sends_undistorted_pixels_within_half_a_pixel(page, endpoin
     assert await handle_of(page, 0, "l_wrist") == pytest.approx((u + 17.5, v - 31.25), abs=0.5)
     ((u2, v2),) = project(endpoint.pose[0, "l_wrist"][None], 2)
     assert await handle_of(page, 2, "l_wrist") == pytest.approx((u2, v2), abs=0.01)
+
+
+async def test_a_move_is_told_before_the_browser_gets_to_the_next_frame(page, endpoint):
+    """The browser tells each move at once by an event of its own; the one that all know waits for a frame."""
+    told = """([x, y]) => {
+      const at = { pointerId: 1, clientX: x, clientY: y };
+      document.querySelectorAll(".pane-overlay")[1].dispatchEvent(new PointerEvent("pointerrawupdate", at));
+    }"""
+    async with dragging(page, 1, "l_wrist", (5, 5), (10, 10)) as (u, v):
+        await asyncio.sleep(0.1)
+        await page.evaluate(told, list(await to_client(page, 1, u + 33, v - 21)))
+        await until(lambda: endpoint.heard("drag")[-1]["u"] == pytest.approx(u + 33, abs=0.01))
+        assert endpoint.heard("drag")[-1]["v"] == pytest.approx(v - 21, abs=0.01)
 
 
 async def test_a_grab_beside_the_joint_keeps_the_distance(page, endpoint):
@@ -157,7 +172,7 @@ async def test_zoom_stays_at_the_pointer_and_zero_resets_it(page):
 async def test_layers_are_asked_for_and_shown_at_once(page, endpoint):
     (first,) = endpoint.views
     assert first["layers"] == ["image", "contours", "joints", "epipolar"]
-    assert first["reductions"] == [1, 1, 1, 1]
+    assert first["reductions"] == pytest.approx([1 / view["scale"] for view in (await state_of(page))["views"]])
     await page.locator("#quick-layers").get_by_text("Distance").click()
     await shows(page, "'distance 3' in quadrille.state.shown.pictures")
     await page.locator("#quick-layers").get_by_text("Contours").click()
