@@ -35,9 +35,9 @@ class _Free:
     fov: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Report:
-    """Where a page says that its view is."""
+    """Where a page says that its view is; each is one of its own, wherever the view is."""
 
     client: int
     position: Array
@@ -86,7 +86,10 @@ class SnapView:
 
         async def moved(_: viser.CameraHandle) -> None:
             seen = client.camera  # what is read here the page has said: nothing of ours is in between
-            self._latest.offer(_Report(client.client_id, seen.position, seen.wxyz), client.client_id)
+            # Each under a key of its own, for each counts: if only the newest did, one who arrives and turns at once
+            # would never have arrived, and never get away from the camera.
+            report = _Report(client.client_id, seen.position, seen.wxyz)
+            self._latest.offer(report, report)
 
         client.camera.on_update(moved)
         await moved(client.camera)

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,6 +27,8 @@ class Page:
             image_width=400, image_height=300, on_update=self._keep,
         )  # fmt: skip
         self.background = None
+        self.shown, self.may_go_on = threading.Event(), threading.Event()
+        self.may_go_on.set()
         self.scene = SimpleNamespace(set_background_image=self._show)
 
     def _keep(self, callback):
@@ -33,6 +36,8 @@ class Page:
 
     def _show(self, image, **_):
         self.background = image
+        self.shown.set()
+        self.may_go_on.wait(20)
 
     def atomic(self):
         return contextlib.nullcontext()
@@ -81,6 +86,18 @@ def test_a_turn_leaves_the_camera(controller, page):
     page.reports(position + 0.1, wxyz)
     wait_for(lambda: controller.state.snapped is None)
     wait_for(lambda: page.background is None)
+
+
+def test_a_turn_right_after_arriving_leaves_it_too(controller, page):
+    page.may_go_on.clear()
+    controller.view_3d.snap(0)
+    assert page.shown.wait(20)
+    # Both are said while the view is still at work.
+    position, wxyz = pose_of(controller, 0)
+    page.reports(position, wxyz)
+    page.reports(position + 0.1, wxyz)
+    page.may_go_on.set()
+    wait_for(lambda: controller.state.snapped is None, 5)
 
 
 def test_what_a_slow_page_says_late_is_no_turn(controller, page):
