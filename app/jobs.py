@@ -58,7 +58,7 @@ class Job(Generic[T]):
         self._launch(until)
 
     def pace(self, rest_s: float) -> None:
-        """Rest so long after each step, seconds, so that a person can watch; a rest at hand is changed at once."""
+        """Do a step only every so many seconds, so that a person can watch; a rest at hand is changed at once."""
         self._rest_s = rest_s
         self._wake.set()
 
@@ -86,7 +86,7 @@ class Job(Generic[T]):
             self._future = _POOL.submit(self._work, until)
 
     def _work(self, until: Callable[[T], bool]) -> None:
-        done = False
+        done, due = False, time.monotonic()
         try:
             while not self._stop.is_set() and not done:
                 began = time.perf_counter()
@@ -101,7 +101,7 @@ class Job(Generic[T]):
                 self._on_step(step, self._seconds)
                 done = until(step)
                 if not done:
-                    self._rest()
+                    due = self._rest(due)
             self.running = False
             self._on_pause()
         except Exception as error:
@@ -109,11 +109,15 @@ class Job(Generic[T]):
             _LOG.exception("a job failed")
             self._on_end(error)
 
-    def _rest(self) -> None:
-        began = time.monotonic()
-        while not self._stop.is_set() and (left := began + self._rest_s - time.monotonic()) > 0:
+    def _rest(self, due: float) -> float:
+        """Rest from a step that was due then until the next one is; the moment when that was to be.
+
+        Steps that take a while are made up for by shorter rests, but no more than one of them.
+        """
+        while not self._stop.is_set() and (left := due + self._rest_s - time.monotonic()) > 0:
             self._wake.wait(left)
             self._wake.clear()
+        return max(due + self._rest_s, time.monotonic() - self._rest_s)
 
 
 class Latest(Generic[T]):

@@ -22,7 +22,7 @@ from tracker.evidence import ViewEvidence
 _LOG = logging.getLogger(__name__)
 _READABLE_S = 0.2
 """Time between updates of the page's numbers during a drag."""
-_WATCHABLE_S = 1 / 30
+_WATCHABLE_S = 1 / 60
 """Time between two looks at a search at work: more nobody sees, and the search needs the processor too."""
 _MOST_HISTORY = 2000
 """Entries of the history, each way, that a page may ask for."""

@@ -4,6 +4,7 @@ import time
 import pytest
 from hands import wait_for
 
+from app import jobs
 from app.jobs import Job
 from tracker.errors import TrackerError
 
@@ -50,6 +51,45 @@ def test_a_stopped_job_stands_and_goes_on():
     go.release(2)
     wait_for(lambda: len(watched.done) == 4)
     watched.job.stop()
+
+
+class Clock:
+    """Time that goes by only where it is slept."""
+
+    def __init__(self):
+        self.now, self.rests = 100.0, []
+
+    def monotonic(self):
+        return self.now
+
+    def perf_counter(self):
+        return self.now
+
+    def wait(self, seconds):
+        self.rests.append(seconds)
+        self.now += seconds
+
+    def clear(self):
+        pass
+
+
+def test_a_pace_counts_from_step_to_step_not_from_the_end_of_one(monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(jobs, "time", clock)
+
+    def steps():
+        for seconds in (0.25, 0.5, 1.5, 0.25, 9.0, 0.25, 0.25):
+            clock.now += seconds
+            yield clock.now
+
+    watched = Watched(steps())
+    watched.job.pace(1.0)
+    watched.job._wake = clock
+    watched.job.run()
+    wait_for(lambda: watched.ended)
+    # What took too long is made up for, by one step at most.
+    assert [t - 100.0 for t in watched.done] == [0.25, 1.5, 3.5, 3.75, 13.0, 13.25, 13.5]
+    assert clock.rests == [0.75, 0.5, 0.25, 0.5]
 
 
 def test_a_step_that_does_not_end_is_said():
