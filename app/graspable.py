@@ -35,13 +35,19 @@ def outlines(session: Session, state: State, view: View) -> list[Outline]:
         return []
     bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
-    for index, source in enumerate(session.cameras):
-        if index not in view.cameras:
-            continue
-        for one in picking.part_outlines(bodies, source.camera.pinhole):
+    seen = sorted(view.cameras)
+    found = picking.part_outlines(bodies, [session.cameras[index].camera.pinhole for index in seen])
+    for index, parts in zip(seen, found, strict=True):
+        for one in parts:
             if one.body in state.cast.hidden:
                 continue
             if drag is None or (one.body, one.part) == (drag.person, drag.part):
-                ends = np.hstack([one.polygon_px, np.roll(one.polygon_px, -1, axis=0)]).astype(np.float32)
-                out.append(Outline(index, one.body, one.part, one.depth_m, ends))
+                out.append(Outline(index, one.body, one.part, one.depth_m, _closed(one.polygon_px)))
     return out
+
+
+def _closed(polygon_px: FloatArray) -> FloatArray:
+    """The sides of a polygon, (n, 2), as x0, y0, x1, y1, (n, 4)."""
+    sides = np.empty((len(polygon_px), 4), np.float32)
+    sides[:, :2], sides[:-1, 2:], sides[-1, 2:] = polygon_px, polygon_px[1:], polygon_px[0]
+    return sides

@@ -8,8 +8,9 @@ import cv2
 import numpy as np
 
 from tracker import rigid
-from tracker.body import Body
+from tracker.body import Body, BodyModel
 from tracker.cameras import Camera
+from tracker.contours import FloatArray
 from tracker.rigid import Array
 from tracker.shapes import Shape
 
@@ -28,26 +29,25 @@ class PartOutline(NamedTuple):
     """Index of the part."""
     depth_m: float
     """Distance of the part's centre along the optical axis: of parts that overlap the nearest is meant."""
-    polygon_px: Array
+    polygon_px: FloatArray
     """Convex outline, (n, 2), undistorted px."""
 
 
-def part_outlines(bodies: Sequence[Body], camera: Camera) -> list[PartOutline]:
-    """Outlines of all parts in a view; those too near to the camera, or behind it, are left out.
+def part_outlines(bodies: Sequence[Body], cameras: Sequence[Camera]) -> list[list[PartOutline]]:
+    """Outlines of all parts in some views; those too near to the camera, or behind it, are left out.
 
     All kinds of parts are convex, or so nearly that nobody sees it: the hull of the surface is the outline.
     """
-    out = []
+    found: list[list[PartOutline]] = [[] for _ in cameras]
     for b, body in enumerate(bodies):
-        Ts, centers = body.model.kinematics(body.values).Ts_world_part, body.model.centers_part
-        # The centre of each part comes first, then its surface, (n_parts, n, 3).
-        of_part = np.stack([np.vstack([c, _surface(s) + c]) for s, c in zip(body.model.shapes, centers, strict=True)])
-        points = of_part @ np.swapaxes(Ts[:, :3, :3], 1, 2) + Ts[:, None, :3, 3]
-        depths, px = camera.depths(points), camera.project(points[:, 1:]).astype(np.float32)
-        for part in np.flatnonzero(depths[:, 1:].min(axis=1) >= _NEAREST_M):
-            hull = cv2.convexHull(px[part]).reshape(-1, 2).astype(np.float64)
-            out.append(PartOutline(b, int(part), float(depths[part, 0]), hull))
-    return out
+        Ts = body.model.kinematics(body.values).Ts_world_part
+        points = _surfaces(body.model) @ np.swapaxes(Ts[:, :3, :3], 1, 2) + Ts[:, None, :3, 3]
+        for camera, out in zip(cameras, found, strict=True):
+            depths, px = camera.depths(points), camera.project(points[:, 1:]).astype(np.float32)
+            for part in np.flatnonzero(depths[:, 1:].min(axis=1) >= _NEAREST_M):
+                hull = cv2.convexHull(px[part]).reshape(-1, 2)
+                out.append(PartOutline(b, int(part), float(depths[part, 0]), hull))
+    return found
 
 
 def place_on_part(body: Body, camera: Camera, part: int, pointer_px: Array) -> Array:
@@ -83,10 +83,11 @@ def place_on_part(body: Body, camera: Camera, part: int, pointer_px: Array) -> A
     return np.asarray(points[np.argmin(np.linalg.norm(points - start - along[:, None] * ray, axis=1))])
 
 
-@lru_cache(maxsize=256)
-def _surface(shape: Shape) -> Array:
-    """Points on a shape, (n, 3), in its frame, metres."""
-    return shape.triangles(_RINGS, _SECTORS).vertices
+@lru_cache(maxsize=32)
+def _surfaces(model: BodyModel) -> Array:
+    """The centre of each part, then points on its surface, (n_parts, 1 + n, 3), in the part's frame, metres."""
+    surfaces = [shape.triangles(_RINGS, _SECTORS).vertices for shape in model.shapes]
+    return np.stack([np.vstack([c, s + c]) for s, c in zip(surfaces, model.centers_part, strict=True)])
 
 
 @lru_cache(maxsize=256)

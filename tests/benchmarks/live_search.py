@@ -47,9 +47,10 @@ async def watched(page, speed: str, seconds: float) -> None:
         await page.keyboard.press("Enter")
         await shows(page, f"quadrille.state.shown?.frame === {frame} && quadrille.state.state.cost_px", 60)
         await page.keyboard.press("m")  # mirrored, the body is far from its edges: there is something to search
+        known = await page.evaluate("seen.spans.length")
         await page.keyboard.press("f")
-        await shows(page, "quadrille.state.state.job.running", 20)
-        await shows(page, "!quadrille.state.state.job.running", 120)
+        # Whoever asks whether it runs may come too late: at full speed a search takes a quarter of a second.
+        await shows(page, f"seen.spans.length > {known} && !quadrille.state.state.job.running", 120)
         left = seconds - sum(await page.evaluate("seen.spans.map((s) => s.to - s.from)")) / 1e3
     spans, waits = await page.evaluate("[seen.spans, seen.waits]")
     spent_s = sum(s["to"] - s["from"] for s in spans) / 1e3
