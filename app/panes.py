@@ -21,7 +21,7 @@ from tracker.evidence import ViewEvidence
 
 _LOG = logging.getLogger(__name__)
 _READABLE_S = 0.2
-"""Time between updates of the page's numbers during a drag."""
+"""Time between updates of the page's figures while a hand drags or a search is at work: nobody reads them faster."""
 _WATCHABLE_S = 1 / 60
 """Time between two looks at a search at work: more nobody sees, and the search needs the processor too."""
 _MOST_HISTORY = 2000
@@ -156,8 +156,10 @@ class _Page:
             self._changed.clear()
             state, sent = self._controller.state, self._sent
             self._sent, began = state, self._loop.time()
+            with_figures = self._figures_are_due(state)
             try:
-                await self._send_state(state)
+                if with_figures:  # else the vectors go first: they are what the eye follows
+                    await self._send_state(state)
                 if self._view is not None:
                     await self._send_drawn(state, self._view)
                 if sent is None or sent.timeline_version != state.timeline_version:
@@ -166,7 +168,7 @@ class _Page:
                     await self._send(messages.disagreeing(state.disagreeing))
                 await self._send_curves(state)
                 await self._send_history()
-                for news in await asyncio.to_thread(self._feed.news, self._controller, state):
+                for news in await asyncio.to_thread(self._feed.news, self._controller, state, with_figures):
                     await (self._socket.send_bytes(news) if isinstance(news, bytes) else self._send(news))
                 if state.track.failed and (sent is None or sent.track is not state.track):
                     await self._notice(state.track.message)
@@ -175,17 +177,23 @@ class _Page:
             if state.job.running:
                 await asyncio.sleep(max(0.0, began + _WATCHABLE_S - self._loop.time()))
 
+    def _figures_are_due(self, state: State) -> bool:
+        """Whether it is time for figures; if not, this page is woken when it is."""
+        sent, now = self._sent_text, self._loop.time()
+        is_busy = state.in_hand or (state.job.running and sent is not None and sent["job"]["running"])
+        wait = self._sent_text_at + _READABLE_S - now
+        if sent is not None and is_busy and wait > 0:
+            self._loop.call_later(wait, self._changed.set)
+            return False
+        self._sent_text_at = now
+        return True
+
     async def _send_state(self, state: State) -> None:
-        """Send what the page's text shows, if it changed; at a readable rate while a hand drags."""
-        message, loop = messages.state(self._controller.session, state), self._loop
-        if message == self._sent_text:
-            return
-        wait = self._sent_text_at + _READABLE_S - loop.time()
-        if state.in_hand and wait > 0 and self._sent_text is not None:
-            loop.call_later(wait, self._changed.set)  # the vectors go first: they are what the hand follows
-            return
-        self._sent_text, self._sent_text_at = message, loop.time()
-        await self._send(message)
+        """Send what the page's text shows, if it changed."""
+        message = messages.state(self._controller.session, state)
+        if message != self._sent_text:
+            self._sent_text = message
+            await self._send(message)
 
     async def _send_drawn(self, state: State, view: View) -> None:
         """Send what the panes show and the page does not have: vectors, then the pictures made meanwhile.

@@ -1,6 +1,5 @@
 """What a page that watches searches is sent: only what it does not know yet (docs/protocol.md)."""
 
-import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,8 +12,6 @@ from app.runs import Run
 from app.state import Landscape, ReplayState, State, finite_or_none
 from tracker.session import Session
 
-_CANDIDATES_S = 0.2
-"""Least time between two lists of the candidates of a search at work: nobody looks through them faster."""
 _COLUMNS = 4
 """Figures of a step: evaluations, cost of the candidate, least cost, index of the stage."""
 
@@ -38,11 +35,16 @@ class SearchFeed:
         self._runs: dict[str, Any] | None = None
         self._steps: dict[int, tuple[int, int]] = {}  # by run: steps sent, times thinned
         self._candidates: dict[int, tuple[object, ...]] = {}
-        self._candidates_at = 0.0
         self._landscape: Landscape | None = None
 
-    def news(self, controller: Controller, state: State) -> list[dict[str, Any] | bytes]:
-        """Messages that bring the page up to date, the text ones as objects."""
+    def news(self, controller: Controller, state: State, with_figures: bool = True) -> list[dict[str, Any] | bytes]:
+        """Messages that bring the page up to date, the text ones as objects.
+
+        Args:
+            controller: of the session.
+            state: what the page is told.
+            with_figures: whether to tell of runs and their candidates too, not only of their steps.
+        """
         if self._tab == "landscape":
             if state.landscape is None or state.landscape is self._landscape:
                 return []
@@ -52,8 +54,8 @@ class SearchFeed:
             return []
         out: list[dict[str, Any] | bytes] = []
         with controller.locked():
-            found = controller.replay.runs()
-            told = runs(found, state)
+            found, state = controller.replay.runs(), controller.state  # of the same moment
+            told = runs(found, state) if with_figures or self._runs is None else self._runs
             if told != self._runs:
                 self._runs = told
                 out.append(told)
@@ -61,9 +63,11 @@ class SearchFeed:
             if now != self._setup:
                 self._setup = now
                 out.append(now)
-            for run in found:
+            known = {run["number"] for run in told["runs"]}
+            for run in (run for run in found if run.number in known):
                 out += self._steps_of(run)
-                out += self._candidates_of(controller.session, run, state)
+                if with_figures:
+                    out += self._candidates_of(controller.session, run)
             kept = {run.number for run in found}
             self._steps = {n: sent for n, sent in self._steps.items() if n in kept}
             self._candidates = {n: sent for n, sent in self._candidates.items() if n in kept}
@@ -77,12 +81,10 @@ class SearchFeed:
         self._steps[run.number] = (len(run.steps), run.thinned)
         return [steps(run, first)]
 
-    def _candidates_of(self, session: Session, run: Run, state: State) -> list[bytes]:
+    def _candidates_of(self, session: Session, run: Run) -> list[bytes]:
         key = tuple(id(c) for c in run.candidates)
-        soon = time.monotonic() < self._candidates_at + _CANDIDATES_S
-        if key == self._candidates.get(run.number, ()) or (state.job.running and soon):
+        if key == self._candidates.get(run.number, ()):
             return []
-        self._candidates_at = time.monotonic()
         self._candidates[run.number] = key
         return [candidates(session, run)]
 

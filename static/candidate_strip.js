@@ -16,6 +16,8 @@ export class CandidateStrip {
   #element = byId("candidates", HTMLElement);
   #list = document.createElement("div");
   #label = document.createElement("span");
+  /** @type {unknown[]} what is drawn: a search at work tells of every step, but seldom of other candidates */
+  #drawn = [];
 
   /**
    * @param {import("./store.js").Store} store
@@ -36,13 +38,16 @@ export class CandidateStrip {
   }
 
   #show() {
-    const { searchCandidates, session, filled } = this.#store.facts;
+    const { searchCandidates, session, filled, shown } = this.#store.facts;
     const run = runLookedAt(this.#store.facts);
     const found = searchCandidates.get(run?.number ?? -1);
     const n = run ? (found?.costs.length ?? 0) : 0;
     while (this.#list.children.length > n) this.#list.lastElementChild?.remove();
     while (this.#list.children.length < n) this.#list.append(this.#make(this.#list.children.length));
     const camera = filled ?? found?.telling ?? 0;
+    const drawn = [found, n, camera, session, devicePixelRatio, shown?.pictures.get(keyOf("image", camera))?.bitmap];
+    if (drawn.every((one, index) => one === this.#drawn[index])) return;
+    this.#drawn = drawn;
     this.#label.textContent = n ? `Best, ${session?.cameras[camera]?.name ?? ""}` : "";
     this.#label.title = "The best candidates that differ by 3 cm or more, in the view that fills the grid, else the one that tells them apart best";
     if (!found || n === 0 || !session) return;

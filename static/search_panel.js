@@ -13,6 +13,8 @@ import { count, px } from "./text.js";
 
 /** Expansions a second that can be watched; 0 stands for as many as there can be. */
 const SPEEDS = [1, 2, 5, 10, 30, 0];
+/** Why the cost at the top is another once the search is over. */
+const MEASURED = "Measured on the edges near the pose it began from, as all its poses are: the cost of the found pose by itself may differ";
 
 export class SearchPanel {
   #store;
@@ -134,6 +136,6 @@ export class SearchPanel {
     }
     const rate = run && run.seconds > 0 ? ` · ${count(run.evaluations / run.seconds)}/s` : "";
     this.#figures.textContent = run ? `${count(run.evaluations)} poses${rate} · best ${px(run.best_px)}` : "No search yet";
-    this.#figures.title = run ? `Run ${run.number}: poses scored, poses a second of work, least cost` : "";
+    this.#figures.title = run ? `Run ${run.number}: poses scored, poses a second of work, least cost. ${MEASURED}` : "";
   }
 }

@@ -1,80 +1,19 @@
 """The pane socket of a real controller: what a page is told, and what it may ask for."""
 
 import asyncio
-import json
-import struct
-from contextlib import asynccontextmanager
 
-import aiohttp
 import cv2
 import numpy as np
 import pytest
-from aiohttp import web
 from hands import drag
+from visits import visiting
 
 from app import messages
-from app.panes import Panes
 
 
 @pytest.fixture
 def controller(placed):
     return placed
-
-
-class Page:
-    """A page that keeps everything it is told."""
-
-    def __init__(self, socket):
-        self._socket = socket
-        self.told = []
-
-    async def send(self, kind, **fields):
-        await self._socket.send_str(json.dumps({"type": kind, **fields}))
-
-    async def shows(self, *layers, reductions=(1, 1, 1, 1), by_part=False):
-        """Say what the page shows."""
-        await self.send("view", layers=layers, reductions=reductions, by_part=by_part)
-
-    async def hear(self, kind, condition=lambda _: True, timeout_s=10.0):
-        """The next message of a kind for which a condition holds; binary ones with their `payload`."""
-        async with asyncio.timeout(timeout_s):
-            while True:
-                message = self._read(await self._socket.receive())
-                self.told.append(message)
-                if message["type"] == kind and condition(message):
-                    return message
-
-    def _read(self, message):
-        if message.type is aiohttp.WSMsgType.TEXT:
-            return json.loads(message.data)
-        assert message.type is aiohttp.WSMsgType.BINARY, message
-        (length,) = struct.unpack_from("<I", message.data)
-        return json.loads(message.data[4 : 4 + length]) | {"payload": message.data[4 + length :]}
-
-
-@asynccontextmanager
-async def visiting(controller):
-    async def serve(request):
-        socket = web.WebSocketResponse()
-        await socket.prepare(request)
-        await Panes(controller).serve(socket)
-        return socket
-
-    app = web.Application()
-    app.router.add_get("/ws", serve)
-    runner = web.AppRunner(app, shutdown_timeout=0.1)
-    await runner.setup()
-    await web.TCPSite(runner, "127.0.0.1", 0).start()
-    try:
-        async with (
-            aiohttp.ClientSession() as session,
-            session.ws_connect(f"http://127.0.0.1:{runner.addresses[0][1]}/ws") as socket,
-        ):
-            page = Page(socket)
-            await page.shows("image", "contours", "joints")
-            yield page
-    finally:
-        await runner.cleanup()
 
 
 def curves_of(message):
