@@ -89,6 +89,9 @@ export const LAYERS = [
   },
 ];
 
+/** Layers that come as pictures, in the order in which they are painted. */
+export const PICTURE_LAYERS = /** @type {const} */ (["image", "distance", "silhouette", "parts"]);
+
 /** Layers by key: Shift 1 toggles the first, and so on. The menu lists them in this order, group by group. */
 export const BY_KEY = /** @type {Layer[]} */ ([
   "image", "distance", "silhouette", "accepted", "rejected", "contours", "hidden", "parts", "skeleton",

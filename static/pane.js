@@ -4,6 +4,7 @@ import * as drawing from "./drawing.js";
 import { drawPins } from "./pin_drawing.js";
 import { uncrowded } from "./crowding.js";
 import { isDimmed } from "./actions.js";
+import { PICTURE_LAYERS } from "./layers.js";
 import { isPlain } from "./looks.js";
 import { PaneCorner } from "./pane_corner.js";
 import { PaneView } from "./pane_view.js";
@@ -182,7 +183,7 @@ export class Pane {
     drawing.drawBackground(context, this.view);
     /** @type {number | null} */
     let limitPx = null;
-    for (const layer of /** @type {const} */ (["image", "distance", "silhouette", "parts"])) {
+    for (const layer of PICTURE_LAYERS) {
       const picture = layers.shown[layer] ? pictures?.get(keyOf(layer, this.#camera)) : undefined;
       if (!picture) continue;
       const source = layer === "image" ? this.#toned.of(picture.bitmap, looks[this.#camera]) : picture.bitmap;

@@ -1,12 +1,12 @@
 /** Puts the program's messages into the store. */
 
 import { Cells } from "./cells.js";
+import { PICTURE_LAYERS } from "./layers.js";
 import { PictureAssembler, keyOf } from "./pictures.js";
 import { mergeCandidates, mergeSteps, takeLandscape, takeRuns } from "./search_facts.js";
 import { mergeCurves } from "./series.js";
 
 const MOST_EARLY = 8;
-const PICTURE_LAYERS = /** @type {const} */ (["image", "silhouette", "distance", "parts"]);
 
 export class Receiver {
   #store;
