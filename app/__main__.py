@@ -10,6 +10,7 @@ import tyro
 from rich.console import Console
 
 from app import commands, ending
+from app.allocation import give_back_freed_memory
 from app.commands import Reporter
 from tracker.errors import TrackerError
 
@@ -419,6 +420,7 @@ def main() -> None:
 
 def program() -> None:
     """`main` as a process of its own."""
+    give_back_freed_memory()
     ending.run(main)
 
 

@@ -69,6 +69,7 @@ ORDER = [
     [
         "app",
         "app.access",
+        "app.allocation",
         "app.cells",
         "app.jobs",
         "app.layers",

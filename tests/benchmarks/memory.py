@@ -2,10 +2,6 @@
 
 Writes the bundled sample, played forth and back, into a session of its own, tracks it as `quadrille track` does, with
 everything stored, and prints the resident memory every 100 frames. Linux only: it reads /proc.
-
-What growth there is comes from glibc, which keeps freed images among others on its heaps: with
-`MALLOC_ARENA_MAX=1 MALLOC_MMAP_THRESHOLD_=131072` in the environment images are given back as they are freed, and the
-same run stays at one figure to the megabyte. It is a tenth slower, so it is not the default.
 """
 
 import argparse
@@ -19,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from app.allocation import give_back_freed_memory
 from app.commands import Reporter, init_from_joints, target
 from app.headless import track
 from tracker.footage import open_footage
@@ -100,6 +97,7 @@ def main() -> None:
     parser.add_argument("--joints", type=Path, default=SAMPLE / "truth.trc", help="to start from")
     parser.add_argument("--times", type=int, default=10, help="how many times as long")
     words = parser.parse_args()
+    give_back_freed_memory()  # as the program does
     with tempfile.TemporaryDirectory() as name:
         session = long_session(words.session, Path(name), words.times)
         at = target(session.folder, None, several=False)
