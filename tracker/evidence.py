@@ -23,7 +23,7 @@ from tracker.matched import MatchedView, fit_region
 from tracker.probes import Probes, Readings
 from tracker.recording import Recording, read_background, read_mask
 from tracker.scenery import Scenery
-from tracker.segments import Segments, accept, link_edges, pixels_of
+from tracker.segments import Segments, accept, link_edges
 from tracker.session import CameraSource
 from tracker.silhouette_contour import Outline, trace_outline, trust_outline
 from tracker.silhouettes import Changes, Image, Mask
@@ -194,8 +194,8 @@ def findable(segments: Segments, still: NDArray[np.bool_] | None) -> NDArray[np.
 
 def with_segments(view: ViewEvidence, chosen: NDArray[np.bool_]) -> ViewEvidence:
     """The same view with only the edges of some segments, (S,); its segments must be known."""
-    nothing = np.zeros((view.camera.height, view.camera.width), np.uint8)
-    points, normals, found = _matched_edges(view.segments, chosen, nothing)
+    assert view.segments is not None
+    points, normals, found = _edges_of(view.segments, chosen, (view.camera.height, view.camera.width))
     distance = distance_image(found, 2 * view.theta_px)
     return replace(view, points_px=points, normals=normals, distance=distance, accepted=chosen)
 
@@ -204,19 +204,48 @@ def _matched_edges(
     segments: Segments | None, chosen: NDArray[np.bool_] | None, found: NDArray[np.uint8]
 ) -> tuple[FloatArray, FloatArray, NDArray[np.uint8]]:
     """Thinned points (N, 2) and normals (N, 2) of chosen segments, and the map of all their pixels."""
+    if segments is not None and chosen is not None:
+        return _edges_of(segments, chosen, found.shape)
     if segments is None:
         pixels = cv2.findNonZero(found)
         points = np.empty((0, 2), np.float32) if pixels is None else np.asarray(pixels, np.float32).reshape(-1, 2)
         normals = np.zeros_like(points)
     else:
         points, normals = segments.points_px, segments.normals
-        if chosen is not None:
-            kept = pixels_of(segments, chosen)
-            points, normals, found = points[kept], normals[kept], np.zeros_like(found)
-            u, v = points.T.astype(np.intp)
-            found[v, u] = 1
     first = _first_in_cells(points, *found.shape)
     return points[first], normals[first], found
+
+
+def _edges_of(
+    segments: Segments, chosen: NDArray[np.bool_], shape: tuple[int, ...]
+) -> tuple[FloatArray, FloatArray, NDArray[np.uint8]]:
+    """The same of chosen segments, (S,), in an image of a height and width."""
+    found = np.zeros(shape, np.uint8)
+    cells = np.zeros((shape[0] // SCENE_SPACING_PX + 1, shape[1] // SCENE_SPACING_PX + 1), np.bool_)
+    first = np.empty(len(segments.points_px), np.int64)
+    n = _mark_chosen(segments.points_px, segments.firsts, chosen, found, cells, first)
+    return segments.points_px[first[:n]], segments.normals[first[:n]], found
+
+
+@njit(nogil=True, cache=True)
+def _mark_chosen(
+    points: FloatArray, firsts: NDArray[np.int64], chosen: NDArray[np.bool_], found: NDArray[np.uint8],
+    cells: NDArray[np.bool_], first: NDArray[np.int64],
+) -> int:  # fmt: skip
+    """Mark the pixels (N, 2) of chosen segments in a map, and list the first of them in each cell; their number."""
+    n = 0
+    for segment in range(len(chosen)):
+        if not chosen[segment]:
+            continue
+        for i in range(firsts[segment], firsts[segment + 1]):
+            u, v = int(points[i, 0]), int(points[i, 1])
+            found[v, u] = 1
+            row, column = v // SCENE_SPACING_PX, u // SCENE_SPACING_PX
+            if not cells[row, column]:
+                cells[row, column] = True
+                first[n] = i
+                n += 1
+    return n
 
 
 @njit(nogil=True, cache=True)

@@ -113,11 +113,6 @@ def sampled(segments: Segments) -> Samples:
     return Samples(sort_points(points, (width, height)), -(-lengths // _STRIDE))
 
 
-def pixels_of(segments: Segments, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which pixels belong to chosen segments, (S,) to (N,)."""
-    return np.repeat(chosen, np.diff(segments.firsts))
-
-
 @njit(nogil=True, cache=True, error_model="numpy")
 def _chain(
     found: NDArray[np.uint8], pixels: NDArray[np.int32], gradients: NDArray[np.int16],

@@ -20,7 +20,6 @@ from tracker.evidence import (
 )
 from tracker.matched import MatchedView, match_scale, region_around
 from tracker.recording import Recording
-from tracker.segments import pixels_of
 from tracker.session import CameraSource, load_session
 
 
@@ -304,13 +303,15 @@ def test_only_edges_near_the_prediction_are_accepted(sample, real_frame):
         kept = accepted(view, pieces)
         assert len(kept.accepted) == len(view.segments.firsts) - 1
         assert 0.02 < kept.accepted.mean() < 0.5  # racks and bars are refused
-        pixels = view.segments.points_px[pixels_of(view.segments, kept.accepted)]
+        pixels = view.segments.points_px[np.repeat(kept.accepted, np.diff(view.segments.firsts))]
         u, v = pixels.astype(int).T
         on_edge = np.zeros(view.distance.shape, dtype=bool)
         on_edge[v, u] = True
         np.testing.assert_array_equal(kept.distance == 0, on_edge)
         here = {tuple(p) for p in pixels.tolist()}
         assert all(tuple(p) in here for p in kept.points_px.tolist())
+        cells = [tuple(c) for c in (pixels // SCENE_SPACING_PX).astype(int).tolist()]
+        assert kept.points_px.tolist() == [p for i, p in enumerate(pixels.tolist()) if cells[i] not in cells[:i]]
         assert len(kept.points_px) == len(kept.normals) > 100
         np.testing.assert_allclose(np.linalg.norm(kept.normals, axis=1), 1, rtol=1e-5)
         assert not accepted(view, pieces, 0.1).accepted.all()

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from tracker.edges import Levels, detect_edges
-from tracker.segments import MAX_LENGTH, Segments, accept, link_edges, pixels_of
+from tracker.segments import MAX_LENGTH, Segments, accept, link_edges
 from tracker.silhouettes import smoothed
 
 
@@ -122,7 +122,6 @@ def test_segments_are_taken_or_left_as_a_whole():
     assert accept(segments, PIECES, 5.0).tolist() == [True, True, False]
     assert accept(segments, PIECES, 3.5).tolist() == [True, False, False]
     assert accept(segments, PIECES, 11.5).tolist() == [True, True, True]
-    assert pixels_of(segments, np.array([True, False, True])).tolist() == [True] * 20 + [False] * 20 + [True] * 20
 
 
 def test_the_distance_is_the_mean_over_the_segment():
