@@ -347,8 +347,11 @@ class BodyModel:
     def clip(self, values: Array) -> Array:
         """Put poses, (..., n_values), within the joint limits: angles to their range, balls to their cone and twist."""
         out = np.array(values, dtype=np.float64)
-        dofs, at = self._plain
-        out[..., at] = np.minimum(np.maximum(out[..., at], self.limits[dofs, 0]), self.limits[dofs, 1])
+        low, high = self._plain_limits
+        if not self._balls:  # then the values are the degrees of freedom
+            return np.minimum(np.maximum(out, low, out=out), high, out=out)
+        at = self._plain[1]
+        out[..., at] = np.minimum(np.maximum(out[..., at], low), high)
         for ball in self._balls:
             joint = ball.joint
             out[..., ball.values] = np.apply_along_axis(_clip_ball, -1, out[..., ball.values], joint.cone, joint.twist)
@@ -359,6 +362,12 @@ class BodyModel:
         """The degrees of freedom that are values themselves, and the index of each into the values."""
         dofs = np.setdiff1d(np.arange(self.n_dofs), np.concatenate([[], *(np.r_[b.dofs] for b in self._balls)]))
         return dofs.astype(np.int64), self.dof_value[dofs.astype(np.int64)]
+
+    @cached_property
+    def _plain_limits(self) -> tuple[Array, Array]:
+        """The lower and upper limits of these."""
+        low, high = self.limits[self._plain[0]].T
+        return low.copy(), high.copy()
 
     @cached_property
     def _balls(self) -> tuple["_Ball", ...]:
