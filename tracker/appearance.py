@@ -141,6 +141,11 @@ class Colors:
         by_view = np.where(samples < _LEAST_SEEN, np.nan, means).reshape(-1, n_parts)
         return ColorScore(float(nats.sum()), *_mean_by_part(nats, parts, n_parts), by_view)
 
+    def nats(self, values: Array, known: PartColors) -> float:
+        """The sum of `score` by itself, for many poses."""
+        parts, colors, _ = self._samples(values)
+        return float(known.log_ratios[parts, colors].sum())
+
     def look(
         self, values: Array, limb: NDArray[np.int64], known: PartColors | None, away: Sequence[int] = ()
     ) -> LimbLook:

@@ -113,7 +113,7 @@ class Judge:
     def _of_colors(self, values: Array) -> float:
         if self.known is None:
             return 0.0
-        return -self.settings.colors * self.colors.score(values, self.known).nats
+        return -self.settings.colors * self.colors.nats(values, self.known)
 
 
 class Searched(NamedTuple):

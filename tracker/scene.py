@@ -263,7 +263,7 @@ class Scene:
     def _nats(self, person: int) -> float:
         """What the colours say for a person where they stand; nothing where nobody has shown them."""
         known = self._memories[person].known
-        return 0.0 if known is None else self.colors(person).score(self.poses[person], known).nats
+        return 0.0 if known is None else self.colors(person).nats(self.poses[person], known)
 
     def _with(self, person: int, values: Array) -> tuple[Array, ...]:
         """Where everybody stands, but for one person."""

@@ -36,6 +36,7 @@ def test_the_pose_it_was_learnt_in_scores_best(gavrila, stand, seen):
     colors, known = seen
     rng = np.random.default_rng(0)
     best = colors.score(stand, known)
+    assert best.nats == colors.nats(stand, known) > 0
     others = [colors.score(shaken(gavrila, stand, rng, 0.25, 0.08), known).nats for _ in range(30)]
     assert best.nats > max(others)
     assert best.nats / best.samples.sum() > 1  # each sample is three times as likely on its part as elsewhere
