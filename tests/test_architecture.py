@@ -57,6 +57,7 @@ ORDER = [
     ["tracker.session", "tracker.proxy"],
     ["tracker.locks", "tracker.recording", "tracker.references"],
     ["tracker.assemble", "tracker.evidence", "tracker.simulate"],
+    ["tracker.kept"],
     ["tracker.limb_look", "tracker.matching"],
     ["tracker.chamfer", "tracker.predict", "tracker.appearance", "tracker.refine", "tracker.apart"],
     ["tracker.sharing", "tracker.surroundings"],

@@ -83,6 +83,8 @@ class Pieces(NamedTuple):
     """The eye in unit coordinates of one part, (3,)."""
     shared: FloatArray
     """What lines of sight share with a part, (2, room + LANES)."""
+    stands: NDArray[np.bool_]
+    """Whether each part stands where its pieces were kept, (P,): what stands has hidden them already, see `kept`."""
 
 
 def part_poses(bodies: Sequence[Body]) -> Array:
@@ -133,7 +135,7 @@ def piece_buffer(surfaces: Surfaces, room: int) -> Pieces:
         np.empty((n_parts, 3, 5)), np.empty((n_parts, 4)), np.empty(n_parts),
         np.zeros((3, MAX_POINTS + LANES), np.float32), np.empty((3, MAX_POINTS + LANES), np.float32),
         np.empty((3, MAX_POINTS), np.float32), np.empty(grid_size, np.float32), np.empty((3, 5), np.float32),
-        np.empty(3), np.empty((2, room + LANES), np.float32),
+        np.empty(3), np.empty((2, room + LANES), np.float32), np.empty(n_parts, np.bool_),
     )  # fmt: skip
 
 
@@ -143,7 +145,7 @@ def piece_buffer(surfaces: Surfaces, room: int) -> Pieces:
 
 
 @njit(inline="always", **FAST)
-def _place(eye: Array, Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
+def place(eye: Array, Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
     """Fill the motions between the parts' unit coordinates and the world, and their distances from the eye."""
     to_world, to_unit, distances = out.Ts_world_unit, out.Ts_unit_world, out.distances
     centers, half_axes = surfaces.centers, surfaces.half_axes
@@ -257,8 +259,11 @@ def _cut(
 
 
 @njit(inline="always", **FAST)
-def _hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
-    """Mark what parts hide of one another: those whose boxes in the image meet, and that are not all behind."""
+def hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
+    """Mark what parts hide of one another: those whose boxes in the image meet, and that are not all behind.
+
+    What two parts that both stand hide of each other is marked already.
+    """
     boxes, distances, radii, firsts, adjoining = (
         out.boxes,
         out.distances,
@@ -269,14 +274,14 @@ def _hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
     to_unit, to_world, Q, middles, shared, hidden = (
         out.Ts_unit_world, out.Ts_world_unit, out.between, out.middles, out.shared, out.hidden
     )  # fmt: skip
-    solids = surfaces.solids
+    solids, stands = surfaces.solids, out.stands
     for a in range(n_parts):
         if firsts[a] == firsts[a + 1]:
             continue
         u0, v0, u1, v1 = boxes[a, 0], boxes[a, 1], boxes[a, 2], boxes[a, 3]
         behind = distances[a] + radii[a] + JOINT_MARGIN_M
         for b in range(n_parts):
-            if b == a or firsts[b] == firsts[b + 1] or distances[b] - radii[b] > behind:
+            if b == a or firsts[b] == firsts[b + 1] or distances[b] - radii[b] > behind or (stands[a] and stands[b]):
                 continue
             if boxes[b, 0] > u1 or boxes[b, 2] < u0 or boxes[b, 1] > v1 or boxes[b, 3] < v0:
                 continue
@@ -290,39 +295,47 @@ def _hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
             hide(b, solids, Q, margin, middles, firsts[a], firsts[a + 1], shared, hidden)
 
 
+@njit(inline="always", **FAST)
+def trace_part(
+    part: int, P: Array, surfaces: Surfaces, piece_px: float, n: int, edge: int, out: Pieces
+) -> tuple[int, int]:  # fmt: skip
+    """Append the pieces of a part that is placed; returns the new counts of pieces and of edges."""
+    unit_eye, to_world, to_unit, half_axes = out.unit_eye, out.Ts_world_unit, out.Ts_unit_world, surfaces.half_axes
+    outline, image, n_points = out.outline, out.image, 0
+    depth = P[2, 3]
+    for i in range(3):
+        depth += P[2, i] * to_world[part, i, 3]
+        unit_eye[i] = to_unit[part, i, 4]
+    # A part that reaches the plane of the camera has no contour that could be drawn.
+    if depth >= surfaces.radii[part] + _NEAREST_M:
+        n_profile = surfaces.profile_sizes[part]
+        if n_profile > 0:
+            focal = np.sqrt(P[0, 0] ** 2 + P[0, 1] ** 2 + P[0, 2] ** 2)
+            radius_px = max(half_axes[part, 0], half_axes[part, 1]) * focal / depth
+            turn = np.float32(min(max(np.sqrt(8 * _SAG_PX / radius_px), 0.05), 0.6))
+            n_points = revolved_outline(part, n_profile, surfaces.profiles, unit_eye, turn, out.half, outline)
+        else:
+            n_points = grid_outline(part, unit_eye, surfaces, out.f, outline)
+    if n_points > 0:
+        n_edges = _project(part, P, n_points, to_world, outline, image, out.boxes)
+        n = _cut(n_edges, edge, piece_px, n, outline, image, out.ends, out.middles, out.edges)
+        edge += n_edges
+    return n, edge
+
+
 @njit(**FAST)
 def trace_pieces(P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: float, out: Pieces) -> int:
     """Fill the pieces of one view; returns their number. See `trace_view`."""
     n_parts = Ts.shape[0]
-    unit_eye, radii, half_axes, firsts = out.unit_eye, surfaces.radii, surfaces.half_axes, out.firsts
-    profiles, profile_sizes = surfaces.profiles, surfaces.profile_sizes
-    to_world, to_unit, outline, image = out.Ts_world_unit, out.Ts_unit_world, out.outline, out.image
-    focal = np.sqrt(P[0, 0] ** 2 + P[0, 1] ** 2 + P[0, 2] ** 2)
     n = edge = 0
-    _place(eye, Ts, surfaces, out)
+    place(eye, Ts, surfaces, out)
     for part in range(n_parts):
-        firsts[part] = n
-        depth = P[2, 3]
-        for i in range(3):
-            depth += P[2, i] * to_world[part, i, 3]
-            unit_eye[i] = to_unit[part, i, 4]
-        # A part that reaches the plane of the camera has no contour that could be drawn.
-        if depth < radii[part] + _NEAREST_M:
-            continue
-        if profile_sizes[part] > 0:
-            radius_px = max(half_axes[part, 0], half_axes[part, 1]) * focal / depth
-            turn = np.float32(min(max(np.sqrt(8 * _SAG_PX / radius_px), 0.05), 0.6))
-            n_points = revolved_outline(part, profile_sizes[part], profiles, unit_eye, turn, out.half, outline)
-        else:
-            n_points = grid_outline(part, unit_eye, surfaces, out.f, outline)
-        if n_points > 0:
-            n_edges = _project(part, P, n_points, to_world, outline, image, out.boxes)
-            n = _cut(n_edges, edge, piece_px, n, outline, image, out.ends, out.middles, out.edges)
-            edge += n_edges
-    firsts[n_parts] = n
+        out.firsts[part], out.stands[part] = n, False
+        n, edge = trace_part(part, P, surfaces, piece_px, n, edge, out)
+    out.firsts[n_parts] = n
     for i in range(n):
         out.hidden[i] = False
-    _hide_all(n_parts, surfaces, out)
+    hide_all(n_parts, surfaces, out)
     return n
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from tracker import contours
 from tracker.contours import FloatArray
 from tracker.evidence import SCENE_SPACING_PX
+from tracker.kept import Kept, keep_pieces, mark_covered, remember, still_stands, trace_moving, trace_standing
 from tracker.kernels import FAST
 from tracker.kinematics import IntArray
 from tracker.nearest import LANES, cells_within
@@ -63,10 +64,12 @@ class Scratch(NamedTuple):
     """Pieces in a row on one straight edge: u, v, du, dv, 1 / length^2, normal's u, v, (7, room)."""
     of_segment: NDArray[np.int32]
     """The first piece of each segment, the number of its pieces, and their part, (3, room)."""
+    wanted: NDArray[np.bool_]
+    """Whether points are held against each segment, (room,)."""
     best: FloatArray
     """Squared distance of each edge point to its segment, with the turn between them, (room,)."""
     nearest: NDArray[np.int32]
-    """Index of that segment, (room,)."""
+    """Index of that segment, (room,); -1 for what stands as it was kept (see `kept`)."""
     pull: FloatArray
     """What each edge point's residual weighs, (room,)."""
 
@@ -76,8 +79,8 @@ def scratch_for(surfaces: contours.Surfaces, room: int, n_points: int) -> Scratc
     return Scratch(
         contours.piece_buffer(surfaces, room), np.empty((8, room), np.float32),
         np.empty(len(surfaces.radii) + 1, np.int64), np.empty((7, room)), np.empty((7, room), np.float32),
-        np.empty((3, room), np.int32), np.empty(n_points, np.float32), np.empty(n_points, np.int32),
-        np.empty(n_points, np.float32),
+        np.empty((3, room), np.int32), np.empty(room, np.bool_), np.empty(n_points, np.float32),
+        np.empty(n_points, np.int32), np.empty(n_points, np.float32),
     )  # fmt: skip
 
 
@@ -97,16 +100,17 @@ class Sums(NamedTuple):
 @njit(**FAST)
 def nearest_alike(
     u: FloatArray, v: FloatArray, nu: FloatArray, nv: FloatArray, rows: IntArray, segments: FloatArray, n: int,
-    turn: float, reach: float, best: FloatArray, nearest: NDArray[np.int32],
+    wanted: NDArray[np.bool_], turn: float, reach: float, best: FloatArray, nearest: NDArray[np.int32],
 ) -> None:  # fmt: skip
-    """For each point (u, v) with normal (nu, nv), (N,) each, the nearest segment within reach.
+    """For each point (u, v) with normal (nu, nv), (N,) each, the nearest wanted segment within reach, or what was best.
 
     The turn between the point's edge and the segment counts as squared distance. Beyond the reach anything may be
     named, at a distance beyond it. As `nearest.nearest_segment`, segments are held only against points nearby.
     """
-    best[: u.shape[0]] = _FAR2
     far, weight = np.float32(reach), np.float32(turn)
     for k in range(n):
+        if not wanted[k]:
+            continue
         x, y, dx, dy, inverse = segments[0, k], segments[1, k], segments[2, k], segments[3, k], segments[4, k]
         nx, ny, index = segments[5, k], segments[6, k], np.int32(k)
         left, right, top, bottom = cells_within(x, y, x + dx, y + dy, far, rows)
@@ -162,8 +166,8 @@ def _visible(n_parts: int, scratch: Scratch) -> int:
 
 @njit(**FAST)
 def _model_to_image(
-    view: int, first: int, last: int, pixel: int, scene: Scene, scale: float, derive: bool, scratch: Scratch,
-    sums: Sums,
+    view: int, first: int, last: int, pixel: int, scene: Scene, scale: float, derive: bool, kept: Kept,
+    scratch: Scratch, sums: Sums,
 ) -> float:  # fmt: skip
     """Add the residuals of the visible pieces of the parts from first to last; their cost."""
     width, height = scene.sizes[view, 0], scene.sizes[view, 1]
@@ -177,6 +181,7 @@ def _model_to_image(
     s2, cost = np.float32((scale * theta) ** 2), 0.0
     for part in range(first, last):
         seen = far = 0.0
+        pulled = derive and kept.moves[part]
         for k in range(np.uint64(firsts[part]), np.uint64(firsts[part + 1])):
             x, y, length = q[0, k], q[1, k], q[2, k]
             # What lies outside the image is neither explained nor refuted: a body may be cut off at the border.
@@ -188,7 +193,7 @@ def _model_to_image(
             seen += length
             far += length * cut
             cost += length * f * cut * cut
-            if derive and d < theta:
+            if pulled and d < theta:
                 across = q[3, k] * along_u + q[4, k] * along_v
                 w = weight * length * (f * f) * across
                 pulls[0, k] += w * across
@@ -199,11 +204,62 @@ def _model_to_image(
 
 
 @njit(**FAST)
+def _hold_against(
+    view: int, n: int, scene: Scene, turn: float, scratch: Scratch, best: FloatArray, nearest: NDArray[np.int32]
+) -> None:  # fmt: skip
+    """Hold the points of a view against those of n segments that are wanted."""
+    start, stop, theta = scene.firsts[view], scene.firsts[view + 1], scene.thetas[view]
+    # Rows first: a slice of both would be of numbers that need not lie side by side, which is not vectorized.
+    u, v, nu, nv = scene.points[0], scene.points[1], scene.points[2], scene.points[3]
+    nearest_alike(
+        u[start:stop], v[start:stop], nu[start:stop], nv[start:stop], scene.rows[view], scratch.segments, n,
+        scratch.wanted, turn * np.float32(theta * theta), theta, best, nearest,
+    )  # fmt: skip
+
+
+@njit(**FAST)
+def _find_nearest(view: int, n_segments: int, scene: Scene, turn: float, kept: Kept, scratch: Scratch) -> None:
+    """Fill the nearest segment of each point of a view, and how far it is."""
+    start, stop = scene.firsts[view], scene.firsts[view + 1]
+    best, nearest, wanted, of, n = scratch.best, scratch.nearest, scratch.wanted, scratch.of_segment, stop - start
+    if kept.best.shape[0] == 0:
+        best[:n], wanted[:n_segments] = _FAR2, True
+    else:
+        for j in range(np.uint64(n)):
+            best[j], nearest[j] = kept.best[np.uint64(start) + j], np.int32(-1)
+        for k in range(n_segments):
+            wanted[k] = kept.moves[of[2, k]]
+        if mark_covered(view, scratch.traced, kept):
+            _uncover(view, n_segments, scene, kept, scratch)
+    _hold_against(view, n_segments, scene, turn, scratch, best, nearest)
+
+
+@njit(**FAST)
+def _uncover(view: int, n_segments: int, scene: Scene, kept: Kept, scratch: Scratch) -> None:
+    """Let the points whose nearest segment something that moves covers be held against whatever is in reach of them."""
+    start, stop, reach = scene.firsts[view], scene.firsts[view + 1], np.float32(scene.thetas[view])
+    best, segments, before, limit = scratch.best, scratch.segments, kept.nearest[start:stop], reach * reach
+    us, vs = scene.points[0][start:stop], scene.points[1][start:stop]
+    u0 = v0 = _FAR2
+    u1 = v1 = -_FAR2
+    for j in range(np.uint64(stop - start)):
+        if best[j] < limit and kept.covered[before[j]]:
+            u0, u1, v0, v1 = min(u0, us[j]), max(u1, us[j]), min(v0, vs[j]), max(v1, vs[j])
+            best[j] = _FAR2
+    u0, u1, v0, v1 = u0 - reach, u1 + reach, v0 - reach, v1 + reach
+    for k in range(np.uint64(n_segments)):
+        x, y = segments[0, k], segments[1, k]
+        x1, y1 = x + segments[2, k], y + segments[3, k]
+        if max(x, x1) >= u0 and min(x, x1) <= u1 and max(y, y1) >= v0 and min(y, y1) <= v1:
+            scratch.wanted[k] = True
+
+
+@njit(**FAST)
 def _image_to_model(
-    view: int, first: int, last: int, n_segments: int, scene: Scene, scale: float, turn: float, derive: bool,
+    view: int, n_segments: int, scene: Scene, scale: float, turn: float, derive: bool, kept: Kept,
     scratch: Scratch, sums: Sums,
 ) -> float:  # fmt: skip
-    """Add the residuals of the view's edge points whose nearest piece is of the parts from first to last; their cost.
+    """Add the residuals of the view's edge points whose nearest piece is of a part that moves; the cost of all.
 
     The points are the same at every pose, so that their costs compare like with like: one that no piece is near, or
     that is nearest to somebody else, costs what a point at the outlier distance does.
@@ -212,10 +268,9 @@ def _image_to_model(
     s2, limit, cost = np.float32((scale * theta) ** 2), np.float32(theta * theta), 0.0
     start, stop = scene.firsts[view], scene.firsts[view + 1]
     us, vs, q, of = scene.points[0][start:stop], scene.points[1][start:stop], scratch.segments, scratch.of_segment
-    nu, nv, weights = scene.points[2][start:stop], scene.points[3][start:stop], scene.points[4][start:stop]
-    of_silhouette, rows = scene.points[5][start:stop], scene.rows[view]
+    weights, of_silhouette = scene.points[4][start:stop], scene.points[5][start:stop]
     best, nearest, pulls = scratch.best, scratch.nearest, scratch.pulls
-    nearest_alike(us, vs, nu, nv, rows, q, n_segments, turn * limit, theta, best, nearest)
+    _find_nearest(view, n_segments, scene, turn, kept, scratch)
     n, pull, explained = np.uint64(stop - start), scratch.pull, 0.0
     for j in range(n):
         squared = min(best[j], limit)
@@ -225,14 +280,16 @@ def _image_to_model(
     for j in range(n):
         if best[j] >= limit:
             continue
-        k = np.uint64(nearest[j])
-        part = of[2, k]
         if not derive:  # who asks for the costs of the parts counts what they explain
             explained += of_silhouette[j]
-            if part >= first and part < last:
-                sums.parts[view, part, 2] += 1
+        if nearest[j] < 0:
             continue
-        if part < first or part >= last:
+        k = np.uint64(nearest[j])
+        part = of[2, k]
+        if not derive:
+            sums.parts[view, part, 2] += 1
+            continue
+        if not kept.moves[part]:
             continue
         w, u, v, dx, dy, count = pull[j], us[j] - q[0, k], vs[j] - q[1, k], q[2, k], q[3, k], of[1, k]
         t = (u * dx + v * dy) * q[4, k]
@@ -258,31 +315,64 @@ def _image_to_model(
 
 
 @njit(**FAST)
+def _keep(
+    view: int, Ts: Array, surfaces: contours.Surfaces, scene: Scene, turn: float, kept: Kept, scratch: Scratch
+) -> None:
+    """Keep the contours of what stands in a view, and what they are nearest to."""
+    trace_standing(scene.P[view], scene.eyes[view], Ts, surfaces, contours.PIECE_PX, kept, scratch.traced)
+    keep_pieces(view, scratch.traced, kept)
+    n_segments, segment, visible = _visible(Ts.shape[0], scratch), -1, 0
+    at = kept.firsts[view, 0]
+    for i in range(scratch.traced.firsts[-1]):
+        if scratch.traced.hidden[i]:
+            continue
+        if segment + 1 < n_segments and scratch.of_segment[0, segment + 1] == visible:
+            segment += 1
+        kept.segments[at + i] = segment
+        visible += 1
+    start, stop = scene.firsts[view], scene.firsts[view + 1]
+    best, nearest = kept.best[start:stop], kept.nearest[start:stop]
+    best[:], scratch.wanted[:n_segments] = _FAR2, True
+    _hold_against(view, n_segments, scene, turn, scratch, best, nearest)
+
+
+@njit(**FAST)
 def gather(
     Ts: Array, first: int, last: int, surfaces: contours.Surfaces, scene: Scene, scale: float, turn: float,
-    derive: bool, scratch: Scratch, sums: Sums,
+    derive: bool, kept: Kept, scratch: Scratch, sums: Sums,
 ) -> float:  # fmt: skip
     """Fill the sums for one pose of the parts from first to last, the other parts fixed; returns the cost.
 
-    Without `derive` the normal matrices stay empty.
+    Without `derive` the normal matrices stay empty; with it those of parts that do not move (see `kept`) do.
     """
     sums.M[:] = 0.0
     sums.b[:] = 0.0
     sums.parts[:] = 0.0
     sums.outline[:] = 0.0
-    pixel, cost = 0, 0.0
+    pixel, cost, keeps = 0, 0.0, kept.best.shape[0] > 0
+    anew = keeps and not still_stands(Ts, kept.moves, kept.Ts)
     for view in range(scene.P.shape[0]):
+        if anew:
+            _keep(view, Ts, surfaces, scene, turn, kept, scratch)
         if scene.weights[view, 0] > 0.0 or scene.weights[view, 1] > 0.0:
-            contours.trace_pieces(scene.P[view], scene.eyes[view], Ts, surfaces, contours.PIECE_PX, scratch.traced)
+            P, eye, traced = scene.P[view], scene.eyes[view], scratch.traced
+            if keeps:
+                trace_moving(view, P, eye, Ts, surfaces, contours.PIECE_PX, kept, traced)
+            else:
+                contours.trace_pieces(P, eye, Ts, surfaces, contours.PIECE_PX, traced)
             n_segments = _visible(Ts.shape[0], scratch)
             scratch.pulls[:, : scratch.firsts[-1]] = 0.0
             if scene.weights[view, 0] > 0.0 or not derive:  # whoever asks for the costs of the parts asks for both
-                cost += _model_to_image(view, first, last, pixel, scene, scale, derive, scratch, sums)
+                cost += _model_to_image(view, first, last, pixel, scene, scale, derive, kept, scratch, sums)
             if scene.weights[view, 1] > 0.0:
-                cost += _image_to_model(view, first, last, n_segments, scene, scale, turn, derive, scratch, sums)
+                cost += _image_to_model(view, n_segments, scene, scale, turn, derive, kept, scratch, sums)
             if derive:
                 for part in range(first, last):
+                    if not kept.moves[part]:
+                        continue
                     span, W = scratch.firsts[part : part + 2], scratch.traced.Ts_world_unit[part]
                     add_twists(span, scratch.pieces, scratch.pulls, scene.P[view], W, sums.M[part], sums.b[part])
         pixel += scene.sizes[view, 0] * scene.sizes[view, 1]
+    if anew:
+        remember(Ts, kept.Ts)
     return cost

@@ -90,6 +90,12 @@ class Judge:
     def _for_threads(self) -> list["Judge"]:
         return [replace(self, match=self.match.twin()) for _ in range(N_HELPERS)]
 
+    def of_limb(self, limb: Limb) -> "Judge":
+        """The same, quicker, for poses that differ in a limb alone; not to be used beside this one."""
+        out = replace(self)
+        out.__dict__["_for_threads"] = [replace(j, match=j.match.of_parts(limb.parts)) for j in self._for_threads]
+        return out
+
     def each(self, work: Callable[["Judge", Array], T], poses: Sequence[Array] | Array) -> list[T]:
         """What some work makes of each of several poses, (n_values,) each, in threads side by side, each with a judge
         of its own."""
@@ -192,11 +198,12 @@ def _search_limb(
         fit = solve(model, pose, judge.blocks, judge.free, iterations, tolerance=1e-3, gain=judge.settings.gain)
         return _Found(fit, judge.cost(fit))
 
-    poses = _candidates(model, limb, away, kept[0], others, judge)
+    of_limb = judge.of_limb(limb)
+    poses = _candidates(model, limb, away, kept[0], others, of_limb)
     if len(kept) > 1:
         poses = np.array([*poses, *(_with_limb(model, k, pose, limb) for k in kept[1:] for pose in poses)])
-        poses = poses[np.argsort(judge.costs(poses), kind="stable")[: judge.settings.refined]]
-    tried = judge.each(alone, poses)
+        poses = poses[np.argsort(of_limb.costs(poses), kind="stable")[: judge.settings.refined]]
+    tried = of_limb.each(alone, poses)
     return judge.each(whole, [x.fit.values for x in _distinct(model, tried, judge.settings.finished, _SAME_M)])
 
 

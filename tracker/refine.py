@@ -27,7 +27,8 @@ from tracker.body import Body, BodyModel, parts_of
 from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence
 from tracker.fit import Normal
-from tracker.kinematics import Kinematics
+from tracker.kept import kept_for
+from tracker.kinematics import IntArray, Kinematics
 from tracker.matching import Scene, Sums, gather, scratch_for
 from tracker.nearest import sort_points, stack_rows
 from tracker.rigid import Array
@@ -133,9 +134,26 @@ class ContourMatch:
     def _make_room(self) -> None:
         n_parts, n_views = len(self._Ts), len(self._scene.sizes)
         self._scratch = scratch_for(self._surfaces, self._most_pieces, self._scene.points.shape[1])
+        self._keep_all_but(np.arange(n_parts)[self._own])
         self._sums = Sums(
             np.empty((n_parts, 6, 6)), np.empty((n_parts, 6)), np.empty((n_views, n_parts, 3)), np.empty(n_views)
         )
+
+    def _keep_all_but(self, parts: IntArray) -> None:
+        moves = np.zeros(len(self._Ts), np.bool_)
+        moves[parts] = True
+        self._kept = kept_for(len(self._scene.sizes), self._most_pieces, self._scene.points.shape[1], moves)
+
+    def of_parts(self, parts: IntArray) -> "ContourMatch":
+        """The same, quicker, for poses that differ in some parts of the person alone, indices (n,).
+
+        It speaks for and against these parts only: what pulls at the others counts as cost, and is left out of the
+        derivatives. Poses in which the others move too are as right, and slower. The room to work in is shared: use one
+        at a time.
+        """
+        out = copy(self)
+        out._keep_all_but(self._own.start + parts)
+        return out
 
     def twin(self) -> "ContourMatch":
         """The same for another thread: the evidence is shared, the room to work in is not."""
@@ -174,7 +192,7 @@ class ContourMatch:
         self._Ts[own] = kinematics.Ts_world_part
         return gather(
             self._Ts, own.start, own.stop, self._surfaces, self._scene, settings.scale, settings.turn, derive,
-            self._scratch, self._sums,
+            self._kept, self._scratch, self._sums,
         )  # fmt: skip
 
 
