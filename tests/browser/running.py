@@ -56,6 +56,15 @@ class Program:
         self.address = ""
 
 
+AT_REST = """async () => {
+  const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+  while (!document.querySelector("#scene")?.contentDocument?.querySelector("canvas")) await pause(50);
+  await pause(9000);
+}"""
+"""Until the 3-D view has faded in and rests beside other work (static/scene_rest.js): before, where no graphics card
+draws, it may keep the page from doing anything else for seconds."""
+
+
 @contextlib.asynccontextmanager
 async def visited(browser, address, size=(1280, 720), viser=False):
     """The page of a program with its first cost on the screen; fails where the page reports an error.
@@ -70,6 +79,8 @@ async def visited(browser, address, size=(1280, 720), viser=False):
         await page.route("**/viser/**", lambda route: route.fulfill(body="<!doctype html>", content_type="text/html"))
     await page.goto(address, timeout=120_000)
     await shows(page, "window.quadrille?.state.overlay && quadrille.state.state?.cost_px !== null", 180)
+    if viser:
+        await page.evaluate(AT_REST)
     yield page
     await context.close()
     assert errors == []

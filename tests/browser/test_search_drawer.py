@@ -83,6 +83,7 @@ async def test_a_search_goes_stage_by_stage_and_the_tree_marks_where_it_is(page)
     await page.get_by_label("Expansions a second").select_option("1")
     await shows(page, "quadrille.state.searchSetup.speed === 1")
     await page.keyboard.press("f")
+    await shows(page, "quadrille.state.state.job.running", 10)  # the stage was marked before, while the search stood
     await shows(page, "document.querySelectorAll('.tree-pass.is-running').length === 1", 10)
     assert await page.locator("#search-controls").get_by_text("Stage", exact=True).is_disabled()
     await page.get_by_label("Expansions a second").select_option("0")
