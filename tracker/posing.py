@@ -46,8 +46,9 @@ _PUSH_DEPTH_WEIGHT = 0.5
 _NEAREST_PUSH_M = 0.3
 """A point is not pulled nearer to the camera than this."""
 
-_REACHED_M = 0.002
-"""A point this near to where it should be has followed the pointer."""
+_REACHED_M, _REACHED_DEPTH_M = 0.002, 0.02
+"""A point this near to where it should be, as its view sees it and along its depth, has followed the pointer: the pull
+of the rest holds it back in depth by some 4 mm."""
 _BEND_RAD = 0.35
 """How far the last joint of a chain is bent to leave a straight limb's dead point."""
 _STRETCHED = 0.999
@@ -263,8 +264,7 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
     ]
     fit = solve(model, values, blocks, free=hand.free, **_QUICK)
     joint, first = model.dof_joint[hand.free][[-1, 0]]
-    missed_m = np.linalg.norm(hand.place_world(fit.values) - target)
-    if joint == first or missed_m < _REACHED_M or _is_stretched(hand, fit.values, int(first), target):
+    if joint == first or _has_reached(hand, fit.values, target) or _is_stretched(hand, fit.values, int(first), target):
         return fit.values
     # A straight limb cannot see that bending would bring the point nearer: begin with its joint bent, either way.
     for bend in (_BEND_RAD, -_BEND_RAD):
@@ -272,6 +272,13 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
         bent = solve(model, start, blocks, free=hand.free, **_QUICK)
         fit = bent if bent.cost < fit.cost else fit
     return fit.values
+
+
+def _has_reached(hand: Grab, values: Array, target_world: Array) -> bool:
+    """Whether the grabbed point is where it should be, as far as a hand can tell."""
+    seen = rigid.apply(hand.camera.T_camera_world, np.stack([hand.place_world(values), target_world]))
+    across = hand.depth_m * np.diff(seen[:, :2] / np.maximum(seen[:, 2:], _NEAREST_M), axis=0)
+    return bool(np.linalg.norm(across) < _REACHED_M and abs(seen[1, 2] - seen[0, 2]) < _REACHED_DEPTH_M)
 
 
 def _is_stretched(hand: Grab, values: Array, first: int, target_world: Array) -> bool:

@@ -174,6 +174,21 @@ def test_a_limb_that_is_stretched_to_what_is_out_of_reach_is_not_tried_bent(gavr
     np.testing.assert_allclose(*wrists, atol=0.001)
 
 
+def test_a_limb_that_has_followed_is_not_tried_bent(gavrila, pose, monkeypatch):
+    start = SIDE.project(place(gavrila, pose, "left_wrist"))
+    hand, way = grab(gavrila, pose, SIDE, "left_wrist", start), np.array([25, -40])
+    solved = []
+    monkeypatch.setattr(posing, "solve", lambda *args, **how: solved.append(0) or solve(*args, **how))
+    values = drag(hand, start + way, pose)
+    end = place(gavrila, values, "left_wrist")
+    assert len(solved) == 1
+    assert np.linalg.norm(SIDE.project(end) - start - way) < 0.5
+    assert 0.002 < abs(SIDE.depths(end) - hand.depth_m) < 0.02  # as far as the pull of the rest holds it back
+    monkeypatch.setattr(posing, "_REACHED_DEPTH_M", 0.002)
+    np.testing.assert_allclose(drag(hand, start + way, pose), values, atol=0.01)
+    assert len(solved) == 4
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_from_any_pose_the_joint_follows_or_a_limit_holds_it(gavrila, seed):
     rng = np.random.default_rng(seed)
