@@ -57,6 +57,7 @@ class _Page:
         self._sent: State | None = None
         self._sent_text: dict[str, Any] | None = None
         self._sent_text_at = 0.0
+        self._reminder: asyncio.TimerHandle | None = None  # that figures are due
         self._sent_overlay: tuple[object, ...] = ()  # what it was drawn from
         self._view: View | None = None  # nothing is drawn for a page that has not said what it shows
         self._pictures = picture_sets.PictureSets(controller)
@@ -160,15 +161,15 @@ class _Page:
             try:
                 if with_figures:  # else the vectors go first: they are what the eye follows
                     await self._send_state(state)
+                if sent is None or sent.timeline_version != state.timeline_version:  # the text may tell of its cells
+                    await self._send_timeline(0 if sent is None else sent.timeline_version)
                 if self._view is not None:
                     await self._send_drawn(state, self._view)
-                if sent is None or sent.timeline_version != state.timeline_version:
-                    await self._send_timeline(0 if sent is None else sent.timeline_version)
                 if sent is None or sent.disagreeing != state.disagreeing:
                     await self._send(messages.disagreeing(state.disagreeing))
                 await self._send_curves(state)
                 await self._send_history()
-                for news in await asyncio.to_thread(self._feed.news, self._controller, state, with_figures):
+                for news in await asyncio.to_thread(self._feed.news, self._controller, with_figures):
                     await (self._socket.send_bytes(news) if isinstance(news, bytes) else self._send(news))
                 if state.track.failed and (sent is None or sent.track is not state.track):
                     await self._notice(state.track.message)
@@ -181,12 +182,17 @@ class _Page:
         """Whether it is time for figures; if not, this page is woken when it is."""
         sent, now = self._sent_text, self._loop.time()
         is_busy = state.in_hand or (state.job.running and sent is not None and sent["job"]["running"])
-        wait = self._sent_text_at + _READABLE_S - now
-        if sent is not None and is_busy and wait > 0:
-            self._loop.call_later(wait, self._changed.set)
-            return False
-        self._sent_text_at = now
-        return True
+        due = self._sent_text_at + _READABLE_S
+        if sent is None or not is_busy or now >= due:
+            self._sent_text_at = now
+            return True
+        if self._reminder is None:
+            self._reminder = self._loop.call_at(due, self._remind)
+        return False
+
+    def _remind(self) -> None:
+        self._reminder = None
+        self._changed.set()
 
     async def _send_state(self, state: State) -> None:
         """Send what the page's text shows, if it changed."""

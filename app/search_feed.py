@@ -37,19 +37,19 @@ class SearchFeed:
         self._candidates: dict[int, tuple[object, ...]] = {}
         self._landscape: Landscape | None = None
 
-    def news(self, controller: Controller, state: State, with_figures: bool = True) -> list[dict[str, Any] | bytes]:
+    def news(self, controller: Controller, with_figures: bool = True) -> list[dict[str, Any] | bytes]:
         """Messages that bring the page up to date, the text ones as objects.
 
         Args:
             controller: of the session.
-            state: what the page is told.
             with_figures: whether to tell of runs and their candidates too, not only of their steps.
         """
         if self._tab == "landscape":
-            if state.landscape is None or state.landscape is self._landscape:
+            shown = controller.state.landscape
+            if shown is None or shown is self._landscape:
                 return []
-            self._landscape = state.landscape
-            return [landscape(controller.session, state.landscape)]
+            self._landscape = shown
+            return [landscape(controller.session, shown)]
         if self._tab != "search":
             return []
         out: list[dict[str, Any] | bytes] = []

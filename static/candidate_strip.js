@@ -45,7 +45,7 @@ export class CandidateStrip {
     while (this.#list.children.length > n) this.#list.lastElementChild?.remove();
     while (this.#list.children.length < n) this.#list.append(this.#make(this.#list.children.length));
     const camera = filled ?? found?.telling ?? 0;
-    const drawn = [found, n, camera, session, devicePixelRatio, shown?.pictures.get(keyOf("image", camera))?.bitmap];
+    const drawn = [found, camera, session, devicePixelRatio, shown?.pictures.get(keyOf("image", camera))?.bitmap];
     if (drawn.every((one, index) => one === this.#drawn[index])) return;
     this.#drawn = drawn;
     this.#label.textContent = n ? `Best, ${session?.cameras[camera]?.name ?? ""}` : "";
