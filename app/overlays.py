@@ -202,11 +202,13 @@ def _by_part(
 
 def _segments(bodies: Sequence[Body], view: ViewEvidence, index: int, shown: View) -> list[Path]:
     """The segments of edges that the poses shown explain, and those that they do not (GD96 Fig. 6)."""
-    segments = view.segments
-    if shown.layers.isdisjoint(("accepted", "rejected")) or segments is None or len(segments.points_px) == 0:
+    if shown.layers.isdisjoint(("accepted", "rejected")):
+        return []
+    segments, samples = view.segments, view.samples
+    if segments is None or samples is None or not len(segments.points_px):
         return []
     contour = contours.trace(bodies, view.camera)
-    chosen = accept(segments, contour.pieces_px[~contour.hidden], ACCEPTED_SHARE * view.theta_px)
+    chosen = accept(samples, contour.pieces_px[~contour.hidden], ACCEPTED_SHARE * view.theta_px)
     lengths = np.diff(segments.firsts)
     owners = np.repeat(np.arange(len(lengths)), lengths)
     places = np.arange(len(owners)) - segments.firsts[owners]

@@ -7,9 +7,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.rigid import FloatArray
 from tracker.silhouettes import Image, Mask
-
-FloatArray = NDArray[np.float32]
 
 STRONG_FRACTION, WEAK_FRACTION = 0.92, 0.80
 """Canny's thresholds, as fractions of the pixels whose gradient is weaker (without a foreground)."""

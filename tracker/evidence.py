@@ -22,13 +22,12 @@ from tracker.edges import Edges, detect_edges, levels
 from tracker.matched import MatchedView, fit_region
 from tracker.probes import Probes, Readings
 from tracker.recording import Recording, read_background, read_mask
+from tracker.rigid import FloatArray
 from tracker.scenery import Scenery
-from tracker.segments import Segments, accept, link_edges
+from tracker.segments import Samples, Segments, accept, link_edges, sampled
 from tracker.session import CameraSource
 from tracker.silhouette_contour import Outline, trace_outline, trust_outline
 from tracker.silhouettes import Changes, Image, Mask
-
-FloatArray = NDArray[np.float32]
 
 SCENE_SPACING_PX = 3
 """Scene edges are thinned to one point per cell of this many pixels a side."""
@@ -96,6 +95,11 @@ class ViewEvidence:
     silhouette: Silhouette | None = None
     """The silhouette in the region; None where neither a mask nor a background tells it."""
 
+    @cached_property
+    def samples(self) -> Samples | None:
+        """Pixels of the segments, to be asked how far they are from contours."""
+        return None if self.segments is None else sampled(self.segments)
+
     @property
     def theta_px(self) -> float:
         """Distance beyond which an edge says nothing, matched px; that of the whole image, whatever the region."""
@@ -155,7 +159,7 @@ def view_evidence(
     if gradients is not None:
         segments = link_edges(found, gradients)
         if predicted_px is not None:
-            chosen = accept(segments, predicted_px, ACCEPTED_SHARE * theta)
+            chosen = accept(sampled(segments), predicted_px, ACCEPTED_SHARE * theta)
         if scenery is not None:
             still = scenery.holds(segments, corner_px)
             chosen = ~still if chosen is None else chosen & ~still
@@ -175,8 +179,8 @@ def accepted(view: ViewEvidence, predicted_px: FloatArray, threshold_px: float |
         predicted_px: visible pieces of the predicted contours, x0, y0, x1, y1, (M, 4), px of the view's camera.
         threshold_px: mean distance of a segment to them up to which it is accepted, px; by default half of theta.
     """
-    assert view.segments is not None
-    return with_segments(view, accept(view.segments, predicted_px, threshold_px or ACCEPTED_SHARE * view.theta_px))
+    assert view.samples is not None
+    return with_segments(view, accept(view.samples, predicted_px, threshold_px or ACCEPTED_SHARE * view.theta_px))
 
 
 def unfiltered(view: ViewEvidence) -> ViewEvidence:

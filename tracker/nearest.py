@@ -12,8 +12,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.kernels import BORROW, FAST
+from tracker.rigid import FloatArray
 
-FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 
 _ZERO, _HALF, _ONE = (

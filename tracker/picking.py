@@ -6,15 +6,12 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from tracker import rigid
 from tracker.body import Body, BodyModel
 from tracker.cameras import Camera
-from tracker.rigid import Array
+from tracker.rigid import Array, FloatArray
 from tracker.shapes import Shape
-
-FloatArray = NDArray[np.float32]
 
 _NEAREST_M = 0.05
 """A part that reaches nearer to the camera than this has no outline."""

@@ -11,9 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.rigid import FloatArray
 from tracker.silhouettes import SMOOTHING_PX, Image
-
-FloatArray = NDArray[np.float32]
 
 SPACING_PX = 20
 """Distance between neighbouring probes, matched px."""

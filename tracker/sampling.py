@@ -2,11 +2,9 @@
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from tracker.kernels import FAST
-
-FloatArray = NDArray[np.float32]
+from tracker.rigid import FloatArray
 
 _ZERO = np.float32(0.0)  # a plain number would turn the kernel's arithmetic into float64
 

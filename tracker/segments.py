@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from tracker.kernels import FAST
 from tracker.nearest import LANES, Sorted, cells_within, sort_points
+from tracker.rigid import FloatArray
 
-FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 
 MAX_LENGTH = 30
@@ -63,21 +63,20 @@ def link_edges(found: NDArray[np.uint8], gradients: NDArray[np.int16]) -> Segmen
     return Segments(points, normals, firsts[: count + 1].copy())
 
 
-def accept(segments: Segments, pieces_px: FloatArray, threshold_px: float) -> NDArray[np.bool_]:
+def accept(samples: "Samples", pieces_px: FloatArray, threshold_px: float) -> NDArray[np.bool_]:
     """Judge each segment by its directed chamfer distance to predicted contours.
 
     A pixel counts with its distance to the nearest piece of contour that runs more or less as the edge does, at most
     twice the threshold.
 
     Args:
-        segments: the segments of a view.
+        samples: of the segments of a view.
         pieces_px: end points x0, y0, x1, y1 of the visible pieces of predicted contours, (M, 4), px of the view.
         threshold_px: mean distance up to which a segment is accepted, px.
 
     Returns:
         (S,) bool.
     """
-    samples = sampled(segments)
     return np.asarray(samples.means(samples.distances(pieces_px, 2.0 * threshold_px)) <= threshold_px)
 
 

@@ -141,7 +141,7 @@ class _View:
 
 def _sampled(view: ViewEvidence) -> tuple[Samples | None, Samples | None]:
     """See `Sharing.samples`."""
-    silhouette, edges = view.silhouette, None if view.segments is None else sampled(view.segments)
+    silhouette, edges = view.silhouette, view.samples
     if silhouette is None or not len(silhouette.points_px):
         return edges, None
     points = silhouette.points_px

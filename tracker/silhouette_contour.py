@@ -4,12 +4,10 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from tracker.edges import Edges
+from tracker.rigid import FloatArray
 from tracker.silhouettes import Mask
-
-FloatArray = NDArray[np.float32]
 
 LEAST_LENGTH = 24
 """Contours of fewer pixels go around specks and pinholes, and are left out."""

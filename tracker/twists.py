@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 
 from tracker.kernels import FAST
 from tracker.kinematics import IntArray
-from tracker.rigid import Array
-
-FloatArray = NDArray[np.float32]
+from tracker.rigid import Array, FloatArray
 
 
 @njit(**FAST)
