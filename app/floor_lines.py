@@ -7,9 +7,9 @@ from app.overlays import EPIPOLAR_COLOR, Path
 from app.state import State
 from tracker.cameras import Camera, epipolar_segment
 from tracker.floor import Floor
-from tracker.posing import up_rotation
 from tracker.rigid import Array
 from tracker.session import Session
+from tracker.standing import up_rotation
 
 FLOOR_COLOR = "#7ee08a"
 _MARK_PX = 7.0

@@ -21,9 +21,9 @@ from tracker import rigid
 from tracker.body import Body, BodyModel
 from tracker.cameras import Camera, viewed_point
 from tracker.contours import part_poses
-from tracker.posing import up_rotation
 from tracker.rigid import Array
 from tracker.session import Session
+from tracker.standing import up_rotation
 
 _REST_S = 0.08
 """Time between updates: drawing the scene costs the browser more than drawing the panes, which go first."""

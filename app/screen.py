@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from app.frames import Frames
 from app.saving import Saver
 from app.state import Shown, State, finite_or_none
-from tracker import posing
 from tracker.body import BodyModel
 from tracker.fit import held
 from tracker.locks import free_of
@@ -20,6 +19,7 @@ from tracker.pins import ViewPin
 from tracker.rebody import rebodied
 from tracker.rigid import Array
 from tracker.session import Session
+from tracker.standing import standing_pose, up_rotation
 from tracker.track_settings import pose_cost
 
 _APART_M = 0.9
@@ -39,7 +39,7 @@ class Screen:
         """
         self.session, self.saver, self.frames = session, saver, frames
         self.lock = threading.RLock()
-        self.stand(posing.up_rotation(session.up, session.floor))
+        self.stand(up_rotation(session.up, session.floor))
         self._subscribers: list[Callable[[State], None]] = []
         self._edit: int | None = None  # the entry of the history that the gesture at hand amends
         self.edit_of: object = None
@@ -84,8 +84,7 @@ class Screen:
         self._R_world_up = R_world_up
         middle = (len(self.present) - 1) / 2
         self._standing = tuple(
-            posing.standing_pose(model, cameras, R_world_up, _APART_M * (i - middle))
-            for i, model in enumerate(self.present)
+            standing_pose(model, cameras, R_world_up, _APART_M * (i - middle)) for i, model in enumerate(self.present)
         )
 
     def embody(self, session: Session) -> None:

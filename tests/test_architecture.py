@@ -47,6 +47,7 @@ ORDER = [
         "tracker.sizes",
         "tracker.evaluate",
         "tracker.interpolate",
+        "tracker.standing",
         "tracker.disagree",
         "tracker.measures",
     ],

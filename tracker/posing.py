@@ -1,7 +1,7 @@
 """Posing a body by hand: a point of it follows a place in an image, the rest of the chain gives way."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypedDict
 
 import numpy as np
@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from tracker import rigid
 from tracker.body import Body, BodyModel
-from tracker.cameras import Camera, viewed_point
+from tracker.cameras import Camera
 from tracker.errors import TrackerError
-from tracker.fit import Block, Normal, StayNear, fit_to_points, normal_of, solve
-from tracker.floor import Floor
+from tracker.fit import Block, Normal, StayNear, normal_of, solve
 from tracker.kinematics import Kinematics
 from tracker.orienting import orient
 from tracker.picking import place_on_part
@@ -54,31 +53,10 @@ _BEND_RAD = 0.35
 _STRETCHED = 0.999
 """A chain has its full length when the point is this share of it away: an elbow bends by 5 degrees there."""
 
-_STRAIGHT_DOWN = 0.1
-"""A camera whose axis has a smaller level component than this looks from above, or from below."""
-
 _QUICK: _Solving = {"max_iterations": 15, "tolerance": 1e-4}
 """A hand makes dozens of moves a second, each from where the last one ended."""
-
-UP_ROTATIONS = {
-    "z": np.eye(3),
-    "-z": np.diag([1.0, -1.0, -1.0]),
-    "y": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
-    "-y": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
-    "x": np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]]),
-    "-x": np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]]),
-}
-"""Rotations that turn the body's z axis to the world axis that points up."""
-
-
-def up_rotation(up: str, floor: Floor | None) -> Array:
-    """Rotation whose z axis points up from the floor, (3, 3).
-
-    Args:
-        up: world axis that points up, or is nearest to it.
-        floor: as a person has set it; None for the plane through the world's origin.
-    """
-    return UP_ROTATIONS[up] if floor is None else floor.turned(UP_ROTATIONS[up])
+_BENT: _Solving = {"max_iterations": 6, "tolerance": 1e-4}
+"""So many show whether a limb that was bent comes nearer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,18 +207,29 @@ class _UnderPointer:
 
     def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `Block`."""
-        hand, T_camera_world = self.hand, self.hand.camera.T_camera_world
-        parts = np.array([hand.part])
+        hand, (R, t) = self.hand, self._world_to_camera
         point_world = rigid.apply(kinematics.Ts_world_part[hand.part], hand.place_part)
-        x = rigid.apply(T_camera_world, point_world)
-        target = rigid.apply(T_camera_world, self.target_world)
-        J = T_camera_world[:3, :3] @ model.point_jacobian(kinematics, parts, point_world[None])[0]  # (3, n_dofs)
+        x, target = R @ point_world + t, self._target
         z = max(x[2], _NEAREST_M)
         # Angles times depth, so that both are in metres.
         across = hand.depth_m * (x[:2] / z - target[:2] / target[2])
-        J_across = hand.depth_m / z * (J[:2] - np.outer(x[:2] / z, J[2]))  # (2, n_dofs)
-        r = np.append(across, self.depth_weight * (x[2] - target[2]))
-        return normal_of(r, np.concatenate([J_across, self.depth_weight * J[2:]]))
+        r = np.array([across[0], across[1], self.depth_weight * (x[2] - target[2])])
+        by_x = np.zeros((3, 3))  # d(r)/d(x)
+        by_x[0, 0] = by_x[1, 1] = hand.depth_m / z
+        by_x[:2, 2], by_x[2, 2] = -hand.depth_m / z**2 * x[:2], self.depth_weight
+        J_world = model.point_jacobian(kinematics, np.array([hand.part]), point_world[None])[0]  # (3, n_dofs)
+        return normal_of(r, by_x @ R @ J_world)
+
+    @cached_property
+    def _world_to_camera(self) -> tuple[Array, Array]:
+        T_camera_world = self.hand.camera.T_camera_world
+        return T_camera_world[:3, :3], T_camera_world[:3, 3]
+
+    @cached_property
+    def _target(self) -> Array:
+        """In the camera, (3,)."""
+        R, t = self._world_to_camera
+        return np.asarray(R @ self.target_world + t)
 
 
 def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
@@ -269,8 +258,9 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
     # A straight limb cannot see that bending would bring the point nearer: begin with its joint bent, either way.
     for bend in (_BEND_RAD, -_BEND_RAD):
         start = model.clip(model.retract(values, np.where(hand.free & (model.dof_joint == joint), bend, 0.0)))
-        bent = solve(model, start, blocks, free=hand.free, **_QUICK)
-        fit = bent if bent.cost < fit.cost else fit
+        bent = solve(model, start, blocks, free=hand.free, **_BENT)
+        if bent.cost < fit.cost:
+            fit = solve(model, bent.values, blocks, free=hand.free, **_QUICK)
     return fit.values
 
 
@@ -364,33 +354,3 @@ def _moved_body(hand: Grab, target_world: Array) -> Array:
 def _rest(hand: Grab) -> StayNear:
     """What keeps the chain near its pose at the grab."""
     return StayNear(hand.values, np.where(np.isfinite(hand.model.spreads), _STIFF_WEIGHT, _REST_WEIGHT))
-
-
-def standing_pose(
-    model: BodyModel, cameras: Sequence[Camera], R_world_up: Array | None = None, beside_m: float = 0.0
-) -> Array:
-    """Upright pose where the cameras look: where a model stands before anybody has placed it.
-
-    Args:
-        model: the body.
-        cameras: the views.
-        R_world_up: rotation whose z axis points up, (3, 3); by default the world's z does.
-        beside_m: how far from the middle it stands, metres to the right as the first camera sees it.
-    """
-    R = np.eye(3) if R_world_up is None else R_world_up
-    middle = viewed_point(cameras) + beside_m * _rightward(cameras[0], R[:, 2])
-    step = np.zeros(model.n_dofs)
-    step[:3] = middle
-    here = model.retract(model.neutral(), step)
-    if np.array_equal(R, np.eye(3)):
-        return here
-    points = model.points_world(model.neutral()) @ R.T + middle
-    return fit_to_points(model, dict(zip(model.point_names, points, strict=True))).values
-
-
-def _rightward(camera: Camera, up: Array) -> Array:
-    """Level direction, (3,), that a camera sees as rightward, however it is rolled; any from straight above."""
-    right = np.cross(camera.T_world_camera[:3, 2], up)
-    if np.linalg.norm(right) < _STRAIGHT_DOWN:
-        right = np.cross(camera.T_world_camera[:3, 1], up)
-    return np.asarray(right / np.linalg.norm(right))

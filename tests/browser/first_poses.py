@@ -16,8 +16,9 @@ from tracker.body import Body
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_table import read_pose_table, write_pose_table
 from tracker.occlusion import points_hidden
-from tracker.posing import drag, grab, standing_pose
+from tracker.posing import drag, grab
 from tracker.session import load_session
+from tracker.standing import standing_pose
 
 FRAME = 0
 SLIDER_STEP_DEG = 5.0

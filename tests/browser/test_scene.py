@@ -20,9 +20,9 @@ from tracker.body import Body
 from tracker.cameras import Camera, viewed_point
 from tracker.contours import part_poses
 from tracker.formats.model_toml import format_model, load_model
-from tracker.posing import standing_pose
 from tracker.records import PoseChange, PoseRecord
 from tracker.session import CameraSource, Person, create_session, load_session
+from tracker.standing import standing_pose
 
 SIZE = (640, 480)
 PAINTED = 4

@@ -1,0 +1,64 @@
+"""Where a body stands before anybody has placed it, and which way is up."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tracker.body import BodyModel
+from tracker.cameras import Camera, viewed_point
+from tracker.fit import fit_to_points
+from tracker.floor import Floor
+from tracker.rigid import Array
+
+_STRAIGHT_DOWN = 0.1
+"""A camera whose axis has a smaller level component than this looks from above, or from below."""
+
+UP_ROTATIONS = {
+    "z": np.eye(3),
+    "-z": np.diag([1.0, -1.0, -1.0]),
+    "y": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
+    "-y": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+    "x": np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]]),
+    "-x": np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]]),
+}
+"""Rotations that turn the body's z axis to the world axis that points up."""
+
+
+def up_rotation(up: str, floor: Floor | None) -> Array:
+    """Rotation whose z axis points up from the floor, (3, 3).
+
+    Args:
+        up: world axis that points up, or is nearest to it.
+        floor: as a person has set it; None for the plane through the world's origin.
+    """
+    return UP_ROTATIONS[up] if floor is None else floor.turned(UP_ROTATIONS[up])
+
+
+def standing_pose(
+    model: BodyModel, cameras: Sequence[Camera], R_world_up: Array | None = None, beside_m: float = 0.0
+) -> Array:
+    """Upright pose where the cameras look: where a model stands before anybody has placed it.
+
+    Args:
+        model: the body.
+        cameras: the views.
+        R_world_up: rotation whose z axis points up, (3, 3); by default the world's z does.
+        beside_m: how far from the middle it stands, metres to the right as the first camera sees it.
+    """
+    R = np.eye(3) if R_world_up is None else R_world_up
+    middle = viewed_point(cameras) + beside_m * _rightward(cameras[0], R[:, 2])
+    step = np.zeros(model.n_dofs)
+    step[:3] = middle
+    here = model.retract(model.neutral(), step)
+    if np.array_equal(R, np.eye(3)):
+        return here
+    points = model.points_world(model.neutral()) @ R.T + middle
+    return fit_to_points(model, dict(zip(model.point_names, points, strict=True))).values
+
+
+def _rightward(camera: Camera, up: Array) -> Array:
+    """Level direction, (3,), that a camera sees as rightward, however it is rolled; any from straight above."""
+    right = np.cross(camera.T_world_camera[:3, 2], up)
+    if np.linalg.norm(right) < _STRAIGHT_DOWN:
+        right = np.cross(camera.T_world_camera[:3, 1], up)
+    return np.asarray(right / np.linalg.norm(right))
