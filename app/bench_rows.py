@@ -15,8 +15,9 @@ from app.painting import PaintedCost
 from tracker import contours
 from tracker.body import Body, BodyModel
 from tracker.chamfer import ChamferCost
+from tracker.descent import solve
 from tracker.evidence import Observer
-from tracker.fit import Block, Fit, StayNear, damped_step, solve
+from tracker.fit import Block, Fit, StayNear, damped_step
 from tracker.formats.trc import MarkerTable
 from tracker.recording import Recording
 from tracker.refine import ContourMatch

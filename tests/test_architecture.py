@@ -61,7 +61,7 @@ ORDER = [
     ["tracker.kept"],
     ["tracker.limb_look", "tracker.matching"],
     ["tracker.chamfer", "tracker.predict", "tracker.appearance", "tracker.refine", "tracker.apart"],
-    ["tracker.sharing", "tracker.surroundings"],
+    ["tracker.descent", "tracker.sharing", "tracker.surroundings"],
     ["tracker.search", "tracker.confidence"],
     ["tracker.recover", "tracker.pose_edits", "tracker.memory"],
     ["tracker.track_settings"],

@@ -38,8 +38,12 @@ class KeepApart:
 
     def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `fit.Block`."""
-        contacts = _contacts((model,), kinematics.Ts_world_part, may_touch(model, self.softness), self.softness)
-        return _pushed(contacts, model, kinematics, 0, _weight(self.sigma_m))
+        return _pushed(self.compiled(model), model, kinematics)
+
+    def compiled(self, model: BodyModel) -> "Apart":
+        """What `push_apart` needs for a body."""
+        Ts, apart = np.empty((len(model.parts), 4, 4)), may_touch(model, self.softness)
+        return _apart((model,), Ts, apart, self.softness, 0, _weight(self.sigma_m))
 
 
 class KeepBodiesApart:
@@ -60,7 +64,7 @@ class KeepBodiesApart:
             sigma_m: depth that is as unlikely as one standard deviation, metres.
             softness: share of a part's radius that may be pressed in without cost.
         """
-        self._models = tuple(b.model for b in bodies)
+        self._models, self._person = tuple(b.model for b in bodies), person
         self._Ts = np.concatenate([b.model.kinematics(b.values).Ts_world_part for b in bodies])
         self._own = parts_of(self._models, person)
         mine = np.zeros(len(self._Ts), dtype=bool)
@@ -70,19 +74,44 @@ class KeepBodiesApart:
 
     def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `fit.Block`."""
+        return _pushed(self.compiled(model), model, kinematics)
+
+    def compiled(self, model: BodyModel) -> "Apart":
+        """What `push_apart` needs for the person, whose model is given."""
+        assert model is self._models[self._person]
         Ts = self._Ts.copy()  # several threads may ask
-        Ts[self._own] = kinematics.Ts_world_part
-        contacts = _contacts(self._models, Ts, self._apart, self._softness)
-        return _pushed(contacts, model, kinematics, self._own.start, self._weight)
+        return _apart(self._models, Ts, self._apart, self._softness, self._own.start, self._weight)
 
 
-class _Contacts(NamedTuple):
-    """Where points on the axes of parts lie within other parts."""
+class Apart(NamedTuple):
+    """What `push_apart` needs."""
 
+    Ts: Array
+    """World poses of all parts, (P, 4, 4), metres; those of the body that is fitted are filled in."""
+    first: int
+    """Index of the first of these."""
+    centers: Array
+    """Of all parts, see `Surfaces`, (P, 3), metres."""
+    half_axes: Array
+    """(P, 3), metres."""
+    apart: NDArray[np.bool_]
+    """Which parts are to be apart, (P, P)."""
+    softness: float
+    """See `KeepApart`."""
+    weight: float
+    """Of the depth of one point, per metre."""
     rows: Array
-    """Depth, the point and the outward normal of the other part there, in the world, (n, 7), metres."""
+    """Room for contacts, points on the axes of parts within other parts: depth, the point and the outward normal of the
+    other part there, in the world, (room, 7), metres."""
     parts: IntArray
-    """Index of the part of the point, and that of the other, (n, 2)."""
+    """Index of the part of each such point, and that of the other, (room, 2)."""
+
+
+NOTHING_APART = Apart(
+    np.empty((0, 4, 4)), 0, np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 0), np.bool_), 0.0, 0.0,
+    np.empty((0, 7)), np.empty((0, 2), np.int64),
+)  # fmt: skip
+"""That pushes nothing."""
 
 
 def _weight(sigma_m: float) -> float:
@@ -90,35 +119,29 @@ def _weight(sigma_m: float) -> float:
     return float(1 / (sigma_m * np.sqrt(_SAMPLES)))
 
 
-def _pushed(contacts: _Contacts, model: BodyModel, kinematics: Kinematics, first: int, weight: float) -> Normal:
-    """Normal equations of weighted depths for a body whose first part has an index; the parts of others stand."""
+def _apart(
+    models: tuple[BodyModel, ...], Ts: Array, apart: NDArray[np.bool_], softness: float, first: int, weight: float
+) -> Apart:
+    """Put together what is said of all bodies, with room for all contacts there may be."""
+    room, surfaces = int(np.count_nonzero(apart)) * _SAMPLES, surfaces_of(models)
+    rows, parts = np.empty((room, 7)), np.empty((room, 2), np.int64)
+    return Apart(Ts, first, surfaces.centers, surfaces.half_axes, apart, softness, weight, rows, parts)
+
+
+def _pushed(apart: Apart, model: BodyModel, kinematics: Kinematics) -> Normal:
+    """Normal equations of the depths for a body."""
     n = model.n_dofs
     gradient, hessian = np.zeros(n), np.zeros((n, n))
-    cost = _push(*contacts, first, weight, kinematics, model.dof_is_length, model.moves, gradient, hessian)
+    cost = push_apart(apart, kinematics, model.dof_is_length, model.moves, gradient, hessian)
     return Normal(cost, gradient, hessian)
-
-
-def _contacts(models: tuple[BodyModel, ...], Ts: Array, apart: NDArray[np.bool_], softness: float) -> _Contacts:
-    """List what lies within what.
-
-    Args:
-        models: all bodies.
-        Ts: world poses of all their parts, (P, 4, 4).
-        apart: which of these are to be apart, (P, P).
-        softness: see `KeepApart`.
-    """
-    room = int(np.count_nonzero(apart)) * _SAMPLES
-    rows, parts = np.empty((room, 7)), np.empty((room, 2), np.int64)
-    surfaces = surfaces_of(models)
-    n = _touch(Ts, surfaces.centers, surfaces.half_axes, apart, softness, rows, parts)
-    return _Contacts(rows[:n], parts[:n])
 
 
 @lru_cache(maxsize=32)
 def may_touch(model: BodyModel, softness: float) -> NDArray[np.bool_]:
     """Which parts are apart in a body that stands at ease: neither adjoining nor overlapping then, (P, P)."""
     everything = ~np.eye(len(model.parts), dtype=bool)
-    own, other = _contacts((model,), model.kinematics(model.neutral()).Ts_world_part, everything, softness).parts.T
+    at_ease = _apart((model,), model.kinematics(model.neutral()).Ts_world_part, everything, softness, 0, 0.0)
+    own, other = at_ease.parts[: _touch(*at_ease[:1], *at_ease[2:6], *at_ease[7:])].T
     for part, parent in enumerate(model.parents):
         if parent >= 0:
             everything[part, parent] = everything[parent, part] = False
@@ -171,11 +194,26 @@ def _touch(
 
 
 @njit(nogil=True, cache=True)
+def push_apart(
+    apart: Apart, kinematics: Kinematics, is_length: NDArray[np.bool_], moves: NDArray[np.bool_], gradient: Array,
+    hessian: Array,
+) -> float:  # fmt: skip
+    """Add the normal equations of the weighted depths, (n_dofs,) and (n_dofs, n_dofs); returns half their squares."""
+    if apart.Ts.shape[0] == 0:
+        return 0.0
+    own = kinematics.Ts_world_part
+    apart.Ts[apart.first : apart.first + own.shape[0]] = own
+    n = _touch(apart.Ts, apart.centers, apart.half_axes, apart.apart, apart.softness, apart.rows, apart.parts)
+    rows, parts = apart.rows[:n], apart.parts[:n]
+    return _push(rows, parts, apart.first, apart.weight, kinematics, is_length, moves, gradient, hessian)
+
+
+@njit(nogil=True, cache=True)
 def _push(
     rows: Array, parts: IntArray, first: int, weight: float, kinematics: Kinematics, is_length: NDArray[np.bool_],
     moves: NDArray[np.bool_], gradient: Array, hessian: Array,
 ) -> float:  # fmt: skip
-    """Add up the normal equations of weighted depths, (n_dofs,) and (n_dofs, n_dofs); returns half their squares.
+    """Add up the normal equations of contacts, (n, 7) and (n, 2); returns half their squares.
 
     A point X in a part moves by a rotation about a through o as a x (X - o), so along the normal n by a . (X - o) x n.
     The two parts move against each other there; what moves both alike changes nothing.

@@ -18,7 +18,7 @@ from tracker.body import Body, BodyModel, parts_of
 from tracker.contours import part_poses, projection
 from tracker.evidence import ViewEvidence
 from tracker.kernels import BORROW
-from tracker.kinematics import Kinematics
+from tracker.kinematics import Kinematics, chain_poses
 from tracker.limb_look import ColorView, LimbLook, Standing
 from tracker.rigid import Array
 from tracker.sights import (
@@ -141,10 +141,15 @@ class Colors:
         by_view = np.where(samples < _LEAST_SEEN, np.nan, means).reshape(-1, n_parts)
         return ColorScore(float(nats.sum()), *_mean_by_part(nats, parts, n_parts), by_view)
 
-    def nats(self, values: Array, known: PartColors) -> float:
-        """The sum of `score` by itself, for many poses."""
-        parts, colors, _ = self._samples(values)
-        return float(known.log_ratios[parts, colors].sum())
+    def nats(self, poses: Array, known: PartColors) -> Array:
+        """The sum of `score` by itself in many poses, (C, n_values), (C,)."""
+        model = self._bodies[self._person].model
+        Ts, first, ratios = self._Ts_world_part.copy(), self._own.start, known.log_ratios
+        placed = chain_poses(model.tree, model.kinematics(poses[0]), np.arange(len(model.parts)), poses)
+        found, room, nats = np.empty((self._most_samples, 3), np.int64), self._room(), np.zeros(len(poses))
+        for v in self._views:
+            _add_nats(v.P, v.eye, v.image, Ts, placed, first, self._shapes, ratios, found, *room, nats)
+        return nats
 
     def look(
         self, values: Array, limb: NDArray[np.int64], known: PartColors | None, away: Sequence[int] = ()
@@ -182,14 +187,23 @@ class Colors:
         """Part, colour and view of each visible sample, (n,) each."""
         model = self._bodies[self._person].model
         Ts = self._Ts(model.kinematics(values))
-        out = np.empty((len(model.parts) * ALONG * _ACROSS * len(self._views), 3), np.int64)
-        room = np.empty((len(Ts), 13)), np.empty((len(Ts), 4)), np.empty(len(Ts), np.int64), np.empty((4, 3))
+        out, room = np.empty((self._most_samples * len(self._views), 3), np.int64), self._room()
         n, first, last = 0, self._own.start, self._own.stop
         for i, view in enumerate(self._views):
             end = n + _look(view.P, view.eye, Ts, self._shapes, first, last, view.image, out[n:], *room)
             out[n:end, 2] = i
             n = end
         return out[:n, 0], out[:n, 1], out[:n, 2]
+
+    @property
+    def _most_samples(self) -> int:
+        """In a view."""
+        return len(self._bodies[self._person].model.parts) * ALONG * _ACROSS
+
+    def _room(self) -> tuple[Array, Array, NDArray[np.int64], Array]:
+        """For `_look`: its last four arguments."""
+        n = len(self._shapes)
+        return np.empty((n, 13)), np.empty((n, 4)), np.empty(n, np.int64), np.empty((4, 3))
 
 
 def _binned(image: Image) -> NDArray[np.int64]:
@@ -217,6 +231,22 @@ def _twins(model: BodyModel) -> NDArray[np.int64]:
     names = [p.name for p in model.parts]
     swapped = [n.replace("left", "?").replace("right", "left").replace("?", "right") for n in names]
     return np.array([names.index(n) if n in names else i for i, n in enumerate(swapped)])
+
+
+@njit(**BORROW)
+def _add_nats(
+    P: Array, eye: Array, image: Image, Ts: Array, placed: Array, first: int, shapes: Array, log_ratios: Array,
+    found: NDArray[np.int64], sights: Array, cones: Array, near: NDArray[np.int64], axis: Array, nats: Array,
+) -> None:  # fmt: skip
+    """Add what one view says of many poses, (C,), of the parts from first on, (C, n, 4, 4); see `_look`."""
+    last = first + placed.shape[1]
+    for c in range(placed.shape[0]):
+        for part in range(placed.shape[1]):
+            for i in range(3):
+                for k in range(4):
+                    Ts[first + part, i, k] = placed[c, part, i, k]
+        for i in range(_look(P, eye, Ts, shapes, first, last, image, found, sights, cones, near, axis)):
+            nats[c] += log_ratios[found[i, 0], found[i, 1]]
 
 
 @njit(**BORROW)

@@ -20,9 +20,11 @@ from tracker.errors import TrackerError
 from tracker.kinematics import IntArray, Kinematics
 from tracker.rigid import Array
 
-_MOST_DAMPING = 1e8
-_FELT_DAMPING = 1e-2
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e8
+FELT_DAMPING = 1e-2
 """Damping after a step that was refused, at least: less would hardly change it."""
+AT_LIMIT = 1e-9
+"""How near to a limit is at it, rad or metres."""
 _UNKNOWN = 1.0
 """Variance of a degree of freedom that nothing is known of, rad^2 or m^2."""
 
@@ -132,7 +134,7 @@ def solve(
     start = values  # what may not move stays as it is there, even outside of the limits
     values = held(model, model.clip(start), start, free)
     here = _sum(model, values, blocks)
-    damping, iterations = 1e-3, 0
+    damping, iterations = FIRST_DAMPING, 0
     while iterations < max_iterations:
         iterations += 1
         moving = np.flatnonzero(may_move & ~_pressed_against_limit(model, values, here.gradient))
@@ -149,14 +151,14 @@ def solve(
             trial = held(model, model.clip(model.retract(values, change)), start, free)
             moved = float(np.abs(model.difference(trial, values)).max())
             there = _sum(model, trial, blocks) if worth else here
-            if there.cost < here.cost or not worth or moved < tolerance or damping > _MOST_DAMPING:
+            if there.cost < here.cost or not worth or moved < tolerance or damping > MOST_DAMPING:
                 break
-            damping = max(10 * damping, _FELT_DAMPING)
+            damping = max(10 * damping, FELT_DAMPING)
         if there.cost >= here.cost:
             break
         gained = here.cost - there.cost
         values, here = trial, there
-        damping = max(1e-9, damping / 10)
+        damping = max(LEAST_DAMPING, damping / 10)
         if moved < tolerance or gained < gain:
             break
     return Fit(values, here.cost, iterations, here.hessian)
@@ -267,4 +269,4 @@ def _pressed_against_limit(model: BodyModel, values: Array, gradient: Array) -> 
     """Degrees of freedom that stand at a limit which descent would cross."""
     at = values[model.dof_value]
     low, high = model.limits[:, 0], model.limits[:, 1]
-    return ((at <= low + 1e-9) & (gradient > 0)) | ((at >= high - 1e-9) & (gradient < 0))
+    return ((at <= low + AT_LIMIT) & (gradient > 0)) | ((at >= high - AT_LIMIT) & (gradient < 0))

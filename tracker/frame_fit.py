@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from tracker.body import Body, BodyModel
 from tracker.cameras import Camera
+from tracker.descent import solve
 from tracker.evidence import ViewEvidence
-from tracker.fit import Block, of_values, solve
+from tracker.fit import Block, of_values
 from tracker.pins import PinBlock, ViewPin, pin_block
 from tracker.refine import ContourMatch
 from tracker.rigid import Array

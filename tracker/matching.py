@@ -336,15 +336,34 @@ def _keep(
     _hold_against(view, n_segments, scene, turn, scratch, best, nearest)
 
 
+class Work(NamedTuple):
+    """All that `gather` needs."""
+
+    Ts: Array
+    """World poses of all parts, (P, 4, 4), metres."""
+    first: int
+    """Index of the first part that is matched."""
+    last: int
+    """Index after the last of them; the others hide, and draw the points that are nearer to them."""
+    surfaces: contours.Surfaces
+    scene: Scene
+    scale: float
+    """See `refine.MatchSettings`."""
+    turn: float
+    """The same."""
+    kept: Kept
+    scratch: Scratch
+    sums: Sums
+    """What it fills."""
+
+
 @njit(**FAST)
-def gather(
-    Ts: Array, first: int, last: int, surfaces: contours.Surfaces, scene: Scene, scale: float, turn: float,
-    derive: bool, kept: Kept, scratch: Scratch, sums: Sums,
-) -> float:  # fmt: skip
+def gather(work: Work, derive: bool) -> float:
     """Fill the sums for one pose of the parts from first to last, the other parts fixed; returns the cost.
 
     Without `derive` the normal matrices stay empty; with it those of parts that do not move (see `kept`) do.
     """
+    Ts, first, last, surfaces, scene, scale, turn, kept, scratch, sums = work
     sums.M[:] = 0.0
     sums.b[:] = 0.0
     sums.parts[:] = 0.0

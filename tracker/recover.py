@@ -19,7 +19,8 @@ from scipy.special import ndtri
 from tracker.appearance import Colors, PartColors
 from tracker.body import BodyModel
 from tracker.confidence import Limb
-from tracker.fit import Block, Fit, solve
+from tracker.descent import solve
+from tracker.fit import Block, Fit
 from tracker.kernels import N_HELPERS, helpers
 from tracker.kinematics import IntArray, chain_poses
 from tracker.refine import WORTH_A_STEP, ContourMatch
@@ -108,18 +109,24 @@ class Judge:
 
     def cost(self, fit: Fit) -> float:
         """Cost of a refined pose with its colours."""
-        return fit.cost + self._of_colors(fit.values)
+        return fit.cost + float(self._of_colors(fit.values[None])[0])
 
     def costs(self, candidates: Array) -> Array:
         """Costs of poses, (n, n_values), without refinement, (n,); priors are left to the refinement."""
-        return np.array(
-            self.each(lambda judge, v: float(judge.match.costs(v[None])[0]) + judge._of_colors(v), candidates)
-        )
+        costs = np.empty(len(candidates))
 
-    def _of_colors(self, values: Array) -> float:
-        if self.known is None:
-            return 0.0
-        return -self.settings.colors * self.colors.nats(values, self.known)
+        def score(i: int, judge: Judge) -> None:
+            own = candidates[i::N_HELPERS]
+            costs[i::N_HELPERS] = judge.match.costs(own) + judge._of_colors(own)
+
+        list(helpers().map(score, range(N_HELPERS), self._for_threads))
+        return costs
+
+    def _of_colors(self, poses: Array) -> Array:
+        """What the colours add to the costs of poses, (n, n_values), (n,)."""
+        if self.known is None or not len(poses):
+            return np.zeros(len(poses))
+        return -self.settings.colors * self.colors.nats(poses, self.known)
 
 
 class Searched(NamedTuple):

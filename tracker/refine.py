@@ -27,9 +27,9 @@ from tracker.body import Body, BodyModel, parts_of
 from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence
 from tracker.fit import Normal
-from tracker.kept import kept_for
-from tracker.kinematics import IntArray, Kinematics
-from tracker.matching import Scene, Sums, gather, scratch_for
+from tracker.kept import Kept, kept_for
+from tracker.kinematics import IntArray, Kinematics, Tree, forward_kinematics
+from tracker.matching import Scene, Sums, Work, gather, scratch_for
 from tracker.nearest import sort_points, stack_rows
 from tracker.rigid import Array
 from tracker.twists import to_dofs
@@ -102,11 +102,8 @@ class ContourMatch:
             everywhere: keep edge points however far from the predicted contours they are, for poses far from it.
         """
         settings = settings or MatchSettings()
-        self._settings = settings
         self._model = bodies[person].model
         self._own = parts_of([b.model for b in bodies], person)
-        self._surfaces = contours.surfaces_of(tuple(b.model for b in bodies))
-        self._Ts = contours.part_poses(bodies)
         thetas = [v.outlier_px(theta_px) for v in views]
         points = [
             _within(v, bodies, np.inf if everywhere else _CAPTURE * theta, settings)
@@ -115,7 +112,7 @@ class ContourMatch:
         sorted_points = [sort_points(p, v.camera.size) for p, v in zip(points, views, strict=True)]
         self._outline_points = np.array([0 if v.silhouette is None else len(v.silhouette.points_px) for v in views])
         weights = settings.information_per_px * np.array([settings.model_to_image, settings.image_to_model])
-        self._scene = Scene(
+        scene = Scene(
             np.stack([contours.projection(v.camera) for v in views]),
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
@@ -129,20 +126,17 @@ class ContourMatch:
         )
         widest = max((v.camera for v in views), key=lambda camera: camera.width)
         self._most_pieces = contours.contour_room(widest, len(bodies))
-        self._make_room()
+        surfaces, Ts, own = contours.surfaces_of(tuple(b.model for b in bodies)), contours.part_poses(bodies), self._own
+        self._work = Work(
+            Ts, own.start, own.stop, surfaces, scene, settings.scale, settings.turn,
+            self._keep_all_but(np.arange(own.start, own.stop), len(Ts), scene),
+            scratch_for(surfaces, self._most_pieces, scene.points.shape[1]), _sums_for(len(Ts), len(views)),
+        )  # fmt: skip
 
-    def _make_room(self) -> None:
-        n_parts, n_views = len(self._Ts), len(self._scene.sizes)
-        self._scratch = scratch_for(self._surfaces, self._most_pieces, self._scene.points.shape[1])
-        self._keep_all_but(np.arange(n_parts)[self._own])
-        self._sums = Sums(
-            np.empty((n_parts, 6, 6)), np.empty((n_parts, 6)), np.empty((n_views, n_parts, 3)), np.empty(n_views)
-        )
-
-    def _keep_all_but(self, parts: IntArray) -> None:
-        moves = np.zeros(len(self._Ts), np.bool_)
+    def _keep_all_but(self, parts: IntArray, n_parts: int, scene: Scene) -> Kept:
+        moves = np.zeros(n_parts, np.bool_)
         moves[parts] = True
-        self._kept = kept_for(len(self._scene.sizes), self._most_pieces, self._scene.points.shape[1], moves)
+        return kept_for(len(scene.sizes), self._most_pieces, scene.points.shape[1], moves)
 
     def of_parts(self, parts: IntArray) -> "ContourMatch":
         """The same, quicker, for poses that differ in some parts of the person alone, indices (n,).
@@ -151,49 +145,73 @@ class ContourMatch:
         derivatives. Poses in which the others move too are as right, and slower. The room to work in is shared: use one
         at a time.
         """
-        out = copy(self)
-        out._keep_all_but(self._own.start + parts)
+        out, work = copy(self), self._work
+        out._work = work._replace(kept=self._keep_all_but(self._own.start + parts, len(work.Ts), work.scene))
         return out
 
     def twin(self) -> "ContourMatch":
         """The same for another thread: the evidence is shared, the room to work in is not."""
-        out = copy(self)
-        out._Ts = self._Ts.copy()
-        out._make_room()
+        out, work = copy(self), self._work
+        moving, n_points = np.flatnonzero(work.kept.moves), work.scene.points.shape[1]
+        out._work = work._replace(
+            Ts=work.Ts.copy(),
+            kept=self._keep_all_but(moving, len(work.Ts), work.scene),
+            scratch=scratch_for(work.surfaces, self._most_pieces, n_points),
+            sums=_sums_for(len(work.Ts), len(work.scene.sizes)),
+        )
         return out
+
+    def work(self, model: BodyModel) -> Work:
+        """What the kernel needs to match the person, whose model is given."""
+        assert model is self._model
+        return self._work
 
     def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
         """See `fit.Block`."""
-        assert model is self._model
-        own = self._own
+        work, own = self.work(model), self._own
         cost = self._gather(kinematics)
         gradient, hessian = np.empty(model.n_dofs), np.empty((model.n_dofs, model.n_dofs))
         to_dofs(
-            self._sums.M[own], self._sums.b[own], kinematics.axes_world, kinematics.origins_world, model.dof_is_length,
+            work.sums.M[own], work.sums.b[own], kinematics.axes_world, kinematics.origins_world, model.dof_is_length,
             model.dof_joint, model.tree.parents, model.moves, gradient, hessian,
         )  # fmt: skip
         return Normal(cost, gradient, hessian)
 
     def costs(self, candidates: Array) -> Array:
         """Costs alone of many poses, (C, n_values) to (C,)."""
-        return np.array([self._gather(self._model.kinematics(values), derive=False) for values in candidates])
+        out, model = np.empty(len(candidates)), self._model
+        _score(np.ascontiguousarray(candidates, np.float64), model.tree, model.n_dofs, self._work, out)
+        return out
 
     def part_costs(self, values: Array) -> PartCosts:
         """How well each part of the person fits, at a pose."""
         self._gather(self._model.kinematics(values), derive=False)
-        length, distance, points = np.moveaxis(self._sums.parts[:, self._own], -1, 0).copy()
+        sums = self._work.sums
+        length, distance, points = np.moveaxis(sums.parts[:, self._own], -1, 0).copy()
         forward = np.divide(distance, length, out=np.full_like(length, np.nan), where=length > 0)
         total = self._outline_points
-        outline = np.divide(self._sums.outline, total, out=np.full(len(total), np.nan), where=total > 0)
+        outline = np.divide(sums.outline, total, out=np.full(len(total), np.nan), where=total > 0)
         return PartCosts(length, forward, points, outline)
 
     def _gather(self, kinematics: Kinematics, derive: bool = True) -> float:
-        own, settings = self._own, self._settings
-        self._Ts[own] = kinematics.Ts_world_part
-        return gather(
-            self._Ts, own.start, own.stop, self._surfaces, self._scene, settings.scale, settings.turn, derive,
-            self._kept, self._scratch, self._sums,
-        )  # fmt: skip
+        self._work.Ts[self._own] = kinematics.Ts_world_part
+        return gather(self._work, derive)
+
+
+def _sums_for(n_parts: int, n_views: int) -> Sums:
+    """Uninitialized room for what the kernel adds up."""
+    return Sums(
+        np.empty((n_parts, 6, 6)), np.empty((n_parts, 6)), np.empty((n_views, n_parts, 3)), np.empty(n_views)
+    )  # fmt: skip
+
+
+@njit(nogil=True, cache=True)
+def _score(candidates: Array, tree: Tree, n_dofs: int, work: Work, out: Array) -> None:
+    """Fill the costs of poses, (C, n_values), of the person who is matched, (C,)."""
+    axes, origins = np.empty((n_dofs, 3)), np.empty((n_dofs, 3))
+    for c in range(candidates.shape[0]):
+        forward_kinematics(candidates[c], tree, work.Ts[work.first : work.last], axes, origins)
+        out[c] = gather(work, False)
 
 
 def _within(view: ViewEvidence, bodies: Sequence[Body], reach_px: float, settings: MatchSettings) -> FloatArray:

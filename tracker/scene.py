@@ -18,8 +18,9 @@ from tracker.apart import KeepBodiesApart
 from tracker.appearance import Colors
 from tracker.body import Body
 from tracker.confidence import Limb, Quality, Status
+from tracker.descent import solve
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
-from tracker.fit import Block, Fit, covariance, held, solve
+from tracker.fit import Block, Fit, covariance, held
 from tracker.memory import Memory
 from tracker.recover import LEAST_GAIN, Judge, for_several, search_limbs
 from tracker.refine import WORTH_A_STEP, ContourMatch, PartCosts
@@ -263,7 +264,7 @@ class Scene:
     def _nats(self, person: int) -> float:
         """What the colours say for a person where they stand; nothing where nobody has shown them."""
         known = self._memories[person].known
-        return 0.0 if known is None else self.colors(person).nats(self.poses[person], known)
+        return 0.0 if known is None else float(self.colors(person).nats(self.poses[person][None], known)[0])
 
     def _with(self, person: int, values: Array) -> tuple[Array, ...]:
         """Where everybody stands, but for one person."""

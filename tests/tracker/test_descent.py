@@ -1,0 +1,152 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from staging import cameras_around, own_evidence, posed, shaken
+
+from tracker import descent, fit
+from tracker.apart import KeepApart, KeepBodiesApart
+from tracker.body import Body
+from tracker.confidence import limbs
+from tracker.descent import solve
+from tracker.fit import PointTargets, StayNear
+from tracker.formats.model_toml import load_model
+from tracker.refine import ContourMatch
+
+CAMERAS = cameras_around(4)
+
+
+INTO_THE_TRUNK = {
+    "left_shoulder.abduction": -0.1, "left_shoulder.elevation": 0.0, "left_shoulder.twist": -1.57,
+    "left_elbow.extension": 2.1,
+}  # fmt: skip
+
+
+class Staged:
+    """Two who reach into each other, one with an arm in the own trunk, and evidence of where they truly stand."""
+
+    def __init__(self, model, seed):
+        rng, self.model = np.random.default_rng(seed), model
+        near, far = posed(model, seed), posed(model, seed + 50)
+        far[:2] = near[:2] + np.array([0.15, 0.1])
+        self.expected = shaken(model, near, rng, np.radians(8), 0.03)
+        self.start = self.expected.copy()
+        for name, angle in INTO_THE_TRUNK.items():
+            self.start[model.dof_names.index(name)] = angle
+        self.views = own_evidence([Body(model, v) for v in (near, far)], CAMERAS)
+        self.bodies = [Body(model, self.start), Body(model, far)]
+
+    def blocks(self):
+        model, n = self.model, self.model.n_dofs
+        priors = [StayNear(self.expected, np.full(n, 5.0)), StayNear(model.neutral(), 1 / model.spreads)]
+        return [ContourMatch(self.views, self.bodies), *priors, KeepApart(), KeepBodiesApart(self.bodies, 0, 1.0)]
+
+
+def assert_same(found, expected):
+    """To rounding, which hundreds of residuals in other order and a dozen steps make more of."""
+    np.testing.assert_allclose(found.values, expected.values, atol=1e-8)
+    assert found.cost == pytest.approx(expected.cost, rel=1e-9)
+    assert found.iterations == expected.iterations
+    np.testing.assert_allclose(found.hessian, expected.hessian, rtol=1e-6, atol=1e-6 * abs(expected.hessian).max())
+
+
+@pytest.fixture
+def compiled_only(monkeypatch):
+    """Nothing is left to the readable version."""
+    monkeypatch.setattr(fit, "solve", None)
+
+
+@pytest.fixture(scope="module", params=["gavrila22", "gavrila31"])
+def staged(request):
+    return Staged(load_model(request.param), 4)
+
+
+def both(staged, blocks, start=None, free=None, **how):
+    """What is found by the compiled version, with no help, and by the readable one."""
+    start = staged.start if start is None else start
+    expected = fit.solve(staged.model, start, blocks, free, **how)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(fit, "solve", None)
+        return solve(staged.model, start, blocks, free, **how), expected
+
+
+@pytest.mark.parametrize("n_blocks", [1, 2, 3, 4, 5])
+def test_every_kind_of_block_counts(staged, n_blocks):
+    """At one pose: each adds what it adds by itself."""
+    blocks = staged.blocks()
+    found, expected = both(staged, blocks[:n_blocks], max_iterations=0)
+    assert_same(found, expected)
+    last = blocks[n_blocks - 1].normal(staged.model, staged.start, staged.model.kinematics(staged.start))
+    assert last.cost > 0.1 or np.isinf(staged.model.spreads).all()
+
+
+@pytest.mark.parametrize("how", [{}, {"tolerance": 1e-3}, {"gain": 0.1}, {"gain": 5.0}, {"max_iterations": 3}])
+def test_descends_as_the_readable_version_does(staged, how):
+    """Until steps are refused, or less is enough."""
+    found, expected = both(staged, staged.blocks(), **how)
+    assert expected.iterations > 2
+    assert_same(found, expected)
+
+
+def test_limits_hold_and_what_may_not_move_stays(staged):
+    """What is drawn beyond limits, down and up, ends at them; what is outside and may not move stays there."""
+    start, wanted, model = staged.start.copy(), staged.expected.copy(), staged.model
+    low, high, fixed = (model.dof_names.index(f"{n}.extension") for n in ("right_knee", "right_elbow", "left_knee"))
+    start[low], wanted[low] = model.limits[low, 0], model.limits[low, 0] - 2
+    start[high], wanted[high] = model.limits[high, 1], model.limits[high, 1] + 2
+    start[fixed] = model.limits[fixed, 0] - 0.3
+    blocks = [*staged.blocks(), StayNear(wanted, np.full(model.n_dofs, 100.0))]
+    found, expected = both(staged, blocks, start, np.arange(model.n_dofs) != fixed, tolerance=1e-3)
+    assert_same(found, expected)
+    assert (found.values[low], found.values[high]) == (model.limits[low, 0], model.limits[high, 1])
+    assert found.values[fixed] == start[fixed]
+
+
+def test_a_limb_alone(staged):
+    limb = next(x for x in limbs(staged.model) if x.name == "left_forearm")
+    match, *others = staged.blocks()
+    found, expected = both(staged, [match.of_parts(limb.parts), *others], free=limb.dofs, tolerance=1e-2, gain=0.1)
+    assert expected.iterations > 1
+    assert_same(found, expected)
+    np.testing.assert_array_equal(found.values[~limb.dofs], staged.start[~limb.dofs])
+
+
+def test_what_nothing_holds(staged):
+    """Views that see nothing: no step is worth taking, and no matrix is definite."""
+    blank = [replace(v, points_px=v.points_px[:0], normals=v.normals[:0]) for v in staged.views]
+    found, expected = both(staged, [ContourMatch(blank, staged.bodies)])
+    assert_same(found, expected)
+    assert found.cost == 0.0
+
+
+@pytest.mark.parametrize("n", [1, 2, 5])
+def test_steps_are_those_of_the_readable_version(n):
+    """Of some degrees of freedom; and against the gradient where the matrix is not definite."""
+    rng = np.random.default_rng(n)
+    J, g, moving, step = rng.normal(size=(20, 6)), rng.normal(size=6), np.arange(n), np.empty(6)
+    for H in (J.T @ J, -J.T @ J):
+        own = H[:n, :n]
+        damping = 0.1 * (np.diag(own) + 1e-6 * max(1e-12, np.trace(own) / n))
+        expected = fit.damped_step(own, g[:n], damping)
+        promised = descent._damped_step(g, H, moving, 0.1, np.empty((6, 6)), step)
+        np.testing.assert_allclose(step[:n], expected, rtol=1e-9)
+        assert promised == pytest.approx(-(g[:n] + 0.5 * own @ expected) @ expected)
+
+
+@pytest.mark.parametrize("strange", ["two matches", "no match", "another block", "a ball joint"])
+def test_what_it_does_not_know_is_left_to_the_readable_version(staged, monkeypatch, strange):
+    model, blocks, asked = staged.model, staged.blocks(), []
+    if strange == "two matches":
+        blocks.append(blocks[0])
+    elif strange == "no match":
+        del blocks[0]
+    elif strange == "another block":
+        blocks.append(PointTargets(np.arange(1), np.zeros((1, 3)), np.ones(1)))
+    else:
+        shoulder = next(i for i, j in enumerate(model.joints) if j.name == "left_shoulder")
+        joints = list(model.joints)
+        joints[shoulder] = replace(joints[shoulder], kind="ball", axes=())
+        model = replace(model, joints=tuple(joints))
+    monkeypatch.setattr(fit, "solve", lambda *args: asked.append(args))
+    solve(model, model.neutral(), blocks)
+    assert len(asked) == 1
