@@ -89,6 +89,11 @@ class Quality(NamedTuple):
         return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if odds > _SUSPECT)
 
     @property
+    def lost(self) -> tuple[str, ...]:
+        """Names of limbs that are likelier lost than found."""
+        return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if odds > _LOST)
+
+    @property
     def suspects(self) -> tuple[str, ...]:
         """Names of limbs worth a search, likeliest first; all where the image shows what no part explains."""
         odds, everyone = self.log_odds, self.unexplained > _MOST_UNEXPLAINED
@@ -97,8 +102,7 @@ class Quality(NamedTuple):
     @property
     def body_lost(self) -> bool:
         """Whether the body stands elsewhere, not a limb or two of it."""
-        limbs_lost = int(np.count_nonzero(self.log_odds > _LOST))
-        return self.views == 0 or self.forward > _LOST_FORWARD or 2 * limbs_lost > len(self.limbs)
+        return self.views == 0 or self.forward > _LOST_FORWARD or 2 * len(self.lost) > len(self.limbs)
 
 
 def evidence(found: Quality, limb: LimbFigures) -> Array:

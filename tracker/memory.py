@@ -59,6 +59,9 @@ class Memory:
     def due(self, found: Quality, alone: bool) -> list[Limb]:
         """Those of them whose turn it is: one that was searched in vain waits longer each time.
 
+        Of somebody alone a limb that is likelier lost than found does not wait: a limb that moves fast is elsewhere in
+        each frame, and the longer it goes astray the farther off is all that is predicted from it.
+
         Of several people nobody knows whose it is what no part explains: it makes nobody's limb due while another of
         theirs seems lost itself, and those that it does wait longer.
 
@@ -72,7 +75,7 @@ class Memory:
 
         def rested(limb: Limb) -> bool:
             last, pause = self._pauses.get(limb.name, (-1, 0))
-            return self._frames > last + min(pause, longest)
+            return (alone and limb.name in found.lost) or self._frames > last + min(pause, longest)
 
         return [x for x in doubted or suspects if rested(x)]
 

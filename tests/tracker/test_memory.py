@@ -63,6 +63,17 @@ def test_pauses_grow_with_each_search_in_vain(memory):
     assert len(memory.due(seen(memory, astray=("left_calf",)), alone=False)) == 1
 
 
+def test_a_limb_of_somebody_alone_that_is_lost_does_not_wait(memory):
+    """One that is merely suspect does, and so does one of several people."""
+    lost, suspect = seen(memory, astray=("left_calf",)), seen(memory, unexplained=0.2)
+    assert lost.lost == ("left_calf",)
+    assert suspect.lost == ()
+    assert searched_at(memory, lost, 6, alone=True) == [0, 1, 2, 3, 4, 5]
+    assert all(len(memory.due(lost, alone)) == waits for alone, waits in ((True, 1), (False, 0)))
+    assert searched_at(memory, suspect, 1, alone=True) == [0]
+    assert "left_calf" not in {x.name for x in memory.due(suspect, alone=True)}
+
+
 def test_limbs_that_nothing_speaks_against_wait_longer(gavrila):
     memory = Memory(gavrila, gavrila.neutral())
     everything = seen(memory, unexplained=0.2)
