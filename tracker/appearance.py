@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from tracker.body import Body, BodyModel, parts_of
 from tracker.contours import part_poses, projection
@@ -213,6 +212,8 @@ def _binned(image: Image) -> NDArray[np.int64]:
 
 
 def _smoothed(counts: Array) -> Array:
+    from scipy.ndimage import gaussian_filter  # takes a tenth of a second, which who opens a session need not wait
+
     cube = np.asarray(counts, dtype=np.float64).reshape(BINS, BINS, BINS)
     return np.asarray(gaussian_filter(cube, _SMOOTHING_BINS, mode="nearest")).ravel()
 

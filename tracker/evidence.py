@@ -310,9 +310,11 @@ class Observer:
         """Their footage."""
         self._views = [MatchedView(c.camera) for c in cameras]
         self._probes = [Probes(v.source.size, v.scale) for v in self._views]
-        self._empty = [self._empty_scene(i, read_background(c)) for i, c in enumerate(self.cameras)]
+        backgrounds = [read_background(c) for c in self.cameras]
         # OpenCV's own threads would only be in the way of those that work on other views.
         self._pool = ThreadPoolExecutor(_WORKERS, "observe", initializer=cv2.setNumThreads, initargs=(1,))
+        # Made meanwhile: the first kernel of a program takes a third of a second to load.
+        self._empty = [self._pool.submit(self._empty_scene, i, b) for i, b in enumerate(backgrounds)]
         self._reader = ThreadPoolExecutor(1, "ahead")
         self._ahead: OrderedDict[int, Future[list[_Prepared | None]]] = OrderedDict()
         self._lock = threading.Lock()
@@ -364,7 +366,7 @@ class Observer:
         ]
 
     def _prepare_view(self, i: int, frame: Image, k: int) -> _Prepared:
-        empty, mask = self._empty[i], read_mask(self.cameras[i], k)
+        empty, mask = self._empty[i].result(), read_mask(self.cameras[i], k)
         readings = self._probes[i].read(frame)
         if empty is None:
             return _Prepared(frame, mask, readings.strengths, 0.0, np.ones(3, np.float32))
@@ -412,7 +414,7 @@ class Observer:
     def _changes(self, i: int, prepared: _Prepared, smooth: Image, box: Region) -> Changes | None:
         """What is new in the region, by its mask or before its background; None where nothing tells it."""
         u0, v0, u1, v1 = box
-        empty = self._empty[i]
+        empty = self._empty[i].result()
         if prepared.mask is not None:
             inside = self._views[i].mask(prepared.mask, box)
             return Changes(inside, inside)

@@ -13,7 +13,6 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dposv
 
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
@@ -182,6 +181,8 @@ def of_values(model: BodyModel, of_dofs: NDArray[np.bool_]) -> NDArray[np.bool_]
 
 def damped_step(H: Array, g: Array, damping: Array) -> Array:
     """The step from a Hessian (n, n), whose diagonal is raised by a damping (n,), and a gradient (n,)."""
+    from scipy.linalg.lapack import dposv  # takes a sixth of a second, which who opens a session need not wait
+
     raised = H.copy()
     raised.flat[:: len(g) + 1] += damping
     _, step, info = dposv(raised, -g)

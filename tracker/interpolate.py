@@ -9,7 +9,6 @@ root turns about one fixed axis, from the one orientation to the other (spherica
 import warnings
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tracker import rigid
 from tracker.body import BodyModel, Joint
@@ -42,6 +41,8 @@ def between(model: BodyModel, start: Array, end: Array, shares: Array) -> Array:
 
 def _turned(joint: Joint, start: Array, end: Array, shares: Array) -> Array:
     """Angles of a joint of three axes on the shortest rotation, (n, 3), rad."""
+    from scipy.spatial.transform import Rotation  # takes a tenth of a second, which who opens a session need not wait
+
     R_start, R_end = _rotation(joint, start), _rotation(joint, end)
     turn = rigid.so3_log(R_start.T @ R_end)
     R = R_start @ rigid.so3_exp(shares[:, None] * turn)  # (n, 3, 3)

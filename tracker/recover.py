@@ -14,7 +14,6 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from tracker.appearance import Colors, PartColors
 from tracker.body import BodyModel
@@ -292,7 +291,7 @@ def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSet
     low, high = model.limits[dofs].T
     low, high = np.maximum(low, -np.pi), np.minimum(high, np.pi)
     now = model.difference(values, model.neutral())[dofs]
-    near = ndtri(0.002 + 0.996 * even) * settings.reach_rad
+    near = _normal(0.002 + 0.996 * even) * settings.reach_rad
     anywhere = low + even * (high - low) - now
     # Joints that people bend little stay near: a collarbone needs no search of its own.
     anywhere = np.where(np.isfinite(model.spreads[dofs]), near, anywhere)
@@ -326,3 +325,10 @@ def _even(n: int, dims: int) -> Array:
     from scipy.stats import qmc  # takes a third of a second, which who searches nothing need not wait
 
     return np.asarray(qmc.Sobol(dims, seed=7).random(n))
+
+
+def _normal(even: Array) -> Array:
+    """Numbers spread evenly from 0 to 1 as numbers spread as the normal distribution."""
+    from scipy.special import ndtri  # as above
+
+    return np.asarray(ndtri(even))
