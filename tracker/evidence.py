@@ -23,6 +23,7 @@ from tracker.matched import MatchedView, fit_region
 from tracker.probes import Probes, Readings
 from tracker.recording import Recording, read_background, read_mask
 from tracker.rigid import FloatArray
+from tracker.sampling import distance_image
 from tracker.scenery import Scenery
 from tracker.segments import Samples, Segments, accept, link_edges, sampled
 from tracker.session import CameraSource
@@ -117,16 +118,6 @@ def default_theta_px(camera: Camera) -> float:
 
 def _theta_px(size: tuple[int, int]) -> float:
     return 0.03 * max(size)
-
-
-def distance_image(edge_map: NDArray[np.bool_] | NDArray[np.uint8], limit_px: float) -> FloatArray:
-    """Distance of each pixel to the nearest edge, `(H, W)` to `(H, W)` float32, cut off at the limit."""
-    edge_map = edge_map.view(np.uint8)
-    if not cv2.countNonZero(edge_map):
-        return np.full(edge_map.shape, limit_px, np.float32)
-    free = (edge_map == 0).view(np.uint8)
-    distance = np.asarray(cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_5), dtype=np.float32)
-    return np.minimum(distance, np.float32(limit_px), out=distance)
 
 
 def view_evidence(

@@ -242,9 +242,11 @@ def _best_apart(model: BodyModel, limb: Limb, poses: Array, scores: Array, n: in
         apart_m: least distance of the joint that is farthest from its place in the other pose, metres.
     """
     points = np.flatnonzero(np.isin(model.point_parts, limb.parts))
-    Ts = chain_poses(model.tree, model.kinematics(poses[0]), limb.parts, poses)
-    Ts = Ts[:, np.searchsorted(limb.parts, model.point_parts[points])]
-    places = np.einsum("mkij,kj->mki", Ts[..., :3, :3], model.points_part[points]) + Ts[..., :3, 3]
+    Ts, places = (
+        chain_poses(model.tree, model.kinematics(poses[0]), limb.parts, poses),
+        np.empty((len(poses), len(points), 3)),
+    )
+    _put(Ts, np.searchsorted(limb.parts, model.point_parts[points]), model.points_part[points], places)
     return poses[_apart(places, np.argsort(-scores), n, apart_m)]
 
 
@@ -278,6 +280,16 @@ def _apart(places: Array, order: IntArray, n: int, apart_m: float) -> IntArray:
     return kept[:n_kept]
 
 
+@njit(nogil=True, cache=True)
+def _put(Ts: Array, parts: IntArray, points: Array, places: Array) -> None:
+    """Fill where points (k, 3) of parts, indices (k,), are in poses of these, (m, n, 4, 4), in the world, (m, k, 3)."""
+    for m in range(places.shape[0]):
+        for k in range(places.shape[1]):
+            T, x, y, z = Ts[m, parts[k]], points[k, 0], points[k, 1], points[k, 2]
+            for i in range(3):
+                places[m, k, i] = T[i, 0] * x + T[i, 1] * y + T[i, 2] * z + T[i, 3]
+
+
 def _with_limb(model: BodyModel, values: Array, other: Array, limb: Limb) -> Array:
     """A pose with the limb of another."""
     change = np.where(limb.dofs, model.difference(other, values), 0.0)
@@ -287,11 +299,11 @@ def _with_limb(model: BodyModel, values: Array, other: Array, limb: Limb) -> Arr
 def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSettings) -> Array:
     """Poses with the limb elsewhere, (n, n_values): every other one nearby, the others anywhere."""
     dofs = np.flatnonzero(limb.dofs)
-    even = _even(settings.proposals, len(dofs))
+    even, normal = _even(settings.proposals, len(dofs))
     low, high = model.limits[dofs].T
     low, high = np.maximum(low, -np.pi), np.minimum(high, np.pi)
     now = model.difference(values, model.neutral())[dofs]
-    near = _normal(0.002 + 0.996 * even) * settings.reach_rad
+    near = normal * settings.reach_rad
     anywhere = low + even * (high - low) - now
     # Joints that people bend little stay near: a collarbone needs no search of its own.
     anywhere = np.where(np.isfinite(model.spreads[dofs]), near, anywhere)
@@ -320,15 +332,11 @@ def _moved(model: BodyModel, poses: Array, dofs: IntArray, steps: Array) -> Arra
 
 
 @lru_cache(maxsize=16)
-def _even(n: int, dims: int) -> Array:
-    """Points that fill the unit cube evenly, the same ones each time, (n, dims)."""
-    from scipy.stats import qmc  # takes a third of a second, which who searches nothing need not wait
+def _even(n: int, dims: int) -> tuple[Array, Array]:
+    """Points that fill the unit cube evenly, the same ones each time, (n, dims); the same normally distributed."""
+    # Take a third of a second, which who searches nothing need not wait.
+    from scipy.special import ndtri
+    from scipy.stats import qmc
 
-    return np.asarray(qmc.Sobol(dims, seed=7).random(n))
-
-
-def _normal(even: Array) -> Array:
-    """Numbers spread evenly from 0 to 1 as numbers spread as the normal distribution."""
-    from scipy.special import ndtri  # as above
-
-    return np.asarray(ndtri(even))
+    even = np.asarray(qmc.Sobol(dims, seed=7).random(n))
+    return even, np.asarray(ndtri(0.002 + 0.996 * even))

@@ -231,8 +231,7 @@ def _within(view: ViewEvidence, bodies: Sequence[Body], reach_px: float, setting
     # A coarse raster of the contours' surroundings is enough: this only spares work.
     near = np.zeros((view.camera.height // 8 + 1, view.camera.width // 8 + 1), np.bool_)
     _mark(contour.pieces_px, contour.hidden, int(np.ceil(reach_px / 8)), near)
-    cells = points[:, :2].astype(np.intp) // 8
-    return points[near[cells[:, 1], cells[:, 0]]]
+    return points[: _pack(points, near)]
 
 
 @njit(nogil=True, cache=True)
@@ -245,3 +244,15 @@ def _mark(pieces: FloatArray, hidden: NDArray[np.bool_], reach: int, near: NDArr
         if hidden[i] or c < -reach or r < -reach or c >= columns + reach or r >= rows + reach:
             continue
         near[max(0, r - reach) : max(0, r + reach + 1), max(0, c - reach) : max(0, c + reach + 1)] = True
+
+
+@njit(nogil=True, cache=True)
+def _pack(points: FloatArray, near: NDArray[np.bool_]) -> int:
+    """Move the points, (N, 6), that lie in marked cells of 8 px to the front; their number."""
+    n = 0
+    for i in range(points.shape[0]):
+        if near[int(points[i, 1]) // 8, int(points[i, 0]) // 8]:
+            for k in range(6):
+                points[n, k] = points[i, k]
+            n += 1
+    return n

@@ -171,6 +171,8 @@ class Scene:
 
     def _moved_m(self, person: int, was: Array, now: Array) -> float:
         """How far apart the points of a person are in two poses, (n_values,), at most, metres."""
+        if was is now:
+            return 0.0
         model = self._models[person]
         return float(np.linalg.norm(model.points_world(now) - model.points_world(was), axis=1).max())
 

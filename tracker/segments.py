@@ -98,18 +98,37 @@ class Samples(NamedTuple):
 
     def means(self, distances: FloatArray) -> NDArray[np.float64]:
         """The mean of each segment's pixels, (n,) to (S,)."""
-        of = self.pixels.points[4, : self.pixels.n_points].astype(np.intp)
-        return np.bincount(of, distances, len(self.counts)) / self.counts
+        sums = np.zeros(len(self.counts))
+        _sum_up(self.pixels.points[4], distances, sums)
+        return sums / self.counts
 
 
 def sampled(segments: Segments) -> Samples:
     """Sample segments, from the first pixel of each on."""
-    lengths = np.diff(segments.firsts)
-    of = np.repeat(np.arange(len(lengths)), lengths)
-    kept = (np.arange(len(of)) - segments.firsts[of]) % _STRIDE == 0
-    points = np.column_stack([segments.points_px[kept], segments.normals[kept], of[kept]]).astype(np.float32)
-    width, height = 1 + np.max(points[:, :2].astype(np.intp), axis=0, initial=0)
-    return Samples(sort_points(points, (width, height)), -(-lengths // _STRIDE))
+    counts = -(-np.diff(segments.firsts) // _STRIDE)
+    points = np.empty((counts.sum(), 5), np.float32)
+    width, height = _sample(segments.points_px, segments.normals, segments.firsts, points)
+    return Samples(sort_points(points, (width, height)), counts)
+
+
+@njit(nogil=True, cache=True)
+def _sample(points: FloatArray, normals: FloatArray, firsts: IntArray, out: FloatArray) -> tuple[int, int]:
+    """Fill points, their normals and the index of their segment, (n, 5); the size of an image that holds them."""
+    n, width, height = 0, 1, 1
+    for segment in range(firsts.shape[0] - 1):
+        for i in range(firsts[segment], firsts[segment + 1], _STRIDE):
+            out[n, 0], out[n, 1] = points[i, 0], points[i, 1]
+            out[n, 2], out[n, 3], out[n, 4] = normals[i, 0], normals[i, 1], segment
+            width, height = max(width, 1 + int(points[i, 0])), max(height, 1 + int(points[i, 1]))
+            n += 1
+    return width, height
+
+
+@njit(nogil=True, cache=True)
+def _sum_up(of: FloatArray, distances: FloatArray, sums: NDArray[np.float64]) -> None:
+    """Add distances, (n,), to the sums, (S,), that they are of, (n or more,)."""
+    for i in range(distances.shape[0]):
+        sums[int(of[i])] += distances[i]
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

@@ -8,9 +8,10 @@ point draws the nearest piece of contour, whosever it is.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from tracker import contours
@@ -116,9 +117,10 @@ class _View:
     @cached_property
     def _boxes(self) -> tuple[Array, Array]:
         """Bounds of each person's visible contours, (K, 2) each; of who shows none nothing lies between them."""
-        ends = [p.reshape(-1, 2) for p in self._pieces]
-        low = np.array([e.min(axis=0, initial=np.inf) for e in ends])
-        return low, np.array([e.max(axis=0, initial=-np.inf) for e in ends])
+        low, high = np.full((len(self._bodies), 2), np.inf), np.full((len(self._bodies), 2), -np.inf)
+        for pieces, a, b in zip(self._pieces, low, high, strict=True):
+            _bound(pieces, a, b)
+        return low, high
 
     @cached_property
     def _pieces(self) -> list[FloatArray]:
@@ -157,6 +159,14 @@ def _theirs(samples: Samples, distances: Sequence[FloatArray], person: int, thet
         person: one's own index.
         theta_px: outlier distance, px.
     """
-    others = np.min([d for i, d in enumerate(distances) if i != person], axis=0)
+    others = reduce(np.minimum, [d for i, d in enumerate(distances) if i != person])
     to_others, to_own = samples.means(others), samples.means(distances[person])
     return np.asarray((to_others <= ACCEPTED_SHARE * theta_px) & (to_others < _CLEARLY * to_own))
+
+
+@njit(nogil=True, cache=True)
+def _bound(pieces: FloatArray, low: Array, high: Array) -> None:
+    """Widen bounds, (2,) each, to those of pieces, (M, 4)."""
+    for i in range(pieces.shape[0]):
+        for k in range(4):
+            low[k % 2], high[k % 2] = min(low[k % 2], pieces[i, k]), max(high[k % 2], pieces[i, k])

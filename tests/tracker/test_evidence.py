@@ -15,7 +15,6 @@ from tracker.evidence import (
     Observer,
     accepted,
     default_theta_px,
-    distance_image,
     view_evidence,
 )
 from tracker.matched import MatchedView, match_scale, region_around
@@ -105,18 +104,6 @@ def test_small_images_are_not_enlarged():
 def test_theta_is_a_share_of_the_longer_side():
     assert default_theta_px(camera_at("c", (4, 0, 0), size=(640, 480))) == pytest.approx(19.2)
     assert default_theta_px(camera_at("c", (4, 0, 0), size=(480, 640))) == pytest.approx(19.2)
-
-
-def test_distance_image():
-    edges = np.zeros((40, 60), dtype=bool)
-    edges[20, 10] = True
-    v, u = np.mgrid[:40, :60]
-    distance = distance_image(edges, 30.0)
-    assert distance.dtype == np.float32
-    np.testing.assert_allclose(distance, np.minimum(np.hypot(u - 10, v - 20), 30), rtol=0.03)
-    assert distance[20, 10] == 0
-    assert distance.max() == 30
-    assert (distance_image(np.zeros((4, 5), dtype=bool), 7.0) == 7).all()
 
 
 def test_scene_points_are_edges_one_to_a_cell():
