@@ -93,6 +93,35 @@ def test_a_descent_ends_as_that_of_the_readable_version(staged, how):
     assert_same(*both(staged, staged.blocks(), max_iterations=4, **how))
 
 
+class Asked:
+    """A block that says nothing, and counts how often it is asked."""
+
+    def __init__(self):
+        self.times = 0
+
+    def normal(self, model, values, kinematics):
+        self.times += 1
+        return fit.Normal(0.0, np.zeros(model.n_dofs), np.zeros((model.n_dofs, model.n_dofs)))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("how", [{}, {"tolerance": 1e-3}, {"gain": 1.0}, {"gain": 10.0}])
+def test_whole_descents_without_images_are_the_same(staged, seed, how):
+    """From within another body: all of it in double precision, so that dozens of steps, many refused, end alike."""
+    model, n, asked = staged.model, staged.model.n_dofs, Asked()
+    other = shaken(model, staged.start, np.random.default_rng(seed), 0.05, 0.03)
+    deep = [Body(model, staged.start), Body(model, other)]
+    blank = [replace(v, points_px=v.points_px[:0], normals=v.normals[:0]) for v in staged.views]
+    match, prior = ContourMatch(blank, deep), StayNear(staged.expected, np.full(n, 2.0))
+    blocks = [match, prior, KeepApart(), KeepBodiesApart(deep, 0, 1.0)]
+    expected = fit.solve(model, staged.start, [*blocks, asked], **how)
+    found = solve(model, staged.start, blocks, **how)
+    assert expected.iterations > 1
+    assert how.get("gain") or asked.times > expected.iterations + 3
+    np.testing.assert_allclose(found.values, expected.values, atol=1e-10)
+    assert (found.iterations, found.cost) == (expected.iterations, pytest.approx(expected.cost, rel=1e-9))
+
+
 def test_limits_hold_and_what_may_not_move_stays(staged):
     """What is drawn beyond limits, down and up, ends at them; what is outside and may not move stays there."""
     start, wanted, model = staged.start.copy(), staged.expected.copy(), staged.model
