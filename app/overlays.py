@@ -10,10 +10,10 @@ from app.state import State
 from tracker import contours, occlusion, rigid
 from tracker.body import Body, BodyModel
 from tracker.cameras import Camera, epipolar_segment
-from tracker.contours import Contour, FloatArray
+from tracker.contours import Contour
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.rebody import rebodied
-from tracker.rigid import Array
+from tracker.rigid import Array, FloatArray
 from tracker.segments import accept
 from tracker.session import Person, Session
 from tracker.silhouettes import Mask

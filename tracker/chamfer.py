@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 
 from tracker import contours
 from tracker.body import Body, BodyModel, parts_of
-from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence
 from tracker.kernels import FAST, helpers
 from tracker.kinematics import Tree, forward_kinematics
 from tracker.nearest import Segments, Sorted, nearest_segment, segment_buffer, sort_points, stack_rows
-from tracker.rigid import Array
+from tracker.rigid import Array, FloatArray
 from tracker.sampling import bilinear
 
 Outliers = Literal["truncated", "paper"]

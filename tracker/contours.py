@@ -20,8 +20,8 @@ from tracker.cameras import Camera
 from tracker.hiding import JOINT_MARGIN_M, LANES, hide
 from tracker.kernels import FAST
 from tracker.outlines import MAX_POINTS, grid_outline, revolved_outline
-from tracker.rigid import Array
-from tracker.surfaces import FloatArray, Surfaces, surfaces_of
+from tracker.rigid import Array, FloatArray
+from tracker.surfaces import Surfaces, surfaces_of
 
 PIECE_PX = 4.0
 """Longest piece of contour that is scored or hidden as a whole, px."""

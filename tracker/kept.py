@@ -15,8 +15,8 @@ from tracker.contours import Pieces, hide_all, place, trace_part
 from tracker.kernels import BORROW, FAST
 from tracker.kinematics import IntArray
 from tracker.outlines import MAX_POINTS
-from tracker.rigid import Array
-from tracker.surfaces import FloatArray, Surfaces
+from tracker.rigid import Array, FloatArray
+from tracker.surfaces import Surfaces
 
 
 class Kept(NamedTuple):

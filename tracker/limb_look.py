@@ -13,10 +13,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body import BodyModel
-from tracker.contours import FloatArray
 from tracker.kernels import BORROW, helpers
 from tracker.kinematics import IntArray, Kinematics, chain_poses
-from tracker.rigid import Array
+from tracker.rigid import Array, FloatArray
 from tracker.sights import ALONG, BINS, NEAREST_M, along_axis, bin_of, hidden, pixel_on_axis, place_before, see_axis
 from tracker.silhouettes import Image
 

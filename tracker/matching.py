@@ -7,13 +7,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker import contours
-from tracker.contours import FloatArray
 from tracker.evidence import SCENE_SPACING_PX
 from tracker.kept import Kept, keep_pieces, mark_covered, remember, still_stands, trace_moving, trace_standing
 from tracker.kernels import FAST
 from tracker.kinematics import IntArray
 from tracker.nearest import LANES, cells_within
-from tracker.rigid import Array
+from tracker.rigid import Array, FloatArray
 from tracker.sampling import bilinear
 from tracker.twists import add_twists
 

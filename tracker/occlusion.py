@@ -11,8 +11,8 @@ from tracker.body import Body
 from tracker.cameras import Camera
 from tracker.hiding import LANES, hide
 from tracker.kernels import FAST
-from tracker.rigid import Array
-from tracker.surfaces import N_RINGS, N_SECTORS, FloatArray
+from tracker.rigid import Array, FloatArray
+from tracker.surfaces import N_RINGS, N_SECTORS
 
 _LIFT_M = 0.012
 """How far a curve is lifted off the surfaces to see whether they hide it, metres."""

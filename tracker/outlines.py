@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 
 from tracker.kernels import FAST
-from tracker.rigid import Array
-from tracker.surfaces import N_RINGS, N_SECTORS, FloatArray, Surfaces
+from tracker.rigid import Array, FloatArray
+from tracker.surfaces import N_RINGS, N_SECTORS, Surfaces
 
 MAX_POINTS = 512
 """Room for the points of one curve."""

@@ -24,14 +24,13 @@ from numpy.typing import NDArray
 
 from tracker import contours
 from tracker.body import Body, BodyModel, parts_of
-from tracker.contours import FloatArray
 from tracker.evidence import ViewEvidence
 from tracker.fit import Normal
 from tracker.kept import Kept, kept_for
 from tracker.kinematics import IntArray, Kinematics, Tree, forward_kinematics
 from tracker.matching import Scene, Sums, Work, gather, scratch_for
 from tracker.nearest import sort_points, stack_rows
-from tracker.rigid import Array
+from tracker.rigid import Array, FloatArray
 from tracker.twists import to_dofs
 
 _CAPTURE = 2.0

@@ -10,7 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.segments import FloatArray, Segments
+from tracker.rigid import FloatArray
+from tracker.segments import Segments
 
 _MEMORY = 4
 """Frames that count: an edge is known at first sight, and three frames later where its place was seen without it."""

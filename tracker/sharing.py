@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from tracker import contours
 from tracker.body import Body
-from tracker.contours import FloatArray
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence, findable, unfiltered, with_segments
 from tracker.kernels import helpers
-from tracker.rigid import Array
+from tracker.rigid import Array, FloatArray
 from tracker.segments import Samples, Segments, sampled
 
 _CLEARLY = 0.5

@@ -7,9 +7,8 @@ import numpy as np
 from tracker import contours
 from tracker.body import Body, BodyModel
 from tracker.cameras import Camera, Region
-from tracker.contours import FloatArray
 from tracker.matched import region_around
-from tracker.rigid import Array
+from tracker.rigid import Array, FloatArray
 
 _NEAREST_M = 0.3
 """Bodies nearer to a camera, and those behind it, count as this near."""
