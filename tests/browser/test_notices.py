@@ -75,7 +75,7 @@ async def test_what_is_not_saved_says_why_is_tried_again_and_holds_the_page(page
     assert await page.evaluate("dispatchEvent(new Event('beforeunload', { cancelable: true }))")
 
 
-async def test_the_first_card_is_put_away_for_good_and_found_again(browser, address):
+async def test_the_first_card_is_put_away_for_good_and_found_again(browser, address, endpoint):
     context = await browser.new_context(viewport={"width": 1280, "height": 720}, newcomer=True)
     page = await context.new_page()
     await page.goto(address)
@@ -86,7 +86,9 @@ async def test_the_first_card_is_put_away_for_good_and_found_again(browser, addr
     box, panes = await card.bounding_box(), await page.locator("#panes").bounding_box()
     assert box["x"] >= panes["x"] + panes["width"]
     assert box["y"] + box["height"] <= (await page.locator("#inspector").bounding_box())["y"]
-    await page.locator("#close-first-steps").click()
+    await say(endpoint, "a sentence of some length that says what was expected, what was found, and what to do now")
+    await page.get_by_role("alert").wait_for()
+    await page.locator("#close-first-steps").click(timeout=2000)  # the notice does not lie over it
     await page.reload()
     await shows(page, "window.quadrille?.state.overlay")
     assert not await card.is_visible()
