@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 PYTHON_FILES := app tracker tests
 
-.PHONY: install run test test-library test-page bench check lint format clean
+.PHONY: install run test test-library test-page kernels bench check lint format clean
 
 install: $(VENV)/.installed
 
@@ -15,7 +15,8 @@ run: install
 	$(BIN)/quadrille
 
 # The library's tests take what those of the page leave: these wait a lot, but what they wait for must not come late.
-test: check
+test:
+	$(MAKE) --jobs 2 check kernels
 	$(MAKE) --jobs 2 $(if $(filter output-sync,$(.FEATURES)),--output-sync) test-library test-page
 
 test-library: $(VENV)/.tested
@@ -23,6 +24,10 @@ test-library: $(VENV)/.tested
 
 test-page: $(VENV)/.tested
 	$(BIN)/python -m pytest tests/browser
+
+# Once, not in each process of the tests at the same time. Modules are found here while pip puts what is installed anew.
+kernels: $(VENV)/.installed
+	$(BIN)/python -m tests.compile_kernels
 
 # How fast it is here, beside what must hold and the ratios that are kept.
 bench: $(VENV)/.tested
