@@ -4,7 +4,7 @@ import pytest
 import pytest_asyncio
 from aiohttp import web
 from chromium import FLAGS, chromium_path
-from driving import listening, shows
+from driving import OPENED, listening, shows
 from fake_endpoint import FakeEndpoint
 from playwright.async_api import Error, async_playwright
 
@@ -81,9 +81,7 @@ async def page(browser, address):
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     await page.goto(address)
-    await shows(
-        page, "window.quadrille?.state.overlay && quadrille.state.overlay.frame === quadrille.state.shown.frame"
-    )
+    await shows(page, OPENED)
     page.errors = errors
     yield page
     await context.close()

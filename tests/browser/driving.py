@@ -5,6 +5,9 @@ from contextlib import asynccontextmanager
 
 from aiohttp import web
 
+OPENED = "window.quadrille?.state.overlay && quadrille.state.overlay.frame === quadrille.state.shown?.frame"
+"""That a page shows its first frame, for `shows`."""
+
 
 @asynccontextmanager
 async def listening(app, port=0):

@@ -4,6 +4,7 @@ import asyncio
 import resource
 import shutil
 
+import pytest
 import pytest_asyncio
 from driving import dragging, handle_of, state_of, to_client
 from driving import shows as shows_within
@@ -124,7 +125,8 @@ async def test_a_full_disk_is_said_and_nothing_is_lost(tabs, program):
         assert await page.locator("#saved").inner_text() == "Not saved"
         await go_to(page, 2)
         await go_to(page, 8)  # what is not on disk is shown all the same
-        assert await handle_of(page, 0, "left_wrist") == (u, v)
+        # Not to the last digit: a hand settles, and the last of its moves may be seen after the mark.
+        assert await handle_of(page, 0, "left_wrist") == pytest.approx((u, v), abs=0.01)
     finally:
         resource.prlimit(program.pid, resource.RLIMIT_FSIZE, unlimited)
     await page.locator("#retry-saving").click()

@@ -4,7 +4,7 @@ import asyncio
 from contextlib import asynccontextmanager
 
 import pytest
-from driving import handle_of, shows, state_of, to_client
+from driving import OPENED, handle_of, shows, state_of, to_client
 
 GO = """(frame) => {
   const box = document.querySelector("#frame");
@@ -103,7 +103,7 @@ async def test_the_mark_fits_a_narrow_pane(browser, address, endpoint, scheme):
     context = await browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme=scheme)
     page = await context.new_page()
     await page.goto(address)
-    await shows(page, "window.quadrille?.state.overlay?.frame === quadrille.state.shown.frame", 15)
+    await shows(page, OPENED, 15)
     await visit(page, 99_000)
     async with slow(page, endpoint, 99_999):
         await shows(page, "quadrille.state.standIn")

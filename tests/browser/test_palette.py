@@ -1,7 +1,7 @@
 """The palette, the list of keys, and keys that hold everywhere, against `fake_endpoint`."""
 
 import pytest
-from driving import shows, to_client, until
+from driving import OPENED, shows, to_client, until
 
 
 async def open_palette(page, query=""):
@@ -147,7 +147,7 @@ async def test_people_are_changed_by_key_by_name_and_by_a_click(browser, endpoin
     endpoint.__post_init__()
     page = await (await browser.new_context(viewport={"width": 1280, "height": 720})).new_page()
     await page.goto(address)
-    await shows(page, "window.quadrille?.state.overlay?.frame === quadrille.state.shown.frame")
+    await shows(page, OPENED)
     chosen = page.locator("#people input:checked")
     for key, person in (("p", 1), ("p", 0), ("Shift+P", 1), ("Shift+P", 0)):
         await page.keyboard.press(key)

@@ -1,7 +1,7 @@
 """Two people in the page: chosen, dimmed, hidden; whom searches move, and who is in the hand's reach."""
 
 import pytest_asyncio
-from driving import handle_of, shows, state_of, to_client, until
+from driving import OPENED, handle_of, shows, state_of, to_client, until
 
 
 @pytest_asyncio.fixture(loop_scope="session")
@@ -14,7 +14,7 @@ async def couple(browser, endpoint, address):
     errors = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     await page.goto(address)
-    await shows(page, "window.quadrille?.state.overlay?.frame === quadrille.state.shown?.frame")
+    await shows(page, OPENED)
     yield page
     await context.close()
     assert errors == []
