@@ -141,7 +141,7 @@ def may_touch(model: BodyModel, softness: float) -> NDArray[np.bool_]:
     """Which parts are apart in a body that stands at ease: neither adjoining nor overlapping then, (P, P)."""
     everything = ~np.eye(len(model.parts), dtype=bool)
     at_ease = _apart((model,), model.kinematics(model.neutral()).Ts_world_part, everything, softness, 0, 0.0)
-    own, other = at_ease.parts[: _touch(*at_ease[:1], *at_ease[2:6], *at_ease[7:])].T
+    own, other = at_ease.parts[: _touch(at_ease)].T
     for part, parent in enumerate(model.parents):
         if parent >= 0:
             everything[part, parent] = everything[parent, part] = False
@@ -150,13 +150,12 @@ def may_touch(model: BodyModel, softness: float) -> NDArray[np.bool_]:
 
 
 @njit(nogil=True, cache=True)
-def _touch(
-    Ts: Array, centers: Array, half_axes: Array, apart: NDArray[np.bool_], softness: float, rows: Array, parts: IntArray
-) -> int:
+def _touch(bodies: Apart) -> int:
     """List the contacts: depth, point, outward normal of the other part; the part of the point and the other one.
 
     A part counts as the elliptic cylinder about its axis, the distance to it along the line from the axis.
     """
+    Ts, _, centers, half_axes, apart, softness, _, rows, parts = bodies
     n, n_parts = 0, Ts.shape[0]
     X, local = np.empty(3), np.empty(3)
     for own in range(n_parts):
@@ -203,7 +202,7 @@ def push_apart(
         return 0.0
     own = kinematics.Ts_world_part
     apart.Ts[apart.first : apart.first + own.shape[0]] = own
-    n = _touch(apart.Ts, apart.centers, apart.half_axes, apart.apart, apart.softness, apart.rows, apart.parts)
+    n = _touch(apart)
     rows, parts = apart.rows[:n], apart.parts[:n]
     return _push(rows, parts, apart.first, apart.weight, kinematics, is_length, moves, gradient, hessian)
 

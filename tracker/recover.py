@@ -242,10 +242,8 @@ def _best_apart(model: BodyModel, limb: Limb, poses: Array, scores: Array, n: in
         apart_m: least distance of the joint that is farthest from its place in the other pose, metres.
     """
     points = np.flatnonzero(np.isin(model.point_parts, limb.parts))
-    Ts, places = (
-        chain_poses(model.tree, model.kinematics(poses[0]), limb.parts, poses),
-        np.empty((len(poses), len(points), 3)),
-    )
+    Ts = chain_poses(model.tree, model.kinematics(poses[0]), limb.parts, poses)
+    places = np.empty((len(poses), len(points), 3))
     _put(Ts, np.searchsorted(limb.parts, model.point_parts[points]), model.points_part[points], places)
     return poses[_apart(places, np.argsort(-scores), n, apart_m)]
 
