@@ -65,7 +65,7 @@ class Camera:
     @property
     def center_world(self) -> Array:
         """Optical centre in the world, (3,), metres."""
-        return self.T_world_camera[:3, 3]
+        return self.T_world_camera[:3, 3].copy()
 
     @property
     def is_pinhole(self) -> bool:

@@ -18,7 +18,7 @@ from tracker.body import BodyModel
 from tracker.fit import AT_LIMIT, FELT_DAMPING, FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING, Block, Fit, StayNear
 from tracker.kernels import BORROW
 from tracker.kinematics import IntArray, Kinematics, Tree, forward_kinematics
-from tracker.matching import Work, gather
+from tracker.matching import DERIVE, Work, gather
 from tracker.refine import ContourMatch
 from tracker.rigid import Array
 from tracker.twists import to_dofs
@@ -150,7 +150,7 @@ def _linearize(blocks: _Blocks, values: Array, out: _Linear) -> float:
     first, last, sums = work.first, work.last, work.sums
     Ts = work.Ts[first:last]
     forward_kinematics(values, blocks.tree, Ts, out.axes, out.origins)
-    cost = gather(work, True)
+    cost = gather(work, DERIVE)
     to_dofs(
         sums.M[first:last], sums.b[first:last], out.axes, out.origins, blocks.is_length, blocks.parts,
         blocks.tree.parents, blocks.moves, out.gradient, out.hessian,

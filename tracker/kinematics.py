@@ -63,7 +63,7 @@ def chain_poses(tree: Tree, rest: Kinematics, chain: IntArray, poses: Array) -> 
     """
     out = np.empty((len(poses), len(chain), 4, 4))
     unread = np.empty((len(rest.axes_world), 3))
-    _place_chain(poses, tree, _starts(tree), rest.Ts_world_part.copy(), unread, chain, out)
+    _place_chain(np.ascontiguousarray(poses), tree, _starts(tree), rest.Ts_world_part.copy(), unread, chain, out)
     return out
 
 

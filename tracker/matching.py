@@ -356,6 +356,10 @@ class Work(NamedTuple):
     """What it fills."""
 
 
+DERIVE, SUM_UP = np.bool_(True), np.bool_(False)
+"""What kernels ask of `gather`. It would be compiled anew for each True and False that a kernel names."""
+
+
 @njit(**FAST)
 def gather(work: Work, derive: bool) -> float:
     """Fill the sums for one pose of the parts from first to last, the other parts fixed; returns the cost.
@@ -367,7 +371,7 @@ def gather(work: Work, derive: bool) -> float:
     sums.b[:] = 0.0
     sums.parts[:] = 0.0
     sums.outline[:] = 0.0
-    pixel, cost, keeps = 0, 0.0, kept.best.shape[0] > 0
+    pixel, cost, keeps = np.int64(0), 0.0, kept.best.shape[0] > 0  # a bare 0 is a type of its own to the compiler
     anew = keeps and not still_stands(Ts, kept.moves, kept.Ts)
     for view in range(scene.P.shape[0]):
         if anew:

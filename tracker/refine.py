@@ -28,7 +28,7 @@ from tracker.evidence import ViewEvidence
 from tracker.fit import Normal
 from tracker.kept import Kept, kept_for
 from tracker.kinematics import IntArray, Kinematics, Tree, forward_kinematics
-from tracker.matching import Scene, Sums, Work, gather, scratch_for
+from tracker.matching import SUM_UP, Scene, Sums, Work, gather, scratch_for
 from tracker.nearest import sort_points, stack_rows
 from tracker.rigid import Array, FloatArray
 from tracker.twists import to_dofs
@@ -210,7 +210,7 @@ def _score(candidates: Array, tree: Tree, n_dofs: int, work: Work, out: Array) -
     axes, origins = np.empty((n_dofs, 3)), np.empty((n_dofs, 3))
     for c in range(candidates.shape[0]):
         forward_kinematics(candidates[c], tree, work.Ts[work.first : work.last], axes, origins)
-        out[c] = gather(work, False)
+        out[c] = gather(work, SUM_UP)
 
 
 def _within(view: ViewEvidence, bodies: Sequence[Body], reach_px: float, settings: MatchSettings) -> FloatArray:
