@@ -209,6 +209,11 @@ class Reporter:
         """Report on standard error unless silent."""
         self._console, self._silent = Console(stderr=True), silent
 
+    def say(self, line: str) -> None:
+        """Show a line."""
+        if not self._silent:
+            self._console.print(line, soft_wrap=True, highlight=False)
+
     @contextmanager
     def over(self, total: int, what: str) -> Iterator[Callable[[], None]]:
         """Give a function to call after each of `total` pieces of work."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from app.casting import Casting
 from app.choosing import Choosing
+from app.compiling import Compiling
 from app.disagreements import Disagreements
 from app.flooring import Flooring
 from app.frames import Frames
@@ -66,6 +67,7 @@ class Controller:
         """Works on ranges of frames, and marks them."""
         self._disagreements = Disagreements(self._screen)
         self._listing = Listing(self._screen)
+        self._compiling: Compiling | None = None
         self.pinning = Pinning(self._screen, self.editing)
         """Sets pins, and fits people to them."""
         self.replay = Replay(self._screen, runs, self.editing)
@@ -260,6 +262,10 @@ class Controller:
         """Do again what was taken back last."""
         self.history.redo()
 
+    def compile_kernels(self) -> None:
+        """Compile, beside the page, the kernels that are not compiled yet."""
+        self._compiling = Compiling(self._screen)
+
     def close(self) -> None:
         """Stop and save what is at hand; the controller is done."""
         with self.editing():
@@ -267,6 +273,8 @@ class Controller:
         self.hand.close()
         self._disagreements.close()
         self._listing.close()
+        if self._compiling is not None:
+            self._compiling.close()
         self.landscape.close()
         self.frames.close()
 

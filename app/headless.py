@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from app.commands import Reporter, Target
+from app.compiling import compiled_mark
 from app.tracked import keyframes_of, told_of, tracked_changes
 from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
@@ -57,6 +58,8 @@ def track(at: Target, frames: Sequence[int], settings: TrackSettings, progress: 
         task = json.loads(json.dumps([frames[0], frames[-1], len(frames), at.people, told_of(settings)]))
         left = _left(store, task, frames)
         run = _Run(at, store, settings, left, f"track frames {min(frames)}:{max(frames) + 1}")
+        if not compiled_mark().exists():
+            progress.say("kernels that are not compiled yet are compiled first, once: it may take a minute or two")
         try:
             with progress.over(len(left), "tracking") as tick:
                 for found in run.estimates(Observer(session.cameras, recording)):

@@ -90,6 +90,7 @@ def state(session: Session, state: State) -> dict[str, Any]:
         "snapped": state.snapped,
         "floor": _floor(state.floor.picking),
         "footage": asdict(state.footage),
+        "compiling": state.compiling,
         "undo": state.undo,
         "redo": state.redo,
         "saved": state.save_error is None,

@@ -259,6 +259,8 @@ class State:
     view_3d: View3d = field(default_factory=View3d)
     floor: FloorState = field(default_factory=FloorState)
     footage: FootageState = field(default_factory=FootageState)
+    compiling: bool = False
+    """Whether kernels are being compiled beside the page."""
     snapped: int | None = None
     """The camera through which the 3-D view looks, by index; None where it is free."""
     settings: TrackSettings = field(default_factory=TrackSettings)

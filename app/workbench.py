@@ -2,16 +2,15 @@
 
 import asyncio
 import getpass
-import shutil
 import signal
 import threading
 import webbrowser
-from collections.abc import Callable, Coroutine, Iterable
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from platformdirs import user_cache_path, user_data_path
+from platformdirs import user_cache_path
 
 from app import indexing
 from app.access import access_for
@@ -24,13 +23,10 @@ from app.saving import Saver
 from app.scene import Scene
 from app.server import create_app, serve_forever, start_viser, static_folder
 from tracker.annotations import AnnotationStore
-from tracker.errors import SessionError
 from tracker.evidence import Observer
 from tracker.recording import Recording
-from tracker.session import SESSION_FILE, load_session
+from tracker.session import load_session
 from tracker.session_lock import SessionLock
-
-DEFAULT_SAMPLE = "tango"
 
 
 @dataclass(frozen=True)
@@ -73,6 +69,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
                 for name in indexing.stale(session):
                     say(f"the proxy of camera {name} is of other footage: run quadrille index {session.folder} again")
                 say(f"{session.name}: {address}")
+                controller.compile_kernels()
                 if serving.browser:
                     threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
@@ -108,42 +105,3 @@ def _author() -> str:
         return getpass.getuser()
     except (KeyError, OSError):  # a container's user may have a number and no name
         return ""
-
-
-def sample_copy(name: str = DEFAULT_SAMPLE, afresh: bool = False) -> Path:
-    """Working copy of a bundled sample in the user's data folder, made where it is missing.
-
-    Args:
-        name: of the sample.
-        afresh: throw the working copy away and start again.
-
-    Raises:
-        SessionError: the sample is unknown, or the copy is open in another program.
-    """
-    source = _samples_folder() / name
-    if not (source / SESSION_FILE).is_file():
-        raise SessionError(f"expected one of the samples {', '.join(samples())}, found '{name}'")
-    copy = user_data_path("quadrille", appauthor=False) / "samples" / name
-    if afresh and copy.exists():
-        with SessionLock(copy):
-            pass  # nobody works on it
-        shutil.rmtree(copy)
-    if not copy.exists():
-        unfinished = copy.with_name(f".{name}.unfinished")
-        shutil.rmtree(unfinished, ignore_errors=True)
-        shutil.copytree(source, unfinished)
-        for path in (unfinished, *unfinished.rglob("*")):  # a read-only install gives read-only copies
-            path.chmod(path.stat().st_mode | 0o200)
-        unfinished.rename(copy)
-    return copy
-
-
-def samples() -> Iterable[str]:
-    """Names of the bundled samples."""
-    return sorted(p.parent.name for p in _samples_folder().glob(f"*/{SESSION_FILE}"))
-
-
-def _samples_folder() -> Path:
-    here = Path(__file__).resolve().parent
-    bundled = here / "sample_sessions"
-    return bundled if bundled.is_dir() else here.parent / "sample_sessions"

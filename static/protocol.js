@@ -26,7 +26,7 @@
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
  *   parts_px: (number | null)[], dofs: number[], locked: number[], other_sizes: boolean, job: Job, track: Track, range: RangeWork,
  *   replay: {run: number, step: number, steps: number, stage: string | null} | null, follow: boolean, snapped: number | null,
- *   floor: FloorPicking | null, footage: {listed: number | null, error: string | null},
+ *   floor: FloorPicking | null, footage: {listed: number | null, error: string | null}, compiling: boolean,
  *   undo: string | null, redo: string | null,
  *   saved: boolean, save_error: string | null}} StateMessage
  * @typedef {{edit: number, label: string, author: string, time: string, undone: boolean}} HistoryEntry

@@ -84,6 +84,7 @@ ORDER = [
     ],
     ["app.centred", "app.expected", "app.floor_picks", "app.trails", "app.view_choice"],
     ["app.state"],
+    ["app.samples"],
     ["app.bench_scenes", "app.commands", "app.curves", "app.frames", "app.overlays", "app.saving", "app.server"],
     ["app.bench_rows", "app.dofs", "app.floor_lines", "app.graspable", "app.pin_marks", "app.runs", "app.screen"],
     [
@@ -97,8 +98,9 @@ ORDER = [
         "app.tracking",
         "app.disagreements",
         "app.listing",
+        "app.compiling",
     ],
-    ["app.flooring", "app.viewing"],
+    ["app.compile_kernels", "app.flooring", "app.viewing"],
     ["app.landscape", "app.pinning", "app.sizing", "app.ranges", "app.replay", "app.search_settings"],
     ["app.controller", "app.messages", "app.headless", "app.indexing"],
     ["app.pace"],

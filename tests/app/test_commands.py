@@ -10,6 +10,7 @@ import pytest
 from command_line import SAMPLE, assert_refused, stored
 
 from app import headless
+from app.compiling import compiled_mark
 from tracker.annotations import AnnotationStore
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_table import read_pose_table, write_pose_table
@@ -88,6 +89,15 @@ def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
     assert store.undo() == "track frames 0:4"  # one entry, however many frames
     assert [row.frame for row in store.frames("person")] == [0, 2]
     store.close()
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_tracking_says_that_kernels_may_have_to_be_compiled(run, session, tmp_path, monkeypatch, compiled):
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path))
+    if compiled:
+        compiled_mark().touch()
+    run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
+    assert ("it may take a minute or two" in run("track", session, "--frames", "0:2")[2]) is not compiled
 
 
 def test_tracking_leaves_what_is_locked(run, session):
@@ -187,7 +197,7 @@ def test_simulate(run, tmp_path):
 def test_without_a_command_the_page_is_opened(run, monkeypatch):
     asked = []
     monkeypatch.setattr("app.workbench.open_session", lambda folder, serving, say: asked.append((folder, serving)))
-    monkeypatch.setattr("app.workbench.sample_copy", lambda name, afresh: Path(f"{name}, {afresh}"))
+    monkeypatch.setattr("app.samples.sample_copy", lambda name, afresh: Path(f"{name}, {afresh}"))
     assert run()[0] == 0
     assert run("some/session", "--port", "0", "--no-browser")[0] == 0
     assert run("open", "some/session")[0] == 0
@@ -216,7 +226,7 @@ def test_init_takes_a_pose_from_a_table(run, session, tmp_path):
 def test_samples_are_opened_as_working_copies_by_name(run, monkeypatch, tmp_path):
     asked = []
     monkeypatch.setattr("app.workbench.open_session", lambda folder, serving, say: asked.append(folder))
-    monkeypatch.setattr("app.workbench.user_data_path", lambda *_, **__: tmp_path)
+    monkeypatch.setattr("app.samples.user_data_path", lambda *_, **__: tmp_path)
     assert run("--sample", "elbow_rotation")[0] == 0
     assert asked == [tmp_path / "samples" / "elbow_rotation"]
     (asked[0] / "mine.txt").write_text("kept")

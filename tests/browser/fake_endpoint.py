@@ -122,7 +122,7 @@ class FakeEndpoint:
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "dofs": [1.0, 2.0, 90.0, 30.0], "locked": [], "other_sizes": False, "solo": False,
             "people": [{"source": "manual", "status": "", "shown": True, "others": 0} for _ in range(self.n_people)],
-            "snapped": None, "floor": None, "footage": {"listed": None, "error": None},
+            "snapped": None, "floor": None, "footage": {"listed": None, "error": None}, "compiling": False,
             "saved": True, "save_error": None,
         }  # fmt: skip
 

@@ -148,3 +148,15 @@ async def test_every_control_has_a_name_and_a_tooltip(page):
           !(button.title && (button.textContent.trim() || button.ariaLabel))).map((b) => b.outerHTML)"""
     )
     assert unnamed == []
+
+
+async def test_that_kernels_are_compiled_is_said_while_they_are(page, endpoint):
+    mark = page.locator("#compiling")
+    assert not await mark.is_visible()
+    endpoint.state["compiling"] = True
+    await endpoint.broadcast(endpoint.state)
+    await mark.wait_for(state="visible")
+    assert await mark.inner_text() == "Compiling"
+    endpoint.state["compiling"] = False
+    await endpoint.broadcast(endpoint.state)
+    await mark.wait_for(state="hidden")

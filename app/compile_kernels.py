@@ -1,0 +1,64 @@
+"""Compiles the kernels that are not in the cache: `python -m app.compile_kernels`.
+
+Numba compiles a kernel when it is first called, and keeps the interpreter to itself meanwhile: after an installation a
+first Track would wait for a minute, and the page with it. This program calls them all at the lowest priority and leaves
+them in the cache, where another program finds those that it has not needed yet.
+"""
+
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+from app.bench_scenes import FRAME, read_crowd
+from app.compiling import compiled_mark
+from app.samples import bundled
+from tracker.body import BodyModel
+from tracker.errors import SessionError
+from tracker.evidence import Observer
+from tracker.recording import Recording
+from tracker.rigid import Array
+from tracker.session import CameraSource
+from tracker.session_lock import SessionLock
+from tracker.track import track_chamfer
+from tracker.track_settings import TrackSettings
+
+_FRAMES = 3
+"""Frames that are tracked: from the second there is a motion, and what was lost."""
+_WAIT_S = 0.5
+
+
+def main() -> None:
+    """Compile what is not compiled yet; waits while another program does."""
+    if hasattr(os, "nice"):
+        os.nice(19)
+    mark = compiled_mark()
+    while not mark.exists():
+        try:
+            with SessionLock(mark.parent):
+                if not mark.exists():  # now that whoever held the lock is done
+                    _call_kernels()
+                    mark.touch()
+        except SessionError:
+            time.sleep(_WAIT_S)
+
+
+def _call_kernels() -> None:
+    """Search and track on a few frames of the bundled tango: two people, one by the paper, one without a background."""
+    crowd = read_crowd(bundled("tango"), FRAME)
+    cameras, settings = crowd.session.cameras, TrackSettings()
+    _track(cameras, settings, crowd.models, crowd.values)
+    _track(cameras, replace(settings, estimate="search"), crowd.models[:1], crowd.values[:1])
+    _track([replace(c, background=None) for c in cameras], settings, crowd.models[:1], crowd.values[:1])
+
+
+def _track(
+    cameras: Sequence[CameraSource], settings: TrackSettings, models: Sequence[BodyModel], start: Sequence[Array]
+) -> None:
+    with Recording(cameras) as recording:
+        for _ in track_chamfer(Observer(cameras, recording), models, start, range(FRAME, FRAME + _FRAMES), settings):
+            pass
+
+
+if __name__ == "__main__":
+    main()
