@@ -92,6 +92,7 @@ class Colors:
             for v in views
             if v.colors is not None
         ]
+        self._shown = tuple(views)
         self._bodies, self._person = list(bodies), person
         self._shapes = np.concatenate([ellipsoids(b.model) for b in bodies])
         self._own = parts_of([b.model for b in bodies], person)
@@ -110,8 +111,7 @@ class Colors:
         seen = np.zeros((len(model.parts), BINS**3))
         np.add.at(seen, (parts, colors), 1.0)
         seen = np.array([_share(s) for s in seen])
-        shown = [np.bincount(_binned(v.image), minlength=BINS**3) for v in self._views]
-        around = _share(np.sum(shown, axis=0, initial=0.0, dtype=np.float64) + np.zeros(BINS**3))
+        around = _share(np.sum([v.color_counts for v in self._shown], axis=0) + np.zeros(BINS**3))
         usual = None
         if before is not None:
             now, samples = _mean_by_part(before.log_ratios[parts, colors], parts, len(model.parts))
@@ -123,7 +123,7 @@ class Colors:
         other = 0.5 * _smoothed(around) + 0.5 * _share(_smoothed(seen.sum(axis=0)))
         blank = seen.sum(axis=1, keepdims=True) == 0
         own = np.where(blank, seen[twins], (1 - _TWIN_SHARE) * seen + _TWIN_SHARE * seen[twins])
-        own = np.array([_smoothed(_share(s)) for s in own])
+        own = _smoothed(np.array([_share(s) for s in own]))
         ratios = np.log(((1 - _DOUBT) * own + _DOUBT * other + 1e-7) / (other + 1e-7))
         ratios[own.sum(axis=1) == 0] = 0.0
         ratios = np.clip(ratios, -_MOST_NATS, _MOST_NATS)
@@ -205,17 +205,11 @@ class Colors:
         return np.empty((n, 13)), np.empty((n, 4)), np.empty(n, np.int64), np.empty((4, 3))
 
 
-def _binned(image: Image) -> NDArray[np.int64]:
-    """Index of each pixel's colour bin, (H, W, 3) to (H * W,)."""
-    steps = image.reshape(-1, 3).astype(np.int64) * BINS // 256
-    return (steps[:, 0] * BINS + steps[:, 1]) * BINS + steps[:, 2]
-
-
 def _smoothed(counts: Array) -> Array:
     from scipy.ndimage import gaussian_filter  # takes a tenth of a second, which who opens a session need not wait
 
-    cube = np.asarray(counts, dtype=np.float64).reshape(BINS, BINS, BINS)
-    return np.asarray(gaussian_filter(cube, _SMOOTHING_BINS, mode="nearest")).ravel()
+    cubes = np.asarray(counts, dtype=np.float64).reshape(*counts.shape[:-1], BINS, BINS, BINS)
+    return np.asarray(gaussian_filter(cubes, _SMOOTHING_BINS, mode="nearest", axes=(-3, -2, -1))).reshape(counts.shape)
 
 
 def _share(counts: Array) -> Array:

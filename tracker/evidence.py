@@ -27,6 +27,7 @@ from tracker.sampling import distance_image
 from tracker.scenery import Scenery
 from tracker.segments import Samples, Segments, accept, link_edges, sampled
 from tracker.session import CameraSource
+from tracker.sights import BINS, count_colors
 from tracker.silhouette_contour import Outline, trace_outline, trust_outline
 from tracker.silhouettes import Changes, Image, Mask
 
@@ -100,6 +101,14 @@ class ViewEvidence:
     def samples(self) -> Samples | None:
         """Pixels of the segments, to be asked how far they are from contours."""
         return None if self.segments is None else sampled(self.segments)
+
+    @cached_property
+    def color_counts(self) -> NDArray[np.int64]:
+        """Pixels of each colour, (BINS^3,); see `sights.bin_of`; all 0 where there is no image."""
+        counts = np.zeros(BINS**3, np.int64)
+        if self.colors is not None:
+            count_colors(self.colors, counts)
+        return counts
 
     @property
     def theta_px(self) -> float:

@@ -2,10 +2,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from staging import SUIT, at, camera_at, cameras_around, dressed, posed, shaken, solid
+from scipy.ndimage import gaussian_filter
+from staging import SUIT, at, camera_at, cameras_around, dressed, own_evidence, posed, shaken, solid
 
+from tracker import appearance
 from tracker.appearance import Colors
 from tracker.body import Body
+from tracker.sights import BINS
 
 GRAY = dict.fromkeys(SUIT, (120, 120, 120))
 CAMERAS = cameras_around()
@@ -231,3 +234,20 @@ def test_a_limb_that_is_away_hides_nothing(gavrila):
     hidden, open_ = (colors.look(stand, arm, known, x)(stand[None]) for x in ([], [*twin, *trunk]))
     assert hidden[0] == 0
     assert open_[0] != 0
+
+
+def test_pixels_are_counted_by_their_colour():
+    image = np.random.default_rng(3).integers(0, 256, (37, 53, 3), dtype=np.uint8)
+    image[:5] = 255
+    steps = image.reshape(-1, 3).astype(int) * BINS // 256
+    each = (steps[:, 0] * BINS + steps[:, 1]) * BINS + steps[:, 2]
+    (view,) = own_evidence([at(solid((0.2, 0.2, 0.2)), 0.0, 0.0, 0.0)], CAMERAS[:1])
+    np.testing.assert_array_equal(replace(view, colors=image).color_counts, np.bincount(each, minlength=BINS**3))
+    assert not replace(view, colors=None).color_counts.any()
+
+
+def test_colours_of_many_parts_are_smoothed_each_by_itself():
+    counts = np.random.default_rng(4).random((3, BINS**3))
+    for one, smooth in zip(counts, appearance._smoothed(counts), strict=True):
+        cube = gaussian_filter(one.reshape(BINS, BINS, BINS), 0.7, mode="nearest")
+        np.testing.assert_allclose(smooth, cube.ravel(), rtol=1e-12)
