@@ -5,12 +5,13 @@ noise), tracks them with and without the search for lost limbs, fits the logisti
 scenes of `FIT`, and prints its weights. It then prints, for thresholds of doubt, how many of the lost frames are
 flagged and how many of the frames called good are lost: on each scene of `FIT` by weights fitted to the other scenes,
 and on the scenes of `CHECK`, which nothing was set by, as the tracker calls them now. A limb is lost when one of its
-joints is off by more than 150 mm. With `--scenes DIR` scenes are kept there and taken up again.
+joints is off by more than 150 mm. With `--scenes DIR` scenes are kept there and taken up again;
+`--check` leaves the fit out.
 """
 
 import argparse
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -152,11 +153,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=Path, help="folder where simulated scenes are kept")
     parser.add_argument("--frames", type=int, default=90, help="frames of a scene that is made")
+    parser.add_argument("--check", action="store_true", help="fit nothing: only check, in a third of the time")
     words = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = words.scenes or Path(name)
         tracked = {}
-        for spec in FIT + CHECK:
+        for spec in CHECK if words.check else FIT + CHECK:
             path = folder / f"{spec.name}_{spec.seed}"
             if not path.exists():
                 # Two people are two persons' frames, and take longer.
@@ -167,13 +169,23 @@ def main() -> None:
             if spec in FIT:
                 limbs.add(path, replace(TrackSettings(), recover=None))
             print(f"{spec.name} {spec.seed}: {sum(limbs.lost)} limbs of {len(limbs.lost)} lost", flush=True)
-    fit = [tracked[s] for s in FIT]
+    if not words.check:
+        _tell_fit([tracked[s] for s in FIT])
+    _tell_check(tracked)
+
+
+def _tell_fit(fit: Sequence[Limbs]) -> None:
+    """Print the weights fitted to scenes, and what they are worth on each by those of the others."""
     print("weights:", np.round(fitted(fit), 3).tolist())
     weights = [fitted(fit[:i] + fit[i + 1 :]) for i in range(len(fit))]
     odds = [by_frame(x, np.array(x.evidence) @ w[:-1] + w[-1], np.max) for x, w in zip(fit, weights, strict=True)]
     lost = np.concatenate([by_frame(x, np.array(x.lost), np.any) for x in fit])
     for threshold in THRESHOLDS:
         print(f"left out one by one, doubt from {threshold}:", report(np.concatenate(odds) > threshold, lost))
+
+
+def _tell_check(tracked: Mapping[Scene, Limbs]) -> None:
+    """Print how the tracker calls frames of scenes that nothing was set by."""
     for size, of_several in ((VGA, False), (SMALL, False), (VGA, True)):
         check = [tracked[s] for s in CHECK if s.size == size and s.of_several == of_several]
         flags = np.concatenate([by_frame(x, np.array([s != "good" for s in x.statuses]), np.any) for x in check])
