@@ -1,9 +1,13 @@
 """How kernels are compiled that other kernels call (options for numba's njit), and threads for kernels to run in."""
 
 import os
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeVar
+
+S = TypeVar("S")
+T = TypeVar("T")
 
 BORROW: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy", "_nrt": False}
 """For kernels that make no arrays: those they are given belong to whoever calls. Otherwise numba counts references to
@@ -19,3 +23,19 @@ N_HELPERS = os.cpu_count() or 1
 def helpers() -> ThreadPoolExecutor:
     """Threads that work besides the caller's; kernels let go of the interpreter's lock."""
     return ThreadPoolExecutor(N_HELPERS, thread_name_prefix="kernels")
+
+
+@lru_cache(maxsize=1)
+def _besides() -> ThreadPoolExecutor:
+    """Threads for what itself waits for `helpers`, which must not wait for one another."""
+    return ThreadPoolExecutor(N_HELPERS, thread_name_prefix="beside")
+
+
+def side_by_side(work: Callable[[S], T], items: Sequence[S]) -> list[T]:
+    """What some work makes of each of several things, the first here and the others in threads beside this one.
+
+    The work may ask `helpers`, but not for this again.
+    """
+    others = [_besides().submit(work, x) for x in items[1:]]
+    first = [work(x) for x in items[:1]]
+    return first + [x.result() for x in others]

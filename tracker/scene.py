@@ -21,6 +21,7 @@ from tracker.confidence import Limb, Quality, Status
 from tracker.descent import solve
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.fit import Block, Fit, covariance, held
+from tracker.kernels import side_by_side
 from tracker.memory import Memory
 from tracker.recover import LEAST_GAIN, Judge, for_several, search_limbs
 from tracker.refine import WORTH_A_STEP, ContourMatch, PartCosts
@@ -127,12 +128,13 @@ class Scene:
         """Find the poses of some people, one after the other, then together; they take their places in `poses`."""
         if self._settings.estimate == "search":
             return {p: self._judged(p, self._searched(p)) for p in people}
-        seen = {p: self._refined(p) for p in people}  # the others as found, or as expected
+        # One after the other: where all are refined at once, each takes what belongs to who has not got there yet.
+        seen = {p: self._refined(p) for p in people}
         self._refine_together(seen)
-        seen = {p: self._recovered(p, s) for p, s in seen.items()}
+        self._recover(seen)
         if any(s.anew is not None for s in seen.values()):
             self._refine_together(seen)
-        found = {p: self._judged(p, s) for p, s in seen.items()}
+        found = dict(zip(seen, side_by_side(lambda p: self._judged(p, seen[p]), [*seen]), strict=True))
         for (p, q), poses in self._exchanges(seen).items():
             for one, other in ((p, q), (q, p)):
                 found[one] = _in_doubt(found[one], f"may be exchanged with person {other + 1}", [poses])
@@ -141,9 +143,10 @@ class Scene:
     def _searched(self, person: int) -> _Seen:
         """Search a person by best-first search alone."""
         match = self._match(person)
-        evaluations = self._search(person, self._settings.search)
+        evaluations, values = self._search(person, self.poses[person], self._settings.search)
         blocks = [match, *self._priors(person)]
-        fit = solve(self._models[person], self.poses[person], blocks, self._memories[person].free, max_iterations=0)
+        fit = solve(self._models[person], values, blocks, self._memories[person].free, max_iterations=0)
+        self.poses[person] = values
         return _Seen(match, tuple(self.poses), fit, evaluations=evaluations)
 
     def _refined(self, person: int, before: _Seen | None = None) -> _Seen:
@@ -182,24 +185,42 @@ class Scene:
             self._moved_m(i, was, now) < within_m[i] for i, (was, now) in enumerate(zip(poses, self.poses, strict=True))
         )
 
-    def _recovered(self, person: int, seen: _Seen) -> _Seen:
-        """Search what the refinement alone did not find, if anything, among all edges.
+    def _recover(self, seen: dict[int, _Seen]) -> None:
+        """Search what the refinement alone did not find, if anything, and put people there.
+
+        They are searched side by side, each with the others as they were refined, so that nothing depends on who is
+        done first.
+        """
+        told = dict(zip(seen, side_by_side(lambda p: self._told(p, seen[p]), [*seen]), strict=True))
+        seen.update({p: s._replace(told=told[p]) for p, s in seen.items()})
+        blind = not any(len(v.points_px) for v in self._views)  # then there is nothing to search in
+        if self._settings.recover is None or blind:
+            return
+        alone, due = len(self._models) == 1, dict[int, list[Limb]]()
+        for person, (found, _) in told.items():
+            limbs = self._memories[person].due(found, alone)[:_AT_ONCE]
+            if (found.suspects if alone else found.doubted or limbs) or found.body_lost:
+                due[person] = limbs
+        if not due:
+            return
+        own = dict(zip(due, self._own([*due], everywhere=True), strict=True))
+        anew = side_by_side(lambda p: self._recovered(p, seen[p], due[p], own[p]), [*due])
+        for person, recovered in zip(due, anew, strict=True):
+            seen[person], self.poses[person] = recovered, recovered.fit.values
+
+    def _recovered(self, person: int, seen: _Seen, due: Sequence[Limb], own: Sequence[ViewEvidence]) -> _Seen:
+        """Search limbs whose turn it is, and the body if it is lost, among all edges.
 
         The prediction may have refused the right ones.
         """
         memory, settings = self._memories[person], self._settings
-        told = self._told(person, seen)
-        found, seen = told[0], seen._replace(told=told)
-        blind = not any(len(v.points_px) for v in self._views)  # then there is nothing to search in
-        alone = len(self._models) == 1
-        suspects, due = tuple(memory.suspects(found)), memory.due(found, alone)[:_AT_ONCE]
-        worth = found.suspects if alone else found.doubted or due
-        if settings.recover is None or blind or not (worth or found.body_lost):
-            return seen
-        model, free = memory.model, memory.free
+        assert settings.recover is not None
+        assert seen.told is not None
+        found, alone = seen.told[0], len(self._models) == 1
+        model, free, suspects = memory.model, memory.free, tuple(memory.suspects(found))
         priors = self._priors(person, suspects)
-        colors = Colors(self._own(person, everywhere=True), *self._around(person))
-        match, poses = self._match(person, everywhere=True), tuple(self.poses)
+        colors = Colors(own, *self._around(person))
+        match, poses = self._match_on(own, person, everywhere=True), tuple(self.poses)
         how = settings.recover if alone else for_several(settings.recover)
         judge = Judge(match, priors, colors, memory.known, how, free)
         fit = solve(model, seen.fit.values, judge.blocks, free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
@@ -215,12 +236,10 @@ class Scene:
             memory.searched(limb, found=turned[limb.dofs].max() > _MOVED_RAD)
             if turned[limb.dofs].max() > _ANEW_RAD:
                 remarks.append(f"{confidence.spoken(limb.name)} searched anew")
-        self.poses[person] = better.values
         return _Seen(match, poses, better, suspects, None, evaluations, tuple(remarks), tuple(r.values for r in rivals))
 
     def _judged(self, person: int, seen: _Seen) -> Found:
-        """Put a person in the pose that was found, with the judgement of it."""
-        self.poses[person] = seen.fit.values
+        """What was found of a person, with the judgement of it."""
         found, costs = seen.told or self._told(person, seen)
         out = Found(
             confidence.judge(found), ", ".join(seen.remarks) or confidence.reason(found), self._parts_px(costs),
@@ -289,26 +308,23 @@ class Scene:
         """Best-first search from the prediction and from the last good pose; the best of what refines from there."""
         memory, predicted, best, evaluations = self._memories[person], self._predicted[person], fit, 0
         for start in (predicted, memory.last_good):
-            self.poses[person] = held(memory.model, start, predicted, memory.free)
-            evaluations += self._search(person, BEFORE_REFINEMENT)
-            refined = solve(
-                memory.model, self.poses[person], judge.blocks, memory.free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP
-            )
+            scored, values = self._search(person, held(memory.model, start, predicted, memory.free), BEFORE_REFINEMENT)
+            evaluations += scored
+            refined = solve(memory.model, values, judge.blocks, memory.free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
             if judge.cost(refined) < judge.cost(best):
                 best = refined
-        self.poses[person] = best.values
         return evaluations, best
 
-    def _search(self, person: int, how: SearchSettings) -> int:
-        """Best-first search of one person from where they stand; returns how many poses were scored."""
-        evaluations, start, free = 0, self.poses[person], self._memories[person].free
+    def _search(self, person: int, start: Array, how: SearchSettings) -> tuple[int, Array]:
+        """Best-first search of one person from a pose, (n_values,): how many poses were scored, and the best."""
+        evaluations, found, free = 0, start, self._memories[person].free
         bodies, index = self._around(person)
         models, poses = [b.model for b in bodies], [b.values for b in bodies]
+        poses[index] = start
         masks = None if free is None else [free] * len(bodies)  # only that of the person counts
         for step in search_frame(self._views, models, poses, replace(self._settings, search=how), [index], masks):
-            self.poses[person], evaluations = step.best[index], step.evaluations
-        self.poses[person] = held(self._models[person], self.poses[person], start, free)
-        return evaluations
+            found, evaluations = step.best[index], step.evaluations
+        return evaluations, held(self._models[person], found, start, free)
 
     def _told(self, person: int, seen: _Seen) -> tuple[Quality, PartCosts]:
         known, colors = self._memories[person].known, None
@@ -329,18 +345,25 @@ class Scene:
 
     def _match(self, person: int, everywhere: bool = False) -> ContourMatch:
         """The residuals of a person's contours against evidence of their own, the others where they stand."""
-        bodies, index = self._around(person)
-        views, settings = self._own(person, everywhere), self._settings
-        return ContourMatch(views, bodies, index, settings.match, settings.theta_px, everywhere)
+        (own,) = self._own([person], everywhere)
+        return self._match_on(own, person, everywhere)
 
-    def _own(self, person: int, everywhere: bool = False) -> tuple[ViewEvidence, ...]:
-        """The evidence without what the others explain, as it was shared out when everybody stood about here."""
+    def _match_on(self, own: Sequence[ViewEvidence], person: int, everywhere: bool) -> ContourMatch:
         bodies, index = self._around(person)
-        for shares in reversed(self._shares if len(bodies) > 1 else ()):
+        settings = self._settings
+        return ContourMatch(own, bodies, index, settings.match, settings.theta_px, everywhere)
+
+    def _own(self, people: Sequence[int], everywhere: bool = False) -> list[tuple[ViewEvidence, ...]]:
+        """Of each of some people the evidence without what the others explain, as it was shared out when everybody
+        stood about here."""
+        bodies = self._bodies()
+        if len(bodies) == 1 or not self._settings.occlusion:
+            return [self._sharing.everything if everywhere else self._sharing.views] * len(people)
+        for shares in reversed(self._shares):
             if self._stand(shares.poses, np.full(len(bodies), _SHARED_M)):
-                return shares.own(index, everywhere)
+                return shares.of_each(people, everywhere)
         self._shares.append(Shares(self._sharing, bodies))
-        return self._shares[-1].own(index, everywhere)
+        return self._shares[-1].of_each(people, everywhere)
 
     def _around(self, person: int) -> tuple[list[Body], int]:
         """Who is in the scene for a person, and their index there."""

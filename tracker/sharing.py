@@ -61,17 +61,25 @@ class Shares:
     def own(self, person: int, everywhere: bool = False) -> tuple[ViewEvidence, ...]:
         """The evidence of each view without the edges and the silhouette's points that clearly are somebody else's.
 
+        Not to be asked by several threads at a time.
+
         Args:
             person: whose evidence is wanted.
             everywhere: whether poses far from the present one will be asked, among all edges, those that the prediction
                 refused too; else views in which nobody else is near stay as they are, because nothing there is in
                 reach.
         """
+        return self.of_each([person], everywhere)[0]
+
+    def of_each(self, people: Sequence[int], everywhere: bool = False) -> list[tuple[ViewEvidence, ...]]:
+        """The same for each of several people; see `own`."""
         if len(self._bodies) == 1:
-            return self._sharing.everything if everywhere else self._sharing.views
-        if (person, everywhere) not in self._own:
-            self._own[person, everywhere] = tuple(helpers().map(lambda v: v.own(person, everywhere), self._views))
-        return self._own[person, everywhere]
+            return [self._sharing.everything if everywhere else self._sharing.views] * len(people)
+        new = [p for p in people if (p, everywhere) not in self._own]
+        if new:  # views side by side, each for all people: what it shows of everybody is asked once
+            shared = helpers().map(lambda v: [v.own(p, everywhere) for p in new], self._views)
+            self._own.update(zip([(p, everywhere) for p in new], zip(*shared, strict=True), strict=True))
+        return [self._own[p, everywhere] for p in people]
 
     @cached_property
     def _views(self) -> list["_View"]:

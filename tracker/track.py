@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from tracker.body import Body, BodyModel
 from tracker.confidence import Quality, Status
 from tracker.evidence import Observer
+from tracker.kernels import side_by_side
 from tracker.memory import Memory
 from tracker.rigid import Array
-from tracker.scene import Scene
+from tracker.scene import Found, Scene
 from tracker.scenery import Scenery
 from tracker.surroundings import regions, visible_outline
 from tracker.track_settings import TrackSettings, pose_cost
@@ -97,8 +98,7 @@ def track_chamfer(
         scene = Scene(views, memories, poses, settings)
         estimates = scene.estimate(sought)
         found = [estimates[p] if p in estimates else scene.held(p) for p in range(len(models))]
-        for p, (memory, seen) in enumerate(zip(memories, found, strict=True)):
-            memory.update(scene.poses[p], scene.colors(p), seen.status, given=p in given)
+        _remember(memories, scene, found, given)
         if scenery is not None:
             scene.teach(scenery)
         cost_of = pose_cost(views, models, scene.poses, settings)
@@ -109,3 +109,12 @@ def track_chamfer(
             tuple(f.status for f in found), tuple(f.remark for f in found), tuple(f.parts_px for f in found),
             tuple(f.covariance for f in found), tuple(f.quality for f in found), tuple(map(tuple, others)),
         )  # fmt: skip
+
+
+def _remember(memories: Sequence[Memory], scene: Scene, found: Sequence[Found], given: Mapping[int, Array]) -> None:
+    """Have everybody's memory take in what a frame brought; `given` are the poses that a person set."""
+
+    def remember(p: int) -> None:
+        memories[p].update(scene.poses[p], scene.colors(p), found[p].status, given=p in given)
+
+    side_by_side(remember, range(len(memories)))

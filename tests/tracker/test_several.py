@@ -10,6 +10,7 @@ from tracker.body import Body
 from tracker.fit import solve
 from tracker.memory import Memory
 from tracker.predict import PredictSettings
+from tracker.recover import search_limbs
 from tracker.scene import Scene
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings
@@ -61,3 +62,28 @@ def test_people_are_refined_again_only_where_others_moved(monkeypatch, off_m, so
     scene.estimate([0, 1])
     np.testing.assert_allclose(np.array(scene.poses)[:, :3], values[:, :3], atol=0.005)
     assert len(done) == solves
+
+
+def test_nothing_depends_on_who_is_done_first(gavrila, monkeypatch):
+    """Two people, each with an arm that is expected elsewhere and is searched: in threads, and one by one from the last
+    to the first."""
+    truth = crowd(gavrila, 2)[:, 0]
+    views, expected = own_evidence([Body(gavrila, v) for v in truth], cameras_around(4)), truth.copy()
+    for values, side in zip(expected, ("left", "right"), strict=True):
+        values[gavrila.dof_names.index(f"{side}_shoulder.elevation")] += 1.2
+    searched = []
+
+    def poses():
+        memories = [Memory(gavrila, v) for v in expected]
+        scene = Scene(views, memories, expected, TrackSettings())
+        found = scene.estimate([0, 1])
+        for person, memory in enumerate(memories):
+            memory.update(scene.poses[person], scene.colors(person), found[person].status, given=False)
+        return np.array([*scene.poses, *(found[p].covariance.sum(axis=1) for p in (0, 1))])
+
+    monkeypatch.setattr("tracker.scene.search_limbs", lambda *a: searched.append(a) or search_limbs(*a))
+    usual = poses()
+    assert len(searched) == 2
+    one_by_one = lambda work, items: [work(x) for x in items[::-1]][::-1]  # noqa: E731
+    monkeypatch.setattr("tracker.scene.side_by_side", one_by_one)
+    np.testing.assert_array_equal(poses(), usual)
