@@ -92,10 +92,11 @@ def _strip(
         count = min(int(angle / turn) + 1, MAX_POINTS // 2 - n)
         step = angle / np.float32(count) if last < first else -angle / np.float32(count)
         cos_step, sin_step = np.cos(step), np.sin(step)
-        c, s = first, s0
+        c, s, is_rim, t = first, s0, r0 == r1 and z0 == z1, _ZERO
         for _ in range(1, count):
             c, s = c * cos_step - s * sin_step, s * cos_step + c * sin_step
-            t = min(max(n0 * (c - c0) / (n0 * (c - c0) + n1 * (c1 - c)), _ZERO), _ONE)
+            if not is_rim:  # a division for each point takes as long as all the rest
+                t = min(max(n0 * (c - c0) / (n0 * (c - c0) + n1 * (c1 - c)), _ZERO), _ONE)
             r = r0 + t * (r1 - r0)
             half[0, n], half[1, n], half[2, n] = r * c, r * s, z0 + t * (z1 - z0)
             n += 1
