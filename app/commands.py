@@ -2,7 +2,7 @@
 
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -165,7 +165,8 @@ def init_from_poses(at: Target, frame: int, table: PoseTable) -> dict[str, Any]:
     if values is None:
         raise TrackerError(
             f"expected poses of '{person.model.name}', the body of '{person.name}', found '{table.model}', which has "
-            "other degrees of freedom; make the session with that --model"
+            f"other degrees of freedom ({_unlike(table.value_names, person.model.value_names)}); make the session with "
+            "the --model, a preset or a file, that the poses are of"
         )
     row = np.flatnonzero(table.frames == frame)
     if not len(row):
@@ -173,6 +174,13 @@ def init_from_poses(at: Target, frame: int, table: PoseTable) -> dict[str, Any]:
     with SessionLock(session.folder):
         _store_keyframe(session, person, frame, values[row[0]], "poses")
     return {"person": person.name, "frame": frame}
+
+
+def _unlike(found: Sequence[str], expected: Sequence[str]) -> str:
+    """The first few names that only one of two lists has, for people to read."""
+    lacking, more = ([n for n in a if n not in b] for a, b in ((expected, found), (found, expected)))
+    said = [f"{what} {', '.join(n[:3])}" for what, n in (("without", lacking), ("with", more)) if n]
+    return ", ".join(said)
 
 
 def _store_keyframe(session: Session, person: Person, frame: int, values: Array, method: str) -> None:

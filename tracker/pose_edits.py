@@ -29,6 +29,8 @@ def taken_over(model: BodyModel, values: Array, other: Array, dofs: NDArray[np.b
 def bent_alike(model: BodyModel, values: Array, other: BodyModel, theirs: Array, free: NDArray[np.bool_]) -> Array:
     """A pose with the joints bent as in one of another body, where both have them by name; the root stays.
 
+    Joints that turn about other axes there, or in another order, take over the rotation, not the angles.
+
     Args:
         model: the body that is to bend.
         values: its pose, (n_values,).
@@ -41,7 +43,26 @@ def bent_alike(model: BodyModel, values: Array, other: BodyModel, theirs: Array,
     """
     known = dict(zip(other.value_names, theirs, strict=True))
     wanted = np.array([known.get(n, own) for n, own in zip(model.value_names, values, strict=True)])
-    return model.clip(taken_over(model, values, wanted, free & (model.dof_joint != 0)))
+    joints = {joint.name: i for i, joint in enumerate(other.joints) if np.any(other.dof_joint == i)}
+    unlike = [i for i, j in enumerate(model.joints) if j.name in joints and not _alike(j, other.joints[joints[j.name]])]
+    same = free & (model.dof_joint != 0) & ~np.isin(model.dof_joint, unlike)
+    out = model.clip(taken_over(model, values, wanted, same))
+    before = other.kinematics(theirs).Ts_world_part[:, :3, :3]
+    for i in unlike:  # parents first: what is turned in the world stands on its parent
+        if i > 0:
+            theirs_at = joints[model.joints[i].name]
+            R_local = before[other.parents[theirs_at]].T @ before[theirs_at]
+            R_parent = model.kinematics(out).Ts_world_part[model.parents[i], :3, :3]
+            out = orient(model, out, i, R_parent @ R_local, free)
+    return out
+
+
+def _alike(joint: Joint, other: Joint) -> bool:
+    """Whether two joints turn about the same axes in the same order."""
+    if joint.kind != other.kind or joint.dof_names != other.dof_names:
+        return False
+    one, two = (np.array([a.direction for a in j.axes]) for j in (joint, other))
+    return np.allclose(one, two, atol=_ALIKE)
 
 
 def joint_of(model: BodyModel, point: str | None) -> int:

@@ -150,10 +150,10 @@ def shaken(model, values, rng, sigma_rad, sigma_m):
 
 POSTURE_DEG = {
     "left_shoulder.abduction": 50, "left_elbow.extension": 50, "right_shoulder.elevation": 60,
-    "right_elbow.extension": 70, "left_hip.elevation": 40, "left_knee.extension": 60, "right_hip.abduction": 15,
-    "right_knee.extension": 20,
+    "right_elbow.extension": 70, "left_hip.elevation": 40, "left_hip.flexion": 40, "left_knee.extension": 60,
+    "right_hip.abduction": 15, "right_knee.extension": 20,
 }  # fmt: skip
-"""Limbs away from the trunk and bent, so that each view shows most of them."""
+"""Limbs away from the trunk and bent, so that each view shows most of them. A hip that flexes has no elevation."""
 
 
 def posed(model, seed):

@@ -243,6 +243,43 @@ def test_gavrila31_joints_turn_the_way_their_names_say(joint, degrees, moving, w
         )
 
 
+@pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
+@pytest.mark.parametrize("flexion", [-40, 0, 60, 90, 130])
+def test_gavrila31_abducts_a_leg_alike_however_far_it_is_lifted(side, sign, flexion):
+    """Abduction is the angle of the thigh with the plane of symmetry, and twist leaves the thigh where it is."""
+    model = MODELS["gavrila31"].with_height(1.0)
+
+    def knee(**angles):
+        values = set_deg(model, **{f"{side}_hip__{name}": angle for name, angle in angles.items()})
+        return at(model, values, f"{side}_knee") - at(model, values, f"{side}_hip")
+
+    level = 0.2425 * np.array([np.sin(np.radians(flexion)), 0, -np.cos(np.radians(flexion))])
+    for abduction in (-35, 0, 40, 75):
+        a = np.radians(abduction)
+        expected = np.cos(a) * level + (0, sign * 0.2425 * np.sin(a), 0)
+        np.testing.assert_allclose(knee(flexion=flexion, abduction=abduction, twist=50), expected, atol=1e-12)
+
+
+def test_only_the_papers_hips_lose_a_degree_of_freedom_when_a_leg_is_lifted():
+    turns = {}
+    for name, lift in (("gavrila22", "elevation"), ("gavrila31", "flexion")):
+        model = MODELS[name]
+        axes = model.kinematics(set_deg(model, **{f"left_hip__{lift}": 90})).axes_world
+        turns[name] = np.linalg.svd(axes[[n.startswith("left_hip.") for n in model.dof_names]])[1]
+    np.testing.assert_allclose(turns["gavrila22"], [np.sqrt(2), 1, 0], atol=1e-9)
+    np.testing.assert_allclose(turns["gavrila31"], 1, atol=1e-9)
+
+
+def test_gavrila31_bends_its_trunk_farther_forwards_than_backwards():
+    model = MODELS["gavrila31"].with_height(1.0)
+    for way, angle in zip((1, -1), model.limits[model.dof_names.index("waist.elevation")], strict=True):
+        values = set_deg(model, waist__elevation=np.degrees(angle))
+        T_pelvis_world = np.linalg.inv(model.kinematics(values).Ts_world_part[model.part_index["pelvis"]])
+        ahead = (T_pelvis_world @ [*at(model, values, "neck"), 1.0])[0]
+        assert way * ahead > 0.05  # x is forward as the pelvis sees it
+        assert abs(np.degrees(angle)) == pytest.approx(75 if way > 0 else 40)
+
+
 def test_spreads_are_known_of_what_bends_little():
     model = MODELS["gavrila31"]
     known = {n.split(".")[0] for n, s in zip(model.dof_names, model.spreads, strict=True) if np.isfinite(s)}

@@ -8,7 +8,7 @@ from tracker import rigid
 from tracker.body import Axis
 from tracker.formats.model_toml import load_model
 from tracker.orienting import orient
-from tracker.pose_edits import joint_of, limb_of, mirrored, taken_over
+from tracker.pose_edits import bent_alike, joint_of, limb_of, mirrored, taken_over
 
 M = np.diag([1.0, -1.0, 1.0])
 
@@ -73,6 +73,35 @@ def test_what_is_taken_over_is_exact_and_the_rest_untouched(model):
     result = taken_over(model, a, b, dofs)
     np.testing.assert_array_equal(np.abs(model.difference(result, a))[~dofs], 0)
     np.testing.assert_allclose(np.abs(model.difference(result, b))[dofs], 0, atol=1e-12)
+
+
+def test_joints_that_turn_in_another_order_are_bent_alike_all_the_same():
+    """The hips of the two bodies have other angles for one rotation; all that both have is bent alike."""
+    paper, ours = load_model("gavrila22"), load_model("gavrila31")
+    theirs = posed_legs(paper)
+    bent = bent_alike(ours, ours.neutral(), paper, theirs, np.ones(ours.n_dofs, dtype=bool))
+    for name in ("left_thigh", "left_calf", "right_thigh", "right_forearm"):
+        R = [b.kinematics(v).Ts_world_part[b.part_index[name], :3, :3] for b, v in ((paper, theirs), (ours, bent))]
+        np.testing.assert_allclose(*R, atol=1e-5, err_msg=name)
+    # Going back they are the angles that they were, and what is locked stays.
+    np.testing.assert_allclose(
+        bent_alike(paper, paper.neutral(), ours, bent, np.ones(paper.n_dofs, dtype=bool)), theirs, atol=1e-5
+    )
+    free = np.array([not n.startswith("left_hip.") for n in ours.dof_names])
+    held = bent_alike(ours, ours.neutral(), paper, theirs, free)
+    np.testing.assert_array_equal(held[~free], ours.neutral()[~free])
+
+
+def posed_legs(model):
+    """Legs lifted sideways and forward, an arm away from the trunk; the root stays."""
+    values = model.neutral()
+    for name, degrees in {
+        "left_hip.abduction": 35, "left_hip.elevation": 60, "left_hip.twist": -20, "left_knee.extension": 50,
+        "right_hip.abduction": 10, "right_hip.elevation": -20, "right_hip.twist": 30, "right_shoulder.abduction": 70,
+        "right_elbow.extension": 40,
+    }.items():  # fmt: skip
+        values[model.value_names.index(name)] = np.radians(degrees)
+    return values
 
 
 def test_points_mean_the_joint_and_limb_that_people_expect(gavrila):
