@@ -56,6 +56,8 @@ export class TopBar {
     this.#cost.textContent = state.cost_px === null ? "–" : state.cost_px.toFixed(2);
     if (hasTrack(state) || state.track.message) this.#showTrack(state.track);
     else this.#showJob(state.job);
+    const isToBegin = (state.track.running && state.track.done === 0) || (isRunning && state.job.evaluations === 0);
+    if (state.compiling && isToBegin) this.#figures.textContent = "waits for the compiler";
   }
 
   /** @param {import("./protocol.js").Job} job */

@@ -2,6 +2,7 @@
 
 import pytest
 from driving import shows, state_of, until
+from playwright.async_api import expect
 
 
 @pytest.mark.parametrize(
@@ -160,3 +161,12 @@ async def test_that_kernels_are_compiled_is_said_while_they_are(page, endpoint):
     endpoint.state["compiling"] = False
     await endpoint.broadcast(endpoint.state)
     await mark.wait_for(state="hidden")
+
+
+async def test_work_that_waits_for_kernels_says_so(page, endpoint):
+    figures = page.locator("#search-figures")
+    track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "total": 18}
+    for compiling, done, text in ((True, 0, "waits for the compiler"), (False, 0, "0.0/s"), (True, 3, "0.0/s")):
+        endpoint.state |= {"compiling": compiling, "track": track | {"done": done}}
+        await endpoint.broadcast(endpoint.state)
+        await expect(figures).to_have_text(text)
