@@ -105,6 +105,7 @@ class Scene:
         self._views, self._settings = views, settings
         self._memories, self._models, self._predicted = memories, [m.model for m in memories], tuple(poses)
         self._sharing, self._shares = Sharing(views), list[Shares]()
+        self._places: dict[tuple[int, int], tuple[Array, Array]] = {}  # poses are kept: no other gets their number
         self._thetas = np.array([v.outlier_px(settings.theta_px) for v in views])
 
     def teach(self, scenery: Sequence[Scenery]) -> None:
@@ -176,8 +177,14 @@ class Scene:
         """How far apart the points of a person are in two poses, (n_values,), at most, metres."""
         if was is now:
             return 0.0
-        model = self._models[person]
-        return float(np.linalg.norm(model.points_world(now) - model.points_world(was), axis=1).max())
+        return float(np.linalg.norm(self._points(person, now) - self._points(person, was), axis=1).max())
+
+    def _points(self, person: int, values: Array) -> Array:
+        """The points of a person in a pose, (n_points, 3), metres; each pose is asked for many times."""
+        key = person, id(values)  # people who are exchanged take each other's poses
+        if key not in self._places:
+            self._places[key] = values, self._models[person].points_world(values)
+        return self._places[key][1]
 
     def _stand(self, poses: Sequence[Array], within_m: Array) -> bool:
         """Whether everybody stands as in some poses, (n_values,) each, each within some metres, (K,)."""
@@ -351,6 +358,8 @@ class Scene:
     def _match_on(self, own: Sequence[ViewEvidence], person: int, everywhere: bool) -> ContourMatch:
         bodies, index = self._around(person)
         settings = self._settings
+        # Of segments a prediction accepts those near it: to look for what is farther costs more than it saves.
+        everywhere = everywhere or settings.segments
         return ContourMatch(own, bodies, index, settings.match, settings.theta_px, everywhere)
 
     def _own(self, people: Sequence[int], everywhere: bool = False) -> list[tuple[ViewEvidence, ...]]:

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from tracker import contours
 from tracker.body import Body
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence, findable, unfiltered, with_segments
-from tracker.kernels import helpers
 from tracker.rigid import Array, FloatArray
 from tracker.segments import Samples, Segments, sampled
 
@@ -76,9 +75,9 @@ class Shares:
         if len(self._bodies) == 1:
             return [self._sharing.everything if everywhere else self._sharing.views] * len(people)
         new = [p for p in people if (p, everywhere) not in self._own]
-        if new:  # views side by side, each for all people: what it shows of everybody is asked once
-            shared = helpers().map(lambda v: [v.own(p, everywhere) for p in new], self._views)
-            self._own.update(zip([(p, everywhere) for p in new], zip(*shared, strict=True), strict=True))
+        # Not in threads: a view takes a dozen kernels of some hundredths of a millisecond, and to get the interpreter's
+        # lock back after each takes as long.
+        self._own.update({(p, everywhere): tuple(v.own(p, everywhere) for v in self._views) for p in new})
         return [self._own[p, everywhere] for p in people]
 
     @cached_property
