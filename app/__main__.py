@@ -214,6 +214,7 @@ def track(
     order: int = 1,
     window: int = 3,
     paper: bool = False,
+    second_pass: bool = True,
     json: bool = False,
 ) -> None:
     """Track people through a range of frames and store the poses.
@@ -230,6 +231,7 @@ def track(
         order: degree of the motion model: 0 stays, 1 constant velocity, 2 constant acceleration.
         window: past frames that the motion is taken from.
         paper: as Gavrila and Davis 1996: best-first search alone, in one pass, outliers rejected.
+        second_pass: at the end, follow whoever was lost back from the first trusted poses after it.
         json: print one JSON object.
     """
     from app import headless
@@ -246,6 +248,7 @@ def track(
         search=SearchSettings(passes=passes),
         theta_px=theta,
         outliers="paper" if paper else "truncated",
+        second_pass=second_pass and not paper,
     )
     found = headless.track(at, wanted[::-1] if backward else wanted, settings, Reporter(silent=json))
     print(commands.as_json(found) if json else _track_summary(found))
@@ -394,6 +397,8 @@ def _track_summary(found: Mapping[str, Any]) -> str:
     for name, statuses in found["statuses"].items():
         odd = [f"{statuses[s]} {s}" for s in ("good", "doubtful", "lost") if statuses.get(s)]
         lines.append(f"{name}: {', '.join(odd)}")
+    if found["followed_back"]:
+        lines.append(f"{found['followed_back']} poses of frames in which somebody was lost are from the second pass")
     if found["stopped_at"] is not None:
         lines.append(f"stopped before frame {found['stopped_at']}; the same command again goes on from there")
     return "\n".join(lines)

@@ -4,21 +4,24 @@ import json
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import closing
-from typing import Any
+from itertools import chain
+from typing import Any, get_args
 
 import numpy as np
 
 from app.commands import Reporter, Target
 from app.compiling import compiled_mark
-from app.tracked import keyframes_of, told_of, tracked_changes
+from app.tracked import Keyframes, keyframes_of, told_of, tracked_changes
 from tracker.annotations import AnnotationStore
+from tracker.confidence import Status
 from tracker.errors import SessionError
 from tracker.evidence import Observer
 from tracker.formats.model_toml import format_model
 from tracker.locks import free_of, kept_locks
 from tracker.recording import Recording
-from tracker.records import PoseChange
+from tracker.records import PoseChange, PoseRecord
 from tracker.rigid import Array
+from tracker.second_pass import Followed, Tracked, follow_back
 from tracker.session import Person
 from tracker.session_lock import SessionLock
 from tracker.track import PoseEstimate, track_chamfer
@@ -34,8 +37,9 @@ _UNFINISHED = "unfinished track"
 def track(at: Target, frames: Sequence[int], settings: TrackSettings, progress: Reporter) -> dict[str, Any]:
     """Track people with the chamfer tracker and store what is found.
 
-    Keyframes stay as they are and tracking goes on from them; what is locked stays as it was. Interrupted, it keeps
-    what is done, and the same call again goes on from there.
+    Keyframes stay as they are and tracking goes on from them; what is locked stays as it was. Whoever was lost is then
+    followed back from the first trusted poses after it (`second_pass`). Interrupted, it keeps what is done, and the
+    same call again goes on from there.
 
     Args:
         at: the session and whom to track.
@@ -44,7 +48,8 @@ def track(at: Target, frames: Sequence[int], settings: TrackSettings, progress: 
         progress: shows how far it is.
 
     Returns:
-        What was done; `stopped_at` is the next frame where it was interrupted, else None.
+        What was done; `stopped_at` is the next frame where it was interrupted, else None, and `followed_back` how many
+        poses the second pass changed.
 
     Raises:
         SessionError: nobody has placed a person at or before the first frame.
@@ -57,28 +62,40 @@ def track(at: Target, frames: Sequence[int], settings: TrackSettings, progress: 
     ):
         task = json.loads(json.dumps([frames[0], frames[-1], len(frames), at.people, told_of(settings)]))
         left = _left(store, task, frames)
-        run = _Run(at, store, settings, left, f"track frames {min(frames)}:{max(frames) + 1}")
+        run = _Run(at, store, settings, frames, left)
         if not compiled_mark().exists():
             progress.say("kernels that are not compiled yet are compiled first, once: it may take a minute or two")
+        stopped = False
         try:
-            with progress.over(len(left), "tracking") as tick:
-                for found in run.estimates(Observer(session.cameras, recording)):
-                    run.take(found)
-                    tick()
-            stopped_at = None
+            observer = Observer(session.cameras, recording)
+            if left:
+                with progress.over(len(left), "tracking") as tick:
+                    for found in run.estimates(observer):
+                        run.take(found)
+                        tick()
+            run.save()
+            steps = run.ways_back(observer) if settings.second_pass else iter(())
+            if (first := next(steps, None)) is not None:
+                with progress.over(first.total, "following back") as tick:
+                    for step in chain([first], steps):
+                        run.take_back(step)
+                        tick()
+            run.finished = True
         except KeyboardInterrupt:
-            stopped_at = left[run.done]
+            stopped = True
         finally:
             run.save()
-            unfinished = run.done < len(left)
-            store.set_setting(_UNFINISHED, {"task": task, "next": left[run.done]} if unfinished else None)
+            unfinished = {"task": task, "next": left[run.done] if run.done < len(left) else None}
+            store.set_setting(_UNFINISHED, None if run.finished else unfinished)
+    statuses = run.statuses()
     return {
         "frames": run.done,
-        "resumed_at": left[0] if len(left) < len(frames) else None,
-        "stopped_at": stopped_at,
+        "resumed_at": None if len(left) == len(frames) else left[0] if left else frames[-1],
+        "stopped_at": None if not stopped else left[run.done] if run.done < len(left) else run.back_at,
+        "followed_back": run.followed_back,
         "people": [session.people[i].name for i in at.people],
-        "mean_cost_px": float(np.mean(run.costs)) if run.costs else None,
-        "statuses": {session.people[i].name: dict(run.statuses[i]) for i in at.people},
+        "mean_cost_px": float(np.mean(list(run.costs.values()))) if run.costs else None,
+        "statuses": {session.people[i].name: dict(statuses[i]) for i in at.people},
     }
 
 
@@ -86,39 +103,69 @@ class _Run:
     """One run and what it has found so far."""
 
     def __init__(
-        self, at: Target, store: AnnotationStore, settings: TrackSettings, frames: Sequence[int], label: str
+        self, at: Target, store: AnnotationStore, settings: TrackSettings, frames: Sequence[int], left: Sequence[int]
     ) -> None:
         people = at.session.people
-        self._at, self._store, self._settings, self._frames, self._label = at, store, settings, frames, label
+        self._at, self._store, self._settings, self._left = at, store, settings, left
+        self._label = f"track frames {min(frames)}:{max(frames) + 1}"
         self._revisions = [store.add_model_revision(p.name, format_model(p.model)) for p in people]
-        self._past = [_past(store, p, frames, i in at.people) for i, p in enumerate(people)]
+        self._past = [_past(store, p, left or frames, i in at.people) for i, p in enumerate(people)]
         self._fixed = keyframes_of(store, people, set(frames))
         locks = kept_locks(people, store.setting)
         self._free = [free_of(p.model, locked) for p, locked in zip(people, locks, strict=True)]
         self._waiting: list[PoseChange] = []
         self._edit: int | None = None
+        before = _tracked_before(at, store, frames[: len(frames) - len(left)], self._past, self._fixed)
+        self._tracked = {f.frame: f for f in before}  # in the order of tracking
         self.done = 0
-        self.costs: list[float] = []
-        self.statuses: list[Counter[str]] = [Counter() for _ in people]
+        self.followed_back = 0
+        self.back_at = frames[-1]
+        """The frame that the second pass has come to."""
+        self.finished = False
+        self.costs: dict[int, float] = {}
+        """Of each frame, px."""
 
     def estimates(self, observer: Observer) -> Iterator[PoseEstimate]:
         """Track the frames one by one."""
         models = [p.model for p in self._at.session.people]
         return track_chamfer(
-            observer, models, self._past, self._frames, self._settings, self._fixed, self._at.people, self._free
+            observer, models, self._past, self._left, self._settings, self._fixed, self._at.people, self._free
         )
+
+    def ways_back(self, observer: Observer) -> Iterator[Followed]:
+        """Follow back whoever was lost, in this call or before it was interrupted."""
+        models, found = [p.model for p in self._at.session.people], list(self._tracked.values())
+        return follow_back(observer, models, found, self._settings, self._fixed, self._at.people, self._free)
 
     def take(self, found: PoseEstimate) -> None:
         """Keep what was found on a frame; on disk with the next save."""
-        names = [p.name for p in self._at.session.people]
-        self._waiting += tracked_changes([found], names, self._at.people, self._revisions, self._fixed, self._settings)
+        self._keep(found, self._at.people)
+        self._tracked[found.frame] = Tracked(found.frame, found.poses, found.statuses)
         self.done += 1
-        if np.isfinite(found.cost_px):
-            self.costs.append(found.cost_px)
-        for i, status in enumerate(found.statuses):
-            self.statuses[i][status] += 1
         if len(self._waiting) >= _SAVE_FRAMES:
             self.save()
+
+    def take_back(self, step: Followed) -> None:
+        """Keep what the second pass found better of one person, on disk at once: a whole stretch or nothing of it."""
+        self.back_at = step.frame
+        for found in step.better:
+            self._keep(found, [step.person])
+            before = self._tracked[found.frame].statuses
+            statuses = tuple(found.statuses[i] if i == step.person else s for i, s in enumerate(before))
+            self._tracked[found.frame] = Tracked(found.frame, found.poses, statuses)
+        self.followed_back += len(step.better)
+        self.save()
+
+    def statuses(self) -> list[Counter[str]]:
+        """How often each person had which status on the frames of this call."""
+        of_frames = [self._tracked[k].statuses for k in self._left[: self.done]]
+        return [Counter(s[i] for s in of_frames) for i in range(len(self._past))]
+
+    def _keep(self, found: PoseEstimate, people: Sequence[int]) -> None:
+        names = [p.name for p in self._at.session.people]
+        self._waiting += tracked_changes([found], names, people, self._revisions, self._fixed, self._settings)
+        if np.isfinite(found.cost_px) and found.frame in self._left:
+            self.costs[found.frame] = found.cost_px
 
     def save(self) -> None:
         """Write what waits; all of a run is one entry of the history."""
@@ -130,11 +177,37 @@ class _Run:
 
 
 def _left(store: AnnotationStore, task: Any, frames: Sequence[int]) -> Sequence[int]:
-    """The frames still to do: all, or the rest of the same task that was interrupted."""
+    """The frames still to track: all, or the rest of the same task that was interrupted; none in its second pass."""
     unfinished = store.setting(_UNFINISHED)
-    if unfinished is None or unfinished["task"] != task or unfinished["next"] not in frames:
+    if unfinished is None or unfinished["task"] != task:
         return frames
-    return frames[list(frames).index(unfinished["next"]) :]
+    if unfinished["next"] is None:
+        return frames[len(frames) :]
+    return frames[list(frames).index(unfinished["next"]) :] if unfinished["next"] in frames else frames
+
+
+def _tracked_before(
+    at: Target, store: AnnotationStore, frames: Sequence[int], past: Sequence[Sequence[Array]], fixed: Keyframes
+) -> list[Tracked]:
+    """What an interrupted call has left in the store, up to the last frame that nobody has taken away since."""
+    out: list[Tracked] = []
+    poses = [p[-1] for p in past]
+    for frame in frames:
+        records = {i: store.pose(at.session.people[i].name, frame) for i in at.people}
+        held = fixed.get(frame, {})
+        for i in range(len(poses)):
+            record = records.get(i)
+            poses[i] = held[i] if i in held else poses[i] if record is None else record.values
+        statuses = tuple(_status(None if i in held else records.get(i)) for i in range(len(poses)))
+        gone = any(r is None and i not in held for i, r in records.items())
+        out = [] if gone else [*out, Tracked(frame, tuple(poses), statuses)]
+    return out
+
+
+def _status(record: PoseRecord | None) -> Status:
+    """How sure a pose of the store is; one that a person set, or that nobody doubted, is good."""
+    statuses: tuple[Status, ...] = get_args(Status)
+    return "good" if record is None else next((s for s in statuses if s == record.status), "good")
 
 
 def _past(store: AnnotationStore, person: Person, frames: Sequence[int], needed: bool) -> list[Array]:

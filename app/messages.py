@@ -289,5 +289,6 @@ def _track(track: TrackState) -> dict[str, Any]:
         "per_second": track.per_second,
         "doubtful": track.doubtful,
         "lost": track.lost,
+        "back": track.back,
         "message": track.message,
     }

@@ -57,6 +57,10 @@ class SettingsPanel:
                     "search lost limbs", shown["recover"],
                     hint="Search anew for a limb that is not where the edges and colours are",
                 ),
+                "second_pass": gui.add_checkbox(
+                    "second pass", shown["second_pass"],
+                    hint="At the end of a run, follow whoever was lost back from the first trusted poses after it",
+                ),
             }  # fmt: skip
 
     def _add_search(self, shown: dict[str, Any]) -> dict[str, Any]:
@@ -118,6 +122,7 @@ def shown_of(settings: TrackSettings) -> dict[str, Any]:
         "order": _ORDERS[predict.order],
         "window": predict.window,
         "recover": settings.recover is not None,
+        "second_pass": settings.second_pass,
         "bound_deg": round(float(np.degrees(search.bound_rad)), 6),
         "bound_cm": round(100 * search.bound_m, 6),
         "step_deg": round(float(np.degrees(search.step_rad)), 6),
@@ -154,6 +159,7 @@ def settings_of(value: dict[str, Any], before: TrackSettings) -> TrackSettings:
         estimate=next(key for key, label in _METHODS.items() if label == value["method"]),
         predict=predict,
         recover=(before.recover or RecoverSettings()) if value["recover"] else None,
+        second_pass=bool(value["second_pass"]),
         search=search,
         theta_px=value["theta_px"] or None,
         outliers=value["outliers"],

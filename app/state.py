@@ -138,6 +138,8 @@ class TrackState:
     """Number of frames called doubtful."""
     lost: int = 0
     """Number of frames called lost."""
+    back: bool = False
+    """Whether it is in its second pass, following back whoever was lost: `done` and `total` are of that."""
     message: str = ""
     """How the last run ended."""
     failed: bool = False

@@ -1,15 +1,23 @@
 """The tracking run: frame after frame from the one shown, watched, paused, saved as one entry of the history."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from app.jobs import Job
 from app.screen import Screen
 from app.state import Shown, TrackState, finite_or_none
 from tracker import confidence
+from tracker.body import BodyModel
+from tracker.confidence import Status
 from tracker.errors import TrackerError
+from tracker.evidence import Observer
 from tracker.rigid import Array
+from tracker.second_pass import Followed, Tracked, follow_back
 from tracker.track import PoseEstimate, track_chamfer
 from tracker.track_settings import TrackSettings
 
@@ -28,7 +36,9 @@ class _Run:
     settings: TrackSettings
     fixed: Mapping[int, Mapping[int, Array]]
     """Keyframes on its way, by frame and person."""
-    job: Job[PoseEstimate] = field(init=False)
+    job: Job[PoseEstimate | Followed] = field(init=False)
+    statuses: dict[int, tuple[Status, ...]] = field(default_factory=dict)
+    """Of each frame that it has tracked, everybody's."""
     waiting: list[PoseEstimate] = field(default_factory=list)
     """Found, but not yet on disk."""
     edit: int | None = None
@@ -71,8 +81,8 @@ class Tracking:
             fixed = {frame: dict(held) for frame, held in run.fixed.items()}
             free = [screen.free(person) for person in range(len(models))]
             run.job = Job(
-                lambda: track_chamfer(screen.frames.observer, models, poses, frames, settings, fixed, people, free),
-                lambda found, seconds: self._tracked(run, found, seconds),
+                lambda: _both_passes(screen.frames.observer, models, poses, frames, settings, fixed, people, free),
+                lambda found, seconds: self._stepped(run, found, seconds),
                 lambda error: self._ended(run, error),
                 lambda: self._paused(run),
             )
@@ -138,25 +148,51 @@ class Tracking:
             )
         return frames
 
+    def _stepped(self, run: _Run, found: PoseEstimate | Followed, seconds: float) -> None:
+        with self._screen.lock:
+            if run is self._run:
+                if isinstance(found, Followed):
+                    self._followed(run, found, seconds)
+                else:
+                    self._tracked(run, found, seconds)
+
+    def _followed(self, run: _Run, step: Followed, seconds: float) -> None:
+        """Take a step of the second pass; at the end of a stretch what is better takes its place, on disk at once."""
+        screen = self._screen
+        self._save(run)
+        if step.better:
+            self._write(run, step.better, (step.person,))
+        for found in step.better:
+            before = run.statuses[found.frame]
+            run.statuses[found.frame] = tuple(
+                found.statuses[i] if i == step.person else s for i, s in enumerate(before)
+            )
+        worst = Counter(confidence.worst([s[i] for i in run.people]) for s in run.statuses.values())
+        steps = len(run.statuses) + step.done
+        screen.set(track=replace(
+            screen.state.track, running=run.job.running, back=True, done=step.done, total=step.total,
+            per_second=steps / max(1e-6, seconds), doubtful=worst["doubtful"], lost=worst["lost"],
+        ))  # fmt: skip
+        if screen.state.frame in {found.frame for found in step.better}:
+            screen.show(screen.state.frame, follow=screen.state.follow)
+
     def _tracked(self, run: _Run, found: PoseEstimate, seconds: float) -> None:
         screen = self._screen
-        with screen.lock:
-            if run is not self._run:
-                return
-            run.waiting.append(found)
-            worst = confidence.worst([found.statuses[i] for i in run.people])
-            track = screen.state.track
-            done = track.done + 1
-            track = replace(
-                track, running=run.job.running, at=found.frame, done=done, per_second=done / max(1e-6, seconds),
-                doubtful=track.doubtful + (worst == "doubtful"), lost=track.lost + (worst == "lost"),
-            )  # fmt: skip
-            if screen.state.follow or screen.state.frame == found.frame:
-                screen.set(track=track, **self._found(run, found))
-            else:
-                screen.set(track=track)
-            if time.monotonic() - screen.last_save > _SAVE_S:
-                self._save(run)
+        run.waiting.append(found)
+        run.statuses[found.frame] = found.statuses
+        worst = confidence.worst([found.statuses[i] for i in run.people])
+        track = screen.state.track
+        done = track.done + 1
+        track = replace(
+            track, running=run.job.running, at=found.frame, done=done, per_second=done / max(1e-6, seconds),
+            doubtful=track.doubtful + (worst == "doubtful"), lost=track.lost + (worst == "lost"),
+        )  # fmt: skip
+        if screen.state.follow or screen.state.frame == found.frame:
+            screen.set(track=track, **self._found(run, found))
+        else:
+            screen.set(track=track)
+        if time.monotonic() - screen.last_save > _SAVE_S:
+            self._save(run)
 
     def _found(self, run: _Run, found: PoseEstimate) -> dict[str, object]:
         """The state's fields that show a tracked frame."""
@@ -185,10 +221,13 @@ class Tracking:
         """Write what waits. Where writing fails the state says why, and it is tried again."""
         if not run.waiting:
             return
-        screen = self._screen
-        run.edit = screen.saver.save_tracked(run.waiting, run.people, run.fixed, run.settings, run.label, run.edit)
-        screen.last_save = time.monotonic()
+        self._write(run, run.waiting, run.people)
         run.waiting.clear()
+
+    def _write(self, run: _Run, found: Sequence[PoseEstimate], people: Sequence[int]) -> None:
+        screen = self._screen
+        run.edit = screen.saver.save_tracked(found, people, run.fixed, run.settings, run.label, run.edit)
+        screen.last_save = time.monotonic()
         screen.refresh_saving()
 
     def _paused(self, run: _Run) -> None:
@@ -214,10 +253,24 @@ class Tracking:
         self._save(run)
         track = self._screen.state.track
         self._run = None
-        self._screen.set(track=TrackState(message=f"{how}: {_summary(track)}", failed=failed))
+        self._screen.set(track=TrackState(message=f"{how}: {_summary(len(run.statuses), track)}", failed=failed))
 
 
-def _summary(track: TrackState) -> str:
+def _both_passes(
+    observer: Observer, models: Sequence[BodyModel], start: Sequence[Array], frames: Sequence[int],
+    settings: TrackSettings, fixed: Mapping[int, Mapping[int, Array]], people: Sequence[int],
+    free: Sequence[NDArray[np.bool_]],
+) -> Iterator[PoseEstimate | Followed]:  # fmt: skip
+    """Track frame by frame, then follow back whoever was lost; arguments as of `track_chamfer`."""
+    tracked = []
+    for found in track_chamfer(observer, models, start, frames, settings, fixed, people, free):
+        tracked.append(Tracked(found.frame, found.poses, found.statuses))
+        yield found
+    if settings.second_pass:
+        yield from follow_back(observer, models, tracked, settings, fixed, people, free)
+
+
+def _summary(frames: int, track: TrackState) -> str:
     """What a run has done, for people to read."""
     odd = [f"{n} {what}" for n, what in ((track.doubtful, "doubtful"), (track.lost, "lost")) if n]
-    return ", ".join([f"{track.done} frame{'' if track.done == 1 else 's'}", *odd])
+    return ", ".join([f"{frames} frame{'' if frames == 1 else 's'}", *odd])

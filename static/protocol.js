@@ -15,7 +15,7 @@
  *   per_second: number, best_px: number | null, message: string}} Job
  * @typedef {"" | "good" | "doubtful" | "lost"} Status
  * @typedef {{running: boolean, first: number | null, last: number | null, at: number | null, done: number, total: number,
- *   per_second: number, doubtful: number, lost: number, message: string}} Track
+ *   per_second: number, doubtful: number, lost: number, back: boolean, message: string}} Track
  * @typedef {{running: boolean, what: string, done: number, total: number, message: string}} RangeWork
  * @typedef {"track_forward" | "track_backward" | "interpolate" | "clear" | "keyframe" | "reviewed" | "unreviewed" |
  *   "none"} RangeAction

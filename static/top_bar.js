@@ -78,11 +78,13 @@ export class TopBar {
   }
 
   /** @param {import("./protocol.js").Track} track */
-  #showTrack({ running, first, last, at, done, total, per_second, doubtful, lost, message }) {
+  #showTrack({ running, first, last, at, done, total, per_second, doubtful, lost, back, message }) {
     const stands = first !== null;
     const [how, ...rest] = message.split(", ");
-    this.#stage.textContent = stands ? `${running ? "tracked" : "paused"} ${done} of ${total}` : how;
-    this.#stage.title = stands ? `Frame ${at ?? first}, on the way to frame ${last}` : message;
+    const work = back ? "followed" : "tracked";
+    const way = back ? "Following back who was lost" : `Frame ${at ?? first}, on the way to frame ${last}`;
+    this.#stage.textContent = stands ? `${running ? work : "paused"} ${done} of ${total}` : how;
+    this.#stage.title = stands ? way : message;
     const counts = [doubtful && `${doubtful} doubtful`, lost && `${lost} lost`].filter(Boolean);
     const figures = [`${per_second.toFixed(1)}/s`, ...counts].join(" · ");
     this.#figures.textContent = stands ? figures : rest.join(" · ");

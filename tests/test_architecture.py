@@ -67,6 +67,7 @@ ORDER = [
     ["tracker.track_settings"],
     ["tracker.scene", "tracker.frame_fit"],
     ["tracker.track"],
+    ["tracker.second_pass"],
     # The program: what the screen shows, then who may change it, then who shows it.
     [
         "app",

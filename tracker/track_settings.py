@@ -51,6 +51,8 @@ class TrackSettings:
     rounds: int = 2
     """Rounds of the joint refinement, in which each person is refined once more with the others where they were found,
     at most; 0 leaves everybody as they were found one after the other."""
+    second_pass: bool = True
+    """Whether whoever tracking lost is followed back from the first trusted poses after it, see `second_pass`."""
     apart: float = 1.0
     """Weight of what keeps people from passing through each other; 0 lets them."""
 

@@ -28,12 +28,17 @@ class FakeTracker:
 
     def __init__(self, monkeypatch):
         monkeypatch.setattr("app.tracking.track_chamfer", self.track)
+        monkeypatch.setattr("app.tracking.follow_back", self.follow_back)
         self.steps = threading.Semaphore(0)
         self.told = None
         """Arguments of the last run."""
         self.seen = []
         """Frames that have been tracked."""
         self.fails_at = None
+        self.last = {}
+        """What was found last on each frame."""
+        self.back = None
+        """Makes the steps of the second pass from what was tracked; None: there is nothing to follow back."""
 
     def let_go(self, frames):
         """Let it track so many frames more."""
@@ -57,7 +62,11 @@ class FakeTracker:
             views_px = np.array([1.0, np.nan, 2.0, 3.0])
             parts_px = np.array([0.5] * (N_PARTS - 1) + [np.nan])
             n = len(models)
-            yield Estimate(
+            self.last[frame] = Estimate(
                 frame, tuple(poses), 1.0 + 0.1 * frame, views_px, 9, (status,) * n, (remark,) * n, (parts_px,) * n,
                 tuple(np.eye(m.n_dofs) for m in models), ((),) * n,
             )  # fmt: skip
+            yield self.last[frame]
+
+    def follow_back(self, observer, models, found, settings, fixed, people, free):
+        yield from () if self.back is None else self.back(found)

@@ -15,6 +15,7 @@ from tracker.annotations import AnnotationStore
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_table import read_pose_table, write_pose_table
 from tracker.records import PoseChange
+from tracker.second_pass import Followed
 from tracker.session import load_session
 
 
@@ -140,6 +141,66 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     assert len(found[3].views_px) == 4
     status, out, _ = run("track", session, "--frames", "0:6", "--json")  # and once done, it begins anew
     assert (json.loads(out)["frames"], json.loads(out)["resumed_at"]) == (6, None)
+
+
+def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run, session, monkeypatch):
+    """What the second pass finds better is in the store at once, in the one entry of the history."""
+    run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
+    estimates, offered = {}, []
+    original = headless.track_chamfer
+
+    def tracked(*arguments):
+        for estimate in original(*arguments):
+            estimates[estimate.frame] = estimate
+            yield estimate._replace(statuses=("lost" if estimate.frame in (1, 3) else "good",))
+
+    def elsewhere(frame):
+        found = estimates[frame]
+        remarks = ("followed back from frame 2",)
+        return found._replace(poses=(found.poses[0] + 0.01,), remarks=remarks, statuses=("good",))
+
+    def ways_back(observer, models, found, *rest):
+        offered.append(found)
+        yield Followed(1, 0, 1, 2, (elsewhere(1),))
+        if len(offered) == 1:
+            raise KeyboardInterrupt
+        yield Followed(3, 0, 2, 2, (elsewhere(3),))
+
+    monkeypatch.setattr(headless, "track_chamfer", tracked)
+    monkeypatch.setattr(headless, "follow_back", ways_back)
+    words = ("track", session, "--frames", "0:5", "--json")
+    status, out, _ = run(*words)
+    told = json.loads(out)
+    assert (status, told["frames"], told["stopped_at"], told["followed_back"]) == (130, 5, 1, 1)
+    assert told["statuses"] == {"person": {"good": 4, "lost": 1}}
+    found = stored(session)
+    np.testing.assert_array_equal(found[1].values, estimates[1].poses[0] + 0.01)
+    assert (found[1].status, found[1].remark) == ("good", "followed back from frame 2")
+    for k in (2, 3, 4):
+        np.testing.assert_array_equal(found[k].values, estimates[k].poses[0])
+    assert found[3].status == "lost"
+
+    def never(*_):
+        raise AssertionError("the first pass is done")
+
+    monkeypatch.setattr(headless, "track_chamfer", never)
+    told = json.loads(run(*words)[1])  # the same call goes on with the second pass alone
+    assert (told["frames"], told["stopped_at"], told["followed_back"]) == (0, None, 2)
+    assert [f.frame for f in offered[1]] == [0, 1, 2, 3, 4]
+    assert [f.statuses for f in offered[1]] == [("good",)] * 3 + [("lost",), ("good",)]
+    for k, f in enumerate(offered[1]):
+        np.testing.assert_array_equal(f.poses[0], found[k].values)
+    np.testing.assert_array_equal(stored(session)[3].values, estimates[3].poses[0] + 0.01)
+    monkeypatch.setattr(headless, "track_chamfer", tracked)
+    told = json.loads(run(*words)[1])  # once done it begins anew, all of it one entry
+    assert (told["frames"], told["resumed_at"]) == (5, None)
+    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+        assert [store.undo() for _ in range(3)] == ["track frames 0:5"] * 3
+        assert [row.frame for row in store.frames("person")] == [0]
+    offered.clear()
+    assert json.loads(run(*words, "--no-second-pass")[1])["followed_back"] == 0
+    assert json.loads(run(*words, "--paper")[1])["followed_back"] == 0
+    assert offered == []
 
 
 def test_going_on_is_as_if_never_stopped(run, session, monkeypatch):

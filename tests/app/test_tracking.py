@@ -2,6 +2,7 @@
 
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hands import FRONT, PAGE, drag, wait_for
 
 from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError, TrackerError
+from tracker.second_pass import Followed
 
 
 def at(controller, frame):
@@ -290,3 +292,63 @@ def test_a_run_survives_a_restart(placed, tracker, opened):
     )
     controller.undo()
     assert set(controller.timeline()) == {2}
+
+
+def followed_back(tracker, steps):
+    """Has the tracker's second pass find frame 7 better, in so many steps; what it is offered."""
+    offered = []
+
+    def back(found):
+        offered.append(found)
+        for i in range(steps):
+            better = ()
+            if i == steps - 1:
+                poses = tuple(p + STEP_M * (np.arange(len(p)) == 1) for p in found[4].poses)
+                better = (tracker.last[7]._replace(poses=poses, statuses=("good",), remarks=("followed back",)),)
+            yield Followed(7, 0, i + 1, steps, better)
+
+    tracker.back = back
+    return offered
+
+
+def test_the_second_pass_takes_the_place_of_what_was_lost(placed, tracker):
+    offered = followed_back(tracker, 3)
+    placed.track(backward=False, until=9)
+    tracker.let_go(7)
+    wait_for(lambda: placed.state.track.message)
+    (found,) = offered
+    assert [(f.frame, f.statuses) for f in found][3:5] == [(6, ("good",)), (7, ("lost",))]
+    assert placed.state.track.message == "done: 7 frames, 1 doubtful"
+    assert placed.state.frame == 9  # nobody is taken elsewhere
+    placed.seek(7)
+    shown = placed.state.people[0]
+    assert (shown.source, shown.status, shown.remark) == ("tracked", "good", "followed back")
+    np.testing.assert_array_equal(placed.state.poses[0], found[4].poses[0] + STEP_M * (np.arange(22) == 1))
+    placed.undo()
+    assert set(placed.timeline()) == {2}  # one entry with the first pass
+
+
+def test_a_frame_that_is_looked_at_shows_what_the_second_pass_found(placed, tracker):
+    seen = []
+    placed.subscribe(lambda state: seen.append(state.track))
+    followed_back(tracker, 2)
+    placed.track(backward=False, until=8)
+    tracker.let_go(5)
+    wait_for(at(placed, 7))
+    placed.follow(False)
+    assert (placed.state.frame, placed.state.people[0].status) == (7, "lost")
+    tracker.let_go(1)
+    wait_for(lambda: placed.state.track.message)
+    assert placed.state.frame == 7
+    assert placed.state.people[0].status == "good"
+    assert {(t.done, t.total) for t in seen if t.back} == {(1, 2), (2, 2)}
+
+
+def test_the_second_pass_can_be_switched_off(placed, tracker):
+    offered = followed_back(tracker, 1)
+    placed.set_settings(replace(placed.state.settings, second_pass=False))
+    placed.track(backward=False, until=9)
+    tracker.let_go(7)
+    wait_for(lambda: placed.state.track.message)
+    assert offered == []
+    assert placed.state.track.message == "done: 7 frames, 1 doubtful, 1 lost"

@@ -1,0 +1,177 @@
+"""What was lost is followed back: which frames, what is kept of them, and what stays as it is."""
+
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+from staging import SUIT, cameras_around, dressed, posed
+
+from tracker.body import Body
+from tracker.recover import LEAST_GAIN
+from tracker.second_pass import _MOVED_M, Followed, Tracked, cheapest_way, follow_back, stretches
+from tracker.track_settings import TrackSettings
+
+N = 9
+LOST = range(2, 5)
+"""Frames of the staged scene on which the first pass has lost an arm."""
+
+
+class Filmed:
+    """Stands for the observer of a recording: the evidence of each frame as given, and which frames were asked for."""
+
+    def __init__(self, views):
+        self.views, self.asked = views, []
+        self.matched_cameras = [v.camera for v in views[0]]
+
+    def prefetch(self, k):
+        pass
+
+    def evidence(self, k, regions, outlines=None, scenery=None):
+        self.asked.append(k)
+        return self.views[k]
+
+
+@pytest.fixture(scope="module")
+def scene(gavrila):
+    """A person who walks and swings an arm: true poses (N, n_values), their evidence, and poses of a first pass that
+    has left the arm hanging on the frames `LOST`."""
+    swing, step = gavrila.dof_names.index("left_shoulder.abduction"), np.zeros(gavrila.n_dofs)
+    step[:2], step[swing] = (0.02, -0.015), np.radians(6)
+    truth = [posed(gavrila, 1)]
+    for _ in range(N - 1):
+        truth.append(gavrila.clip(gavrila.retract(truth[-1], step)))
+    views = [dressed([Body(gavrila, v)], cameras_around(4), SUIT) for v in truth]
+    first = np.array(truth)
+    first[LOST, swing] -= np.radians(70)
+    return gavrila, np.array(truth), views, first
+
+
+def tracked(first, lost=LOST):
+    return [Tracked(k, (v,), ("lost" if k in lost else "good",)) for k, v in enumerate(first)]
+
+
+def off_m(model, values, truth):
+    return np.linalg.norm(model.points_world(values) - model.points_world(truth), axis=1).max()
+
+
+@pytest.mark.parametrize("backward", [False, True])
+def test_a_lost_arm_is_followed_back_from_where_it_is_trusted_again(scene, backward):
+    model, truth, views, first = scene
+    assert min(off_m(model, first[k], truth[k]) for k in LOST) > 0.25
+    found = tracked(first)[:: -1 if backward else 1]
+    steps = list(follow_back(Filmed(views), [model], found, TrackSettings()))
+    way = list(LOST)[:: 1 if backward else -1]
+    assert steps == [Followed(k, 0, i + 1, 3, steps[-1].better if i == 2 else ()) for i, k in enumerate(way)]
+    better = steps[-1].better
+    assert [e.frame for e in better] == way[::-1]  # in the order of tracking
+    for estimate in better:
+        assert off_m(model, estimate.poses[0], truth[estimate.frame]) < 0.03
+        assert estimate.statuses == ("good",)
+        assert estimate.remarks == (f"followed back from frame {1 if backward else 5}",)
+
+
+def test_where_nobody_is_lost_nothing_is_looked_at(scene):
+    model, _, views, first = scene
+    observer = Filmed(views)
+    doubtful = [f._replace(statuses=("doubtful",)) if f.frame in LOST else f for f in tracked(first, ())]
+    for found in (tracked(first, ()), doubtful, tracked(first, [])[:1], []):
+        assert list(follow_back(observer, [model], found, TrackSettings())) == []
+    assert list(follow_back(observer, [model], tracked(first), TrackSettings(), people=[])) == []
+    assert observer.asked == []
+
+
+def test_a_pose_that_was_right_stays_where_it_was_called_lost(scene):
+    model, truth, views, _ = scene
+    steps = list(follow_back(Filmed(views), [model], tracked(truth), TrackSettings()))
+    assert [s.frame for s in steps] == [4, 3, 2]
+    assert steps[-1].better == ()
+
+
+def test_keyframes_and_locked_degrees_of_freedom_stay(scene):
+    model, _, views, first = scene
+    fixed = {3: {0: first[3]}}
+    steps = list(follow_back(Filmed(views), [model], tracked(first), TrackSettings(), fixed))
+    assert [s.frame for s in steps] == [2, 4]  # 2 from the keyframe, 4 from the frame after it
+    assert 3 not in [e.frame for s in steps for e in s.better]
+    free = np.array([n != "right_elbow.extension" for n in model.dof_names])
+    first = first.copy()
+    first[:5, ~free] += 0.2
+    better = list(follow_back(Filmed(views), [model], tracked(first), TrackSettings(), free=[free]))[-1].better
+    assert len(better) == 3
+    for estimate in better:
+        np.testing.assert_array_equal(estimate.poses[0][~free], first[2, ~free])
+
+
+def test_the_others_stay_as_they_were_found(scene):
+    model, truth, _, first = scene
+    other = truth.copy()
+    other[:, 0] += 1.2
+    views = [
+        dressed([Body(model, a), Body(model, b)], cameras_around(4), SUIT) for a, b in zip(truth, other, strict=True)
+    ]
+    odd = other + 0.03  # not where the evidence is, yet it stays
+    found = [Tracked(k, (odd[k], first[k]), ("good", "lost" if k in LOST else "good")) for k in range(N)]
+    steps = list(follow_back(Filmed(views), [model, model], found, TrackSettings()))
+    assert {s.person for s in steps} == {1}
+    assert [e.frame for e in steps[-1].better] == list(LOST)
+    for estimate in steps[-1].better:
+        np.testing.assert_array_equal(estimate.poses[0], odd[estimate.frame])
+        assert off_m(model, estimate.poses[1], truth[estimate.frame]) < 0.05
+        assert estimate.remarks[0] == ""
+
+
+def test_what_an_end_of_the_run_leaves_open_is_followed_back_from_the_last_frame_that_is_not_lost(scene):
+    model, _, views, first = scene
+    found = [f._replace(statuses=("lost" if f.frame in LOST else "doubtful" if f.frame > 4 else "good",))
+             for f in tracked(first)]  # fmt: skip
+    steps = list(follow_back(Filmed(views), [model], found, TrackSettings()))
+    assert [s.frame for s in steps] == [7, 6, 5, 4, 3, 2]
+    assert {2, 3, 4} <= {e.frame for e in steps[-1].better}
+    hopeless = [f._replace(statuses=("lost" if f.frame > 1 else "good",)) for f in tracked(first)]
+    assert list(follow_back(Filmed(views), [model], hopeless, TrackSettings())) == []
+
+
+@pytest.mark.parametrize(
+    ("statuses", "expected"),
+    [
+        ("ggdggg", []),  # doubtful alone
+        ("gglggg", [(2, 3)]),
+        ("gdldgggg", [(1, 4)]),
+        ("glggdg", [(1, 5)]),  # two good frames in between are not trusted
+        ("glgggdg", [(1, 2)]),
+        ("lggglggg", [(0, 1), (4, 5)]),
+        ("ggl", [(2, 3)]),
+        ("glKlggg", [(1, 2), (3, 4)]),  # a keyframe is
+        ("glgKl", [(1, 2), (4, 5)]),
+    ],
+)
+def test_stretches(statuses, expected):
+    names = {"g": "good", "d": "doubtful", "l": "lost", "K": "good"}
+    found = stretches([names[s] for s in statuses], [s == "K" for s in statuses])
+    assert [(r.start, r.stop) for r in found] == expected
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("open_end", [False, True])
+def test_the_cheapest_way_is_that_of_all_ways_tried(gavrila, seed, open_end):
+    rng = np.random.default_rng(seed)
+    base = posed(gavrila, 1)
+    poses = [
+        [gavrila.clip(gavrila.retract(base, rng.normal(0, 0.4, gavrila.n_dofs))) for _ in range(2)] for _ in range(6)
+    ]
+    costs, ends = rng.normal(0, 6.0, (6, 2)), (base, None if open_end else base)
+
+    def cost(way):
+        path = [
+            gavrila.points_world(p)
+            for p in (base, *(poses[i][k] for i, k in enumerate(way)), *([base] * (not open_end)))
+        ]
+        moved = sum(np.sum((b - a) ** 2) for a, b in pairwise(path)) / (2 * _MOVED_M**2)
+        return moved + sum(costs[i][k] for i, k in enumerate(way))
+
+    best = min(product((0, 1), repeat=6), key=cost)
+    assert cost((0,) * 6) - cost(best) > LEAST_GAIN
+    assert tuple(cheapest_way(gavrila, poses, costs, ends)) == best
+    # What is hardly cheaper changes nothing.
+    little = np.array([[0.0, -LEAST_GAIN / 8]] * 6)
+    assert cheapest_way(gavrila, [[p[0], p[0]] for p in poses], little, ends) == [0] * 6
