@@ -43,7 +43,7 @@ HIDDEN_LINE = np.column_stack([np.arange(100, 300), np.full(200, 60), np.arange(
 """What the layer of hidden contours shows: a line of short pieces, px."""
 NO_TRACK = {
     "running": False, "first": None, "last": None, "at": None, "done": 0, "total": 0, "per_second": 0.0, "doubtful": 0,
-    "lost": 0, "message": "",
+    "lost": 0, "back": False, "message": "",
 }  # fmt: skip
 DISAGREEING = [44, 45]
 AMBIGUOUS = (71, 72)

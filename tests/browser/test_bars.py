@@ -170,3 +170,12 @@ async def test_work_that_waits_for_kernels_says_so(page, endpoint):
         endpoint.state |= {"compiling": compiling, "track": track | {"done": done}}
         await endpoint.broadcast(endpoint.state)
         await expect(figures).to_have_text(text)
+
+
+async def test_the_second_pass_is_told_from_the_first(page, endpoint):
+    track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "at": 30, "lost": 2}
+    for back, text in ((False, "Tracked 4 of 9"), (True, "Followed 4 of 9")):
+        endpoint.state["track"] = track | {"back": back, "done": 4, "total": 9}
+        await endpoint.broadcast(endpoint.state)
+        await expect(page.locator("#search-stage")).to_have_text(text, use_inner_text=True)
+    assert await page.locator("#search-stage").get_attribute("title") == "Following back who was lost"
