@@ -156,10 +156,15 @@ POSTURE_DEG = {
 """Limbs away from the trunk and bent, so that each view shows most of them. A hip that flexes has no elevation."""
 
 
-def posed(model, seed):
-    """A body with its limbs away from the trunk, a little otherwise for each seed; other models are just shaken."""
+def in_posture(model):
+    """A body in the posture, as far as it has such joints."""
     values = model.neutral()
     for name, degrees in POSTURE_DEG.items():
         if name in model.dof_names:
             values[model.dof_value[model.dof_names.index(name)]] = np.radians(degrees)
-    return shaken(model, values, np.random.default_rng(seed), 0.1, 0.05)
+    return values
+
+
+def posed(model, seed):
+    """A body in the posture, a little otherwise for each seed; models without such joints are just shaken."""
+    return shaken(model, in_posture(model), np.random.default_rng(seed), 0.1, 0.05)

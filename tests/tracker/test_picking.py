@@ -1,7 +1,7 @@
 import cv2
 import numpy as np
 import pytest
-from staging import POSTURE_DEG, camera_at
+from staging import camera_at, in_posture
 
 from tracker import rigid
 from tracker.body import Body
@@ -12,10 +12,7 @@ SIDE = camera_at("side", (3.0, 2.5, 1.0))
 
 @pytest.fixture(scope="module")
 def body(gavrila):
-    values = gavrila.neutral()
-    for name, angle in POSTURE_DEG.items():
-        values[gavrila.value_names.index(name)] = np.radians(angle)
-    return Body(gavrila, values)
+    return Body(gavrila, in_posture(gavrila))
 
 
 def test_outlines_hold_the_images_of_their_parts(body):

@@ -98,7 +98,7 @@ def _upright(model: BodyModel) -> Array:
     """Pose to start the first frame's limbs from: knees and elbows bent, so that they know which way to go."""
     values = model.neutral()
     for i, name in enumerate(model.value_names):
-        values[i] += 0.4 * name.endswith("_knee.extension") + 0.2 * name.endswith("_hip.elevation")
+        values[i] += 0.4 * name.endswith("_knee.extension") + 0.2 * name.endswith(("_hip.elevation", "_hip.flexion"))
         values[i] += 1.2 * name.endswith("_elbow.extension") + 0.4 * name.endswith("_shoulder.elevation")
     return values
 
