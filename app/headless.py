@@ -67,34 +67,21 @@ def track(at: Target, frames: Sequence[int], settings: TrackSettings, progress: 
             progress.say("kernels that are not compiled yet are compiled first, once: it may take a minute or two")
         stopped = False
         try:
-            observer = Observer(session.cameras, recording)
-            if left:
-                with progress.over(len(left), "tracking") as tick:
-                    for found in run.estimates(observer):
-                        run.take(found)
-                        tick()
-            run.save()
-            steps = run.ways_back(observer) if settings.second_pass else iter(())
-            if (first := next(steps, None)) is not None:
-                with progress.over(first.total, "following back") as tick:
-                    for step in chain([first], steps):
-                        run.take_back(step)
-                        tick()
-            run.finished = True
+            run.work(Observer(session.cameras, recording), progress)
         except KeyboardInterrupt:
             stopped = True
         finally:
             run.save()
             unfinished = {"task": task, "next": left[run.done] if run.done < len(left) else None}
             store.set_setting(_UNFINISHED, None if run.finished else unfinished)
-    statuses = run.statuses()
+    statuses, costs = run.statuses(), [c for c in run.costs.values() if np.isfinite(c)]
     return {
         "frames": run.done,
         "resumed_at": None if len(left) == len(frames) else left[0] if left else frames[-1],
         "stopped_at": None if not stopped else left[run.done] if run.done < len(left) else run.back_at,
         "followed_back": run.followed_back,
         "people": [session.people[i].name for i in at.people],
-        "mean_cost_px": float(np.mean(list(run.costs.values()))) if run.costs else None,
+        "mean_cost_px": float(np.mean(costs)) if costs else None,
         "statuses": {session.people[i].name: dict(statuses[i]) for i in at.people},
     }
 
@@ -125,34 +112,51 @@ class _Run:
         self.costs: dict[int, float] = {}
         """Of each frame, px."""
 
-    def estimates(self, observer: Observer) -> Iterator[PoseEstimate]:
+    def work(self, observer: Observer, progress: Reporter) -> None:
+        """Do both passes, telling how far each is."""
+        if self._left:
+            with progress.over(len(self._left), "tracking") as tick:
+                for found in self._estimates(observer):
+                    self._take(found)
+                    tick()
+        self.save()
+        steps = self._ways_back(observer) if self._settings.second_pass else iter(())
+        if (first := next(steps, None)) is not None:
+            with progress.over(first.total, "following back") as tick:
+                for step in chain([first], steps):
+                    self._take_back(step)
+                    tick()
+        self.finished = True
+
+    def _estimates(self, observer: Observer) -> Iterator[PoseEstimate]:
         """Track the frames one by one."""
         models = [p.model for p in self._at.session.people]
         return track_chamfer(
             observer, models, self._past, self._left, self._settings, self._fixed, self._at.people, self._free
         )
 
-    def ways_back(self, observer: Observer) -> Iterator[Followed]:
+    def _ways_back(self, observer: Observer) -> Iterator[Followed]:
         """Follow back whoever was lost, in this call or before it was interrupted."""
         models, found = [p.model for p in self._at.session.people], list(self._tracked.values())
         return follow_back(observer, models, found, self._settings, self._fixed, self._at.people, self._free)
 
-    def take(self, found: PoseEstimate) -> None:
+    def _take(self, found: PoseEstimate) -> None:
         """Keep what was found on a frame; on disk with the next save."""
         self._keep(found, self._at.people)
-        self._tracked[found.frame] = Tracked(found.frame, found.poses, found.statuses)
+        self._tracked[found.frame] = Tracked.of(found)
+        self.costs[found.frame] = found.cost_px
         self.done += 1
         if len(self._waiting) >= _SAVE_FRAMES:
             self.save()
 
-    def take_back(self, step: Followed) -> None:
+    def _take_back(self, step: Followed) -> None:
         """Keep what the second pass found better of one person, on disk at once: a whole stretch or nothing of it."""
         self.back_at = step.frame
         for found in step.better:
             self._keep(found, [step.person])
-            before = self._tracked[found.frame].statuses
-            statuses = tuple(found.statuses[i] if i == step.person else s for i, s in enumerate(before))
-            self._tracked[found.frame] = Tracked(found.frame, found.poses, statuses)
+            self._tracked[found.frame] = Tracked.of(found)
+            if found.frame in self.costs:  # it was tracked in this call
+                self.costs[found.frame] = found.cost_px
         self.followed_back += len(step.better)
         self.save()
 
@@ -164,8 +168,6 @@ class _Run:
     def _keep(self, found: PoseEstimate, people: Sequence[int]) -> None:
         names = [p.name for p in self._at.session.people]
         self._waiting += tracked_changes([found], names, people, self._revisions, self._fixed, self._settings)
-        if np.isfinite(found.cost_px) and found.frame in self._left:
-            self.costs[found.frame] = found.cost_px
 
     def save(self) -> None:
         """Write what waits; all of a run is one entry of the history."""
@@ -200,7 +202,10 @@ def _tracked_before(
             poses[i] = held[i] if i in held else poses[i] if record is None else record.values
         statuses = tuple(_status(None if i in held else records.get(i)) for i in range(len(poses)))
         gone = any(r is None and i not in held for i, r in records.items())
-        out = [] if gone else [*out, Tracked(frame, tuple(poses), statuses)]
+        if gone:
+            out.clear()
+        else:
+            out.append(Tracked(frame, tuple(poses), statuses))
     return out
 
 

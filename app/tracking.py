@@ -162,16 +162,15 @@ class Tracking:
         self._save(run)
         if step.better:
             self._write(run, step.better, (step.person,))
-        for found in step.better:
-            before = run.statuses[found.frame]
-            run.statuses[found.frame] = tuple(
-                found.statuses[i] if i == step.person else s for i, s in enumerate(before)
-            )
-        worst = Counter(confidence.worst([s[i] for i in run.people]) for s in run.statuses.values())
+        run.statuses |= {found.frame: found.statuses for found in step.better}
+        track = screen.state.track
+        if step.better:  # not at every step: there may be many frames
+            worst = Counter(confidence.worst([s[i] for i in run.people]) for s in run.statuses.values())
+            track = replace(track, doubtful=worst["doubtful"], lost=worst["lost"])
         steps = len(run.statuses) + step.done
         screen.set(track=replace(
-            screen.state.track, running=run.job.running, back=True, done=step.done, total=step.total,
-            per_second=steps / max(1e-6, seconds), doubtful=worst["doubtful"], lost=worst["lost"],
+            track, running=run.job.running, back=True, done=step.done, total=step.total,
+            per_second=steps / max(1e-6, seconds),
         ))  # fmt: skip
         if screen.state.frame in {found.frame for found in step.better}:
             screen.show(screen.state.frame, follow=screen.state.follow)
@@ -264,7 +263,7 @@ def _both_passes(
     """Track frame by frame, then follow back whoever was lost; arguments as of `track_chamfer`."""
     tracked = []
     for found in track_chamfer(observer, models, start, frames, settings, fixed, people, free):
-        tracked.append(Tracked(found.frame, found.poses, found.statuses))
+        tracked.append(Tracked.of(found))
         yield found
     if settings.second_pass:
         yield from follow_back(observer, models, tracked, settings, fixed, people, free)

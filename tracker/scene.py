@@ -370,9 +370,9 @@ class Scene:
             return [self._sharing.everything if everywhere else self._sharing.views] * len(people)
         for shares in reversed(self._shares):
             if self._stand(shares.poses, np.full(len(bodies), _SHARED_M)):
-                return shares.of_each(people, everywhere)
+                return [shares.own(p, everywhere) for p in people]
         self._shares.append(Shares(self._sharing, bodies))
-        return self._shares[-1].of_each(people, everywhere)
+        return [self._shares[-1].own(p, everywhere) for p in people]
 
     def _around(self, person: int) -> tuple[list[Body], int]:
         """Who is in the scene for a person, and their index there."""

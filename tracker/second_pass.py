@@ -45,6 +45,11 @@ class Tracked(NamedTuple):
     statuses: tuple[Status, ...]
     """How sure the tracker is of each person."""
 
+    @classmethod
+    def of(cls, estimate: PoseEstimate) -> "Tracked":
+        """What is needed of an estimate, which holds much more."""
+        return cls(estimate.frame, estimate.poses, estimate.statuses)
+
 
 class Followed(NamedTuple):
     """A step of the second pass: one frame of a stretch, followed back."""
@@ -56,7 +61,8 @@ class Followed(NamedTuple):
     total: int
     """Frames to follow back, of all people."""
     better: tuple[PoseEstimate, ...] = ()
-    """At the end of a stretch, in the order of tracking: what takes the place of what was found of this person."""
+    """At the end of a stretch, in the order of tracking: what takes the place of what was found. It differs in this
+    person alone; the others' poses and statuses are those that were found."""
 
 
 class _Stretch(NamedTuple):
@@ -127,7 +133,7 @@ def follow_back(
         better = _better(observer, models, known, stretch, back, settings)
         at = {f.frame: i for i, f in enumerate(known)}
         for estimate in better:
-            known[at[estimate.frame]] = Tracked(estimate.frame, estimate.poses, estimate.statuses)
+            known[at[estimate.frame]] = Tracked.of(estimate)
         yield Followed(back[0].frame, person, done, total, better)
 
 
@@ -179,7 +185,8 @@ def _better(
     ways = [[p[i].poses[person] for p in passes] for i in range(len(back))]
     way = cheapest_way(model, ways, costs, tuple(None if e is None else e.poses[person] for e in ends))
     remark = f"followed back from frame {found[end].frame}"
-    return tuple(_remarked(estimate, person, remark) for estimate, taken in zip(back, way, strict=True) if taken)
+    chosen = zip(passes[0], back, way, strict=True)
+    return tuple(_in_place_of(before, estimate, person, remark) for before, estimate, taken in chosen if taken)
 
 
 def cheapest_way(
@@ -219,9 +226,12 @@ def _moved(one: Array | None, others: Array) -> Array:
     return np.zeros(len(others)) if one is None else np.sum((others - one) ** 2, axis=(1, 2)) / (2 * _MOVED_M**2)
 
 
-def _remarked(estimate: PoseEstimate, person: int, remark: str) -> PoseEstimate:
-    remarks = [", ".join(filter(None, (r, remark))) if p == person else r for p, r in enumerate(estimate.remarks)]
-    return estimate._replace(remarks=tuple(remarks))
+def _in_place_of(before: Tracked, estimate: PoseEstimate, person: int, remark: str) -> PoseEstimate:
+    """An estimate with a remark on a person; of the others, who were held, as sure as before."""
+    statuses, remarks = list(before.statuses), list(estimate.remarks)
+    statuses[person] = estimate.statuses[person]
+    remarks[person] = ", ".join(filter(None, (remarks[person], remark)))
+    return estimate._replace(statuses=tuple(statuses), remarks=tuple(remarks))
 
 
 def _bodies(models: Sequence[BodyModel], poses: Sequence[Array]) -> list[Body]:

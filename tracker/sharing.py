@@ -68,17 +68,13 @@ class Shares:
                 refused too; else views in which nobody else is near stay as they are, because nothing there is in
                 reach.
         """
-        return self.of_each([person], everywhere)[0]
-
-    def of_each(self, people: Sequence[int], everywhere: bool = False) -> list[tuple[ViewEvidence, ...]]:
-        """The same for each of several people; see `own`."""
         if len(self._bodies) == 1:
-            return [self._sharing.everything if everywhere else self._sharing.views] * len(people)
-        new = [p for p in people if (p, everywhere) not in self._own]
+            return self._sharing.everything if everywhere else self._sharing.views
         # Not in threads: a view takes a dozen kernels of some hundredths of a millisecond, and to get the interpreter's
         # lock back after each takes as long.
-        self._own.update({(p, everywhere): tuple(v.own(p, everywhere) for v in self._views) for p in new})
-        return [self._own[p, everywhere] for p in people]
+        if (person, everywhere) not in self._own:
+            self._own[person, everywhere] = tuple(v.own(person, everywhere) for v in self._views)
+        return self._own[person, everywhere]
 
     @cached_property
     def _views(self) -> list["_View"]:

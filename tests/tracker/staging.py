@@ -168,3 +168,19 @@ def in_posture(model):
 def posed(model, seed):
     """A body in the posture, a little otherwise for each seed; models without such joints are just shaken."""
     return shaken(model, in_posture(model), np.random.default_rng(seed), 0.1, 0.05)
+
+
+class Shown:
+    """Stands for the observer of a recording: the evidence of each frame as given, and which frames were asked for."""
+
+    def __init__(self, views):
+        self.views, self.asked = views, []
+        self.matched_cameras = [v.camera for v in views[0]]
+
+    def prefetch(self, k):
+        pass
+
+    def evidence(self, k, regions, outlines=None, scenery=None):
+        assert len(regions) == len(self.matched_cameras)
+        self.asked.append(k)
+        return self.views[k]

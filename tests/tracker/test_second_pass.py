@@ -4,7 +4,7 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
-from staging import SUIT, cameras_around, dressed, posed
+from staging import SUIT, Shown, cameras_around, dressed, posed
 
 from tracker.body import Body
 from tracker.recover import LEAST_GAIN
@@ -14,21 +14,6 @@ from tracker.track_settings import TrackSettings
 N = 9
 LOST = range(2, 5)
 """Frames of the staged scene on which the first pass has lost an arm."""
-
-
-class Filmed:
-    """Stands for the observer of a recording: the evidence of each frame as given, and which frames were asked for."""
-
-    def __init__(self, views):
-        self.views, self.asked = views, []
-        self.matched_cameras = [v.camera for v in views[0]]
-
-    def prefetch(self, k):
-        pass
-
-    def evidence(self, k, regions, outlines=None, scenery=None):
-        self.asked.append(k)
-        return self.views[k]
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +44,7 @@ def test_a_lost_arm_is_followed_back_from_where_it_is_trusted_again(scene, backw
     model, truth, views, first = scene
     assert min(off_m(model, first[k], truth[k]) for k in LOST) > 0.25
     found = tracked(first)[:: -1 if backward else 1]
-    steps = list(follow_back(Filmed(views), [model], found, TrackSettings()))
+    steps = list(follow_back(Shown(views), [model], found, TrackSettings()))
     way = list(LOST)[:: 1 if backward else -1]
     assert steps == [Followed(k, 0, i + 1, 3, steps[-1].better if i == 2 else ()) for i, k in enumerate(way)]
     better = steps[-1].better
@@ -72,7 +57,7 @@ def test_a_lost_arm_is_followed_back_from_where_it_is_trusted_again(scene, backw
 
 def test_where_nobody_is_lost_nothing_is_looked_at(scene):
     model, _, views, first = scene
-    observer = Filmed(views)
+    observer = Shown(views)
     doubtful = [f._replace(statuses=("doubtful",)) if f.frame in LOST else f for f in tracked(first, ())]
     for found in (tracked(first, ()), doubtful, tracked(first, [])[:1], []):
         assert list(follow_back(observer, [model], found, TrackSettings())) == []
@@ -82,7 +67,7 @@ def test_where_nobody_is_lost_nothing_is_looked_at(scene):
 
 def test_a_pose_that_was_right_stays_where_it_was_called_lost(scene):
     model, truth, views, _ = scene
-    steps = list(follow_back(Filmed(views), [model], tracked(truth), TrackSettings()))
+    steps = list(follow_back(Shown(views), [model], tracked(truth), TrackSettings()))
     assert [s.frame for s in steps] == [4, 3, 2]
     assert steps[-1].better == ()
 
@@ -90,13 +75,13 @@ def test_a_pose_that_was_right_stays_where_it_was_called_lost(scene):
 def test_keyframes_and_locked_degrees_of_freedom_stay(scene):
     model, _, views, first = scene
     fixed = {3: {0: first[3]}}
-    steps = list(follow_back(Filmed(views), [model], tracked(first), TrackSettings(), fixed))
+    steps = list(follow_back(Shown(views), [model], tracked(first), TrackSettings(), fixed))
     assert [s.frame for s in steps] == [2, 4]  # 2 from the keyframe, 4 from the frame after it
     assert 3 not in [e.frame for s in steps for e in s.better]
     free = np.array([n != "right_elbow.extension" for n in model.dof_names])
     first = first.copy()
     first[:5, ~free] += 0.2
-    better = list(follow_back(Filmed(views), [model], tracked(first), TrackSettings(), free=[free]))[-1].better
+    better = list(follow_back(Shown(views), [model], tracked(first), TrackSettings(), free=[free]))[-1].better
     assert len(better) == 3
     for estimate in better:
         np.testing.assert_array_equal(estimate.poses[0][~free], first[2, ~free])
@@ -110,25 +95,25 @@ def test_the_others_stay_as_they_were_found(scene):
         dressed([Body(model, a), Body(model, b)], cameras_around(4), SUIT) for a, b in zip(truth, other, strict=True)
     ]
     odd = other + 0.03  # not where the evidence is, yet it stays
-    found = [Tracked(k, (odd[k], first[k]), ("good", "lost" if k in LOST else "good")) for k in range(N)]
-    steps = list(follow_back(Filmed(views), [model, model], found, TrackSettings()))
+    found = [Tracked(k, (odd[k], first[k]), ("doubtful", "lost" if k in LOST else "good")) for k in range(N)]
+    steps = list(follow_back(Shown(views), [model, model], found, TrackSettings()))
     assert {s.person for s in steps} == {1}
     assert [e.frame for e in steps[-1].better] == list(LOST)
     for estimate in steps[-1].better:
         np.testing.assert_array_equal(estimate.poses[0], odd[estimate.frame])
         assert off_m(model, estimate.poses[1], truth[estimate.frame]) < 0.05
-        assert estimate.remarks[0] == ""
+        assert (estimate.remarks[0], estimate.statuses[0]) == ("", "doubtful")
 
 
 def test_what_an_end_of_the_run_leaves_open_is_followed_back_from_the_last_frame_that_is_not_lost(scene):
     model, _, views, first = scene
     found = [f._replace(statuses=("lost" if f.frame in LOST else "doubtful" if f.frame > 4 else "good",))
              for f in tracked(first)]  # fmt: skip
-    steps = list(follow_back(Filmed(views), [model], found, TrackSettings()))
+    steps = list(follow_back(Shown(views), [model], found, TrackSettings()))
     assert [s.frame for s in steps] == [7, 6, 5, 4, 3, 2]
     assert {2, 3, 4} <= {e.frame for e in steps[-1].better}
     hopeless = [f._replace(statuses=("lost" if f.frame > 1 else "good",)) for f in tracked(first)]
-    assert list(follow_back(Filmed(views), [model], hopeless, TrackSettings())) == []
+    assert list(follow_back(Shown(views), [model], hopeless, TrackSettings())) == []
 
 
 @pytest.mark.parametrize(

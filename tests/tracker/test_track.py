@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from staging import SUIT, at, cameras_around, dressed, filmed, own_evidence, posed, shaken, solid
+from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_evidence, posed, shaken, solid
 
 from tracker.assemble import assemble
 from tracker.body import Body
@@ -23,22 +23,6 @@ COARSE = TrackSettings(
 )
 STEP = 0.05
 """What a ball moves from frame to frame: a step of the lattice, so that tracking it is exact, metres."""
-
-
-class Shown:
-    """Stands for the observer of a recording: the evidence of each frame as given, and which frames were asked for."""
-
-    def __init__(self, views):
-        self.views, self.asked = views, []
-        self.matched_cameras = [v.camera for v in views[0]]
-
-    def prefetch(self, k):
-        pass
-
-    def evidence(self, k, regions, outlines, scenery):
-        assert len(regions) == len(self.matched_cameras)
-        self.asked.append(k)
-        return self.views[k]
 
 
 @pytest.fixture(scope="module")
