@@ -26,6 +26,8 @@ AT_LIMIT = 1e-9
 """How near to a limit is at it, rad or metres."""
 _UNKNOWN = 1.0
 """Variance of a degree of freedom that nothing is known of, rad^2 or m^2."""
+_PLACE_M = 0.02
+"""How well joints go with the places they are known at (one standard deviation): a body is of other sizes, metres."""
 
 
 class Normal(NamedTuple):
@@ -220,7 +222,7 @@ def fit_to_points(model: BodyModel, targets_world: dict[str, Array], near: Array
         )
     indices = np.array([model.point_names.index(n) for n in known])
     targets = np.stack(list(known.values()))
-    block = PointTargets(indices, targets, np.ones(len(indices)))
+    block = PointTargets(indices, targets, np.full(len(indices), 1 / _PLACE_M))
     if near is not None:
         starts = [near]
     else:
@@ -232,11 +234,13 @@ def fit_to_points(model: BodyModel, targets_world: dict[str, Array], near: Array
         for tilt, turn in itertools.product(range(4), range(8)):
             step[turns[0]], step[turns[-1]] = tilt * np.pi / 2, turn * np.pi / 4
             starts.append(model.retract(base, step))
+    # Where a body of other sizes could reach the places better by a bend that people do not make, it is not bent so.
+    usual = StayNear(model.neutral(), 1 / model.spreads)
     # A weak pull to the start decides what the points leave open, such as the twist of a straight arm.
-    rest = np.full(model.n_dofs, 1e-3)
+    rest = np.full(model.n_dofs, 1e-3 / _PLACE_M)
 
     def fitted(start: Array) -> Fit:
-        return solve(model, start, [block, StayNear(start if near is None else near, rest)], max_iterations=100)
+        return solve(model, start, [block, usual, StayNear(start if near is None else near, rest)], max_iterations=100)
 
     best = min(map(fitted, starts), key=lambda f: f.cost)
     # Descent cannot lead a limb that is pressed against a limit around to where it belongs: begin again from there.
