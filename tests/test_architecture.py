@@ -59,7 +59,7 @@ ORDER = [
     ["tracker.locks", "tracker.recording", "tracker.references"],
     ["tracker.assemble", "tracker.evidence", "tracker.simulate"],
     ["tracker.kept"],
-    ["tracker.limb_look", "tracker.matching"],
+    ["tracker.limb_look", "tracker.matching", "tracker.points"],
     ["tracker.chamfer", "tracker.predict", "tracker.appearance", "tracker.refine", "tracker.apart"],
     ["tracker.descent", "tracker.sharing", "tracker.surroundings"],
     ["tracker.search", "tracker.confidence"],

@@ -34,8 +34,8 @@ class Scene(NamedTuple):
     distances: FloatArray
     """The distance images, one after the other, row by row."""
     points: FloatArray
-    """u, v of the points, their normals' u, v, their weights, and 0 for edges, 1 for the silhouette, (6, N); one view
-    after the other, each as `nearest.Sorted`; those it is filled up with have no weight."""
+    """The columns of `points_to_match`, (N_COLUMNS, N); one view after the other, each as `nearest.Sorted`; those that
+    it is filled up with stand for nothing."""
     firsts: NDArray[np.int64]
     """Index of the first point of each view, and the number of all, (V + 1,)."""
     rows: NDArray[np.int64]
@@ -267,7 +267,11 @@ def _image_to_model(
     s2, limit, cost = np.float32((scale * theta) ** 2), np.float32(theta * theta), 0.0
     start, stop = scene.firsts[view], scene.firsts[view + 1]
     us, vs, q, of = scene.points[0][start:stop], scene.points[1][start:stop], scratch.segments, scratch.of_segment
-    weights, of_silhouette = scene.points[4][start:stop], scene.points[5][start:stop]
+    weights, counts, of_silhouette = (
+        scene.points[4][start:stop],
+        scene.points[5][start:stop],
+        scene.points[6][start:stop],
+    )
     best, nearest, pulls = scratch.best, scratch.nearest, scratch.pulls
     _find_nearest(view, n_segments, scene, turn, kept, scratch)
     n, pull, explained = np.uint64(stop - start), scratch.pull, 0.0
@@ -286,7 +290,7 @@ def _image_to_model(
         k = np.uint64(nearest[j])
         part = of[2, k]
         if not derive:
-            sums.parts[view, part, 2] += 1
+            sums.parts[view, part, 2] += counts[j]
             continue
         if not kept.moves[part]:
             continue

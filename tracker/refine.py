@@ -20,7 +20,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from tracker import contours
 from tracker.body import Body, BodyModel, parts_of
@@ -30,7 +29,8 @@ from tracker.kept import Kept, kept_for
 from tracker.kinematics import IntArray, Kinematics, Tree, forward_kinematics
 from tracker.matching import SUM_UP, Scene, Sums, Work, gather, scratch_for
 from tracker.nearest import sort_points, stack_rows
-from tracker.rigid import Array, FloatArray
+from tracker.points import points_to_match
+from tracker.rigid import Array
 from tracker.twists import to_dofs
 
 _CAPTURE = 2.0
@@ -105,7 +105,7 @@ class ContourMatch:
         self._own = parts_of([b.model for b in bodies], person)
         thetas = [v.outlier_px(theta_px) for v in views]
         points = [
-            _within(v, bodies, np.inf if everywhere else _CAPTURE * theta, settings)
+            points_to_match(v, bodies, np.inf if everywhere else _CAPTURE * theta, settings.edges, settings.silhouette)
             for v, theta in zip(views, thetas, strict=True)
         ]
         sorted_points = [sort_points(p, v.camera.size) for p, v in zip(points, views, strict=True)]
@@ -211,47 +211,3 @@ def _score(candidates: Array, tree: Tree, n_dofs: int, work: Work, out: Array) -
     for c in range(candidates.shape[0]):
         forward_kinematics(candidates[c], tree, work.Ts[work.first : work.last], axes, origins)
         out[c] = gather(work, SUM_UP)
-
-
-def _within(view: ViewEvidence, bodies: Sequence[Body], reach_px: float, settings: MatchSettings) -> FloatArray:
-    """Points of edges, then of the silhouette, within reach of the visible contours, (N, 6).
-
-    Columns: u, v, normal's u, v, weight, and 0 for edges, 1 for the silhouette.
-    """
-    edges, outline = len(view.points_px), view.silhouette
-    weight = 0.0 if outline is None else settings.silhouette * outline.trust
-    points = np.empty((edges + (len(outline.points_px) if outline is not None and weight > 0 else 0), 6), np.float32)
-    points[:edges, :2], points[:edges, 2:4], points[:edges, 4:] = view.points_px, view.normals, (settings.edges, 0.0)
-    if outline is not None and weight > 0:
-        points[edges:, :2], points[edges:, 2:4], points[edges:, 4:] = outline.points_px, outline.normals, (weight, 1.0)
-    if np.isinf(reach_px):
-        return points
-    contour = contours.trace(bodies, view.camera)
-    # A coarse raster of the contours' surroundings is enough: this only spares work.
-    near = np.zeros((view.camera.height // 8 + 1, view.camera.width // 8 + 1), np.bool_)
-    _mark(contour.pieces_px, contour.hidden, int(np.ceil(reach_px / 8)), near)
-    return points[: _pack(points, near)]
-
-
-@njit(nogil=True, cache=True)
-def _mark(pieces: FloatArray, hidden: NDArray[np.bool_], reach: int, near: NDArray[np.bool_]) -> None:
-    """Mark the cells of 8 px around the middles of visible pieces, in steps of one for all cells within reach."""
-    rows, columns = near.shape
-    for i in range(pieces.shape[0]):
-        c = int(0.5 * (pieces[i, 0] + pieces[i, 2])) // 8
-        r = int(0.5 * (pieces[i, 1] + pieces[i, 3])) // 8
-        if hidden[i] or c < -reach or r < -reach or c >= columns + reach or r >= rows + reach:
-            continue
-        near[max(0, r - reach) : max(0, r + reach + 1), max(0, c - reach) : max(0, c + reach + 1)] = True
-
-
-@njit(nogil=True, cache=True)
-def _pack(points: FloatArray, near: NDArray[np.bool_]) -> int:
-    """Move the points, (N, 6), that lie in marked cells of 8 px to the front; their number."""
-    n = 0
-    for i in range(points.shape[0]):
-        if near[int(points[i, 1]) // 8, int(points[i, 0]) // 8]:
-            for k in range(6):
-                points[n, k] = points[i, k]
-            n += 1
-    return n

@@ -1,0 +1,121 @@
+"""The points of a view that contours are matched with: those of its edges and of its silhouette, each line once.
+
+Where a silhouette ends there mostly is an edge as well. One point then speaks for both: it lies between them and weighs
+as much as they do together, which pulls at a pose as they both do.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tracker import contours
+from tracker.body import Body
+from tracker.evidence import SCENE_SPACING_PX, ViewEvidence
+from tracker.kernels import BORROW
+from tracker.kinematics import IntArray
+from tracker.rigid import FloatArray
+
+N_COLUMNS = 7
+"""u, v, the normal's u and v, the weight, and how many points it stands for: in all, and of the silhouette."""
+_AREA_PX = 8
+"""Size of the areas that are near a contour or not: this only spares work, so that coarse ones are enough."""
+_SAME_PX, _SAME_COS = 2.0, 0.9
+"""A silhouette's point is on an edge no farther from it than that, if both run the same way."""
+
+
+def points_to_match(
+    view: ViewEvidence, bodies: Sequence[Body], reach_px: float, edges: float, silhouette: float
+) -> FloatArray:
+    """Points of a view within reach of the visible contours, (N, N_COLUMNS).
+
+    Args:
+        view: what the view shows.
+        bodies: everybody in the scene.
+        reach_px: how far from their contours points are kept, matched px; all may be.
+        edges: weight of a point of an edge.
+        silhouette: weight of a point of the silhouette, where it is fully trusted.
+    """
+    outline, n_edges = view.silhouette, len(view.points_px)
+    weight = 0.0 if outline is None else silhouette * outline.trust
+    n_outline = len(outline.points_px) if outline is not None and weight > 0 else 0
+    points = np.empty((n_edges + n_outline, N_COLUMNS), np.float32)
+    points[:n_edges, :2], points[:n_edges, 2:4], points[:n_edges, 4:] = view.points_px, view.normals, (edges, 1.0, 0.0)
+    n = n_edges
+    if outline is not None and n_outline:
+        own = points[n_edges:]
+        own[:, :2], own[:, 2:4], own[:, 4:] = outline.points_px, outline.normals, (weight, 1.0, 1.0)
+        cells = (view.camera.height // SCENE_SPACING_PX + 1, view.camera.width // SCENE_SPACING_PX + 1)
+        n = _merge(points, n_edges, np.full(cells, -1, np.int64))
+    if np.isinf(reach_px):
+        return points[:n]
+    contour = contours.trace(bodies, view.camera)
+    near = np.zeros((view.camera.height // _AREA_PX + 1, view.camera.width // _AREA_PX + 1), np.bool_)
+    _mark(contour.pieces_px, contour.hidden, int(np.ceil(reach_px / _AREA_PX)), near)
+    return points[: _pack(points[:n], near)]
+
+
+@njit(**BORROW)
+def _merge(points: FloatArray, n_edges: int, cells: IntArray) -> int:
+    """Add the points of the silhouette, which come after those of the edges, to the edges that they lie on.
+
+    Args:
+        points: (N, N_COLUMNS).
+        n_edges: how many of them are of edges.
+        cells: room, -1 in each cell of the spacing of the points.
+
+    Returns:
+        How many are left; they stand at the front.
+    """
+    rows, columns = cells.shape
+    for i in range(n_edges):
+        cells[int(points[i, 1]) // SCENE_SPACING_PX, int(points[i, 0]) // SCENE_SPACING_PX] = i
+    n = n_edges
+    for i in range(n_edges, points.shape[0]):
+        u, v, nu, nv = points[i, 0], points[i, 1], points[i, 2], points[i, 3]
+        row, column, nearest, best = int(v) // SCENE_SPACING_PX, int(u) // SCENE_SPACING_PX, -1, np.inf
+        for r in range(max(0, row - 1), min(rows, row + 2)):
+            for c in range(max(0, column - 1), min(columns, column + 2)):
+                k = cells[r, c]
+                if k < 0 or abs(points[k, 2] * nu + points[k, 3] * nv) < _SAME_COS:
+                    continue
+                du, dv = u - points[k, 0], v - points[k, 1]
+                squared = du * du + dv * dv
+                if squared < best and abs(du * nu + dv * nv) <= _SAME_PX:
+                    nearest, best = k, squared
+        if nearest >= 0:
+            for k in range(4, N_COLUMNS):
+                points[nearest, k] += points[i, k]
+            share = points[i, 4] / points[nearest, 4]
+            for k in range(2):
+                points[nearest, k] += share * (points[i, k] - points[nearest, k])
+        else:
+            for k in range(N_COLUMNS):
+                points[n, k] = points[i, k]
+            n += 1
+    return n
+
+
+@njit(nogil=True, cache=True)
+def _mark(pieces: FloatArray, hidden: NDArray[np.bool_], reach: int, near: NDArray[np.bool_]) -> None:
+    """Mark the areas around the middles of visible pieces, in steps of one for all areas within reach."""
+    rows, columns = near.shape
+    for i in range(pieces.shape[0]):
+        c = int(0.5 * (pieces[i, 0] + pieces[i, 2])) // _AREA_PX
+        r = int(0.5 * (pieces[i, 1] + pieces[i, 3])) // _AREA_PX
+        if hidden[i] or c < -reach or r < -reach or c >= columns + reach or r >= rows + reach:
+            continue
+        near[max(0, r - reach) : max(0, r + reach + 1), max(0, c - reach) : max(0, c + reach + 1)] = True
+
+
+@njit(nogil=True, cache=True)
+def _pack(points: FloatArray, near: NDArray[np.bool_]) -> int:
+    """Move the points that lie in marked areas to the front; their number."""
+    n = 0
+    for i in range(points.shape[0]):
+        if near[int(points[i, 1]) // _AREA_PX, int(points[i, 0]) // _AREA_PX]:
+            for k in range(N_COLUMNS):
+                points[n, k] = points[i, k]
+            n += 1
+    return n
