@@ -163,20 +163,19 @@ def _apart(frame: BenchFrame, start: Array, fit: Fit) -> str:
 
 
 def iterations(cones: BenchFrame, six: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
-    """One iteration of the symmetric Gauss-Newton, and what a numeric Jacobian takes for one."""
+    """One iteration of the symmetric Gauss-Newton: as the tracker runs it, step by step, and by a numeric Jacobian."""
     for name, of, must, aim in (("4", cones, 12, 18), ("6", six, 8, 12)):
         start = of.near_prediction()
         match = ContourMatch(of.views, [Body(of.model, start)])
         steps = np.random.default_rng(3).normal(scale=0.005, size=(50, of.model.n_dofs))
         poses = [of.model.retract(start, step) for step in steps]
-
-        def all_steps(of: BenchFrame = of, match: ContourMatch = match, poses: Sequence[Array] = poses) -> None:
-            for values in poses:
-                normal = match.normal(of.model, values, of.model.kinematics(values))
-                damped_step(normal.hessian, normal.gradient, 1e-3 * np.diag(normal.hessian) + 1e-9)
-
-        timed = yardstick.beside(all_steps, 30, len(poses))
+        # What a descent takes besides its iterations drops out of the difference between long ones and short ones.
+        few, many = (partial(_descended, of.model, match, poses, n) for n in (2, 6))
+        n, short, long = many() - few(), yardstick.beside(few, 30), yardstick.beside(many, 30)
+        timed = Timed((long.work_us - short.work_us) / n, long.yardstick_us)
         yield Row(f"iteration_{name}_views", f"Gauss-Newton iteration, cones, {name} views", *timed, 1 / must, 1 / aim)
+        timed = yardstick.beside(partial(_stepped, of.model, match, poses), 30, len(poses))
+        yield Row(f"iteration_{name}_views_readable", "the same as `fit.solve` takes it", *timed)
     start, cost = cones.near_prediction(), cones.cost(cones.near_prediction())
 
     def residuals(values: Array) -> Array:
@@ -184,6 +183,18 @@ def iterations(cones: BenchFrame, six: BenchFrame, yardstick: Yardstick) -> Iter
 
     timed = yardstick.beside(lambda: least_squares(residuals, start, method="trf", max_nfev=2), 5, 2)
     yield Row("iteration_scipy", "the same by scipy's least_squares with numeric Jacobian, edges to contour", *timed)
+
+
+def _descended(model: BodyModel, match: ContourMatch, poses: Sequence[Array], most: int) -> int:
+    """Descend from some poses, (n_values,) each, for so many iterations at most; how many there were."""
+    return sum(solve(model, pose, [match], max_iterations=most, tolerance=0.0).iterations for pose in poses)
+
+
+def _stepped(model: BodyModel, match: ContourMatch, poses: Sequence[Array]) -> None:
+    """Linearize at some poses, (n_values,) each, and find the step from there."""
+    for values in poses:
+        normal = match.normal(model, values, model.kinematics(values))
+        damped_step(normal.hessian, normal.gradient, 1e-3 * np.diag(normal.hessian) + 1e-9)
 
 
 def _edge_distances(cost: ChamferCost, frame: BenchFrame, values: Array) -> list[Array]:

@@ -29,8 +29,8 @@ MAX_PIECES = 6000
 """Room for the pieces of one view; a 22-DOF body that fills a 640x480 image has some 600."""
 _NEAREST_M = 0.05
 """What comes nearer to the camera's plane is not drawn, metres."""
-_SAG_PX = 0.11
-"""How far the middle of a chord around a part may lie inside the arc, px."""
+_SAG_PX = 0.2
+"""How far the middle of a chord around a part may lie inside the arc, px; the grid of other parts leaves as much."""
 _THIN2 = np.float32(0.1**2)
 """A point of an outline less than this off the line between its neighbours is left out, px squared."""
 
@@ -296,8 +296,14 @@ def hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
 
 
 @njit(inline="always", **FAST)
+def focal_px(P: Array) -> float:
+    """Focal length of a projection matrix, (3, 4), px."""
+    return np.sqrt(P[0, 0] ** 2 + P[0, 1] ** 2 + P[0, 2] ** 2)
+
+
+@njit(inline="always", **FAST)
 def trace_part(
-    part: int, P: Array, surfaces: Surfaces, piece_px: float, n: int, edge: int, out: Pieces
+    part: int, P: Array, focal: float, surfaces: Surfaces, piece_px: float, n: int, edge: int, out: Pieces
 ) -> tuple[int, int]:  # fmt: skip
     """Append the pieces of a part that is placed; returns the new counts of pieces and of edges."""
     unit_eye, to_world, to_unit, half_axes = out.unit_eye, out.Ts_world_unit, out.Ts_unit_world, surfaces.half_axes
@@ -310,9 +316,8 @@ def trace_part(
     if depth >= surfaces.radii[part] + _NEAREST_M:
         n_profile = surfaces.profile_sizes[part]
         if n_profile > 0:
-            focal = np.sqrt(P[0, 0] ** 2 + P[0, 1] ** 2 + P[0, 2] ** 2)
-            radius_px = max(half_axes[part, 0], half_axes[part, 1]) * focal / depth
-            turn = np.float32(min(max(np.sqrt(8 * _SAG_PX / radius_px), 0.05), 0.6))
+            radius = max(half_axes[part, 0], half_axes[part, 1])
+            turn = np.float32(min(max(np.sqrt(8 * _SAG_PX * depth / (radius * focal)), 0.05), 0.6))
             n_points = revolved_outline(part, n_profile, surfaces.profiles, unit_eye, turn, out.half, outline)
         else:
             n_points = grid_outline(part, unit_eye, surfaces, out.f, outline)
@@ -326,12 +331,12 @@ def trace_part(
 @njit(**FAST)
 def trace_pieces(P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: float, out: Pieces) -> int:
     """Fill the pieces of one view; returns their number. See `trace_view`."""
-    n_parts = Ts.shape[0]
+    n_parts, focal = Ts.shape[0], focal_px(P)
     n = edge = 0
     place(eye, Ts, surfaces, out)
     for part in range(n_parts):
         out.firsts[part], out.stands[part] = n, False
-        n, edge = trace_part(part, P, surfaces, piece_px, n, edge, out)
+        n, edge = trace_part(part, P, focal, surfaces, piece_px, n, edge, out)
     out.firsts[n_parts] = n
     for i in range(n):
         out.hidden[i] = False

@@ -31,7 +31,7 @@ from tracker.sights import BINS, count_colors
 from tracker.silhouette_contour import Outline, trace_outline, trust_outline
 from tracker.silhouettes import Changes, Image, Mask
 
-SCENE_SPACING_PX = 3
+SCENE_SPACING_PX = 4
 """Scene edges are thinned to one point per cell of this many pixels a side."""
 
 ACCEPTED_SHARE = 0.5

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.contours import Pieces, hide_all, place, trace_part
+from tracker.contours import Pieces, focal_px, hide_all, place, trace_part
 from tracker.kernels import BORROW, FAST
 from tracker.kinematics import IntArray
 from tracker.outlines import MAX_POINTS
@@ -86,13 +86,13 @@ def trace_standing(
     P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: float, kept: Kept, out: Pieces
 ) -> None:
     """Fill the pieces of one view with those of the parts that stand, as if the others were not there."""
-    n_parts = Ts.shape[0]
+    n_parts, focal = Ts.shape[0], focal_px(P)
     n = edge = 0
     place(eye, Ts, surfaces, out)
     for part in range(n_parts):
         out.firsts[part], out.stands[part] = n, False
         if not kept.moves[part]:
-            n, edge = trace_part(part, P, surfaces, piece_px, n, edge, out)
+            n, edge = trace_part(part, P, focal, surfaces, piece_px, n, edge, out)
     out.firsts[n_parts] = n
     for i in range(n):
         out.hidden[i] = False
@@ -125,12 +125,12 @@ def trace_moving(
     """Fill the pieces of one view as `contours.trace_pieces` does, those of what stands as they were kept."""
     n_parts, room = Ts.shape[0], out.edges.shape[0]
     # The edges of what stands keep their numbers; there are fewer of them.
-    n, edge = 0, n_parts * MAX_POINTS
+    n, edge, focal = 0, n_parts * MAX_POINTS, focal_px(P)
     place(eye, Ts, surfaces, out)
     for part in range(n_parts):
         out.firsts[part], out.stands[part] = n, not kept.moves[part]
         if kept.moves[part]:
-            n, edge = trace_part(part, P, surfaces, piece_px, n, edge, out)
+            n, edge = trace_part(part, P, focal, surfaces, piece_px, n, edge, out)
             out.hidden[out.firsts[part] : n] = False
             continue
         first = np.uint64(kept.firsts[view, part])

@@ -88,10 +88,12 @@ def _strip(
         half[0, 0], half[1, 0], half[2, 0] = r * first, r * s0, z0 + t * (z1 - z0)
         n = 1
     if (last - first) * (last - first) + (s1 - s0) * (s1 - s0) > turn * turn:
-        angle = np.arccos(min(max(first * last + s0 * s1, -_ONE), _ONE))
+        angle = _arccos(first * last + s0 * s1)
         count = min(int(angle / turn) + 1, MAX_POINTS // 2 - n)
         step = angle / np.float32(count) if last < first else -angle / np.float32(count)
-        cos_step, sin_step = np.cos(step), np.sin(step)
+        squared = step * step
+        cos_step = _ONE - squared * (np.float32(1 / 2) - squared * np.float32(1 / 24))
+        sin_step = step * (_ONE - squared * (np.float32(1 / 6) - squared * np.float32(1 / 120)))
         c, s, is_rim, t = first, s0, r0 == r1 and z0 == z1, _ZERO
         for _ in range(1, count):
             c, s = c * cos_step - s * sin_step, s * cos_step + c * sin_step
@@ -106,6 +108,16 @@ def _strip(
         half[0, n], half[1, n], half[2, n] = r * last, r * s1, z0 + t * (z1 - z0)
         n += 1
     return n
+
+
+@njit(inline="always", **FAST)
+def _arccos(x: np.float32) -> np.float32:
+    """The arc cosine within 7e-5 rad (Abramowitz and Stegun 4.4.45), in a third of the time of the exact one."""
+    a = min(abs(x), _ONE)
+    angle = np.float32(-0.0187293) * a + np.float32(0.0742610)
+    angle = (angle * a - np.float32(0.2121144)) * a + np.float32(1.5707288)
+    angle *= np.sqrt(_ONE - a)
+    return angle if x >= _ZERO else np.float32(np.pi) - angle
 
 
 @njit(**FAST)
