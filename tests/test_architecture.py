@@ -65,7 +65,7 @@ ORDER = [
     ["tracker.search", "tracker.confidence"],
     ["tracker.recover", "tracker.pose_edits", "tracker.memory"],
     ["tracker.track_settings"],
-    ["tracker.scene", "tracker.frame_fit"],
+    ["tracker.scene", "tracker.frame_fit", "tracker.ways"],
     ["tracker.track"],
     ["tracker.second_pass"],
     # The program: what the screen shows, then who may change it, then who shows it.

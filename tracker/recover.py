@@ -27,7 +27,7 @@ from tracker.rigid import Array
 
 T = TypeVar("T")
 
-_APART_M, _SAME_M = 0.12, 0.06
+APART_M, _SAME_M = 0.12, 0.06
 """How far apart the places are that are improved; poses nearer to each other than the second lead to the same one."""
 LEAST_GAIN = 3.0
 """What a pose must cost less to take the place of the one at hand: it must be some 20 times likelier. Poses whose costs
@@ -174,7 +174,7 @@ def search_limbs(
         kept = _distinct(model, [*kept, *found], judge.settings.kept, _SAME_M)
     best = kept[0] if kept[0].cost < start.cost - LEAST_GAIN else start
     rivals = [x for x in (*kept, start) if x is not best and x.cost < best.cost + LEAST_GAIN]
-    places = _distinct(model, [best._replace(cost=-np.inf), *rivals], judge.settings.kept, _APART_M)
+    places = _distinct(model, [best._replace(cost=-np.inf), *rivals], judge.settings.kept, APART_M)
     return Searched(best.fit, tuple(x.fit for x in places[1:]))
 
 
@@ -220,7 +220,7 @@ def _candidates(
     settings = judge.settings
     look = judge.colors.look(here, limb.parts, judge.known, away)
     proposals = _proposals(model, limb, here, settings)
-    best = _best_apart(model, limb, proposals, look(proposals), settings.improved, _APART_M)
+    best = _best_apart(model, limb, proposals, look(proposals), settings.improved, APART_M)
     for round_, spread_rad in enumerate(settings.shakes_rad):
         around = _shaken(model, limb, best, settings.shakes, spread_rad, round_)
         of_each = look(around.reshape(-1, best.shape[1])).reshape(len(best), -1).argmax(axis=1)

@@ -125,6 +125,13 @@ class Scene:
         costs = match.part_costs(self.poses[person])
         return Found("good", "", self._parts_px(costs), np.zeros((n, n)), 0, None)
 
+    def judged(self, person: int, rivals: Sequence[Array] = ()) -> Found:
+        """Judge a person where they stand, with poses that are about as good, (n_values,) each."""
+        match = self._match(person, everywhere=True)
+        blocks, free = [match, *self._priors(person)], self._memories[person].free
+        fit = solve(self._models[person], self.poses[person], blocks, free, max_iterations=0)
+        return self._judged(person, _Seen(match, tuple(self.poses), fit, rivals=tuple(rivals)))
+
     def estimate(self, people: Sequence[int]) -> dict[int, Found]:
         """Find the poses of some people, one after the other, then together; they take their places in `poses`."""
         if self._settings.estimate == "search":

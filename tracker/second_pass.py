@@ -2,12 +2,13 @@
 
 A limb that is lost in fast motion is found again where the motion slows down. Followed back from there it is often
 found in frames in which it was lost; where it is lost the other way round too, both passes are seldom wrong in the same
-frames. Which poses are kept is chosen over the whole stretch, as the cheapest way through the two passes (A. Viterbi
-1967, IEEE Trans. Inf. Theory 13:260): what single frames leave open, the frames before and after tell.
+frames. What both found is carried to the frames around, and which poses are kept is chosen over the whole stretch
+(`ways`).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise, takewhile
+from functools import lru_cache
+from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -17,23 +18,25 @@ from tracker.apart import KeepBodiesApart
 from tracker.appearance import Colors, PartColors
 from tracker.body import Body, BodyModel
 from tracker.confidence import Status
-from tracker.evidence import Observer
-from tracker.fit import Block, held
-from tracker.recover import LEAST_GAIN
+from tracker.evidence import Observer, ViewEvidence
+from tracker.fit import held
+from tracker.memory import Memory
 from tracker.refine import ContourMatch
 from tracker.rigid import Array
+from tracker.scene import Scene
 from tracker.surroundings import regions, visible_outline
-from tracker.track import PoseEstimate, track_chamfer
-from tracker.track_settings import TrackSettings, prior_blocks
+from tracker.track import PoseEstimate, summed_up, track_chamfer
+from tracker.track_settings import TrackSettings
+from tracker.ways import ROUNDS, Candidates, Sight, carry, cheapest_way
 
 _TRUSTED = 3
 """So many good frames in a row end a stretch; fewer may be a lost limb that looks well by chance."""
 _MOTION_FRAMES = 3
 """Poses after the stretch from which its motion is known."""
-_SAME_M = 0.01
-"""Poses of which no point differs by more are the same, metres."""
-_MOVED_M = 0.5
-"""What a point moves from frame to frame (one standard deviation), metres: far, as points of a limb move together."""
+_VISITS = 1 + 2 * ROUNDS
+"""How often the second pass comes to each frame."""
+_SEEN_AT_ONCE = 32
+"""Frames whose evidence is kept while poses are carried through a stretch: some megabytes each."""
 
 
 class Tracked(NamedTuple):
@@ -44,22 +47,25 @@ class Tracked(NamedTuple):
     """Of each person, (n_values,) each."""
     statuses: tuple[Status, ...]
     """How sure the tracker is of each person."""
+    others: tuple[tuple[Array, ...], ...] = ()
+    """Of each person poses that are about as good, (n_values,) each; empty where that is not known of anybody."""
 
     @classmethod
     def of(cls, estimate: PoseEstimate) -> "Tracked":
         """What is needed of an estimate, which holds much more."""
-        return cls(estimate.frame, estimate.poses, estimate.statuses)
+        others = tuple(tuple(other.values for other in of_one) for of_one in estimate.alternatives)
+        return cls(estimate.frame, estimate.poses, estimate.statuses, others)
 
 
 class Followed(NamedTuple):
-    """A step of the second pass: one frame of a stretch, followed back."""
+    """A step of the second pass: one frame of a stretch, come to once."""
 
     frame: int
     person: int
     done: int
-    """Frames followed back so far."""
+    """Steps so far."""
     total: int
-    """Frames to follow back, of all people."""
+    """All steps, of all people: each frame is followed back once, and come to again as poses are carried through."""
     better: tuple[PoseEstimate, ...] = ()
     """At the end of a stretch, in the order of tracking: what takes the place of what was found. It differs in this
     person alone; the others' poses and statuses are those that were found."""
@@ -121,16 +127,20 @@ def follow_back(
     known, keyframes = list(found), fixed or {}
     work = [s for person in everybody for s in _to_follow(known, person, keyframes)]
     work.sort(key=lambda s: s.frames.stop)
-    total, done = sum(len(s.frames) for s in work), 0
+    total, done = _VISITS * sum(len(s.frames) for s in work), 0
     for stretch in work:
-        person, back = stretch.person, list[PoseEstimate]()
+        person, back, last = stretch.person, list[PoseEstimate](), done + _VISITS * len(stretch.frames)
         for estimate in _back(observer, models, known, stretch, settings, free):
             back.append(estimate)
             done += 1
-            if len(back) < len(stretch.frames):
-                yield Followed(estimate.frame, person, done, total)
+            yield Followed(estimate.frame, person, done, total)
         back.reverse()
-        better = _better(observer, models, known, stretch, back, settings)
+        choice = _Choice(observer, models, known, stretch, back, settings, None if free is None else free[person])
+        for i in choice.carried():
+            done += 1
+            if done < last:
+                yield Followed(back[i].frame, person, done, total)
+        better = choice.better()
         at = {f.frame: i for i, f in enumerate(known)}
         for estimate in better:
             known[at[estimate.frame]] = Tracked.of(estimate)
@@ -169,61 +179,82 @@ def _back(
     return tracked
 
 
-def _better(
-    observer: Observer, models: Sequence[BodyModel], found: Sequence[Tracked], stretch: _Stretch,
-    back: Sequence[PoseEstimate], settings: TrackSettings,
-) -> tuple[PoseEstimate, ...]:  # fmt: skip
-    """What of the way back is kept, in the order of tracking: what lies on the cheapest way through both passes."""
-    person, (first, end) = stretch.person, (stretch.frames.start, stretch.frames.stop)
-    model, passes = models[person], (found[first:end], back)
-    ends = (found[first - 1] if first > 0 else None), found[end]
-    known: PartColors | None = None
-    for good in ends:
-        if good is not None:
-            known = _colors(observer, models, good, person).learn(known, 0.5)
-    costs = np.array([_costs(observer, models, both, person, known, settings) for both in zip(*passes, strict=True)])
-    ways = [[p[i].poses[person] for p in passes] for i in range(len(back))]
-    way = cheapest_way(model, ways, costs, tuple(None if e is None else e.poses[person] for e in ends))
-    remark = f"followed back from frame {found[end].frame}"
-    chosen = zip(passes[0], back, way, strict=True)
-    return tuple(_in_place_of(before, estimate, person, remark) for before, estimate, taken in chosen if taken)
+class _Choice:
+    """The poses that one person may have in a stretch, and which of them are kept."""
 
+    def __init__(
+        self, observer: Observer, models: Sequence[BodyModel], found: Sequence[Tracked], stretch: _Stretch,
+        back: Sequence[PoseEstimate], settings: TrackSettings, free: NDArray[np.bool_] | None,
+    ) -> None:  # fmt: skip
+        """Begin with what both passes found: `found` on all frames, `back` on those of the stretch, in order."""
+        self._observer, self._models, self._settings, self._free = observer, models, settings, free
+        self._person, (first, end) = stretch.person, (stretch.frames.start, stretch.frames.stop)
+        self._before, self._after = found[max(0, first - 2) : first], found[end : end + 2]
+        self._found, self._back = found[first:end], back
+        self._model = models[self._person]
+        self._known: PartColors | None = None
+        for good in (*self._before[-1:], self._after[0]):
+            self._known = _colors(observer, models, good, self._person).learn(self._known, 0.5)
+        self._options = [self._options_of(f, Tracked.of(b)) for f, b in zip(self._found, back, strict=True)]
+        self._sight = lru_cache(_SEEN_AT_ONCE)(self._look)
 
-def cheapest_way(
-    model: BodyModel, poses: Sequence[Sequence[Array]], costs: Array, ends: Sequence[Array | None]
-) -> list[int]:
-    """Which of several poses is taken on each frame: those that cost and move the least in all.
+    def _options_of(self, *passes: Tracked) -> Candidates:
+        p = self._person
+        others = [v for e in passes if e.others for v in e.others[p]]
+        return Candidates(self._model, [e.poses[p] for e in passes], others)
 
-    Args:
-        model: the body.
-        poses: of each frame the poses to choose from, (n_values,) each; as many on every frame.
-        costs: what each costs on its frame, (n_frames, n_poses), nats.
-        ends: the poses before the first frame and after the last, (n_values,) each; None where there is none.
+    def carried(self) -> Iterator[int]:
+        """Carry the poses through the stretch; the index of each frame that was come to."""
+        locked = self._found[0].poses[self._person]
+        ends = [e[i].poses[self._person] if e else None for e, i in ((self._before, -1), (self._after, 0))]
+        ends = [None if e is None else held(self._model, e, locked, self._free) for e in ends]
+        yield from carry(self._options, self._sight, ends)
 
-    Returns:
-        The index of the pose of each frame; 0 throughout unless others are cheaper by far.
-    """
-    points = np.array([[model.points_world(v) for v in of_frame] for of_frame in poses])
-    before, after = (None if e is None else model.points_world(e) for e in ends)
-    total, came = costs[0] + _moved(before, points[0]), []
-    for now, then, cost in zip(points[1:], points, costs[1:], strict=False):
-        ways = total + np.array([_moved(x, then) for x in now])  # (to, from)
-        came.append(ways.argmin(axis=1))
-        total = cost + ways.min(axis=1)
-    total = total + _moved(after, points[-1])
-    stay = float(costs[:, 0].sum() + _moved(before, points[0])[0] + _moved(after, points[-1])[0])
-    stay += sum(float(_moved(b[0], a[:1])[0]) for a, b in pairwise(points))
-    if stay - total.min() < LEAST_GAIN:
-        return [0] * len(points)
-    way = [int(total.argmin())]
-    for step in reversed(came):
-        way.append(int(step[way[-1]]))
-    return way[::-1]
+    def better(self) -> tuple[PoseEstimate, ...]:
+        """What takes the place of what was found, in the order of tracking: what lies on the cheapest way."""
+        ends = [[self._model.points_world(e.poses[self._person]) for e in some] for some in (self._before, self._after)]
+        points, costs = [np.array(o.points) for o in self._options], [np.array(o.costs) for o in self._options]
+        way, out = cheapest_way(points, costs, *ends), []
+        for i, taken in enumerate(way):
+            if taken == 1:
+                out.append(self._in_place_of(i, self._back[i], f"followed back from frame {self._after[0].frame}"))
+            elif taken > 1:
+                out.append(self._in_place_of(i, self._judged(i, taken), "carried over from frames around it"))
+        return tuple(out)
 
+    def _bodies(self, i: int, values: Array) -> list[Body]:
+        """Everybody on a frame of the stretch, the person in a pose, (n_values,)."""
+        poses = [values if p == self._person else v for p, v in enumerate(self._found[i].poses)]
+        return [Body(m, p) for m, p in zip(self._models, poses, strict=True)]
 
-def _moved(one: Array | None, others: Array) -> Array:
-    """What it costs to go from a pose to others, points (n, 3) and (m, n, 3) in the world; (m,), nats."""
-    return np.zeros(len(others)) if one is None else np.sum((others - one) ** 2, axis=(1, 2)) / (2 * _MOVED_M**2)
+    def _look(self, i: int) -> Sight:
+        person, settings = self._person, self._settings
+        bodies, views = self._bodies(i, self._found[i].poses[person]), self._views(i)
+        match = ContourMatch(views, bodies, person, settings.match, settings.theta_px, everywhere=True)
+        apart = [KeepBodiesApart(bodies, person, settings.apart)] if len(bodies) > 1 and settings.apart > 0 else []
+        return Sight(self._model, match, Colors(views, bodies, person), self._known, apart, settings, self._free)
+
+    def _views(self, i: int) -> tuple[ViewEvidence, ...]:
+        """The evidence of a frame around what both passes found there, by which all poses are judged."""
+        cameras = self._observer.matched_cameras
+        guesses = [self._bodies(i, e.poses[self._person]) for e in (self._found[i], self._back[i])]
+        outlines = [np.concatenate([visible_outline(g, c) for g in guesses]) for c in cameras]
+        where = regions(cameras, [body for g in guesses for body in g])
+        return self._observer.evidence(self._found[i].frame, where, outlines if self._settings.segments else None)
+
+    def _judged(self, i: int, taken: int) -> PoseEstimate:
+        """What is told of a pose that was carried to a frame."""
+        options, views = self._options[i], self._views(i)
+        poses = [b.values for b in self._bodies(i, options.poses[taken])]
+        memories = [Memory(m, v) for m, v in zip(self._models, poses, strict=True)]
+        memories[self._person].known = self._known
+        scene = Scene(views, memories, poses, self._settings)
+        people = range(len(poses))
+        found = [scene.judged(p, options.rivals(taken)) if p == self._person else scene.held(p) for p in people]
+        return summed_up(self._found[i].frame, views, self._models, poses, found, self._settings)
+
+    def _in_place_of(self, i: int, estimate: PoseEstimate, remark: str) -> PoseEstimate:
+        return _in_place_of(self._found[i], estimate, self._person, remark)
 
 
 def _in_place_of(before: Tracked, estimate: PoseEstimate, person: int, remark: str) -> PoseEstimate:
@@ -242,30 +273,3 @@ def _colors(observer: Observer, models: Sequence[BodyModel], where: Tracked, per
     """The colours under a person on a frame on which they were not lost."""
     bodies = _bodies(models, where.poses)
     return Colors(observer.evidence(where.frame, regions(observer.matched_cameras, bodies)), bodies, person)
-
-
-def _costs(
-    observer: Observer, models: Sequence[BodyModel], both: Sequence[Tracked | PoseEstimate], person: int,
-    known: PartColors | None, settings: TrackSettings,
-) -> list[float]:  # fmt: skip
-    """What one person's poses of a frame cost, judged by the same evidence; nothing where they are the same."""
-    one, other = (models[person].points_world(e.poses[person]) for e in both)
-    if np.linalg.norm(one - other, axis=1).max() < _SAME_M:
-        return [0.0] * len(both)
-    cameras, guesses = observer.matched_cameras, [_bodies(models, e.poses) for e in both]
-    outlines = [np.concatenate([visible_outline(g, c) for g in guesses]) for c in cameras]
-    where = regions(cameras, [body for g in guesses for body in g])
-    views = observer.evidence(both[0].frame, where, outlines if settings.segments else None)
-    costs = []
-    for bodies in guesses:
-        model, values = models[person], bodies[person].values
-        match = ContourMatch(views, bodies, person, settings.match, settings.theta_px, everywhere=True)
-        priors: list[Block] = prior_blocks(model, values, np.ones(model.n_dofs))
-        if len(models) > 1 and settings.apart > 0:
-            priors.append(KeepBodiesApart(bodies, person, settings.apart))
-        kinematics = model.kinematics(values)
-        cost = float(match.costs(values[None])[0]) + sum(b.normal(model, values, kinematics).cost for b in priors)
-        if settings.recover is not None and known is not None:
-            cost -= settings.recover.colors * float(Colors(views, bodies, person).nats(values[None], known)[0])
-        costs.append(cost)
-    return costs

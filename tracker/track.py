@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tracker.body import Body, BodyModel
 from tracker.confidence import Quality, Status
-from tracker.evidence import Observer
+from tracker.evidence import Observer, ViewEvidence
 from tracker.kernels import side_by_side
 from tracker.memory import Memory
 from tracker.rigid import Array
@@ -101,14 +101,31 @@ def track_chamfer(
         _remember(memories, scene, found, given)
         if scenery is not None:
             scene.teach(scenery)
-        cost_of = pose_cost(views, models, scene.poses, settings)
-        cost = cost_of(scene.poses)
-        others = [[OtherPose(poses[p], cost_of(poses).total_px) for poses in f.others] for p, f in enumerate(found)]
-        yield PoseEstimate(
-            frame, tuple(scene.poses), cost.total_px, cost.views_px, sum(f.evaluations for f in found),
-            tuple(f.status for f in found), tuple(f.remark for f in found), tuple(f.parts_px for f in found),
-            tuple(f.covariance for f in found), tuple(f.quality for f in found), tuple(map(tuple, others)),
-        )  # fmt: skip
+        yield summed_up(frame, views, models, scene.poses, found, settings)
+
+
+def summed_up(
+    frame: int, views: Sequence[ViewEvidence], models: Sequence[BodyModel], poses: Sequence[Array],
+    found: Sequence[Found], settings: TrackSettings,
+) -> PoseEstimate:  # fmt: skip
+    """What is told of a frame on which everybody was found.
+
+    Args:
+        frame: its number.
+        views: its evidence.
+        models: the body of each person.
+        poses: where each stands, (n_values,).
+        found: of each what was found.
+        settings: of the tracker.
+    """
+    cost_of = pose_cost(views, models, poses, settings)
+    cost = cost_of(poses)
+    others = [[OtherPose(rival[p], cost_of(rival).total_px) for rival in f.others] for p, f in enumerate(found)]
+    return PoseEstimate(
+        frame, tuple(poses), cost.total_px, cost.views_px, sum(f.evaluations for f in found),
+        tuple(f.status for f in found), tuple(f.remark for f in found), tuple(f.parts_px for f in found),
+        tuple(f.covariance for f in found), tuple(f.quality for f in found), tuple(map(tuple, others)),
+    )  # fmt: skip
 
 
 def _remember(memories: Sequence[Memory], scene: Scene, found: Sequence[Found], given: Mapping[int, Array]) -> None:

@@ -1,15 +1,13 @@
 """What was lost is followed back: which frames, what is kept of them, and what stays as it is."""
 
-from itertools import pairwise, product
-
 import numpy as np
 import pytest
 from staging import SUIT, Shown, cameras_around, dressed, posed
 
 from tracker.body import Body
-from tracker.recover import LEAST_GAIN
-from tracker.second_pass import _MOVED_M, Followed, Tracked, cheapest_way, follow_back, stretches
+from tracker.second_pass import Followed, Tracked, follow_back, stretches
 from tracker.track_settings import TrackSettings
+from tracker.ways import ROUNDS
 
 N = 9
 LOST = range(2, 5)
@@ -46,7 +44,9 @@ def test_a_lost_arm_is_followed_back_from_where_it_is_trusted_again(scene, backw
     found = tracked(first)[:: -1 if backward else 1]
     steps = list(follow_back(Shown(views), [model], found, TrackSettings()))
     way = list(LOST)[:: 1 if backward else -1]
-    assert steps == [Followed(k, 0, i + 1, 3, steps[-1].better if i == 2 else ()) for i, k in enumerate(way)]
+    visits = way + ROUNDS * (way[::-1] + way)
+    n = len(visits)
+    assert steps == [Followed(k, 0, i + 1, n, steps[-1].better if i + 1 == n else ()) for i, k in enumerate(visits)]
     better = steps[-1].better
     assert [e.frame for e in better] == way[::-1]  # in the order of tracking
     for estimate in better:
@@ -68,15 +68,32 @@ def test_where_nobody_is_lost_nothing_is_looked_at(scene):
 def test_a_pose_that_was_right_stays_where_it_was_called_lost(scene):
     model, truth, views, _ = scene
     steps = list(follow_back(Shown(views), [model], tracked(truth), TrackSettings()))
-    assert [s.frame for s in steps] == [4, 3, 2]
+    assert [s.frame for s in steps[:3]] == [4, 3, 2]
     assert steps[-1].better == ()
+
+
+def test_what_was_right_on_one_frame_is_carried_to_those_that_both_passes_lost(scene):
+    model, truth, views, first = scene
+    first = first.copy()
+    first[5, model.dof_names.index("left_shoulder.abduction")] -= np.radians(70)  # where the way back begins
+    first[3] = truth[3]
+    found = [f._replace(statuses=("doubtful",)) if f.frame == 3 else f for f in tracked(first)]
+    better = list(follow_back(Shown(views), [model], found, TrackSettings(recover=None)))[-1].better
+    assert [e.frame for e in better] == [2, 4]
+    for estimate in better:
+        assert off_m(model, estimate.poses[0], truth[estimate.frame]) < 0.03
+        assert estimate.statuses == ("good",)
+        assert estimate.remarks == ("carried over from frames around it",)
+        assert estimate.covariances[0].any()
+        assert estimate.qualities[0] is not None
 
 
 def test_keyframes_and_locked_degrees_of_freedom_stay(scene):
     model, _, views, first = scene
     fixed = {3: {0: first[3]}}
     steps = list(follow_back(Shown(views), [model], tracked(first), TrackSettings(), fixed))
-    assert [s.frame for s in steps] == [2, 4]  # 2 from the keyframe, 4 from the frame after it
+    # 2 from the keyframe, 4 from the frame after it
+    assert [s.frame for s in steps] == [2] * (1 + 2 * ROUNDS) + [4] * (1 + 2 * ROUNDS)
     assert 3 not in [e.frame for s in steps for e in s.better]
     free = np.array([n != "right_elbow.extension" for n in model.dof_names])
     first = first.copy()
@@ -110,7 +127,7 @@ def test_what_an_end_of_the_run_leaves_open_is_followed_back_from_the_last_frame
     found = [f._replace(statuses=("lost" if f.frame in LOST else "doubtful" if f.frame > 4 else "good",))
              for f in tracked(first)]  # fmt: skip
     steps = list(follow_back(Shown(views), [model], found, TrackSettings()))
-    assert [s.frame for s in steps] == [7, 6, 5, 4, 3, 2]
+    assert [s.frame for s in steps[:6]] == [7, 6, 5, 4, 3, 2]
     assert {2, 3, 4} <= {e.frame for e in steps[-1].better}
     hopeless = [f._replace(statuses=("lost" if f.frame > 1 else "good",)) for f in tracked(first)]
     assert list(follow_back(Shown(views), [model], hopeless, TrackSettings())) == []
@@ -134,29 +151,3 @@ def test_stretches(statuses, expected):
     names = {"g": "good", "d": "doubtful", "l": "lost", "K": "good"}
     found = stretches([names[s] for s in statuses], [s == "K" for s in statuses])
     assert [(r.start, r.stop) for r in found] == expected
-
-
-@pytest.mark.parametrize("seed", range(6))
-@pytest.mark.parametrize("open_end", [False, True])
-def test_the_cheapest_way_is_that_of_all_ways_tried(gavrila, seed, open_end):
-    rng = np.random.default_rng(seed)
-    base = posed(gavrila, 1)
-    poses = [
-        [gavrila.clip(gavrila.retract(base, rng.normal(0, 0.4, gavrila.n_dofs))) for _ in range(2)] for _ in range(6)
-    ]
-    costs, ends = rng.normal(0, 6.0, (6, 2)), (base, None if open_end else base)
-
-    def cost(way):
-        path = [
-            gavrila.points_world(p)
-            for p in (base, *(poses[i][k] for i, k in enumerate(way)), *([base] * (not open_end)))
-        ]
-        moved = sum(np.sum((b - a) ** 2) for a, b in pairwise(path)) / (2 * _MOVED_M**2)
-        return moved + sum(costs[i][k] for i, k in enumerate(way))
-
-    best = min(product((0, 1), repeat=6), key=cost)
-    assert cost((0,) * 6) - cost(best) > LEAST_GAIN
-    assert tuple(cheapest_way(gavrila, poses, costs, ends)) == best
-    # What is hardly cheaper changes nothing.
-    little = np.array([[0.0, -LEAST_GAIN / 8]] * 6)
-    assert cheapest_way(gavrila, [[p[0], p[0]] for p in poses], little, ends) == [0] * 6
