@@ -29,8 +29,8 @@ from tracker.track_settings import TrackSettings
 
 _SAVE_FRAMES = 10
 """A tracking run is on disk at least every so many frames."""
-_MOTION_FRAMES = 3
-"""Frames before the first one from which its motion is known."""
+_MOTION_FRAMES = 4
+"""Frames before the first one from which its motion is known, also as it was before the last of them."""
 _UNFINISHED = "unfinished track"
 
 

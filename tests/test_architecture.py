@@ -57,6 +57,7 @@ ORDER = [
     # knows cameras, bodies and tables, never a session.
     ["tracker.session", "tracker.proxy"],
     ["tracker.locks", "tracker.recording", "tracker.references"],
+    ["tracker.foreground"],
     ["tracker.assemble", "tracker.evidence", "tracker.simulate"],
     ["tracker.kept"],
     ["tracker.limb_look", "tracker.matching", "tracker.points"],

@@ -1,6 +1,7 @@
 """What a frame shows: per view the edges that poses are scored against, and their distance image.
 
-The observer works only in the regions asked for, on several views at a time, and one frame ahead.
+The observer works only in the regions asked for, on several views at a time, and one frame ahead: it decodes that
+frame, and where it is told the region in time it finds there what does not depend on the prediction.
 """
 
 import threading
@@ -19,9 +20,9 @@ from numpy.typing import NDArray
 from tracker import silhouettes
 from tracker.cameras import Camera, Region
 from tracker.edges import Edges, detect_edges, levels
-from tracker.matched import MatchedView, fit_region
-from tracker.probes import Probes, Readings
-from tracker.recording import Recording, read_background, read_mask
+from tracker.foreground import Foreground, Prepared
+from tracker.matched import fit_region
+from tracker.recording import Recording
 from tracker.rigid import FloatArray
 from tracker.sampling import distance_image
 from tracker.scenery import Scenery
@@ -29,7 +30,7 @@ from tracker.segments import Samples, Segments, accept, link_edges, sampled
 from tracker.session import CameraSource
 from tracker.sights import BINS, count_colors
 from tracker.silhouette_contour import Outline, trace_outline, trust_outline
-from tracker.silhouettes import Changes, Image, Mask
+from tracker.silhouettes import Image, Mask
 
 SCENE_SPACING_PX = 4
 """Scene edges are thinned to one point per cell of this many pixels a side."""
@@ -154,21 +155,54 @@ def view_evidence(
         scenery: what is known to stand still in the view; such edges are refused.
     """
     assert edge_map.shape == (camera.height, camera.width), (edge_map.shape, camera.size)
-    found, theta = edge_map.view(np.uint8), _theta_px(image_size or camera.size)
-    segments = chosen = still = None
-    if gradients is not None:
-        segments = link_edges(found, gradients)
+    found = edge_map.view(np.uint8)
+    segments = None if gradients is None else link_edges(found, gradients)
+    look = _Look(camera, scale, corner_px, image_size, found, segments, colors=colors)
+    return _expecting(look, predicted_px, scenery)
+
+
+class _Look(NamedTuple):
+    """What a region of a view shows, whatever is expected there; see `ViewEvidence`."""
+
+    camera: Camera
+    scale: float
+    corner_px: tuple[int, int]
+    image_size: tuple[int, int] | None
+    found: NDArray[np.uint8]
+    """Edges are not 0, (H, W)."""
+    segments: Segments | None = None
+    samples: Samples | None = None
+    """Of the segments, where they have been taken."""
+    colors: Image | None = None
+    silhouette: Silhouette | None = None
+
+    @property
+    def box(self) -> Region:
+        """The region, matched px of the whole image."""
+        (u0, v0), (width, height) = self.corner_px, self.camera.size
+        return u0, v0, u0 + width, v0 + height
+
+
+def _expecting(look: _Look, predicted_px: FloatArray | None, scenery: Scenery | None) -> ViewEvidence:
+    """What of a region's edges is kept where something is expected and something stands still; see `view_evidence`."""
+    segments, theta = look.segments, _theta_px(look.image_size or look.camera.size)
+    chosen = still = None
+    if segments is not None:
         if predicted_px is not None:
-            chosen = accept(sampled(segments), predicted_px, ACCEPTED_SHARE * theta)
+            chosen = accept(look.samples or sampled(segments), predicted_px, ACCEPTED_SHARE * theta)
         if scenery is not None:
-            still = scenery.holds(segments, corner_px)
+            still = scenery.holds(segments, look.corner_px)
             chosen = ~still if chosen is None else chosen & ~still
-    points, normals, found = _matched_edges(segments, chosen, found)
+    points, normals, found = _matched_edges(segments, chosen, look.found)
     # Beyond twice theta nothing asks for the distance any more.
     distance = distance_image(found, 2 * theta)
-    return ViewEvidence(
-        camera, scale, points, distance, corner_px, image_size, normals, colors, segments, chosen, still
+    seen = ViewEvidence(
+        look.camera, look.scale, points, distance, look.corner_px, look.image_size, normals, look.colors, segments,
+        chosen, still, look.silhouette,
     )  # fmt: skip
+    if look.samples is not None:
+        seen.__dict__["samples"] = look.samples  # taken once
+    return seen
 
 
 def accepted(view: ViewEvidence, predicted_px: FloatArray, threshold_px: float | None = None) -> ViewEvidence:
@@ -268,28 +302,15 @@ def _first_in_cells(points: FloatArray, height: int, width: int) -> NDArray[np.i
     return first[:n].copy()
 
 
-class _Prepared(NamedTuple):
-    """A view of a frame, and what of it does not depend on a region."""
+class _Ahead(NamedTuple):
+    """A frame as far as it is looked at before its evidence is asked for."""
 
-    frame: Image
-    """As filmed, (H, W, 3) RGB."""
-    mask: NDArray[np.uint8] | None
-    """As filmed, (H, W); None where there is none."""
-    strengths: FloatArray
-    """Strengths of the gradient all over the image, which set the thresholds of edges, (n,)."""
-    threshold: float
-    """Difference from the background that is a change, gray levels."""
-    gain: FloatArray
-    """How much brighter than the background the camera shows each channel, (3,)."""
-
-
-class _Empty(NamedTuple):
-    """The empty scene of a view."""
-
-    smooth: Image
-    """Smoothed, in matched pixels, (H, W, 3)."""
-    readings: Readings
-    """What the probes show of it."""
+    prepared: Future[list[Prepared | None]]
+    """Each view; None where it is damaged."""
+    looks: Future[list[_Look]] | None = None
+    """A region of each view; None where no regions are known."""
+    still: bool = False
+    """Whether what stands still is going to be known."""
 
 
 class Observer:
@@ -308,32 +329,42 @@ class Observer:
         self.cameras = tuple(cameras)
         self.recording = recording
         """Their footage."""
-        self._views = [MatchedView(c.camera) for c in cameras]
-        self._probes = [Probes(v.source.size, v.scale) for v in self._views]
-        backgrounds = [read_background(c) for c in self.cameras]
         # OpenCV's own threads would only be in the way of those that work on other views.
-        self._pool = ThreadPoolExecutor(_WORKERS, "observe", initializer=cv2.setNumThreads, initargs=(1,))
-        # Made meanwhile: the first kernel of a program takes a third of a second to load.
-        self._empty = [self._pool.submit(self._empty_scene, i, b) for i, b in enumerate(backgrounds)]
-        self._reader = ThreadPoolExecutor(1, "ahead")
-        self._ahead: OrderedDict[int, Future[list[_Prepared | None]]] = OrderedDict()
+        self._pool, self._pool_ahead = (
+            ThreadPoolExecutor(_WORKERS, name, initializer=cv2.setNumThreads, initargs=(1,))
+            for name in ("observe", "observe ahead")
+        )
+        self._views = [Foreground(c, self._pool) for c in self.cameras]
+        self._reader, self._looker = (ThreadPoolExecutor(1, name) for name in ("read ahead", "look ahead"))
+        self._ahead: OrderedDict[int, _Ahead] = OrderedDict()
         self._lock = threading.Lock()
 
     @property
     def matched_cameras(self) -> tuple[Camera, ...]:
         """The views as they are matched, whole: without lens distortion, at the scale of matching."""
-        return tuple(v.camera for v in self._views)
+        return tuple(v.view.camera for v in self._views)
 
-    def prefetch(self, k: int) -> None:
-        """Begin to decode frame k, and to do with it what needs no region; `evidence` will find it done.
+    def prefetch(self, k: int, regions: Sequence[Region | None] | None = None, still: bool = False) -> None:
+        """Begin to decode frame k, and to do with it what needs no prediction; `evidence` will find it done.
 
-        At most two frames are kept so. A frame that cannot be read is reported when its evidence is asked for.
+        At most two frames are kept so. To be called again when the regions are known. A frame that cannot be read is
+        reported when its evidence is asked for.
+
+        Args:
+            k: the frame.
+            regions: where `evidence` is going to look, if it is known; asked for others it looks anew, so that what it
+                gives does not depend on what was told here.
+            still: whether it will be told what stands still.
         """
         with self._lock:
-            if k not in self._ahead:
-                self._ahead[k] = self._reader.submit(self._prepare, k)
+            ahead = self._ahead.get(k) or _Ahead(self._reader.submit(self._prepare, k))
+            if regions is not None and ahead.looks is None:
+                ahead = ahead._replace(
+                    looks=self._looker.submit(self._look_ahead, ahead.prepared, list(regions), still), still=still
+                )
+            self._ahead[k] = ahead
             while len(self._ahead) > _FRAMES_AHEAD:
-                self._ahead.popitem(last=False)[1].cancel()
+                self._ahead.popitem(last=False)[1].prepared.cancel()
 
     def evidence(
         self,
@@ -355,73 +386,59 @@ class Observer:
         """
         with self._lock:
             ahead = self._ahead.pop(k, None)
-        prepared = self._prepare(k) if ahead is None else ahead.result()
-        everywhere = [None] * len(self.cameras)
-        boxes, predictions, still = regions or everywhere, predicted_px or everywhere, scenery or everywhere
-        return tuple(self._pool.map(self._observe, range(len(self.cameras)), prepared, boxes, predictions, still))
+        prepared = self._prepare(k) if ahead is None else ahead.prepared.result()
+        everywhere, still, looks = [None] * len(self.cameras), scenery is not None, list[_Look]()
+        if ahead is not None and ahead.looks is not None and ahead.still == still:
+            looks = ahead.looks.result()
 
-    def _prepare(self, k: int) -> list[_Prepared | None]:
-        return [
-            None if frame is None else self._prepare_view(i, frame, k) for i, frame in enumerate(self.recording.read(k))
-        ]
+        def observe(
+            i: int, region: Region | None, predicted_px: FloatArray | None, room: Scenery | None
+        ) -> ViewEvidence:
+            known = looks and looks[i].box == self._box(i, region)
+            look = looks[i] if known else self._look(i, prepared[i], region, still)
+            if predicted_px is not None:
+                predicted_px = predicted_px - np.array([*look.corner_px, *look.corner_px], np.float32)
+            return _expecting(look, predicted_px, room if look.silhouette is None else None)
 
-    def _prepare_view(self, i: int, frame: Image, k: int) -> _Prepared:
-        empty, mask = self._empty[i].result(), read_mask(self.cameras[i], k)
-        readings = self._probes[i].read(frame)
-        if empty is None:
-            return _Prepared(frame, mask, readings.strengths, 0.0, np.ones(3, np.float32))
-        gain = silhouettes.exposure_gain(readings.colors, empty.readings.colors)
-        differences = np.abs(readings.colors - gain * empty.readings.colors).max(axis=-1)
-        return _Prepared(frame, mask, readings.strengths, silhouettes.change_threshold(differences), gain)
+        return tuple(
+            self._pool.map(
+                observe, range(len(self.cameras)), regions or everywhere, predicted_px or everywhere,
+                scenery or everywhere,
+            )
+        )  # fmt: skip
 
-    def _empty_scene(self, i: int, background: Image | None) -> _Empty | None:
-        if background is None:
-            return None
-        view = self._views[i]
-        return _Empty(silhouettes.smoothed(view.image(background, view.whole)), self._probes[i].read(background))
+    def _prepare(self, k: int) -> list[Prepared | None]:
+        frames = self.recording.read(k)
+        return [None if f is None else view.prepare(f, k) for view, f in zip(self._views, frames, strict=True)]
 
-    def _observe(
-        self,
-        i: int,
-        prepared: _Prepared | None,
-        region: Region | None,
-        predicted_px: FloatArray | None,
-        scenery: Scenery | None,
-    ) -> ViewEvidence:
-        view = self._views[i]
-        box = view.whole if region is None else fit_region(region, view.camera.size)
-        camera = view.camera.cropped(box)
+    def _look_ahead(
+        self, prepared: Future[list[Prepared | None]], regions: Sequence[Region | None], still: bool
+    ) -> list[_Look]:
+        views = range(len(self._views))
+        return list(self._pool_ahead.map(self._look, views, prepared.result(), regions, [still] * len(views)))
+
+    def _box(self, i: int, region: Region | None) -> Region:
+        view = self._views[i].view
+        return view.whole if region is None else fit_region(region, view.camera.size)
+
+    def _look(self, i: int, prepared: Prepared | None, region: Region | None, still: bool) -> _Look:
+        view, box = self._views[i], self._box(i, region)
+        matched = view.view.camera
+        camera, scale = matched.cropped(box), view.view.scale
         if prepared is None:
             nothing = np.zeros((camera.height, camera.width), np.uint8)
-            return view_evidence(camera, view.scale, nothing, box[:2], view.camera.size)
-        smooth = silhouettes.smoothed(view.image(prepared.frame, box))
-        changes = self._changes(i, prepared, smooth, box)
-        margin_px = FOREGROUND_MARGIN * max(view.camera.size)
+            return _Look(camera, scale, box[:2], matched.size, nothing)
+        smooth = view.smoothed(prepared, box)
+        changes = view.changes(prepared, smooth, box)
+        margin_px = FOREGROUND_MARGIN * max(matched.size)
         foreground = None if changes is None else silhouettes.grow(changes.anything, margin_px)
         # Texture that stands still need not be kept out by thresholds, which would keep out the weaker edges of bodies.
-        bounds = levels(prepared.strengths, restricted=changes is not None or scenery is not None)
-        edges = detect_edges(smooth, bounds, foreground)
-        if predicted_px is not None:
-            predicted_px = predicted_px - np.array([*box[:2], *box[:2]], np.float32)
-        seen = view_evidence(
-            camera, view.scale, edges.found, box[:2], view.camera.size, edges.gradients, smooth, predicted_px,
-            scenery if changes is None else None,
+        edges = detect_edges(smooth, levels(prepared.strengths, restricted=changes is not None or still), foreground)
+        segments = link_edges(edges.found, edges.gradients)
+        silhouette = None if changes is None else _silhouette(changes.inside, edges, 2 * _theta_px(matched.size))
+        return _Look(
+            camera, scale, box[:2], matched.size, edges.found, segments, sampled(segments), smooth, silhouette
         )  # fmt: skip
-        if changes is None:
-            return seen
-        return replace(seen, silhouette=_silhouette(changes.inside, edges, 2 * seen.theta_px))
-
-    def _changes(self, i: int, prepared: _Prepared, smooth: Image, box: Region) -> Changes | None:
-        """What is new in the region, by its mask or before its background; None where nothing tells it."""
-        u0, v0, u1, v1 = box
-        empty = self._empty[i].result()
-        if prepared.mask is not None:
-            inside = self._views[i].mask(prepared.mask, box)
-            return Changes(inside, inside)
-        if empty is None:
-            return None
-        background = silhouettes.brightened(empty.smooth[v0:v1, u0:u1], prepared.gain)
-        return silhouettes.subtract_background(smooth, background, prepared.threshold)
 
 
 def _silhouette(inside: Mask, edges: Edges, limit_px: float) -> Silhouette:

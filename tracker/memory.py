@@ -50,7 +50,18 @@ class Memory:
 
     def expected(self, settings: PredictSettings) -> Array:
         """The predicted pose of the next frame."""
-        return held(self.model, predict(self.model, self.past, settings), self.past[-1], self.free)
+        return self._expected(settings, self.past)
+
+    def expected_ahead(self, settings: PredictSettings) -> Array:
+        """The predicted pose of the frame after the next one, (n_values,), as if that came as expected."""
+        return self._expected(settings, [*self.past, self.expected(settings)])
+
+    def was_expected(self, settings: PredictSettings) -> Array:
+        """The pose of the next frame, (n_values,), as it was predicted before the last one was known."""
+        return self._expected(settings, [*self.past[:-1], self._expected(settings, self.past[:-1])])
+
+    def _expected(self, settings: PredictSettings, past: list[Array]) -> Array:
+        return held(self.model, predict(self.model, past, settings), past[-1], self.free)
 
     def suspects(self, found: Quality) -> list[Limb]:
         """Limbs worth a search that may move, likeliest to be lost first."""

@@ -14,9 +14,13 @@ _NEAREST_M = 0.3
 """Bodies nearer to a camera, and those behind it, count as this near."""
 _REGION_MARGIN_M = 0.22
 """What is added around the joints to the region that is looked at: the flesh, and what the prediction may be off."""
+_AHEAD_MARGIN_M, _LEAST_MARGIN_M = 0.25, 0.19
+"""The same a frame ahead, where a prediction is farther off; and what must be left of it when the time comes."""
 
 
-def regions(cameras: Sequence[Camera], bodies: Sequence[Body]) -> list[Region | None]:
+def regions(
+    cameras: Sequence[Camera], bodies: Sequence[Body], margin_m: float = _REGION_MARGIN_M
+) -> list[Region | None]:
     """Where to look in each view: around everybody, as predicted; None where that is the whole image."""
     points = np.concatenate([b.model.points_world(b.values) for b in bodies])
     out: list[Region | None] = []
@@ -25,9 +29,32 @@ def regions(cameras: Sequence[Camera], bodies: Sequence[Body]) -> list[Region | 
         if depths.min() < 2 * _REGION_MARGIN_M:  # too near for its outline to lie around the joints' images
             out.append(None)
             continue
-        margin = _REGION_MARGIN_M * camera.K[0, 0] / float(np.median(depths))
+        margin = margin_m * camera.K[0, 0] / float(np.median(depths))
         out.append(region_around(camera.project(points), margin, camera.size))
     return out
+
+
+def regions_ahead(cameras: Sequence[Camera], bodies: Sequence[Body]) -> list[Region | None]:
+    """Where to look in each view before the frame before is known: around everybody, as predicted two frames on."""
+    return regions(cameras, bodies, _AHEAD_MARGIN_M)
+
+
+def confirmed(ahead: Sequence[Region | None], cameras: Sequence[Camera], bodies: Sequence[Body]) -> list[Region | None]:
+    """The regions that were looked at ahead, but for views in which somebody, as predicted now, comes near the border.
+
+    They follow from poses alone, so that what is found in them does not depend on what was done first.
+    """
+    least, anew = regions(cameras, bodies, _LEAST_MARGIN_M), regions(cameras, bodies)
+    return [a if _holds(a, small) else new for a, small, new in zip(ahead, least, anew, strict=True)]
+
+
+def _holds(outer: Region | None, inner: Region | None) -> bool:
+    """Whether a region lies within another; None is the whole image."""
+    if outer is None or inner is None:
+        return outer is None
+    return all(o <= i for o, i in zip(outer[:2], inner[:2], strict=True)) and all(
+        o >= i for o, i in zip(outer[2:], inner[2:], strict=True)
+    )
 
 
 def visible_outline(bodies: Sequence[Body], camera: Camera) -> FloatArray:

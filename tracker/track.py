@@ -1,20 +1,22 @@
 """The chamfer tracker of GD96: predict, observe, estimate, judge, one frame at a time (see `scene`)."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body import Body, BodyModel
+from tracker.cameras import Region
 from tracker.confidence import Quality, Status
 from tracker.evidence import Observer, ViewEvidence
 from tracker.kernels import side_by_side
 from tracker.memory import Memory
+from tracker.predict import PredictSettings
 from tracker.rigid import Array
 from tracker.scene import Found, Scene
 from tracker.scenery import Scenery
-from tracker.surroundings import regions, visible_outline
+from tracker.surroundings import confirmed, regions, regions_ahead, visible_outline
 from tracker.track_settings import TrackSettings, pose_cost
 
 
@@ -84,17 +86,32 @@ def track_chamfer(
     masks = [None] * len(models) if free is None else list(free)
     memories = [Memory(m, s, mask) for m, s, mask in zip(models, start, masks, strict=True)]
     scenery = [Scenery(c.size) for c in observer.matched_cameras] if settings.segments else None
-    for i, frame in enumerate(frames):
-        for ahead in frames[i : i + 2]:
-            observer.prefetch(ahead)
+    cameras, ahead = observer.matched_cameras, list[Region | None]()
+    several = len(models) > 1  # one alone is fitted sooner than the next frame is looked at: all cores are busy anyway
+
+    def placed(frame: int, expected: Callable[[Memory, PredictSettings], Array]) -> list[Body]:
+        """Everybody on a frame, where they are given or expected."""
         given = (fixed or {}).get(frame, {})
-        sought = [p for p in everybody if p not in given]
         poses = [
-            given.get(p, m.expected(settings.predict) if p in everybody else m.past[-1]) for p, m in enumerate(memories)
+            given.get(p, expected(m, settings.predict) if p in everybody else m.past[-1])
+            for p, m in enumerate(memories)
         ]
-        cameras, bodies = observer.matched_cameras, [Body(m, p) for m, p in zip(models, poses, strict=True)]
+        return [Body(m, v) for m, v in zip(models, poses, strict=True)]
+
+    for i, frame in enumerate(frames):
+        if i == 0:  # who goes on from known poses looks where who never stopped would have
+            if several and all(len(m.past) > 1 for m in memories):
+                ahead = regions_ahead(cameras, placed(frame, Memory.was_expected))
+            observer.prefetch(frame, ahead or None, still=scenery is not None)
+        given, bodies = (fixed or {}).get(frame, {}), placed(frame, Memory.expected)
+        sought, poses = [p for p in everybody if p not in given], [b.values for b in bodies]
+        where = confirmed(ahead, cameras, bodies) if ahead else regions(cameras, bodies)
+        for following in frames[i + 1 : i + 2]:
+            if several:
+                ahead = regions_ahead(cameras, placed(following, Memory.expected_ahead))
+            observer.prefetch(following, ahead or None, still=scenery is not None)
         outlines = [visible_outline(bodies, c) for c in cameras] if settings.segments else None
-        views = observer.evidence(frame, regions(cameras, bodies), outlines, scenery)
+        views = observer.evidence(frame, where, outlines, scenery)
         scene = Scene(views, memories, poses, settings)
         estimates = scene.estimate(sought)
         found = [estimates[p] if p in estimates else scene.held(p) for p in range(len(models))]

@@ -177,7 +177,7 @@ class Shown:
         self.views, self.asked = views, []
         self.matched_cameras = [v.camera for v in views[0]]
 
-    def prefetch(self, k):
+    def prefetch(self, k, regions=None, still=False):
         pass
 
     def evidence(self, k, regions, outlines=None, scenery=None):

@@ -19,6 +19,8 @@ from tracker.evidence import (
 )
 from tracker.matched import MatchedView, match_scale, region_around
 from tracker.recording import Recording
+from tracker.scenery import Scenery
+from tracker.segments import link_edges
 from tracker.session import CameraSource, load_session
 
 
@@ -267,6 +269,42 @@ def test_a_frame_read_ahead_is_read_once():
     observer.prefetch(0)
     observer.evidence(0)
     assert frames.reads == [0]
+
+
+def same_evidence(views, others):
+    for a, b in zip(views, others, strict=True):
+        assert (a.corner_px, a.camera.size) == (b.corner_px, b.camera.size)
+        for name in ("distance", "points_px", "normals", "accepted", "colors"):
+            np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+        for mine, theirs in zip((*a.segments, *a.samples.pixels), (*b.segments, *b.samples.pixels), strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+        assert (a.silhouette is None) == (b.silhouette is None)
+        if a.silhouette is not None:
+            np.testing.assert_array_equal(a.silhouette.points_px, b.silhouette.points_px)
+
+
+@pytest.mark.parametrize("background", [True, False])
+def test_what_is_looked_at_ahead_is_what_would_be_found_later(sample, real_frame, monkeypatch, background):
+    session, recording = sample
+    cameras = session.cameras if background else [replace(c, background=None) for c in session.cameras]
+    observer, linked = Observer(cameras, recording), []
+    predicted = [visible_contours(real_frame, c) for c in observer.matched_cameras]
+    boxes = [region_around(p.reshape(-1, 2), 40, (640, 480)) for p in predicted]
+    scenery = None if background else [Scenery(c.size) for c in observer.matched_cameras]
+    expected = observer.evidence(25, boxes, predicted, scenery)
+    monkeypatch.setattr("tracker.evidence.link_edges", lambda *a: linked.append(a) or link_edges(*a))
+    observer.prefetch(25, boxes, still=not background)
+    observer._looker.submit(lambda: None).result()  # it has been done by now
+    assert len(linked) == 4
+    same_evidence(observer.evidence(25, boxes, predicted, scenery), expected)
+    assert len(linked) == 4
+    # Told other regions, or not that something stands still, it does the work again.
+    observer.prefetch(25, [None, *boxes[1:]], still=not background)
+    same_evidence(observer.evidence(25, boxes, predicted, scenery), expected)
+    assert len(linked) == 4 + 4 + 1
+    observer.prefetch(25, boxes, still=background)
+    same_evidence(observer.evidence(25, boxes, predicted, scenery), expected)
+    assert len(linked) == 9 + 4 + 4
 
 
 def test_what_is_wrong_with_a_frame_read_ahead_is_told_when_it_is_asked_for():

@@ -3,6 +3,7 @@ import pytest
 
 from tracker.confidence import LimbFigures, Quality
 from tracker.memory import Memory
+from tracker.predict import PredictSettings
 
 CLEAR, ASTRAY = (1.0, 0.0, 1.2, 0.05, 0.6, 0.5), (-2.0, 3.0, 4.0, 0.3, 0.2, 0.1)
 
@@ -89,3 +90,17 @@ def test_limbs_that_nothing_speaks_against_wait_longer(gavrila):
     # Once it seems lost itself it is due at once.
     (limb,) = memory.due(seen(memory, astray=("right_calf",)), alone=False)
     assert limb.name == "right_calf"
+
+
+def test_what_is_expected_two_frames_on_is_what_would_be_if_the_next_came_as_expected(gavrila):
+    memory, settings = Memory(gavrila, gavrila.neutral()), PredictSettings()
+    step = np.zeros(gavrila.n_dofs)
+    step[:3] = 0.02
+    moved = gavrila.retract(gavrila.neutral(), step)
+    memory.update(moved, NoColors(), "good", given=False)
+    twice = memory.expected_ahead(settings)
+    memory.update(memory.expected(settings), NoColors(), "good", given=False)
+    np.testing.assert_array_equal(twice, memory.expected(settings))
+    memory.past[-1] = gavrila.neutral()  # it came otherwise
+    np.testing.assert_array_equal(twice, memory.was_expected(settings))
+    np.testing.assert_allclose(gavrila.difference(twice, moved)[:3], 0.04, atol=1e-9)

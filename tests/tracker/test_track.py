@@ -15,6 +15,7 @@ from tracker.recording import Recording
 from tracker.recover import Searched
 from tracker.references import read_joints
 from tracker.search import SearchSettings
+from tracker.session import load_session
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings, pose_cost, search_frame
 
@@ -291,6 +292,33 @@ def test_a_sample_frame_is_drawn_to_its_truth(real_frame, sample_folder):
     assert off(last.best[0]) < 0.045
     assert off(last.best[0]) < off(start)
     assert last.best_px < pose_cost(views, [model], [start], TrackSettings())([start]).total_px
+
+
+@pytest.mark.parametrize("n_people", [1, 2])
+def test_poses_do_not_depend_on_what_was_looked_at_ahead(sample_folder, monkeypatch, n_people):
+    """One person of the sample, and two, as if there were another: each as they stand a frame before."""
+    session, frames = load_session(sample_folder), range(25, 28)
+    joints = read_joints(sample_folder / "truth.trc", session.fps)
+    model, ahead = session.people[0].model, []
+    start = fit_to_points(model, dict(zip(joints.names, joints.points[24], strict=True))).values
+    aside = model.neutral() * 0
+    aside[0] = 0.8
+    starts = [start, start + aside][:n_people]
+
+    def run():
+        with Recording(session.cameras) as recording:
+            observer = Observer(session.cameras, recording)
+            tracked = track_chamfer(observer, [model] * n_people, starts, frames, TrackSettings(recover=None))
+            return [(*f.poses, f.cost_px) for f in tracked]
+
+    prefetch = Observer.prefetch
+    monkeypatch.setattr(Observer, "prefetch", lambda *a, **k: ahead.append(a[2:]) or prefetch(*a, **k))
+    looked_ahead = run()
+    assert any(regions for (regions, *_) in ahead if regions) == (n_people > 1)
+    monkeypatch.setattr(Observer, "prefetch", lambda *_, **__: None)
+    for found, late in zip(looked_ahead, run(), strict=True):
+        for one, other in zip(found, late, strict=True):
+            np.testing.assert_array_equal(one, other)
 
 
 def test_a_real_recording(data_folder, tmp_path):

@@ -1,0 +1,99 @@
+"""One view of a frame made ready, then of a region its smoothed image, and what in it is new."""
+
+from concurrent.futures import Executor
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker import silhouettes
+from tracker.cameras import Region
+from tracker.matched import MatchedView
+from tracker.probes import Probes, Readings
+from tracker.recording import read_background, read_mask
+from tracker.rigid import FloatArray
+from tracker.session import CameraSource
+from tracker.silhouettes import Changes, Image
+
+
+class Prepared(NamedTuple):
+    """A view of a frame, and what of it does not depend on a region."""
+
+    frame: Image
+    """As filmed, (H, W, 3) RGB."""
+    mask: NDArray[np.uint8] | None
+    """As filmed, (H, W); None where there is none."""
+    strengths: FloatArray
+    """Strengths of the gradient all over the image, which set the thresholds of edges, (n,)."""
+    threshold: float
+    """Difference from the background that is a change, gray levels."""
+    gain: FloatArray
+    """How much brighter than the background the camera shows each channel, (3,)."""
+
+
+class _Empty(NamedTuple):
+    """The empty scene of a view."""
+
+    smooth: Image
+    """Smoothed, in matched pixels, (H, W, 3)."""
+    readings: Readings
+    """What the probes show of it."""
+
+
+class Foreground:
+    """What is new in the frames of one view. Safe to use from several threads."""
+
+    def __init__(self, source: CameraSource, executor: Executor) -> None:
+        """Read the background.
+
+        Args:
+            source: the view, with its side files.
+            executor: where the empty scene is made meanwhile: the first kernel of a program takes a third of a second
+                to load.
+
+        Raises:
+            RecordingError: the background is missing, unreadable or of the wrong size.
+        """
+        self.view = MatchedView(source.camera)
+        """The way from footage to matched pixels."""
+        self._source, self._probes = source, Probes(source.camera.size, self.view.scale)
+        self._empty = executor.submit(self._empty_scene, read_background(source))
+
+    def prepare(self, frame: Image, k: int) -> Prepared:
+        """Do with frame k, as filmed, what needs no region.
+
+        Raises:
+            RecordingError: its mask cannot be used.
+        """
+        empty, mask = self._empty.result(), read_mask(self._source, k)
+        readings = self._probes.read(frame)
+        if empty is None:
+            return Prepared(frame, mask, readings.strengths, 0.0, np.ones(3, np.float32))
+        gain = silhouettes.exposure_gain(readings.colors, empty.readings.colors)
+        differences = np.abs(readings.colors - gain * empty.readings.colors).max(axis=-1)
+        return Prepared(frame, mask, readings.strengths, silhouettes.change_threshold(differences), gain)
+
+    def smoothed(self, prepared: Prepared, box: Region) -> Image:
+        """A region of the frame, smoothed, in matched pixels, (H, W, 3)."""
+        return silhouettes.smoothed(self.view.image(prepared.frame, box))
+
+    def changes(self, prepared: Prepared, smooth: Image, box: Region) -> Changes | None:
+        """What is new in a region, whose smoothed image is given, by its mask or before its background.
+
+        None where nothing tells it.
+        """
+        u0, v0, u1, v1 = box
+        empty = self._empty.result()
+        if prepared.mask is not None:
+            inside = self.view.mask(prepared.mask, box)
+            return Changes(inside, inside)
+        if empty is None:
+            return None
+        background = silhouettes.brightened(empty.smooth[v0:v1, u0:u1], prepared.gain)
+        return silhouettes.subtract_background(smooth, background, prepared.threshold)
+
+    def _empty_scene(self, background: Image | None) -> _Empty | None:
+        if background is None:
+            return None
+        smooth = silhouettes.smoothed(self.view.image(background, self.view.whole))
+        return _Empty(smooth, self._probes.read(background))
