@@ -93,7 +93,7 @@ class Samples(NamedTuple):
         is longer than the reach."""
         out = np.empty(self.pixels.points.shape[1], np.float32)
         pieces = np.ascontiguousarray(pieces_px, np.float32)
-        _nearest_alongside(self.pixels.points, self.pixels.rows, pieces, reach_px, MAX_ANGLE_RAD, out)
+        nearest_alongside(self.pixels.points, self.pixels.rows, pieces, reach_px, MAX_ANGLE_RAD, out)
         return out[: self.pixels.n_points]
 
     def means(self, distances: FloatArray) -> NDArray[np.float64]:
@@ -222,7 +222,7 @@ def _cut(points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_], fir
 
 
 @njit(**FAST)
-def _nearest_alongside(
+def nearest_alongside(
     pixels: FloatArray, rows: IntArray, pieces: FloatArray, reach: float, max_angle: float, out: FloatArray
 ) -> None:
     """Distance of each pixel, (5, N) as in `Samples`, to the nearest piece, (M, 4), that runs its way, up to a reach.

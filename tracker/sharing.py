@@ -8,7 +8,8 @@ point draws the nearest piece of contour, whosever it is.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property, reduce
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -16,9 +17,11 @@ from numpy.typing import NDArray
 
 from tracker import contours
 from tracker.body import Body
+from tracker.contours import PIECE_PX, Contour, trace_view
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence, findable, unfiltered, with_segments
 from tracker.rigid import Array, FloatArray
-from tracker.segments import Samples, Segments, sampled
+from tracker.segments import MAX_ANGLE_RAD, Samples, Segments, nearest_alongside, sampled
+from tracker.surfaces import Surfaces
 
 _CLEARLY = 0.5
 """What is another's is nearer to that body than this share of its distance from one's own."""
@@ -70,77 +73,68 @@ class Shares:
         """
         if len(self._bodies) == 1:
             return self._sharing.everything if everywhere else self._sharing.views
-        # Not in threads: a view takes a dozen kernels of some hundredths of a millisecond, and to get the interpreter's
-        # lock back after each takes as long.
         if (person, everywhere) not in self._own:
             self._own[person, everywhere] = tuple(v.own(person, everywhere) for v in self._views)
         return self._own[person, everywhere]
 
     @cached_property
     def _views(self) -> list["_View"]:
-        return [_View(v, *s, self._bodies) for v, s in zip(self._sharing.views, self._sharing.samples, strict=True)]
+        surfaces, Ts = contours.surfaces_of(tuple(b.model for b in self._bodies)), contours.part_poses(self._bodies)
+        sharing = self._sharing
+        return [_View(v, *s, surfaces, Ts) for v, s in zip(sharing.views, sharing.samples, strict=True)]
 
 
 class _View:
-    """What one view shows of several people in some poses. Distances are in px, cut off at the reach."""
+    """What one view shows of several people in some poses."""
 
     def __init__(
-        self, view: ViewEvidence, edges: Samples | None, outline: Samples | None, bodies: Sequence[Body]
+        self, view: ViewEvidence, edges: Samples | None, outline: Samples | None, surfaces: Surfaces, Ts: Array
     ) -> None:
-        self._view, self._edges, self._outline, self._bodies = view, edges, outline, bodies
-        self._reach_px = _REACH * view.theta_px
+        self._view, self._edges, self._outline, self._surfaces, self._Ts = view, edges, outline, surfaces, Ts
 
     def own(self, person: int, everywhere: bool) -> ViewEvidence:
         """See `Shares.own`."""
         view, seen = self._view, self._view
-        if view.segments is None or self._edges is None or not (everywhere or self._meets(person)):
+        if view.segments is None or self._edges is None or not (everywhere or self._theirs.near[person]):
             return unfiltered(view) if everywhere else view
         asked = view.accepted
         if everywhere or asked is None:
             asked = findable(view.segments, view.still)
-        theirs = asked & _theirs(self._edges, self._to_edges, person, view.theta_px)
+        theirs = asked & self._theirs.edges[person]
         if theirs.any():
             seen = with_segments(view, asked & ~theirs)
         elif everywhere:
             seen = unfiltered(view)
         if view.silhouette is None or self._outline is None:
             return seen
-        mine = ~_theirs(self._outline, self._to_outline, person, view.theta_px)
+        mine = ~self._theirs.outline[person]
         points, normals = view.silhouette.points_px[mine], view.silhouette.normals[mine]
         return replace(seen, silhouette=replace(view.silhouette, points_px=points, normals=normals))
 
-    def _meets(self, person: int) -> bool:
-        """Whether boxes around the contours of a person and of anybody else come within reach of each other."""
-        low, high = self._boxes
-        near = np.all((low[person] - self._reach_px < high) & (low - self._reach_px < high[person]), axis=1)
-        near[person] = False
-        return bool(near.any())
-
     @cached_property
-    def _boxes(self) -> tuple[Array, Array]:
-        """Bounds of each person's visible contours, (K, 2) each; of who shows none nothing lies between them."""
-        low, high = np.full((len(self._bodies), 2), np.inf), np.full((len(self._bodies), 2), -np.inf)
-        for pieces, a, b in zip(self._pieces, low, high, strict=True):
-            _bound(pieces, a, b)
-        return low, high
+    def _theirs(self) -> "_Theirs":
+        view, n_people = self._view, int(self._surfaces.people[-1]) + 1
+        edges, outline = self._edges or _NOTHING, self._outline or _NOTHING
+        out = _Theirs(
+            np.empty((n_people, len(edges.counts)), np.bool_), np.empty((n_people, len(outline.counts)), np.bool_),
+            np.zeros(n_people, np.bool_),
+        )  # fmt: skip
+        _tell_apart(
+            contours.projection(view.camera), view.camera.center_world, self._Ts, self._surfaces,
+            contours.contour_buffer(view.camera, n_people), edges, outline, view.theta_px, out,
+        )  # fmt: skip
+        return out
 
-    @cached_property
-    def _pieces(self) -> list[FloatArray]:
-        """Visible pieces of each person's contour, x0, y0, x1, y1, (M, 4) each, px."""
-        contour = contours.trace(self._bodies, self._view.camera)
-        people = contours.surfaces_of(tuple(b.model for b in self._bodies)).people
-        owners = np.where(contour.hidden, -1, people[contour.parts])
-        return [contour.pieces_px[owners == person] for person in range(len(self._bodies))]
 
-    @cached_property
-    def _to_edges(self) -> list[FloatArray]:
-        """How far the samples of the edges are from each person, (n,) each."""
-        return [] if self._edges is None else [self._edges.distances(p, self._reach_px) for p in self._pieces]
+class _Theirs(NamedTuple):
+    """Of each person what runs along the contours of the others and clearly not along their own, in one view."""
 
-    @cached_property
-    def _to_outline(self) -> list[FloatArray]:
-        """The same of the silhouette."""
-        return [] if self._outline is None else [self._outline.distances(p, self._reach_px) for p in self._pieces]
+    edges: NDArray[np.bool_]
+    """Which segments do, (K, S)."""
+    outline: NDArray[np.bool_]
+    """Which points of the silhouette do, (K, N)."""
+    near: NDArray[np.bool_]
+    """Whether boxes around the contours of the person and of anybody else come within reach of each other, (K,)."""
 
 
 def _sampled(view: ViewEvidence) -> tuple[Samples | None, Samples | None]:
@@ -152,23 +146,90 @@ def _sampled(view: ViewEvidence) -> tuple[Samples | None, Samples | None]:
     return edges, sampled(Segments(points, silhouette.normals, np.arange(len(points) + 1)))
 
 
-def _theirs(samples: Samples, distances: Sequence[FloatArray], person: int, theta_px: float) -> NDArray[np.bool_]:
-    """Which segments, (S,), run along the others' contours and clearly not along one's own.
+_NOTHING = sampled(Segments(np.empty((0, 2), np.float32), np.empty((0, 2), np.float32), np.zeros(1, np.int64)))
+
+
+# One call for all that is asked of a view: of a dozen calls each hands the interpreter's lock over and waits for it.
+@njit(nogil=True, cache=True)
+def _tell_apart(
+    P: Array, eye: Array, Ts: Array, surfaces: Surfaces, contour: Contour, edges: Samples, outline: Samples,
+    theta_px: float, out: _Theirs,
+) -> None:  # fmt: skip
+    """Tell in one view what is whose.
 
     Args:
-        samples: of the segments.
-        distances: of the samples from each person's contours, (n,) each, px.
-        person: one's own index.
+        P: the view, as the following three see `contours.trace_view`.
+        eye: of the view.
+        Ts: of everybody.
+        surfaces: of everybody.
+        contour: room for the contours.
+        edges: samples of the edges.
+        outline: points of the silhouette, each its own segment.
         theta_px: outlier distance, px.
+        out: what is filled.
     """
-    others = reduce(np.minimum, [d for i, d in enumerate(distances) if i != person])
-    to_others, to_own = samples.means(others), samples.means(distances[person])
-    return np.asarray((to_others <= ACCEPTED_SHARE * theta_px) & (to_others < _CLEARLY * to_own))
+    reach, n_people = _REACH * theta_px, out.near.shape[0]
+    n = trace_view(P, eye, Ts, surfaces, PIECE_PX, contour)
+    own, boxes = np.empty((n, 4), np.float32), np.empty((n_people, 4))
+    # Distances of the samples from each person's visible contours, px, cut off at the reach.
+    to_edges = np.empty((n_people, edges.pixels.points.shape[1]), np.float32)
+    to_outline = np.empty((n_people, outline.pixels.points.shape[1]), np.float32)
+    for person in range(n_people):
+        m = _take_own(person, n, contour, surfaces.people, own, boxes[person])
+        nearest_alongside(edges.pixels.points, edges.pixels.rows, own[:m], reach, MAX_ANGLE_RAD, to_edges[person])
+        nearest_alongside(outline.pixels.points, outline.pixels.rows, own[:m], reach, MAX_ANGLE_RAD, to_outline[person])
+    for a in range(n_people):
+        for b in range(n_people):
+            if a != b and _meet(boxes[a], boxes[b], reach):
+                out.near[a] = True
+    for person in range(n_people):
+        _mark_theirs(edges, to_edges, person, theta_px, out.edges[person])
+        _mark_theirs(outline, to_outline, person, theta_px, out.outline[person])
 
 
 @njit(nogil=True, cache=True)
-def _bound(pieces: FloatArray, low: Array, high: Array) -> None:
-    """Widen bounds, (2,) each, to those of pieces, (M, 4)."""
-    for i in range(pieces.shape[0]):
+def _take_own(person: int, n: int, contour: Contour, people: NDArray[np.int64], own: FloatArray, box: Array) -> int:
+    """Take the visible ones of n pieces that are a person's, (n or more, 4), and bound them, (4,); their number."""
+    box[:2], box[2:] = np.inf, -np.inf
+    m = 0
+    for i in range(n):
+        if contour.hidden[i] or people[contour.parts[i]] != person:
+            continue
         for k in range(4):
-            low[k % 2], high[k % 2] = min(low[k % 2], pieces[i, k]), max(high[k % 2], pieces[i, k])
+            own[m, k] = contour.pieces_px[i, k]
+            box[k % 2], box[2 + k % 2] = min(box[k % 2], own[m, k]), max(box[2 + k % 2], own[m, k])
+        m += 1
+    return m
+
+
+@njit(nogil=True, cache=True)
+def _meet(a: Array, b: Array, reach: float) -> bool:
+    """Whether two boxes u0, v0, u1, v1, (4,), come within reach; one that holds nothing meets none."""
+    return bool(a[0] - reach < b[2] and b[0] - reach < a[2] and a[1] - reach < b[3] and b[1] - reach < a[3])
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _mark_theirs(
+    samples: Samples, distances: FloatArray, person: int, theta_px: float, theirs: NDArray[np.bool_]
+) -> None:
+    """Mark the segments, (S,), whose samples lie along the others' contours and clearly not along a person's own.
+
+    Args:
+        samples: of the segments.
+        distances: of the samples from each person's contours, (K, n or more), px.
+        person: whose.
+        theta_px: outlier distance, px.
+        theirs: what is marked.
+    """
+    to_own, to_others = np.zeros(theirs.shape[0]), np.zeros(theirs.shape[0])
+    for i in range(samples.pixels.rows[-1, -1]):
+        nearest = np.float32(np.inf)
+        for other in range(distances.shape[0]):
+            if other != person:
+                nearest = min(nearest, distances[other, i])
+        segment = int(samples.pixels.points[4, i])
+        to_own[segment] += distances[person, i]
+        to_others[segment] += nearest
+    for s in range(theirs.shape[0]):
+        own, others = to_own[s] / samples.counts[s], to_others[s] / samples.counts[s]
+        theirs[s] = others <= ACCEPTED_SHARE * theta_px and others < _CLEARLY * own

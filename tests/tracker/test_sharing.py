@@ -7,12 +7,11 @@ from staging import at, camera_at, own_evidence, solid
 from tracker import contours
 from tracker.evidence import Silhouette, with_segments
 from tracker.segments import Segments
-from tracker.sharing import Shares, Sharing
+from tracker.sharing import Shares, Sharing, _tell_apart
 from tracker.silhouette_contour import Outline
 
 BALL = solid((0.15, 0.15, 0.3))
 FRONT = camera_at("front", (4.0, 0.0, 0.0))
-TRACE = contours.trace
 
 
 def seen(bodies, camera=FRONT):
@@ -81,12 +80,11 @@ def test_the_shares_of_three_are_those_of_the_simple_version(person):
 
 def test_distances_are_measured_once_for_all(monkeypatch):
     """Of two people in one pose each, whoever asks first."""
-    bodies, traced = [at(BALL, 0, -0.25, 0), at(BALL, 0, 0.25, 0)], []
-    monkeypatch.setattr("tracker.sharing.contours.trace", lambda *a: traced.append(a) or TRACE(*a))
+    bodies, told = [at(BALL, 0, -0.25, 0), at(BALL, 0, 0.25, 0)], []
+    monkeypatch.setattr("tracker.sharing._tell_apart", lambda *a: told.append(a) or _tell_apart(*a))
     shares = Shares(Sharing([seen(bodies)]), bodies)
-    traced.clear()
     views = [shares.own(person, everywhere) for person in (0, 1) for everywhere in (False, True)]
-    assert len(traced) == 1
+    assert len(told) == 1
     assert shares.own(0) is views[0]
 
 
