@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body import BodyModel
-from tracker.kernels import BORROW, helpers
+from tracker.kernels import BORROW
 from tracker.kinematics import IntArray, Kinematics, chain_poses
 from tracker.rigid import Array, FloatArray
 from tracker.sights import ALONG, BINS, NEAREST_M, along_axis, bin_of, hidden, pixel_on_axis, place_before, see_axis
@@ -89,24 +89,22 @@ class LimbLook:
         self._ratios = np.zeros((len(shapes), BINS**3)) if log_ratios is None else log_ratios
         reach = _reach(model, limb, self._shapes)
         root = rest.Ts_world_part[limb[0], :3, 3]
-        self._backdrops = list(helpers().map(lambda view: _backdrop(view, standing, root, reach), self._views))
+        # Not side by side: it is so little work that threads would wait longer for one another.
+        self._backdrops = [_backdrop(view, standing, root, reach) for view in self._views]
 
     def __call__(self, poses: Array) -> Array:
         """How good the limb seems in many poses, (C, n_values), that differ in it alone, (C,), nats; more is better.
 
         At samples along the axes of its parts, where nothing hides them, the colours speak, and the edges at both
         sides: near ones for it, none against it. Where the limb is hidden nothing is said.
+
+        In the thread that asks; several may ask at a time.
         """
         Ts = chain_poses(self._model.tree, self._rest, self._limb, poses)
-
-        def look(view: ColorView, backdrop: _Backdrop) -> Array:
-            nats = np.zeros(len(poses))
-            room = np.arange(len(self._limb)), np.empty((len(self._limb), 13)), np.empty((4, 3))
+        room = np.arange(len(self._limb)), np.empty((len(self._limb), 13)), np.empty((4, 3))
+        total, nats = np.zeros(len(poses)), np.zeros(len(poses))
+        for view, backdrop in zip(self._views, self._backdrops, strict=True):
             _look_along(*view, *backdrop, Ts, self._shapes, self._limb, self._ratios, *room, nats)
-            return nats
-
-        total = np.zeros(len(poses))
-        for nats in helpers().map(look, self._views, self._backdrops):
             total += nats
         return total
 

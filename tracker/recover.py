@@ -220,12 +220,17 @@ def _candidates(
     settings = judge.settings
     look = judge.colors.look(here, limb.parts, judge.known, away)
     proposals = _proposals(model, limb, here, settings)
-    best = _best_apart(model, limb, proposals, look(proposals), settings.improved, APART_M)
-    for round_, spread_rad in enumerate(settings.shakes_rad):
-        around = _shaken(model, limb, best, settings.shakes, spread_rad, round_)
-        of_each = look(around.reshape(-1, best.shape[1])).reshape(len(best), -1).argmax(axis=1)
-        best = around[np.arange(len(best)), of_each]
-    best = best[np.argsort(-look(best), kind="stable")[: settings.scored]]
+    looks = np.concatenate(_in_parts(look, proposals))
+    best = _best_apart(model, limb, proposals, looks, settings.improved, APART_M)
+    # Each improves by itself, so that threads need not wait for one another in between.
+    dofs = np.flatnonzero(limb.dofs)
+    steps = [
+        np.random.default_rng(round_).normal(0.0, spread_rad, (len(best), settings.shakes, len(dofs)))
+        for round_, spread_rad in enumerate(settings.shakes_rad)
+    ]
+    improved = _in_parts(lambda *some: _improved(model, dofs, look, *some), best, *steps)
+    best, looks = (np.concatenate(x) for x in zip(*improved, strict=True))
+    best = best[np.argsort(-looks, kind="stable")[: settings.scored]]
     best = np.array([*best, *(_with_limb(model, here, other, limb) for other in others)])
     return _best_apart(model, limb, best, -judge.costs(best), settings.refined, _SAME_M)
 
@@ -310,12 +315,23 @@ def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSet
     return _moved(model, np.repeat(values[None], len(steps), axis=0), dofs, steps)
 
 
-def _shaken(model: BodyModel, limb: Limb, poses: Array, shakes: int, spread_rad: float, seed: int) -> Array:
-    """Each of some poses (n, n_values) and others with the limb around where it is there, (n, 1 + shakes, n_values)."""
-    dofs = np.flatnonzero(limb.dofs)
-    steps = np.random.default_rng(seed).normal(0.0, spread_rad, (len(poses), shakes, len(dofs)))
-    moved = _moved(model, np.repeat(poses, shakes, axis=0), dofs, steps.reshape(-1, len(dofs)))
-    return np.concatenate([poses[:, None], moved.reshape(len(poses), shakes, -1)], axis=1)
+def _in_parts(work: Callable[..., T], *arrays: Array) -> list[T]:
+    """What some work makes of parts of arrays of the same length, in order, one for each of the threads."""
+    return list(helpers().map(work, *(np.array_split(a, N_HELPERS) for a in arrays)))
+
+
+def _improved(
+    model: BodyModel, dofs: IntArray, look: Callable[[Array], Array], poses: Array, *rounds: Array
+) -> tuple[Array, Array]:
+    """Poses, (n, n_values), after rounds of steps, (n, shakes, len(dofs)) each, of which each takes its best; how they
+    look, (n,)."""
+    for steps in rounds:
+        (n, shakes), n_values = steps.shape[:2], poses.shape[1]
+        moved = _moved(model, np.repeat(poses, shakes, axis=0), dofs, steps.reshape(n * shakes, len(dofs)))
+        around = np.concatenate([poses[:, None], moved.reshape(n, shakes, n_values)], axis=1)
+        of_each = look(around.reshape(n * (1 + shakes), n_values)).reshape(n, 1 + shakes).argmax(axis=1)
+        poses = around[np.arange(n), of_each]
+    return poses, look(poses)
 
 
 def _moved(model: BodyModel, poses: Array, dofs: IntArray, steps: Array) -> Array:

@@ -196,6 +196,20 @@ def test_the_same_every_time(gavrila):
     assert twice[0].cost == twice[1].cost
 
 
+@pytest.mark.parametrize("threads", [2, 5, 60])
+def test_the_same_however_many_threads_look(gavrila, monkeypatch, threads):
+    """Also where there are more threads than poses."""
+    truth = posed(gavrila, 1)
+    wrong = turned(gavrila, truth, **LOST["60 degrees off"])
+    limb, judge = limb_of(gavrila, "left_forearm"), Staged(gavrila, truth, wrong).judge
+
+    def candidates(n):
+        monkeypatch.setattr(recover, "N_HELPERS", n)
+        return recover._candidates(gavrila, limb, [], wrong, [], replace(judge).of_limb(limb))
+
+    np.testing.assert_array_equal(candidates(threads), candidates(1))
+
+
 def test_other_poses_are_tried_as_they_are(gavrila):
     """No proposal lies near enough, but the frame before had the arm where it belongs, and the legs elsewhere."""
     truth = posed(gavrila, 1)
