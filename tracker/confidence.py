@@ -27,11 +27,12 @@ _LEAST_TRUST = 0.5
 """Silhouettes trusted less have no say."""
 _MOST_UNEXPLAINED = 0.07
 """A silhouette of whose contour more than this is explained by no part shows a limb that is elsewhere."""
-_WEIGHTS = np.array([-1.459, 0.753, 2.404, 11.344, 8.074, -3.76, -2.929, -6.672])
+_WEIGHTS = np.array([-1.611, 0.579, 2.663, 5.724, 6.632, -2.025, -2.906, -5.704])
 """Of the evidence in `evidence`, in its order; the last is the constant."""
-_DOUBTFUL, _SUSPECT, _LOST = -3.8, -3.0, 0.0
+_DOUBTFUL, _SUSPECT, _LOST = -3.8, -3.5, 0.0
 """Log odds that a limb is lost from which on the frame is doubtful, the limb is searched for, and the frame is lost.
-Few limbs are lost, and a lost one that is called good is the costlier error: doubt begins at 1 to 45."""
+Few limbs are lost, and a lost one that is called good is the costlier error: doubt begins at 1 to 45. A search is begun
+nearly as soon: it costs time, and a limb that is left astray leads the frames after it astray."""
 _LOST_FORWARD = 0.6
 """Of a body whose contours are farther than this from all edges, in outlier distances, nothing holds."""
 
