@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 S = TypeVar("S")
 T = TypeVar("T")
+U = TypeVar("U")
 
 BORROW: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy", "_nrt": False}
 """For kernels that make no arrays: those they are given belong to whoever calls. Otherwise numba counts references to
@@ -23,6 +24,17 @@ N_HELPERS = os.cpu_count() or 1
 def helpers() -> ThreadPoolExecutor:
     """Threads that work besides the caller's; kernels let go of the interpreter's lock."""
     return ThreadPoolExecutor(N_HELPERS, thread_name_prefix="kernels")
+
+
+def dealt_out(work: Callable[[S, U], T], rooms: Sequence[S], items: Sequence[U]) -> list[T]:
+    """What some work makes of each of several things, in order, in as many threads as there are rooms to work in."""
+
+    def share(room: S, own: Sequence[U]) -> list[T]:
+        return [work(room, x) for x in own]
+
+    n = len(rooms)
+    shares = list(helpers().map(share, rooms, [items[i::n] for i in range(n)]))
+    return [shares[i % n][i // n] for i in range(len(items))]
 
 
 @lru_cache(maxsize=1)

@@ -20,7 +20,7 @@ from tracker.body import BodyModel
 from tracker.confidence import Limb
 from tracker.descent import solve
 from tracker.fit import Block, Fit
-from tracker.kernels import N_HELPERS, helpers
+from tracker.kernels import N_HELPERS, dealt_out, helpers
 from tracker.kinematics import IntArray, chain_poses
 from tracker.refine import WORTH_A_STEP, ContourMatch
 from tracker.rigid import Array
@@ -99,12 +99,7 @@ class Judge:
     def each(self, work: Callable[["Judge", Array], T], poses: Sequence[Array] | Array) -> list[T]:
         """What some work makes of each of several poses, (n_values,) each, in threads side by side, each with a judge
         of its own."""
-
-        def share(i: int, judge: Judge) -> list[T]:
-            return [work(judge, pose) for pose in poses[i::N_HELPERS]]
-
-        shares = list(helpers().map(share, range(N_HELPERS), self._for_threads))
-        return [shares[i % N_HELPERS][i // N_HELPERS] for i in range(len(poses))]
+        return dealt_out(work, self._for_threads, list(poses))
 
     def cost(self, fit: Fit) -> float:
         """Cost of a refined pose with its colours."""

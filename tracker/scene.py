@@ -234,13 +234,12 @@ class Scene:
         model, free, suspects = memory.model, memory.free, tuple(memory.suspects(found))
         priors = self._priors(person, suspects)
         match, poses = self._match_on(own, person, everywhere=True), tuple(self.poses)
+        fit = solve(model, seen.fit.values, [match, *priors], free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
         if not due and not found.body_lost:  # whose turn it is not yet are no longer drawn to what was predicted
-            gone_on = solve(model, seen.fit.values, [match, *priors], free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
-            return _Seen(match, poses, gone_on, suspects)
+            return _Seen(match, poses, fit, suspects)
         colors = Colors(own, *self._around(person))
         how = settings.recover if alone else for_several(settings.recover)
         judge = Judge(match, priors, colors, memory.known, how, free)
-        fit = solve(model, seen.fit.values, judge.blocks, free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
         remarks: list[str] = []
         evaluations = 0
         if found.body_lost:

@@ -196,6 +196,7 @@ class _Choice:
         for good in (*self._before[-1:], self._after[0]):
             self._known = _colors(observer, models, good, self._person).learn(self._known, 0.5)
         self._options = [self._options_of(f, Tracked.of(b)) for f, b in zip(self._found, back, strict=True)]
+        self._views = lru_cache(_SEEN_AT_ONCE)(self._observed)
         self._sight = lru_cache(_SEEN_AT_ONCE)(self._look)
 
     def _options_of(self, *passes: Tracked) -> Candidates:
@@ -234,7 +235,7 @@ class _Choice:
         apart = [KeepBodiesApart(bodies, person, settings.apart)] if len(bodies) > 1 and settings.apart > 0 else []
         return Sight(self._model, match, Colors(views, bodies, person), self._known, apart, settings, self._free)
 
-    def _views(self, i: int) -> tuple[ViewEvidence, ...]:
+    def _observed(self, i: int) -> tuple[ViewEvidence, ...]:
         """The evidence of a frame around what both passes found there, by which all poses are judged."""
         cameras = self._observer.matched_cameras
         guesses = [self._bodies(i, e.poses[self._person]) for e in (self._found[i], self._back[i])]
@@ -254,15 +255,11 @@ class _Choice:
         return summed_up(self._found[i].frame, views, self._models, poses, found, self._settings)
 
     def _in_place_of(self, i: int, estimate: PoseEstimate, remark: str) -> PoseEstimate:
-        return _in_place_of(self._found[i], estimate, self._person, remark)
-
-
-def _in_place_of(before: Tracked, estimate: PoseEstimate, person: int, remark: str) -> PoseEstimate:
-    """An estimate with a remark on a person; of the others, who were held, as sure as before."""
-    statuses, remarks = list(before.statuses), list(estimate.remarks)
-    statuses[person] = estimate.statuses[person]
-    remarks[person] = ", ".join(filter(None, (remarks[person], remark)))
-    return estimate._replace(statuses=tuple(statuses), remarks=tuple(remarks))
+        """An estimate with a remark on the person; of the others, who were held, as sure as before."""
+        person, statuses, remarks = self._person, list(self._found[i].statuses), list(estimate.remarks)
+        statuses[person] = estimate.statuses[person]
+        remarks[person] = ", ".join(filter(None, (remarks[person], remark)))
+        return estimate._replace(statuses=tuple(statuses), remarks=tuple(remarks))
 
 
 def _bodies(models: Sequence[BodyModel], poses: Sequence[Array]) -> list[Body]:

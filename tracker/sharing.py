@@ -8,7 +8,7 @@ point draws the nearest piece of contour, whosever it is.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -114,7 +114,7 @@ class _View:
     @cached_property
     def _theirs(self) -> "_Theirs":
         view, n_people = self._view, int(self._surfaces.people[-1]) + 1
-        edges, outline = self._edges or _NOTHING, self._outline or _NOTHING
+        edges, outline = self._edges or _nothing(), self._outline or _nothing()
         out = _Theirs(
             np.empty((n_people, len(edges.counts)), np.bool_), np.empty((n_people, len(outline.counts)), np.bool_),
             np.zeros(n_people, np.bool_),
@@ -146,7 +146,10 @@ def _sampled(view: ViewEvidence) -> tuple[Samples | None, Samples | None]:
     return edges, sampled(Segments(points, silhouette.normals, np.arange(len(points) + 1)))
 
 
-_NOTHING = sampled(Segments(np.empty((0, 2), np.float32), np.empty((0, 2), np.float32), np.zeros(1, np.int64)))
+@lru_cache(maxsize=1)  # not made by the import, which would load a kernel
+def _nothing() -> Samples:
+    """Samples of no segments."""
+    return sampled(Segments(np.empty((0, 2), np.float32), np.empty((0, 2), np.float32), np.zeros(1, np.int64)))
 
 
 # One call for all that is asked of a view: of a dozen calls each hands the interpreter's lock over and waits for it.

@@ -17,7 +17,7 @@ from tracker.appearance import Colors, PartColors
 from tracker.body import BodyModel
 from tracker.descent import solve
 from tracker.fit import Block
-from tracker.kernels import N_HELPERS, helpers
+from tracker.kernels import N_HELPERS, dealt_out
 from tracker.recover import APART_M, LEAST_GAIN
 from tracker.refine import WORTH_A_STEP, ContourMatch
 from tracker.rigid import Array
@@ -72,15 +72,11 @@ class Sight:
         model, settings = self._model, self._settings
         sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
 
-        def refine(match: ContourMatch, own: Sequence[Array]) -> list[Array]:
-            return [
-                solve(model, v, [match, *prior_blocks(model, v, sigma), *self._apart], self._free,
-                      _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP).values
-                for v in own
-            ]  # fmt: skip
+        def refine(match: ContourMatch, pose: Array) -> Array:
+            blocks = [match, *prior_blocks(model, pose, sigma), *self._apart]
+            return solve(model, pose, blocks, self._free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP).values
 
-        shares = list(helpers().map(refine, self._matches, [poses[i::N_HELPERS] for i in range(N_HELPERS)]))
-        return np.array([shares[i % N_HELPERS][i // N_HELPERS] for i in range(len(poses))])
+        return np.array(dealt_out(refine, self._matches, poses))
 
     def _held(self, values: Array) -> float:
         """What a pose costs besides the image."""

@@ -293,16 +293,20 @@ def test_what_is_looked_at_ahead_is_what_would_be_found_later(sample, real_frame
     scenery = None if background else [Scenery(c.size) for c in observer.matched_cameras]
     expected = observer.evidence(25, boxes, predicted, scenery)
     monkeypatch.setattr("tracker.evidence.link_edges", lambda *a: linked.append(a) or link_edges(*a))
-    observer.prefetch(25, boxes, still=not background)
-    observer._looker.submit(lambda: None).result()  # it has been done by now
+
+    def look_ahead(regions, still):
+        observer.prefetch(25, regions, still)
+        observer._looker.submit(lambda: None).result()  # it has been done by now
+
+    look_ahead(boxes, not background)
     assert len(linked) == 4
     same_evidence(observer.evidence(25, boxes, predicted, scenery), expected)
     assert len(linked) == 4
     # Told other regions, or not that something stands still, it does the work again.
-    observer.prefetch(25, [None, *boxes[1:]], still=not background)
+    look_ahead([None, *boxes[1:]], not background)
     same_evidence(observer.evidence(25, boxes, predicted, scenery), expected)
     assert len(linked) == 4 + 4 + 1
-    observer.prefetch(25, boxes, still=background)
+    look_ahead(boxes, background)
     same_evidence(observer.evidence(25, boxes, predicted, scenery), expected)
     assert len(linked) == 9 + 4 + 4
 
