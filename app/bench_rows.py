@@ -16,9 +16,9 @@ from tracker import contours
 from tracker.body import Body, BodyModel
 from tracker.chamfer import ChamferCost
 from tracker.descent import solve
-from tracker.evidence import Observer
 from tracker.fit import Block, Fit, StayNear, damped_step
 from tracker.formats.trc import MarkerTable
+from tracker.observer import Observer
 from tracker.recording import Recording
 from tracker.refine import ContourMatch
 from tracker.rigid import Array

@@ -7,10 +7,11 @@ import numpy as np
 
 from tracker.body import Body, BodyModel
 from tracker.chamfer import ChamferCost
-from tracker.evidence import Observer, ViewEvidence
+from tracker.evidence import ViewEvidence
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
+from tracker.observer import Observer
 from tracker.recording import Recording
 from tracker.references import read_joints
 from tracker.rigid import Array

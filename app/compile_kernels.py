@@ -15,7 +15,7 @@ from app.compiling import compiled_mark
 from app.samples import bundled
 from tracker.body import BodyModel
 from tracker.errors import SessionError
-from tracker.evidence import Observer
+from tracker.observer import Observer
 from tracker.recording import Recording
 from tracker.rigid import Array
 from tracker.session import CameraSource

@@ -13,8 +13,9 @@ import cv2
 from app import pictures
 from app.recent import Recent
 from tracker.errors import RecordingError
-from tracker.evidence import Observer, ViewEvidence
+from tracker.evidence import ViewEvidence
 from tracker.matched import MatchedView
+from tracker.observer import Observer
 from tracker.proxy import Proxy
 from tracker.silhouettes import Image
 

@@ -15,9 +15,9 @@ from app.tracked import Keyframes, keyframes_of, told_of, tracked_changes
 from tracker.annotations import AnnotationStore
 from tracker.confidence import Status
 from tracker.errors import SessionError
-from tracker.evidence import Observer
 from tracker.formats.model_toml import format_model
 from tracker.locks import free_of, kept_locks
+from tracker.observer import Observer
 from tracker.recording import Recording
 from tracker.records import PoseChange, PoseRecord
 from tracker.rigid import Array

@@ -15,7 +15,7 @@ from tracker import confidence
 from tracker.body import BodyModel
 from tracker.confidence import Status
 from tracker.errors import TrackerError
-from tracker.evidence import Observer
+from tracker.observer import Observer
 from tracker.rigid import Array
 from tracker.second_pass import Followed, Tracked, follow_back
 from tracker.track import PoseEstimate, track_chamfer

@@ -59,7 +59,7 @@ ORDER = [
     ["tracker.locks", "tracker.recording", "tracker.references"],
     ["tracker.foreground"],
     ["tracker.assemble", "tracker.evidence", "tracker.simulate"],
-    ["tracker.kept"],
+    ["tracker.kept", "tracker.observer"],
     ["tracker.limb_look", "tracker.matching", "tracker.points"],
     ["tracker.chamfer", "tracker.predict", "tracker.appearance", "tracker.refine", "tracker.apart"],
     ["tracker.descent", "tracker.sharing", "tracker.surroundings"],

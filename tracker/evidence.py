@@ -1,13 +1,8 @@
 """What a frame shows: per view the edges that poses are scored against, and their distance image.
 
-The observer works only in the regions asked for, on several views at a time, and one frame ahead: it decodes that
-frame, and where it is told the region in time it finds there what does not depend on the prediction.
+What an image shows does not depend on what is expected there (`Look`); which of its edges are kept does.
 """
 
-import threading
-from collections import OrderedDict
-from collections.abc import Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -17,17 +12,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker import silhouettes
 from tracker.cameras import Camera, Region
-from tracker.edges import Edges, detect_edges, levels
-from tracker.foreground import Foreground, Prepared
-from tracker.matched import fit_region
-from tracker.recording import Recording
+from tracker.edges import Edges
 from tracker.rigid import FloatArray
 from tracker.sampling import distance_image
 from tracker.scenery import Scenery
 from tracker.segments import Samples, Segments, accept, link_edges, sampled
-from tracker.session import CameraSource
 from tracker.sights import BINS, count_colors
 from tracker.silhouette_contour import Outline, trace_outline, trust_outline
 from tracker.silhouettes import Image, Mask
@@ -37,10 +27,6 @@ SCENE_SPACING_PX = 4
 
 ACCEPTED_SHARE = 0.5
 """Mean distance to the predicted contours up to which a segment of edges is accepted, as a share of theta."""
-FOREGROUND_MARGIN = 0.012
-"""How far around the silhouette edges are kept, as a fraction of the longer side of the image."""
-_WORKERS = 2
-_FRAMES_AHEAD = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,11 +143,19 @@ def view_evidence(
     assert edge_map.shape == (camera.height, camera.width), (edge_map.shape, camera.size)
     found = edge_map.view(np.uint8)
     segments = None if gradients is None else link_edges(found, gradients)
-    look = _Look(camera, scale, corner_px, image_size, found, segments, colors=colors)
-    return _expecting(look, predicted_px, scenery)
+    look = Look(camera, scale, corner_px, image_size, found, segments, colors=colors)
+    return expecting(look, predicted_px, scenery)
 
 
-class _Look(NamedTuple):
+def silhouette_evidence(inside: Mask, edges: Edges, limit_px: float) -> Silhouette:
+    """A silhouette, (H, W), in a region whose edges are known, with its distance cut off at a limit, matched px."""
+    outline = trace_outline(inside)
+    first = _first_in_cells(outline.points_px, *inside.shape)
+    trust = trust_outline(outline, inside, edges)
+    return Silhouette(inside, outline.points_px[first], outline.normals[first], trust, outline, limit_px)
+
+
+class Look(NamedTuple):
     """What a region of a view shows, whatever is expected there; see `ViewEvidence`."""
 
     camera: Camera
@@ -183,7 +177,7 @@ class _Look(NamedTuple):
         return u0, v0, u0 + width, v0 + height
 
 
-def _expecting(look: _Look, predicted_px: FloatArray | None, scenery: Scenery | None) -> ViewEvidence:
+def expecting(look: Look, predicted_px: FloatArray | None, scenery: Scenery | None) -> ViewEvidence:
     """What of a region's edges is kept where something is expected and something stands still; see `view_evidence`."""
     segments, theta = look.segments, _theta_px(look.image_size or look.camera.size)
     chosen = still = None
@@ -300,149 +294,3 @@ def _first_in_cells(points: FloatArray, height: int, width: int) -> NDArray[np.i
             first[n] = i
             n += 1
     return first[:n].copy()
-
-
-class _Ahead(NamedTuple):
-    """A frame as far as it is looked at before its evidence is asked for."""
-
-    prepared: Future[list[Prepared | None]]
-    """Each view; None where it is damaged."""
-    looks: Future[list[_Look]] | None = None
-    """A region of each view; None where no regions are known."""
-    still: bool = False
-    """Whether what stands still is going to be known."""
-
-
-class Observer:
-    """Turns the frames of a recording into evidence. Safe to use from several threads."""
-
-    def __init__(self, cameras: Sequence[CameraSource], recording: Recording) -> None:
-        """Read the backgrounds.
-
-        Args:
-            cameras: the views, with their side files.
-            recording: their footage.
-
-        Raises:
-            RecordingError: a background is missing, unreadable or of the wrong size.
-        """
-        self.cameras = tuple(cameras)
-        self.recording = recording
-        """Their footage."""
-        # OpenCV's own threads would only be in the way of those that work on other views.
-        self._pool, self._pool_ahead = (
-            ThreadPoolExecutor(_WORKERS, name, initializer=cv2.setNumThreads, initargs=(1,))
-            for name in ("observe", "observe ahead")
-        )
-        self._views = [Foreground(c, self._pool) for c in self.cameras]
-        self._reader, self._looker = (ThreadPoolExecutor(1, name) for name in ("read ahead", "look ahead"))
-        self._ahead: OrderedDict[int, _Ahead] = OrderedDict()
-        self._lock = threading.Lock()
-
-    @property
-    def matched_cameras(self) -> tuple[Camera, ...]:
-        """The views as they are matched, whole: without lens distortion, at the scale of matching."""
-        return tuple(v.view.camera for v in self._views)
-
-    def prefetch(self, k: int, regions: Sequence[Region | None] | None = None, still: bool = False) -> None:
-        """Begin to decode frame k, and to do with it what needs no prediction; `evidence` will find it done.
-
-        At most two frames are kept so. To be called again when the regions are known. A frame that cannot be read is
-        reported when its evidence is asked for.
-
-        Args:
-            k: the frame.
-            regions: where `evidence` is going to look, if it is known; asked for others it looks anew, so that what it
-                gives does not depend on what was told here.
-            still: whether it will be told what stands still.
-        """
-        with self._lock:
-            ahead = self._ahead.get(k) or _Ahead(self._reader.submit(self._prepare, k))
-            if regions is not None and ahead.looks is None:
-                ahead = ahead._replace(
-                    looks=self._looker.submit(self._look_ahead, ahead.prepared, list(regions), still), still=still
-                )
-            self._ahead[k] = ahead
-            while len(self._ahead) > _FRAMES_AHEAD:
-                self._ahead.popitem(last=False)[1].prepared.cancel()
-
-    def evidence(
-        self,
-        k: int,
-        regions: Sequence[Region | None] | None = None,
-        predicted_px: Sequence[FloatArray | None] | None = None,
-        scenery: Sequence[Scenery] | None = None,
-    ) -> tuple[ViewEvidence, ...]:
-        """The edges of frame k in each view, kept to the foreground where masks or a background tell it.
-
-        A damaged frame has no edges: the view has no say in the cost.
-
-        Args:
-            k: the frame.
-            regions: where to look in each view, matched px, see `matched.region_around`; None is the whole image.
-            predicted_px: visible pieces of the predicted contours in each view, (M, 4), px of `matched_cameras`, by
-                which segments of edges are accepted; None keeps all edges.
-            scenery: what is known to stand still in each view; asked where neither masks nor a background tell.
-        """
-        with self._lock:
-            ahead = self._ahead.pop(k, None)
-        prepared = self._prepare(k) if ahead is None else ahead.prepared.result()
-        everywhere, still, looks = [None] * len(self.cameras), scenery is not None, list[_Look]()
-        if ahead is not None and ahead.looks is not None and ahead.still == still:
-            looks = ahead.looks.result()
-
-        def observe(
-            i: int, region: Region | None, predicted_px: FloatArray | None, room: Scenery | None
-        ) -> ViewEvidence:
-            known = looks and looks[i].box == self._box(i, region)
-            look = looks[i] if known else self._look(i, prepared[i], region, still)
-            if predicted_px is not None:
-                predicted_px = predicted_px - np.array([*look.corner_px, *look.corner_px], np.float32)
-            return _expecting(look, predicted_px, room if look.silhouette is None else None)
-
-        return tuple(
-            self._pool.map(
-                observe, range(len(self.cameras)), regions or everywhere, predicted_px or everywhere,
-                scenery or everywhere,
-            )
-        )  # fmt: skip
-
-    def _prepare(self, k: int) -> list[Prepared | None]:
-        frames = self.recording.read(k)
-        return [None if f is None else view.prepare(f, k) for view, f in zip(self._views, frames, strict=True)]
-
-    def _look_ahead(
-        self, prepared: Future[list[Prepared | None]], regions: Sequence[Region | None], still: bool
-    ) -> list[_Look]:
-        views = range(len(self._views))
-        return list(self._pool_ahead.map(self._look, views, prepared.result(), regions, [still] * len(views)))
-
-    def _box(self, i: int, region: Region | None) -> Region:
-        view = self._views[i].view
-        return view.whole if region is None else fit_region(region, view.camera.size)
-
-    def _look(self, i: int, prepared: Prepared | None, region: Region | None, still: bool) -> _Look:
-        view, box = self._views[i], self._box(i, region)
-        matched = view.view.camera
-        camera, scale = matched.cropped(box), view.view.scale
-        if prepared is None:
-            nothing = np.zeros((camera.height, camera.width), np.uint8)
-            return _Look(camera, scale, box[:2], matched.size, nothing)
-        smooth = view.smoothed(prepared, box)
-        changes = view.changes(prepared, smooth, box)
-        margin_px = FOREGROUND_MARGIN * max(matched.size)
-        foreground = None if changes is None else silhouettes.grow(changes.anything, margin_px)
-        # Texture that stands still need not be kept out by thresholds, which would keep out the weaker edges of bodies.
-        edges = detect_edges(smooth, levels(prepared.strengths, restricted=changes is not None or still), foreground)
-        segments = link_edges(edges.found, edges.gradients)
-        silhouette = None if changes is None else _silhouette(changes.inside, edges, 2 * _theta_px(matched.size))
-        return _Look(
-            camera, scale, box[:2], matched.size, edges.found, segments, sampled(segments), smooth, silhouette
-        )  # fmt: skip
-
-
-def _silhouette(inside: Mask, edges: Edges, limit_px: float) -> Silhouette:
-    outline = trace_outline(inside)
-    first = _first_in_cells(outline.points_px, *inside.shape)
-    trust = trust_outline(outline, inside, edges)
-    return Silhouette(inside, outline.points_px[first], outline.normals[first], trust, outline, limit_px)

@@ -18,9 +18,10 @@ from tracker.apart import KeepBodiesApart
 from tracker.appearance import Colors, PartColors
 from tracker.body import Body, BodyModel
 from tracker.confidence import Status
-from tracker.evidence import Observer, ViewEvidence
+from tracker.evidence import ViewEvidence
 from tracker.fit import held
 from tracker.memory import Memory
+from tracker.observer import Observer
 from tracker.refine import ContourMatch
 from tracker.rigid import Array
 from tracker.scene import Scene

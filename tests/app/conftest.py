@@ -14,7 +14,7 @@ from app.controller import Controller
 from app.frames import Frames
 from app.saving import Saver
 from tracker.annotations import AnnotationStore
-from tracker.evidence import Observer
+from tracker.observer import Observer
 from tracker.recording import Recording
 from tracker.session import load_session
 

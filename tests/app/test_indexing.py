@@ -5,7 +5,7 @@ from hands import wait_for
 
 from app import indexing
 from app.frames import Frames
-from tracker.evidence import Observer
+from tracker.observer import Observer
 from tracker.recording import Recording
 from tracker.session import load_session
 

@@ -12,8 +12,8 @@ from app.state import FootageState
 from tracker import footage_listing
 from tracker.annotations import AnnotationStore
 from tracker.errors import RecordingError, TrackerError
-from tracker.evidence import Observer
 from tracker.footage import VideoFile
+from tracker.observer import Observer
 from tracker.recording import Recording
 from tracker.session import load_session
 

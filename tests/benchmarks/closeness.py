@@ -19,8 +19,8 @@ from true_starts import read_simulated
 
 from tracker.body import BodyModel
 from tracker.evaluate import evaluate_joints, joints_of_poses
-from tracker.evidence import Observer
 from tracker.formats.trc import MarkerTable
+from tracker.observer import Observer
 from tracker.recording import Recording
 from tracker.rigid import Array
 from tracker.session import Session

@@ -17,9 +17,9 @@ from running import ROOT, Program, visited
 from scripted_user import TRUNK, ScriptedUser
 
 from tracker.annotations import AnnotationStore
-from tracker.evidence import Observer
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_table import read_pose_table
+from tracker.observer import Observer
 from tracker.recording import Recording
 from tracker.records import PoseChange, PoseRecord
 from tracker.session import load_session

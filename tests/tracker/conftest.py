@@ -6,9 +6,10 @@ from typing import NamedTuple
 import pytest
 
 from tracker.body import BodyModel
-from tracker.evidence import Observer, ViewEvidence
+from tracker.evidence import ViewEvidence
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import load_model
+from tracker.observer import Observer
 from tracker.recording import Recording
 from tracker.references import read_joints
 from tracker.rigid import Array

@@ -10,14 +10,13 @@ from tracker.body import Body
 from tracker.cameras import Camera
 from tracker.errors import RecordingError
 from tracker.evidence import (
-    FOREGROUND_MARGIN,
     SCENE_SPACING_PX,
-    Observer,
     accepted,
     default_theta_px,
     view_evidence,
 )
 from tracker.matched import MatchedView, match_scale, region_around
+from tracker.observer import FOREGROUND_MARGIN, Observer
 from tracker.recording import Recording
 from tracker.scenery import Scenery
 from tracker.segments import link_edges
@@ -292,7 +291,7 @@ def test_what_is_looked_at_ahead_is_what_would_be_found_later(sample, real_frame
     boxes = [region_around(p.reshape(-1, 2), 40, (640, 480)) for p in predicted]
     scenery = None if background else [Scenery(c.size) for c in observer.matched_cameras]
     expected = observer.evidence(25, boxes, predicted, scenery)
-    monkeypatch.setattr("tracker.evidence.link_edges", lambda *a: linked.append(a) or link_edges(*a))
+    monkeypatch.setattr("tracker.observer.link_edges", lambda *a: linked.append(a) or link_edges(*a))
 
     def look_ahead(regions, still):
         observer.prefetch(25, regions, still)

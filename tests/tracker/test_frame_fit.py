@@ -7,11 +7,11 @@ from test_fit import ARM
 from test_pins import seen
 
 from tracker.body import Body
-from tracker.evidence import Observer
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import load_model
 from tracker.frame_fit import fit_frame
 from tracker.joint_maps import LIMB_JOINTS
+from tracker.observer import Observer
 from tracker.pins import ViewPin
 from tracker.recording import Recording
 from tracker.references import read_joints

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tracker.confidence import Status
-from tracker.evidence import Observer
 from tracker.formats.pose_table import read_pose_table
+from tracker.observer import Observer
 from tracker.predict import predict
 from tracker.recording import Recording
 from tracker.session import Session

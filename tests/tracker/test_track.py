@@ -7,9 +7,10 @@ from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_eviden
 from tracker.assemble import assemble
 from tracker.body import Body
 from tracker.evaluate import evaluate_joints, joints_of_poses
-from tracker.evidence import Observer, view_evidence
+from tracker.evidence import view_evidence
 from tracker.fit import fit_to_points
 from tracker.joint_maps import LIMB_JOINTS
+from tracker.observer import Observer
 from tracker.predict import PredictSettings
 from tracker.recording import Recording
 from tracker.recover import Searched
