@@ -7,6 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.quantiles import quantiles
 from tracker.rigid import FloatArray
 from tracker.silhouettes import Image, Mask
 
@@ -42,7 +43,7 @@ def levels(strengths: FloatArray, restricted: bool) -> Levels:
         restricted: whether only a foreground is looked at. Inside it the noise sets the bounds, not what share of
             the picture is textured.
     """
-    strongest, weaker = np.quantile(strengths, (STRONG_FRACTION, WEAK_FRACTION)).tolist()
+    strongest, weaker = quantiles(strengths, (STRONG_FRACTION, WEAK_FRACTION)).tolist()
     strong, weak = max(2 * MIN_GRADIENT, strongest), max(MIN_GRADIENT, weaker)
     return Levels(min(strong, 4 * MIN_GRADIENT), min(weak, 2 * MIN_GRADIENT)) if restricted else Levels(strong, weak)
 

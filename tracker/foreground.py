@@ -38,6 +38,8 @@ class _Empty(NamedTuple):
     """Smoothed, in matched pixels, (H, W, 3)."""
     readings: Readings
     """What the probes show of it."""
+    usable: NDArray[np.intp]
+    """Which of them tell the exposure, (m,)."""
 
 
 class Foreground:
@@ -69,7 +71,7 @@ class Foreground:
         readings = self._probes.read(frame)
         if empty is None:
             return Prepared(frame, mask, readings.strengths, 0.0, np.ones(3, np.float32))
-        gain = silhouettes.exposure_gain(readings.colors, empty.readings.colors)
+        gain = silhouettes.exposure_gain(readings.colors[empty.usable], empty.readings.colors[empty.usable])
         differences = np.abs(readings.colors - gain * empty.readings.colors).max(axis=-1)
         return Prepared(frame, mask, readings.strengths, silhouettes.change_threshold(differences), gain)
 
@@ -96,4 +98,5 @@ class Foreground:
         if background is None:
             return None
         smooth = silhouettes.smoothed(self.view.image(background, self.view.whole))
-        return _Empty(smooth, self._probes.read(background))
+        readings = self._probes.read(background)
+        return _Empty(smooth, readings, np.flatnonzero(silhouettes.tells_exposure(readings.colors)))

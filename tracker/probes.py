@@ -46,10 +46,10 @@ class Probes:
 
     def read(self, image: Image) -> Readings:
         """Read a frame as filmed, (H, W, 3)."""
-        responses = np.empty((len(self._rows) * len(self._columns), 3, 3), np.float32)
-        _respond(image, self._rows, self._columns, self._block, self._kernels, responses)
-        strengths = np.abs(responses[..., 1:]).sum(axis=-1).max(axis=-1)
-        return Readings(np.ascontiguousarray(responses[..., 0]), strengths)
+        n = len(self._rows) * len(self._columns)
+        out = Readings(np.empty((n, 3), np.float32), np.empty(n, np.float32))
+        _read(image, self._rows, self._columns, self._block, self._kernels, out)
+        return out
 
 
 def _taps(length: int, scale: float) -> NDArray[np.int64]:
@@ -70,26 +70,28 @@ def _kernels() -> FloatArray:
 
 
 @njit(nogil=True, cache=True, fastmath={"reassoc", "contract"})
-def _respond(
-    image: Image, rows: NDArray[np.int64], columns: NDArray[np.int64], block: int, kernels: FloatArray,
-    responses: FloatArray,
-) -> None:  # fmt: skip
-    """Fill the responses of the kernels, (3, taps^2), at each place: (n, channels, kernels).
+def _read(
+    image: Image, rows: NDArray[np.int64], columns: NDArray[np.int64], block: int, kernels: FloatArray, out: Readings
+) -> None:
+    """Fill what each place shows by the responses of the kernels, (3, taps^2).
 
     One place after the other: the patches of all of them would be fresh memory, and their product with the kernels so
     large that BLAS spreads it over threads of its own, which wait for cores that are busy.
     """
-    patch = np.empty((3, kernels.shape[1]), np.float32)
-    n = 0
+    patch, responses, n = np.empty((3, kernels.shape[1]), np.float32), np.empty(3, np.float32), 0
     for r in range(rows.shape[0]):
         for c in range(columns.shape[0]):
             _take_patch(image, rows[r], columns[c], block, patch)
+            strongest = np.float32(0.0)
             for channel in range(3):
                 for k in range(3):
                     total = np.float32(0.0)
                     for t in range(kernels.shape[1]):
                         total += patch[channel, t] * kernels[k, t]
-                    responses[n, channel, k] = total
+                    responses[k] = total
+                out.colors[n, channel] = responses[0]
+                strongest = max(strongest, abs(responses[1]) + abs(responses[2]))
+            out.strengths[n] = strongest
             n += 1
 
 
@@ -100,14 +102,13 @@ def _take_patch(
     """Fill a patch, (3, taps^2); each tap is the mean of a block of pixels, as a reduced image would show."""
     height, width, _ = image.shape
     share = np.float32(1.0 / (block * block))
-    patch[:] = 0.0
     for di in range(block):
         for dj in range(block):
             for i in range(rows.shape[0]):
-                v = min(rows[i] + di, height - 1)
-                first = i * columns.shape[0]
+                line = image[min(rows[i] + di, height - 1)]
                 for j in range(columns.shape[0]):
-                    u, t = min(columns[j] + dj, width - 1), first + j
-                    patch[0, t] += share * np.float32(image[v, u, 0])
-                    patch[1, t] += share * np.float32(image[v, u, 1])
-                    patch[2, t] += share * np.float32(image[v, u, 2])
+                    # An index that may be negative is looked at twice.
+                    u, t = np.uint64(min(columns[j] + dj, width - 1)), np.uint64(i * columns.shape[0] + j)
+                    for channel in range(3):
+                        level = share * np.float32(line[u, channel])
+                        patch[channel, t] = level if di + dj == 0 else patch[channel, t] + level

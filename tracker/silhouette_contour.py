@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from tracker.edges import Edges
 from tracker.rigid import FloatArray
@@ -12,7 +14,7 @@ from tracker.silhouettes import Mask
 LEAST_LENGTH = 24
 """Contours of fewer pixels go around specks and pinholes, and are left out."""
 _NORMAL_WINDOW = (7, 7)
-_NEAR = np.ones((5, 5), np.uint8)  # an edge this near to the contour is the same
+_NEAR_PX = 2  # an edge this near to the contour, along both axes, is the same
 _ALIGNED = 0.7  # cosine of the angle between the contour's normal and the image's gradient
 _NO_TRUST, _FULL_TRUST = 0.5, 0.9
 """Shares of the outline with an edge of the image along it."""
@@ -32,18 +34,36 @@ class Outline(NamedTuple):
 def trace_outline(silhouette: Mask) -> Outline:
     """Trace the contours of a silhouette, (H, W), and of the holes in it; where it leaves the image it has none."""
     found, _ = cv2.findContours(silhouette.view(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-    height, width = silhouette.shape
     long = [np.asarray(c, np.int32).reshape(-1, 2) for c in found if len(c) >= LEAST_LENGTH]
     points = np.concatenate(long) if long else np.empty((0, 2), np.int32)
-    u, v = points.T
-    points = points[(u > 0) & (v > 0) & (u < width - 1) & (v < height - 1)]
-    soft = cv2.blur(silhouette.view(np.uint8) * np.uint8(255), _NORMAL_WINDOW)
-    u, v = points.T
-    inward = np.stack([np.asarray(g)[v, u] for g in cv2.spatialGradient(soft)], axis=-1).astype(np.float32)
-    lengths = np.linalg.norm(inward, axis=-1, keepdims=True)
-    # Around something one pixel wide neither side is out.
-    kept = lengths[:, 0] > 0
-    return Outline(points[kept].astype(np.float32), -inward[kept] / lengths[kept])
+    soft = np.asarray(cv2.blur(silhouette.view(np.uint8) * np.uint8(255), _NORMAL_WINDOW))
+    outline = Outline(np.empty((len(points), 2), np.float32), np.empty((len(points), 2), np.float32))
+    n = _look_out(points, soft, outline)
+    return Outline(outline.points_px[:n], outline.normals[:n])
+
+
+@njit(nogil=True, cache=True)
+def _look_out(points: NDArray[np.int32], soft: NDArray[np.uint8], out: Outline) -> int:
+    """Fill the points, (N, 2), that do not lie on the border, and their normals: against the slope of a softened
+    silhouette, (H, W), by Sobel's kernel. Returns their number."""
+    height, width = soft.shape
+    n = 0
+    for i in range(points.shape[0]):
+        u, v = points[i, 0], points[i, 1]
+        if u <= 0 or v <= 0 or u >= width - 1 or v >= height - 1:
+            continue
+        du = dv = 0
+        for k in (-1, 0, 1):
+            weight = 2 - abs(k)
+            du += weight * (int(soft[v + k, u + 1]) - int(soft[v + k, u - 1]))
+            dv += weight * (int(soft[v + 1, u + k]) - int(soft[v - 1, u + k]))
+        length = np.sqrt(np.float32(du * du + dv * dv))
+        if length == 0:  # around something one pixel wide neither side is out
+            continue
+        out.points_px[n, 0], out.points_px[n, 1] = u, v
+        out.normals[n, 0], out.normals[n, 1] = -np.float32(du) / length, -np.float32(dv) / length
+        n += 1
+    return n
 
 
 def trust_outline(outline: Outline, silhouette: Mask, edges: Edges) -> float:
@@ -59,11 +79,32 @@ def trust_outline(outline: Outline, silhouette: Mask, edges: Edges) -> float:
     """
     if not len(outline.points_px):
         return 0.0
-    u, v = outline.points_px.T.astype(np.intp)
-    near = np.asarray(cv2.dilate(edges.found, _NEAR))[v, u] > 0
-    gradients = edges.gradients[:, v, u].T.astype(np.float32)
-    lengths = np.linalg.norm(gradients, axis=-1)
-    aligned = np.abs(np.sum(gradients * outline.normals, axis=-1)) > _ALIGNED * lengths
-    seen = (float(np.mean(near & aligned)) - _NO_TRUST) / (_FULL_TRUST - _NO_TRUST)
+    along = _count_along(outline, edges.found, edges.gradients) / len(outline.points_px)
+    seen = (along - _NO_TRUST) / (_FULL_TRUST - _NO_TRUST)
     plausible = (_TOO_FULL - cv2.countNonZero(silhouette.view(np.uint8)) / silhouette.size) / (_TOO_FULL - _FULL)
     return min(max(seen, 0.0), 1.0) * min(max(plausible, 0.0), 1.0)
+
+
+@njit(nogil=True, cache=True)
+def _count_along(outline: Outline, found: NDArray[np.uint8], gradients: NDArray[np.int16]) -> int:
+    """Points of an outline with an edge nearby, (H, W), where the image's gradient, (2, H, W), is across it."""
+    count = 0
+    for i in range(outline.points_px.shape[0]):
+        u, v = int(outline.points_px[i, 0]), int(outline.points_px[i, 1])
+        gu, gv = np.float32(gradients[0, v, u]), np.float32(gradients[1, v, u])
+        across = abs(gu * outline.normals[i, 0] + gv * outline.normals[i, 1])
+        if across <= np.float32(_ALIGNED) * np.sqrt(gu * gu + gv * gv):
+            continue
+        count += _is_near(found, u, v)
+    return count
+
+
+@njit(nogil=True, cache=True)
+def _is_near(found: NDArray[np.uint8], u: int, v: int) -> bool:
+    """Whether there is an edge near a pixel, in a map of them, (H, W)."""
+    height, width = found.shape
+    for row in range(max(0, v - _NEAR_PX), min(height, v + _NEAR_PX + 1)):
+        for column in range(max(0, u - _NEAR_PX), min(width, u + _NEAR_PX + 1)):
+            if found[row, column]:
+                return True
+    return False

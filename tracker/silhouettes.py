@@ -7,6 +7,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.quantiles import median
+
 Image = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
@@ -39,7 +41,12 @@ def change_threshold(differences: NDArray[np.float32]) -> float:
         differences: of the smoothed frame to the smoothed background, largest over the channels, at places spread
             over the whole image, (n,).
     """
-    return max(MIN_DIFFERENCE, 5.0 * float(np.median(differences)))
+    return max(MIN_DIFFERENCE, 5.0 * float(median(differences)))
+
+
+def tells_exposure(empty_colors: NDArray[np.float32]) -> Mask:
+    """Where an empty scene is neither too dark nor too bright to tell the exposure by its smoothed colours, (n, 3)."""
+    return np.asarray(np.all((empty_colors > _DARK) & (empty_colors < _BRIGHT), axis=-1))
 
 
 def exposure_gain(colors: NDArray[np.float32], empty_colors: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -47,12 +54,9 @@ def exposure_gain(colors: NDArray[np.float32], empty_colors: NDArray[np.float32]
 
     Args:
         colors: smoothed colours at places spread over the whole frame, (n, 3), of which most show the scene.
-        empty_colors: those of the empty scene at the same places, (n, 3).
+        empty_colors: those of the empty scene at the same places, which all tell it (`tells_exposure`), (n, 3).
     """
-    usable = np.all((empty_colors > _DARK) & (empty_colors < _BRIGHT), axis=-1)
-    if usable.sum() < _LEAST_PLACES:
-        return np.ones(3, np.float32)
-    return np.median(colors[usable] / empty_colors[usable], axis=0).astype(np.float32)
+    return np.ones(3, np.float32) if len(colors) < _LEAST_PLACES else median(colors / empty_colors).astype(np.float32)
 
 
 def brightened(image: Image, gain: NDArray[np.float32]) -> Image:

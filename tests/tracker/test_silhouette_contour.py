@@ -34,6 +34,32 @@ def test_points_lie_on_the_contour_and_normals_point_out():
     np.testing.assert_allclose(np.linalg.norm(outline.normals, axis=1), 1, rtol=1e-5)
 
 
+def test_normals_are_against_the_slope_of_the_softened_silhouette():
+    blots = cv2.GaussianBlur(np.random.default_rng(3).normal(size=(120, 160)), (0, 0), 5) > 0
+    outline = trace_outline(blots)
+    assert len(outline.points_px) > 500
+    u, v = outline.points_px.T.astype(int)
+    soft = cv2.blur(blots.view(np.uint8) * np.uint8(255), (7, 7))
+    inward = np.stack([np.asarray(g)[v, u] for g in cv2.spatialGradient(soft)], axis=-1).astype(np.float32)
+    expected = -inward / np.linalg.norm(inward, axis=-1, keepdims=True)
+    np.testing.assert_array_equal(outline.normals, expected)
+
+
+def test_trust_is_the_share_of_the_outline_with_an_edge_along_it():
+    rng = np.random.default_rng(4)
+    blots = cv2.GaussianBlur(rng.normal(size=(120, 160)), (0, 0), 9) > 0.02
+    seen = blots & (cv2.GaussianBlur(rng.normal(size=(120, 160)), (0, 0), 6) > -0.04)
+    edges, outline = detect_edges(smoothed(picture(seen)), BOUNDS), trace_outline(blots)
+    u, v = outline.points_px.T.astype(int)
+    near = cv2.dilate(edges.found, np.ones((5, 5), np.uint8))[v, u] > 0
+    gradients = edges.gradients[:, v, u].T.astype(np.float32)
+    across = np.abs(np.sum(gradients * outline.normals, axis=-1))
+    share = np.mean(near & (across > 0.7 * np.linalg.norm(gradients, axis=-1)))
+    assert 0.6 < share < 0.85
+    assert np.mean(blots) < 0.5  # else it would count against the silhouette
+    assert trust_outline(outline, blots, edges) == pytest.approx((share - 0.5) / 0.4)
+
+
 def test_holes_have_a_contour_too_and_specks_do_not():
     ring = disc(40) & ~disc(20)
     inner = np.linalg.norm(trace_outline(ring).points_px - (80, 60), axis=1) < 25

@@ -9,6 +9,7 @@ from tracker.silhouettes import (
     grow,
     smoothed,
     subtract_background,
+    tells_exposure,
 )
 
 
@@ -106,8 +107,11 @@ def test_exposure_is_found_although_a_person_stands_there():
     seen = empty * (1.2, 1.1, 0.9)
     seen[:300] = rng.uniform(0, 255, (300, 3))
     np.testing.assert_allclose(exposure_gain(seen.astype(np.float32), empty), (1.2, 1.1, 0.9), atol=0.03)
-    # Where everything is black nothing can be told.
-    np.testing.assert_array_equal(exposure_gain(seen.astype(np.float32), 0 * empty), 1)
+    # Where everything is black, or white, nothing can be told.
+    empty[:500], empty[500:960] = 5, 250
+    told = tells_exposure(empty)
+    assert told.sum() == 40
+    np.testing.assert_array_equal(exposure_gain(seen[told].astype(np.float32), empty[told]), 1)
 
 
 def test_a_background_follows_the_exposure():

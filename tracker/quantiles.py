@@ -1,0 +1,32 @@
+"""Quantiles of some thousand numbers: numpy's own spend ten times as long on all that they could be asked."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def quantiles(values: NDArray[np.floating], shares: Sequence[float]) -> NDArray[np.float64]:
+    """Quantiles along the first axis, interpolated as `numpy.quantile` does.
+
+    Args:
+        values: (n, ...), n > 0.
+        shares: which quantiles, from 0 to 1, (q,).
+
+    Returns:
+        They, (q, ...).
+    """
+    ordered, last = np.sort(values, axis=0), len(values) - 1
+    places = [share * last for share in shares]
+    below = [min(int(at), max(last - 1, 0)) for at in places]
+    return np.array(
+        [
+            ordered[i] + (at - i) * (ordered[min(i + 1, last)].astype(np.float64) - ordered[i])
+            for i, at in zip(below, places, strict=True)
+        ]
+    )
+
+
+def median(values: NDArray[np.floating]) -> NDArray[np.float64]:
+    """The median along the first axis, (n, ...) to (...)."""
+    return np.asarray(quantiles(values, (0.5,))[0])
