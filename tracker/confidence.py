@@ -29,10 +29,13 @@ _MOST_UNEXPLAINED = 0.07
 """A silhouette of whose contour more than this is explained by no part shows a limb that is elsewhere."""
 _WEIGHTS = np.array([-1.611, 0.579, 2.663, 5.724, 6.632, -2.025, -2.906, -5.704])
 """Of the evidence in `evidence`, in its order; the last is the constant."""
-_DOUBTFUL, _SUSPECT, _LOST = -3.8, -3.5, 0.0
-"""Log odds that a limb is lost from which on the frame is doubtful, the limb is searched for, and the frame is lost.
-Few limbs are lost, and a lost one that is called good is the costlier error: doubt begins at 1 to 45. A search is begun
-nearly as soon: it costs time, and a limb that is left astray leads the frames after it astray."""
+_DOUBTFUL, _LOST = -3.8, 0.0
+"""Log odds that a limb is lost from which on the frame is doubtful, and lost. Few limbs are lost, and a lost one that
+is called good is the costlier error: doubt begins at 1 to 45."""
+_SUSPECT, _SUSPECT_OF_SEVERAL = -3.5, -3.0
+"""From which on a limb is searched for, of somebody alone and of one of several. A search is begun nearly as soon as
+there is doubt: it costs time, and a limb that is left astray leads the frames after it astray. Among several people
+half of all limbs are in doubt, and what is searched in vain may find what is another's."""
 _LOST_FORWARD = 0.6
 """Of a body whose contours are farther than this from all edges, in outlier distances, nothing holds."""
 
@@ -84,21 +87,21 @@ class Quality(NamedTuple):
         """Log odds that each limb is lost, (n_limbs,)."""
         return _log_odds(self)
 
-    @property
-    def doubted(self) -> tuple[str, ...]:
-        """Names of limbs that seem lost themselves."""
-        return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if odds > _SUSPECT)
+    def doubted(self, alone: bool) -> tuple[str, ...]:
+        """Names of limbs that seem lost themselves, of somebody alone or of one of several."""
+        least = _SUSPECT if alone else _SUSPECT_OF_SEVERAL
+        return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if odds > least)
 
     @property
     def lost(self) -> tuple[str, ...]:
         """Names of limbs that are likelier lost than found."""
         return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if odds > _LOST)
 
-    @property
-    def suspects(self) -> tuple[str, ...]:
+    def suspects(self, alone: bool) -> tuple[str, ...]:
         """Names of limbs worth a search, likeliest first; all where the image shows what no part explains."""
-        odds, everyone = self.log_odds, self.unexplained > _MOST_UNEXPLAINED
-        return tuple(self.limbs[i].name for i in np.argsort(-odds) if everyone or odds[i] > _SUSPECT)
+        doubted, everyone = self.doubted(alone), self.unexplained > _MOST_UNEXPLAINED
+        names = [self.limbs[i].name for i in np.argsort(-self.log_odds)]
+        return tuple(name for name in names if everyone or name in doubted)
 
     @property
     def body_lost(self) -> bool:

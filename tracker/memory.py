@@ -13,9 +13,11 @@ from tracker.fit import held
 from tracker.predict import PredictSettings, predict
 from tracker.rigid import Array
 
-_LONGEST_PAUSE, _LONGEST_UNDOUBTED = 8, 64
-"""A limb that seems lost and is not found is searched at least every so many frames; one of several people that nothing
-speaks against but what no part explains, which may be anybody's, every so many."""
+_LONGEST_PAUSE = 8
+"""A limb that seems lost and is not found is searched at least every so many frames."""
+_UNDOUBTED_PAUSE, _LONGEST_UNDOUBTED = 31, 64
+"""One of several people that nothing speaks against but what no part explains, which may be anybody's, waits so many
+frames after the first search in vain, and so many at most."""
 _LEARN_FRAMES, _TRACKED_SHARE, _GIVEN_SHARE = 3, 0.15, 0.5
 """Every so many frames the colours of the parts are brought up to date, and what such a frame counts; what a keyframe
 counts against the frames before it."""
@@ -26,15 +28,22 @@ _POSES = 8
 class Memory:
     """What is remembered of one person."""
 
-    def __init__(self, model: BodyModel, start: Array | Sequence[Array], free: NDArray[np.bool_] | None = None) -> None:
+    def __init__(
+        self,
+        model: BodyModel,
+        start: Array | Sequence[Array],
+        free: NDArray[np.bool_] | None = None,
+        alone: bool = True,
+    ) -> None:
         """Begin with the poses before the first frame.
 
         Args:
             model: the body.
             start: the pose from which the first frame is predicted, (n_values,), or several, the last one last.
             free: the degrees of freedom that may move, (n_dofs,); None: all.
+            alone: whether there is nobody else.
         """
-        self.model, self.free = model, free
+        self.model, self.free, self.alone = model, free, alone
         moving = np.ones(model.n_dofs, dtype=bool) if free is None else free
         limbs = [limb._replace(dofs=limb.dofs & moving) for limb in confidence.limbs(model)]
         self.limbs = [limb for limb in limbs if limb.dofs.any()]
@@ -65,9 +74,9 @@ class Memory:
 
     def suspects(self, found: Quality) -> list[Limb]:
         """Limbs worth a search that may move, likeliest to be lost first."""
-        return [x for name in found.suspects for x in self.limbs if x.name == name]
+        return [x for name in found.suspects(self.alone) for x in self.limbs if x.name == name]
 
-    def due(self, found: Quality, alone: bool) -> list[Limb]:
+    def due(self, found: Quality) -> list[Limb]:
         """Those of them whose turn it is: one that was searched in vain waits longer each time.
 
         Of somebody alone a limb that is likelier lost than found does not wait: a limb that moves fast is elsewhere in
@@ -78,10 +87,9 @@ class Memory:
 
         Args:
             found: what the evidence says of the pose.
-            alone: whether there is nobody else.
         """
-        suspects = self.suspects(found)
-        doubted = [] if alone else [x for x in suspects if x.name in found.doubted]
+        suspects, alone = self.suspects(found), self.alone
+        doubted = [] if alone else [x for x in suspects if x.name in found.doubted(alone)]
         longest = _LONGEST_PAUSE if alone or doubted else _LONGEST_UNDOUBTED
 
         def rested(limb: Limb) -> bool:
@@ -90,10 +98,11 @@ class Memory:
 
         return [x for x in doubted or suspects if rested(x)]
 
-    def searched(self, limb: Limb, found: bool) -> None:
-        """Note how the search for a limb went."""
-        pause = 0 if found else min(_LONGEST_UNDOUBTED, 2 * self._pauses.get(limb.name, (0, 0))[1] + 1)
-        self._pauses[limb.name] = (self._frames, pause)
+    def searched(self, limb: Limb, before: Quality, found: bool) -> None:
+        """Note how the search for a limb went, and what the evidence had said before."""
+        least = 1 if self.alone or limb.name in before.doubted(self.alone) else _UNDOUBTED_PAUSE
+        longer = max(least, 2 * self._pauses.get(limb.name, (0, 0))[1] + 1)
+        self._pauses[limb.name] = (self._frames, 0 if found else min(_LONGEST_UNDOUBTED, longer))
 
     def update(self, pose: Array, colors: Colors, status: Status, given: bool) -> None:
         """Take in what a frame brought.

@@ -212,8 +212,8 @@ class Scene:
             return
         alone, due = len(self._models) == 1, dict[int, list[Limb]]()
         for person, (found, _) in told.items():
-            limbs = self._memories[person].due(found, alone)[:_AT_ONCE]
-            if (found.suspects if alone else found.doubted or limbs) or found.body_lost:
+            limbs = self._memories[person].due(found)[:_AT_ONCE]
+            if limbs or (found.suspects(alone) if alone else found.doubted(alone)) or found.body_lost:
                 due[person] = limbs
         if not due:
             return
@@ -249,7 +249,7 @@ class Scene:
         better, rivals = search_limbs(model, due, fit, others, judge, _ITERATIONS)
         turned = np.abs(model.difference(better.values, fit.values))
         for limb in due:
-            memory.searched(limb, found=turned[limb.dofs].max() > _MOVED_RAD)
+            memory.searched(limb, found, turned[limb.dofs].max() > _MOVED_RAD)
             if turned[limb.dofs].max() > _ANEW_RAD:
                 remarks.append(f"{confidence.spoken(limb.name)} searched anew")
         return _Seen(match, poses, better, suspects, None, evaluations, tuple(remarks), tuple(r.values for r in rivals))

@@ -248,7 +248,7 @@ class _Choice:
         """What is told of a pose that was carried to a frame."""
         options, views = self._options[i], self._views(i)
         poses = [b.values for b in self._bodies(i, options.poses[taken])]
-        memories = [Memory(m, v) for m, v in zip(self._models, poses, strict=True)]
+        memories = [Memory(m, v, alone=len(poses) == 1) for m, v in zip(self._models, poses, strict=True)]
         memories[self._person].known = self._known
         scene = Scene(views, memories, poses, self._settings)
         people = range(len(poses))

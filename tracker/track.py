@@ -85,10 +85,10 @@ def track_chamfer(
     """
     everybody = tuple(range(len(models))) if people is None else tuple(people)
     masks = [None] * len(models) if free is None else list(free)
-    memories = [Memory(m, s, mask) for m, s, mask in zip(models, start, masks, strict=True)]
+    several = len(models) > 1
+    memories = [Memory(m, s, mask, alone=not several) for m, s, mask in zip(models, start, masks, strict=True)]
     scenery = [Scenery(c.size) for c in observer.matched_cameras] if settings.segments else None
     cameras, ahead = observer.matched_cameras, list[Region | None]()
-    several = len(models) > 1  # one alone is fitted sooner than the next frame is looked at: all cores are busy anyway
 
     def placed(frame: int, expected: Callable[[Memory, PredictSettings], Array]) -> list[Body]:
         """Everybody on a frame, where they are given or expected."""
@@ -108,7 +108,7 @@ def track_chamfer(
         sought, poses = [p for p in everybody if p not in given], [b.values for b in bodies]
         where = confirmed(ahead, cameras, bodies) if ahead else regions(cameras, bodies)
         for following in frames[i + 1 : i + 2]:
-            if several:
+            if several:  # one alone is fitted sooner than the next frame is looked at: all cores are busy anyway
                 ahead = regions_ahead(cameras, placed(following, Memory.expected_ahead))
             observer.prefetch(following, ahead or None, still=scenery is not None)
         outlines = [visible_outline(bodies, c) for c in cameras] if settings.segments else None

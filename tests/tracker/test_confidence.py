@@ -89,7 +89,8 @@ def test_worse_figures_never_clear_a_limb(before, worse, body):
     better = Quality(0.05, 3, 0.0, (before, CLEAR))
     worst_of = Quality(0.05 + body[0], 3, body[1], (after, CLEAR))
     assert (worst_of.log_odds >= better.log_odds).all()
-    assert set(better.suspects) <= set(worst_of.suspects)
+    for alone in (True, False):
+        assert set(better.suspects(alone)) <= set(worst_of.suspects(alone))
     order = ("good", "doubtful", "lost")
     assert order.index(judge(worst_of)) >= order.index(judge(better))
 
@@ -99,7 +100,7 @@ def test_what_is_plain():
     assert judge(Quality(0.05, 3, 0.0, (CLEAR, CLEAR))) == "good"
     for limb in (undressed, vague):
         found = Quality(0.15, 3, 0.03, (CLEAR, CLEAR, limb))
-        assert found.suspects == (limb.name,)
+        assert found.suspects(True) == found.suspects(False) == (limb.name,)
         assert judge(found) == "lost"
         assert not found.body_lost
     assert Quality(0.15, 3, 0.03, (CLEAR, undressed, vague)).body_lost  # most of it

@@ -21,12 +21,12 @@ def seen(memory, unexplained=0.0, astray=()):
     return Quality(0.05, 4, unexplained, tuple(limbs))
 
 
-def searched_at(memory, found, n_frames, alone=False):
+def searched_at(memory, found, n_frames):
     """The frames in which the first limb that is due is searched, in vain each time."""
     out = []
     for frame in range(n_frames):
-        for limb in memory.due(found, alone)[:1]:
-            memory.searched(limb, found=False)
+        for limb in memory.due(found)[:1]:
+            memory.searched(limb, found, found=False)
             out.append(frame)
         memory.update(memory.past[-1], NoColors(), "doubtful", given=False)
     return out
@@ -35,13 +35,13 @@ def searched_at(memory, found, n_frames, alone=False):
 @pytest.fixture
 def memory(gavrila):
     free = ~np.array([name.startswith(("left_shoulder", "left_elbow")) for name in gavrila.dof_names])
-    return Memory(gavrila, gavrila.neutral(), free)
+    return Memory(gavrila, gavrila.neutral(), free, alone=False)
 
 
 def test_what_is_locked_is_not_due(memory):
     assert {x.name for x in memory.limbs} == {"right_forearm", "left_calf", "right_calf"}
-    assert {x.name for x in memory.due(seen(memory, unexplained=0.2), alone=False)} == {x.name for x in memory.limbs}
-    assert memory.due(seen(memory), alone=False) == memory.suspects(seen(memory)) == []
+    assert {x.name for x in memory.due(seen(memory, unexplained=0.2))} == {x.name for x in memory.limbs}
+    assert memory.due(seen(memory)) == memory.suspects(seen(memory)) == []
 
 
 def test_limbs_that_seem_lost_go_before_those_that_do_not(memory):
@@ -49,46 +49,48 @@ def test_limbs_that_seem_lost_go_before_those_that_do_not(memory):
     found = seen(memory, unexplained=0.2, astray=("left_calf",))
     assert memory.suspects(found)[0].name == "left_calf"
     assert len(memory.suspects(found)) == 3
-    (limb,) = memory.due(found, alone=False)
+    (limb,) = memory.due(found)
     assert limb.name == "left_calf"
-    memory.searched(limb, found=False)
-    assert memory.due(found, alone=False) == []
+    memory.searched(limb, found, found=False)
+    assert memory.due(found) == []
 
 
 def test_pauses_grow_with_each_search_in_vain(memory):
     """Of a limb that seems lost up to eight frames; of one that does not they go on growing."""
     assert np.diff(searched_at(memory, seen(memory, astray=("left_calf",)), 40)).tolist() == [2, 4, 8, 9, 9]
-    memory.searched(next(x for x in memory.limbs if x.name == "left_calf"), found=True)
-    assert memory.due(seen(memory, astray=("left_calf",)), alone=False) == []
+    found = seen(memory, astray=("left_calf",))
+    memory.searched(next(x for x in memory.limbs if x.name == "left_calf"), found, found=True)
+    assert memory.due(seen(memory, astray=("left_calf",))) == []
     memory.update(memory.past[-1], NoColors(), "good", given=False)
-    assert len(memory.due(seen(memory, astray=("left_calf",)), alone=False)) == 1
+    assert len(memory.due(seen(memory, astray=("left_calf",)))) == 1
 
 
-def test_a_limb_of_somebody_alone_that_is_lost_does_not_wait(memory):
+def test_a_limb_of_somebody_alone_that_is_lost_does_not_wait(memory, gavrila):
     """One that is merely suspect does, and so does one of several people."""
+    alone = Memory(gavrila, gavrila.neutral(), memory.free)
     lost, suspect = seen(memory, astray=("left_calf",)), seen(memory, unexplained=0.2)
     assert lost.lost == ("left_calf",)
     assert suspect.lost == ()
-    assert searched_at(memory, lost, 6, alone=True) == [0, 1, 2, 3, 4, 5]
-    assert all(len(memory.due(lost, alone)) == waits for alone, waits in ((True, 1), (False, 0)))
-    assert searched_at(memory, suspect, 1, alone=True) == [0]
-    assert "left_calf" not in {x.name for x in memory.due(suspect, alone=True)}
+    assert searched_at(alone, lost, 6) == [0, 1, 2, 3, 4, 5]
+    assert searched_at(memory, lost, 6) == [0, 2]
+    assert searched_at(alone, suspect, 1) == [0]
+    assert "left_calf" not in {x.name for x in alone.due(suspect)}
 
 
 def test_limbs_that_nothing_speaks_against_wait_longer(gavrila):
-    memory = Memory(gavrila, gavrila.neutral())
+    memory = Memory(gavrila, gavrila.neutral(), alone=False)
     everything = seen(memory, unexplained=0.2)
     frames = []
-    for _ in range(100):
-        due = memory.due(everything, alone=False)
+    for _ in range(110):
+        due = memory.due(everything)
         frames.append(len(due))
         for limb in due:
-            memory.searched(limb, found=False)
+            memory.searched(limb, everything, found=False)
         memory.update(memory.past[-1], NoColors(), "doubtful", given=False)
-    assert np.flatnonzero(frames).tolist() == [0, 2, 6, 14, 30, 62]
+    assert np.flatnonzero(frames).tolist() == [0, 32, 96]
     assert set(frames) == {0, 4}
     # Once it seems lost itself it is due at once.
-    (limb,) = memory.due(seen(memory, astray=("right_calf",)), alone=False)
+    (limb,) = memory.due(seen(memory, astray=("right_calf",)))
     assert limb.name == "right_calf"
 
 

@@ -58,7 +58,9 @@ def test_people_are_refined_again_only_where_others_moved(monkeypatch, off_m, so
     expected = values.copy()
     expected[1, 0] += off_m
     monkeypatch.setattr("tracker.scene.solve", lambda *a, **k: done.append(a) or solve(*a, **k))
-    scene = Scene(views, [Memory(ball, v) for v in expected], expected, TrackSettings(recover=None, rounds=5))
+    scene = Scene(
+        views, [Memory(ball, v, alone=False) for v in expected], expected, TrackSettings(recover=None, rounds=5)
+    )
     scene.estimate([0, 1])
     np.testing.assert_allclose(np.array(scene.poses)[:, :3], values[:, :3], atol=0.005)
     assert len(done) == solves
@@ -74,7 +76,7 @@ def test_nothing_depends_on_who_is_done_first(gavrila, monkeypatch):
     searched = []
 
     def poses():
-        memories = [Memory(gavrila, v) for v in expected]
+        memories = [Memory(gavrila, v, alone=False) for v in expected]
         scene = Scene(views, memories, expected, TrackSettings())
         found = scene.estimate([0, 1])
         for person, memory in enumerate(memories):
