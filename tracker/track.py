@@ -107,12 +107,14 @@ def track_chamfer(
         given, bodies = (fixed or {}).get(frame, {}), placed(frame, Memory.expected)
         sought, poses = [p for p in everybody if p not in given], [b.values for b in bodies]
         where = confirmed(ahead, cameras, bodies) if ahead else regions(cameras, bodies)
-        for following in frames[i + 1 : i + 2]:
-            if several:  # one alone is fitted sooner than the next frame is looked at: all cores are busy anyway
-                ahead = regions_ahead(cameras, placed(following, Memory.expected_ahead))
-            observer.prefetch(following, ahead or None, still=scenery is not None)
+        following = frames[i + 1 : i + 2]
+        for k in following if several else ():
+            ahead = regions_ahead(cameras, placed(k, Memory.expected_ahead))
+            observer.prefetch(k, ahead, still=scenery is not None)
         outlines = [visible_outline(bodies, c) for c in cameras] if settings.segments else None
         views = observer.evidence(frame, where, outlines, scenery)
+        for k in () if several else following:  # of one alone no sooner: all cores were busy with this frame
+            observer.prefetch(k)
         scene = Scene(views, memories, poses, settings)
         estimates = scene.estimate(sought)
         found = [estimates[p] if p in estimates else scene.held(p) for p in range(len(models))]
