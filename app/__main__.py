@@ -2,9 +2,9 @@
 
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
 import tyro
 from rich.console import Console
@@ -12,10 +12,10 @@ from rich.console import Console
 from app import commands, ending
 from app.allocation import give_back_freed_memory
 from app.commands import Reporter
+from app.words import common_or_pairs, pairs
 from tracker.errors import TrackerError
 
 SessionArg = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION", help="session folder")]
-T = TypeVar("T")
 _app = tyro.extras.SubcommandApp()
 
 
@@ -93,13 +93,13 @@ def new(
         session,
         calibration=calibration,
         videos=videos,
-        camera_paths=_pairs(camera, "--camera", str),
+        camera_paths=pairs(camera, "--camera", str),
         background=background,
         masks=masks,
-        offsets=_pairs(offset, "--offset", int),
+        offsets=pairs(offset, "--offset", int),
         people=people,
-        models=_common_or_pairs(model, "--model", str) or DEFAULT_MODEL,
-        heights=_common_or_pairs(height, "--height", float),
+        models=common_or_pairs(model, "--model", str) or DEFAULT_MODEL,
+        heights=common_or_pairs(height, "--height", float),
         fps=fps,
         up=up,
         units=units,
@@ -363,30 +363,6 @@ def bench(json: bool = False, baseline: Path | None = None, save: Path | None = 
         measuring.show(found, Console())
     if found["slower"]:
         sys.exit(1)
-
-
-def _pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> dict[str, T]:
-    """Parse NAME=VALUE words."""
-    out: dict[str, T] = {}
-    for word in words:
-        name, equals, value = word.partition("=")
-        try:
-            if not equals or not name:
-                raise ValueError
-            out[name] = kind(value)
-        except ValueError:
-            raise TrackerError(f"expected {option} as NAME=VALUE, found '{word}'") from None
-    return out
-
-
-def _common_or_pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> Mapping[str, T] | T | None:
-    """Parse one value for everybody, or NAME=VALUE words; None where there are none."""
-    if len(words) == 1 and "=" not in words[0]:
-        try:
-            return kind(words[0])
-        except ValueError:
-            raise TrackerError(f"expected {option} as a value or NAME=VALUE, found '{words[0]}'") from None
-    return _pairs(words, option, kind) or None
 
 
 def _track_summary(found: Mapping[str, Any]) -> str:

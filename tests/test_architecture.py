@@ -82,6 +82,7 @@ ORDER = [
         "app.pictures",
         "app.recent",
         "app.tracked",
+        "app.words",
         "app.writing",
     ],
     ["app.centred", "app.expected", "app.floor_picks", "app.trails", "app.view_choice"],
