@@ -77,6 +77,8 @@ class _Scratch(NamedTuple):
     pieces: contours.Pieces
     segments: Segments
     """Visible pieces, joined where they are straight."""
+    visible: FloatArray
+    """Of each visible piece u and v of its middle, px, and its squared length, px^2, (3, room)."""
     lengths: FloatArray
     """Length of each visible piece, (room,)."""
     distances: FloatArray
@@ -194,9 +196,10 @@ class ChamferCost:
         """Room of the calling thread's own: several threads may score at a time."""
         scratch: _Scratch | None = getattr(self._own, "scratch", None)
         if scratch is None:
+            room = self._room
             scratch = self._own.scratch = _Scratch(
-                contours.piece_buffer(self._surfaces, self._room), segment_buffer(self._room),
-                np.empty(self._room, np.float32), np.empty(self._room, np.float32), np.ones(self._room, np.float32),
+                contours.piece_buffer(self._surfaces, room), segment_buffer(room), np.empty((3, room), np.float32),
+                np.empty(room, np.float32), np.empty(room, np.float32), np.ones(room, np.float32),
             )  # fmt: skip
         return scratch
 
@@ -267,18 +270,16 @@ def _distance(image: FloatArray, width: int, height: int, u: np.float32, v: np.f
 
 
 @njit(**FAST)
-def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, pieces: contours.Pieces) -> float:
-    """Mean distance of the n visible pieces, cut off at theta; theta where none is visible.
+def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, visible: FloatArray) -> float:
+    """Mean distance of n visible pieces, see `_Scratch`, cut off at theta; theta where none is visible.
 
-    It stores nothing, so that it runs on whole vectors of pieces, hidden ones included.
+    It stores nothing, so that it runs on whole vectors of pieces.
     """
-    ends, hidden, limit = pieces.ends, pieces.hidden, np.float32(theta)
+    limit = np.float32(theta)
     spared = weight = 0.0
     for i in range(np.uint64(n)):
-        x0, y0, x1, y1 = ends[0, i], ends[1, i], ends[2, i], ends[3, i]
-        d = _distance(image, width, height, _HALF * (x0 + x1), _HALF * (y0 + y1))
-        length = np.sqrt((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0))
-        length = _ZERO if hidden[i] else length
+        d = _distance(image, width, height, visible[0, i], visible[1, i])
+        length = np.sqrt(visible[2, i])
         spared += float(length * (limit - d if d < limit else _ZERO))
         weight += float(length)
     return theta - spared / weight if weight > 0.0 else theta
@@ -287,34 +288,35 @@ def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, p
 @njit(**FAST)
 def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: float, scratch: _Scratch) -> float:
     """The same by the paper's robust mean."""
-    ends, hidden, lengths, d, kept = scratch.pieces.ends, scratch.pieces.hidden, scratch.lengths, scratch.distances, 0
+    visible, lengths, d = scratch.visible, scratch.lengths, scratch.distances
     for i in range(n):
-        if not hidden[i]:
-            x0, y0, x1, y1 = ends[0, i], ends[1, i], ends[2, i], ends[3, i]
-            d[kept] = _distance(image, width, height, _HALF * (x0 + x1), _HALF * (y0 + y1))
-            lengths[kept] = np.sqrt((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0))
-            kept += 1
-    return _robust_mean(d, lengths, kept, theta, True)
+        d[i] = _distance(image, width, height, visible[0, i], visible[1, i])
+        lengths[i] = np.sqrt(visible[2, i])
+    return _robust_mean(d, lengths, n, theta, True)
 
 
 @njit(**FAST)
-def _join(n: int, pieces: contours.Pieces, segments: Segments) -> int:
-    """Join n pieces, as far as they are visible, to segments; the number of those."""
+def _take_visible(n: int, pieces: contours.Pieces, visible: FloatArray, segments: Segments) -> tuple[int, int]:
+    """Take the visible ones of n pieces, and join them to segments; the number of both."""
     ends, hidden, edges = pieces.ends, pieces.hidden, pieces.edges
     su, sv, du, dv = segments.u, segments.v, segments.du, segments.dv
-    joined, edge, k = 0, -1, np.uint64(0)
+    joined, edge, k, m = 0, -1, np.uint64(0), np.uint64(0)
     for i in range(np.uint64(n)):
         if hidden[i]:
             edge = -1
             continue
+        x0, y0, x1, y1 = ends[0, i], ends[1, i], ends[2, i], ends[3, i]
         if edges[i] != edge or joined == _JOINED:
             edge, joined = edges[i], 0
-            su[k], sv[k] = ends[0, i], ends[1, i]
+            su[k], sv[k] = x0, y0
             k += np.uint64(1)
         joined += 1
         last = k - np.uint64(1)
-        du[last], dv[last] = ends[2, i] - su[last], ends[3, i] - sv[last]
-    return int(k)
+        du[last], dv[last] = x1 - su[last], y1 - sv[last]
+        visible[0, m], visible[1, m] = _HALF * (x0 + x1), _HALF * (y0 + y1)
+        visible[2, m] = (x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0)
+        m += np.uint64(1)
+    return int(m), int(k)
 
 
 @njit(**FAST)
@@ -326,12 +328,12 @@ def _score(
     for view in range(scene.P.shape[0]):
         width, height, theta = scene.sizes[view, 0], scene.sizes[view, 1], scene.thetas[view]
         n = contours.trace_pieces(scene.P[view], scene.eyes[view], Ts, surfaces, contours.PIECE_PX, scratch.pieces)
+        n_visible, n_segments = _take_visible(n, scratch.pieces, scratch.visible, scratch.segments)
         image = scene.distances[pixel : pixel + width * height]
         if paper:
-            directed[view, 0] = _forward_paper(n, image, width, height, theta, scratch)
+            directed[view, 0] = _forward_paper(n_visible, image, width, height, theta, scratch)
         else:
-            directed[view, 0] = _forward(n, image, width, height, theta, scratch.pieces)
-        n_segments = _join(n, scratch.pieces, scratch.segments)
+            directed[view, 0] = _forward(n_visible, image, width, height, theta, scratch.visible)
         first, last = scene.firsts[view], scene.firsts[view + 1]
         u, v = scene.points[0][first:last], scene.points[1][first:last]
         nearest_segment(u, v, scene.rows[view], scratch.segments, n_segments, theta, d)
