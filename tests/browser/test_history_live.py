@@ -116,8 +116,9 @@ async def test_a_full_disk_is_said_and_nothing_is_lost(tabs, program):
     unlimited = resource.prlimit(program.pid, resource.RLIMIT_FSIZE)
     resource.prlimit(program.pid, resource.RLIMIT_FSIZE, (0, unlimited[1]))
     try:
-        async with dragging(page, 0, "left_wrist", (0, -8), (0, -16)):
-            pass
+        async with dragging(page, 0, "left_wrist", (0, -8), (0, -16)) as (_, v):
+            follows = f"h.camera === 0 && h.point === 'left_wrist' && Math.abs(h.v - {v - 16}) < 1"
+            await shows(page, f"quadrille.state.overlay.handles.some((h) => {follows})")
         await shows(page, "!document.querySelector('#unsaved').hidden")
         u, v = await handle_of(page, 0, "left_wrist")
         await page.locator("#retry-saving").click()
