@@ -110,7 +110,7 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
 def handles(session: Session, state: State, cameras: Collection[int]) -> list[Handle]:
     """The joints of everybody shown, in some views, given by index; those behind a camera are left out."""
     bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
-    points = [b.model.points_world(b.values) for b in bodies]
+    points = [b.points_world for b in bodies]
     seen = {index: session.cameras[index].camera.pinhole for index in sorted(cameras)}
     out, hidden_by_view = [], occlusion.points_hidden(bodies, list(seen.values()), np.concatenate(points))
     for (index, camera), hidden in zip(seen.items(), hidden_by_view, strict=True):

@@ -65,7 +65,7 @@ class KeepBodiesApart:
             softness: share of a part's radius that may be pressed in without cost.
         """
         self._models, self._person = tuple(b.model for b in bodies), person
-        self._Ts = np.concatenate([b.model.kinematics(b.values).Ts_world_part for b in bodies])
+        self._Ts = np.concatenate([b.kinematics.Ts_world_part for b in bodies])
         self._own = parts_of(self._models, person)
         mine = np.zeros(len(self._Ts), dtype=bool)
         mine[self._own] = True

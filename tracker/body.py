@@ -354,7 +354,9 @@ class BodyModel:
         out[..., at] = np.minimum(np.maximum(out[..., at], low), high)
         for ball in self._balls:
             joint = ball.joint
-            out[..., ball.values] = np.apply_along_axis(_clip_ball, -1, out[..., ball.values], joint.cone, joint.twist)
+            out[..., ball.values] = np.apply_along_axis(
+                rigid.clip_swing_twist, -1, out[..., ball.values], joint.cone, joint.twist
+            )
         return out
 
     @cached_property
@@ -389,22 +391,18 @@ class Body:
     values: Array
     """Pose, (n_values,)."""
 
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """Where its parts are."""
+        return self.model.kinematics(self.values)
+
+    @cached_property
+    def points_world(self) -> Array:
+        """Positions of its points, (n_points, 3), metres."""
+        return self.model.points_at(self.kinematics, np.arange(len(self.model.point_parts)))
+
 
 def parts_of(models: Sequence[BodyModel], person: int) -> slice:
     """Which of everybody's parts, one body after the other, are one person's."""
     first = sum(len(m.parts) for m in models[:person])
     return slice(first, first + len(models[person].parts))
-
-
-def _clip_ball(wxyz: Array, cone: float, twist: float) -> Array:
-    """Split a rotation into swing times twist about z, bound both, and put them together again."""
-    q = wxyz / np.linalg.norm(wxyz)
-    norm = np.hypot(q[0], q[3])
-    turn = np.array([q[0], 0.0, 0.0, q[3]]) / norm if norm > 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
-    swing = rigid.quaternion_log(rigid.quaternion_multiply(q, turn * (1.0, -1.0, -1.0, -1.0)))
-    angle = np.linalg.norm(swing)
-    if angle > cone:
-        swing *= cone / angle
-    about_z = np.clip(rigid.quaternion_log(turn)[2], -twist, twist)
-    turn = rigid.quaternion_exp(np.array([0.0, 0.0, about_z]))
-    return rigid.quaternion_multiply(rigid.quaternion_exp(swing), turn)

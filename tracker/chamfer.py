@@ -21,7 +21,7 @@ from tracker.body import Body, BodyModel, parts_of
 from tracker.evidence import ViewEvidence
 from tracker.kernels import FAST, helpers
 from tracker.kinematics import Tree, forward_kinematics
-from tracker.nearest import Segments, Sorted, nearest_segment, segment_buffer, sort_points, stack_rows
+from tracker.nearest import Segments, Sorted, nearest_segment, segment_buffer, sort_points, stack_rows, within_reach
 from tracker.rigid import Array, FloatArray
 from tracker.sampling import bilinear
 
@@ -223,12 +223,7 @@ def _distances(views: tuple[ViewEvidence, ...]) -> FloatArray:
 def _near(view: ViewEvidence, contour: contours.Contour, theta: float) -> Sorted:
     """Edge points within theta of the visible model contour."""
     everything = sort_points(view.points_px, view.camera.size)
-    pieces = contour.pieces_px[~contour.hidden]
-    segments = Segments(*np.ascontiguousarray(np.column_stack([pieces[:, :2], pieces[:, 2:] - pieces[:, :2]]).T))
-    u, v = everything.points
-    distances = np.empty(len(u), np.float32)
-    nearest_segment(u, v, everything.rows, segments, len(pieces), theta, distances)
-    return sort_points(everything.points[:, distances <= theta].T, view.camera.size)
+    return within_reach(everything, contour.pieces_px, contour.hidden, theta)
 
 
 @njit(**FAST)

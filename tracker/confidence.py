@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.appearance import ColorScore, PartColors
-from tracker.body import BodyModel
+from tracker.body import Body, BodyModel
 from tracker.fit import Fit, covariance
 from tracker.refine import PartCosts
 from tracker.rigid import Array
@@ -146,7 +146,7 @@ def limbs(model: BodyModel) -> tuple[Limb, ...]:
 
 
 def quality(
-    model: BodyModel,
+    body: Body,
     fit: Fit,
     costs: PartCosts,
     thetas_px: Array,
@@ -157,15 +157,15 @@ def quality(
     """Sum up what speaks for and against a pose.
 
     Args:
-        model: the body.
-        fit: the pose, and the normal matrix there.
+        body: in the pose that was found.
+        fit: that pose, and the normal matrix there.
         costs: of its parts.
         thetas_px: outlier distance of each view, (V,), matched px.
         trusts: how far the silhouette of each view is trusted, (V,), 0 to 1; 0 where there is none.
         px_per_m: length of a metre in the images where the body stands, matched px.
         colors: of its parts; None where there are none.
     """
-    chains = limbs(model)
+    model, chains = body.model, limbs(body.model)
     far = np.nan_to_num(costs.forward_px) / thetas_px[:, None] * costs.length_px
     views = int(np.count_nonzero(costs.length_px.sum(axis=1) > 0))
     beside_px = 2.0 * px_per_m * max(1, views) * np.array([2.0 * s.half_axes[2] for s in model.shapes])
@@ -174,7 +174,7 @@ def quality(
         score, known = colors
         color = np.where(score.samples >= _LEAST_SAMPLES, score.parts, np.inf)
         worst_drop = np.nan_to_num(known.usual - score.views, nan=-np.inf).max(axis=0, initial=-np.inf)
-    spreads = px_per_m * _end_spreads(model, fit)
+    spreads = px_per_m * _end_spreads(body, fit)
     return Quality(
         float(far.sum() / max(1e-9, costs.length_px.sum())),
         views,
@@ -240,9 +240,9 @@ def worst(statuses: Sequence[Status]) -> Status:
     return max(statuses, key=("good", "doubtful", "lost").index, default="good")
 
 
-def _end_spreads(model: BodyModel, fit: Fit) -> Array:
+def _end_spreads(body: Body, fit: Fit) -> Array:
     """Standard deviation of the end of each limb, (n_limbs,), metres."""
+    model = body.model
     ends = np.array([np.flatnonzero(model.point_parts == c.parts[-1])[-1] for c in limbs(model)], dtype=np.int64)
-    kinematics, points = model.kinematics(fit.values), model.points_world(fit.values)
-    J = model.point_jacobian(kinematics, model.point_parts[ends], points[ends])
+    J = model.point_jacobian(body.kinematics, model.point_parts[ends], body.points_world[ends])
     return np.sqrt(np.trace(J @ covariance(model, fit) @ np.swapaxes(J, 1, 2), axis1=1, axis2=2))

@@ -89,7 +89,7 @@ class Pieces(NamedTuple):
 
 def part_poses(bodies: Sequence[Body]) -> Array:
     """World poses of all parts of all bodies, (P, 4, 4), metres."""
-    return np.concatenate([b.model.kinematics(b.values).Ts_world_part for b in bodies])
+    return np.concatenate([b.kinematics.Ts_world_part for b in bodies])
 
 
 def trace(bodies: Sequence[Body], camera: Camera, piece_px: float = PIECE_PX) -> Contour:

@@ -67,11 +67,16 @@ class Sorted(NamedTuple):
 def sort_points(points: FloatArray, size: tuple[int, int]) -> Sorted:
     """Sort points (N, 2 + more) of an image of a width and height; those beside it count to its border."""
     n_strips = -(-size[0] // STRIP_PX)
-    filled = np.zeros((points.shape[1], (len(points) // LANES + 2) * LANES), np.float32)
+    filled = np.zeros((points.shape[1], _room_for(len(points))), np.float32)
     filled[:2] = _FAR
     begins = np.zeros((n_strips, size[1] + 1), np.int64)
     _sort(np.ascontiguousarray(points, np.float32), np.empty(len(points), np.int64), begins, filled)
     return Sorted(filled, begins)
+
+
+def _room_for(n: int) -> int:
+    """Room for sorted points, see `Sorted`."""
+    return (n // LANES + 2) * LANES
 
 
 @njit(nogil=True, cache=True)
@@ -94,6 +99,45 @@ def _sort(points: FloatArray, cells: IntArray, begins: IntArray, out: FloatArray
     for k in range(flat.shape[0] - 1, 0, -1):  # each cell has moved on to where the next one begins
         flat[k] = flat[k - 1]
     flat[0] = 0
+
+
+def within_reach(everything: Sorted, pieces_px: FloatArray, hidden: NDArray[np.bool_], reach: float) -> Sorted:
+    """Those of some points that come within reach, px, of a visible piece, x0, y0, x1, y1, (M, 4); hidden is (M,)."""
+    points, rows = everything.points.copy(), everything.rows.copy()
+    n = _keep_within(
+        points, rows, pieces_px, hidden, reach, segment_buffer(len(hidden)), np.empty(points.shape[1], np.float32)
+    )
+    return Sorted(points[:, : _room_for(n)], rows)
+
+
+@njit(**BORROW)
+def _keep_within(
+    points: FloatArray, rows: IntArray, pieces: FloatArray, hidden: NDArray[np.bool_], reach: float,
+    segments: Segments, distances: FloatArray,
+) -> int:  # fmt: skip
+    """Move the points, (n, N), within reach of a visible piece to the front, where they stay sorted; their number.
+
+    Segments and distances are room, (M,) and (N,).
+    """
+    n = 0
+    for i in range(pieces.shape[0]):
+        if not hidden[i]:
+            segments.u[n], segments.v[n] = pieces[i, 0], pieces[i, 1]
+            segments.du[n], segments.dv[n] = pieces[i, 2] - pieces[i, 0], pieces[i, 3] - pieces[i, 1]
+            n += 1
+    nearest_segment(points[0], points[1], rows, segments, n, reach, distances)
+    kept = i = 0
+    for strip in range(rows.shape[0]):
+        for row in range(rows.shape[1]):
+            while i < rows[strip, row]:
+                if distances[i] <= reach:
+                    for k in range(points.shape[0]):
+                        points[k, kept] = points[k, i]
+                    kept += 1
+                i += 1
+            rows[strip, row] = kept
+    points[:2, kept:], points[2:, kept:] = _FAR, _ZERO
+    return kept
 
 
 def stack_rows(rows: Sequence[IntArray]) -> IntArray:

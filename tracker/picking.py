@@ -39,7 +39,7 @@ def part_outlines(bodies: Sequence[Body], cameras: Sequence[Camera]) -> list[lis
     """
     found: list[list[PartOutline]] = [[] for _ in cameras]
     for b, body in enumerate(bodies):
-        Ts = body.model.kinematics(body.values).Ts_world_part
+        Ts = body.kinematics.Ts_world_part
         points = _surfaces(body.model) @ np.swapaxes(Ts[:, :3, :3], 1, 2) + Ts[:, None, :3, 3]
         for camera, out in zip(cameras, found, strict=True):
             depths, px = camera.depths(points), camera.project(points[:, 1:]).astype(np.float32)
@@ -60,7 +60,7 @@ def place_on_part(body: Body, camera: Camera, part: int, pointer_px: Array) -> A
         part: index of the part.
         pointer_px: undistorted px, (2,).
     """
-    T_part_world = rigid.inverse(body.model.kinematics(body.values).Ts_world_part[part])
+    T_part_world = rigid.inverse(body.kinematics.Ts_world_part[part])
     start = rigid.apply(T_part_world, camera.center_world)
     ray = rigid.apply(T_part_world, camera.pinhole.back_project(np.asarray(pointer_px, dtype=np.float64), 1.0)) - start
     ray /= np.linalg.norm(ray)

@@ -96,6 +96,20 @@ def quaternion_multiply(a: Array, b: Array) -> Array:
     return np.concatenate([w, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
 
 
+def clip_swing_twist(wxyz: Array, cone: float, twist: float) -> Array:
+    """Split a rotation into swing times twist about z, bound both, rad, and put them together again; `(4,)`."""
+    q = wxyz / np.linalg.norm(wxyz)
+    norm = np.hypot(q[0], q[3])
+    turn = np.array([q[0], 0.0, 0.0, q[3]]) / norm if norm > 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
+    swing = quaternion_log(quaternion_multiply(q, turn * (1.0, -1.0, -1.0, -1.0)))
+    angle = np.linalg.norm(swing)
+    if angle > cone:
+        swing *= cone / angle
+    about_z = np.clip(quaternion_log(turn)[2], -twist, twist)
+    turn = quaternion_exp(np.array([0.0, 0.0, about_z]))
+    return quaternion_multiply(quaternion_exp(swing), turn)
+
+
 def transform(R: Array | None = None, t: Array | None = None) -> Array:
     """Homogeneous transform from a rotation `(3, 3)` and a translation `(3,)`; identity where missing."""
     T = np.eye(4)

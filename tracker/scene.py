@@ -105,7 +105,7 @@ class Scene:
         self._views, self._settings = views, settings
         self._memories, self._models, self._predicted = memories, [m.model for m in memories], tuple(poses)
         self._sharing, self._shares = Sharing(views), list[Shares]()
-        self._places: dict[tuple[int, int], tuple[Array, Array]] = {}  # poses are kept: no other gets their number
+        self._placed: dict[tuple[int, int], Body] = {}  # poses are kept: no other gets their number
         self._thetas = np.array([v.outlier_px(settings.theta_px) for v in views])
 
     def teach(self, scenery: Sequence[Scenery]) -> None:
@@ -184,14 +184,8 @@ class Scene:
         """How far apart the points of a person are in two poses, (n_values,), at most, metres."""
         if was is now:
             return 0.0
-        return float(np.linalg.norm(self._points(person, now) - self._points(person, was), axis=1).max())
-
-    def _points(self, person: int, values: Array) -> Array:
-        """The points of a person in a pose, (n_points, 3), metres; each pose is asked for many times."""
-        key = person, id(values)  # people who are exchanged take each other's poses
-        if key not in self._places:
-            self._places[key] = values, self._models[person].points_world(values)
-        return self._places[key][1]
+        there, here = self._body(person, was), self._body(person, now)
+        return float(np.linalg.norm(here.points_world - there.points_world, axis=1).max())
 
     def _stand(self, poses: Sequence[Array], within_m: Array) -> bool:
         """Whether everybody stands as in some poses, (n_values,) each, each within some metres, (K,)."""
@@ -347,10 +341,10 @@ class Scene:
         if known is not None:
             colors = self.colors(person).score(seen.fit.values, known), known
         trusts = np.array([0.0 if v.silhouette is None else v.silhouette.trust for v in self._views])
-        model, values = self._models[person], seen.fit.values
-        scale = px_per_m([v.camera for v in self._views], model, values)
-        costs = seen.match.part_costs(values)
-        return confidence.quality(model, seen.fit, costs, self._thetas, trusts, scale, colors), costs
+        body = self._body(person, seen.fit.values)
+        scale = px_per_m([v.camera for v in self._views], body)
+        costs = seen.match.part_costs(seen.fit.values)
+        return confidence.quality(body, seen.fit, costs, self._thetas, trusts, scale, colors), costs
 
     def _parts_px(self, costs: PartCosts) -> Array:
         """Mean distance of each part's contour to the edges, (n_parts,), px of the footage."""
@@ -390,4 +384,11 @@ class Scene:
 
     def _bodies(self) -> list[Body]:
         """Everybody where they stand so far."""
-        return [Body(m, p) for m, p in zip(self._models, self.poses, strict=True)]
+        return [self._body(i, pose) for i, pose in enumerate(self.poses)]
+
+    def _body(self, person: int, values: Array) -> Body:
+        """A person in a pose, (n_values,); each is asked for many times."""
+        key = person, id(values)  # people who are exchanged take each other's poses
+        if key not in self._placed:
+            self._placed[key] = Body(self._models[person], values)
+        return self._placed[key]

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from tracker import contours
-from tracker.body import Body, BodyModel
+from tracker.body import Body
 from tracker.cameras import Camera, Region
 from tracker.matched import region_around
-from tracker.rigid import Array, FloatArray
+from tracker.rigid import FloatArray
 
 _NEAREST_M = 0.3
 """Bodies nearer to a camera, and those behind it, count as this near."""
@@ -22,7 +22,7 @@ def regions(
     cameras: Sequence[Camera], bodies: Sequence[Body], margin_m: float = _REGION_MARGIN_M
 ) -> list[Region | None]:
     """Where to look in each view: around everybody, as predicted; None where that is the whole image."""
-    points = np.concatenate([b.model.points_world(b.values) for b in bodies])
+    points = np.concatenate([b.points_world for b in bodies])
     out: list[Region | None] = []
     for camera in cameras:
         depths = camera.depths(points)
@@ -63,7 +63,7 @@ def visible_outline(bodies: Sequence[Body], camera: Camera) -> FloatArray:
     return contour.pieces_px[~contour.hidden]
 
 
-def px_per_m(cameras: Sequence[Camera], model: BodyModel, values: Array) -> float:
+def px_per_m(cameras: Sequence[Camera], body: Body) -> float:
     """Length of a metre where a body stands, in the view that shows it in between the largest and the smallest."""
-    middle = model.points_world(values).mean(axis=0)
+    middle = body.points_world.mean(axis=0)
     return float(np.median([c.K[0, 0] / max(c.depths(middle), _NEAREST_M) for c in cameras]))

@@ -136,7 +136,7 @@ def judged(model, truth, values, colors=False):
     if colors:
         known = Colors(views, bodies).learn()
         score = Colors(views, [Body(model, values)]).score(values, known), known
-    return quality(model, fit, match.part_costs(values), thetas, np.zeros(len(views)), 100.0, score)
+    return quality(Body(model, values), fit, match.part_costs(values), thetas, np.zeros(len(views)), 100.0, score)
 
 
 @pytest.mark.parametrize("colors", [False, True])

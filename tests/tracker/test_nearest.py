@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracker.nearest import LANES, STRIP_PX, Segments, nearest_segment, sort_points, stack_rows
+from tracker.nearest import LANES, STRIP_PX, Segments, nearest_segment, sort_points, stack_rows, within_reach
 
 WIDTH, HEIGHT = 3 * STRIP_PX - 50, 200
 
@@ -48,6 +48,27 @@ def test_filled_up_by_points_that_are_nowhere():
     assert out[:2] == pytest.approx([2.5, 2.0])
     assert out[3:].min() > 1e5
     assert found.rows[:, [9, 10, 11, HEIGHT]].tolist() == [[0, 1, 2, 2], [2, 3, 3, 3], [3, 3, 3, 3]]
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000), st.integers(0, 70), st.integers(0, 12), st.sampled_from([1.0, 20.0, 500.0]))
+def test_those_within_reach_of_visible_pieces_stay_sorted(seed, n_points, n_pieces, reach):
+    rng = np.random.default_rng(seed)
+    size = np.array([WIDTH, HEIGHT])
+    points = rng.uniform(0, size, (n_points, 2)).astype(np.float32)
+    starts, steps = rng.uniform(0, size, (n_pieces, 2)), rng.normal(0, 30, (n_pieces, 2))
+    pieces, hidden = np.column_stack([starts, starts + steps]).astype(np.float32), rng.random(n_pieces) < 0.4
+    everything = sort_points(points, (WIDTH, HEIGHT))
+    before = everything.points.copy()
+    kept = within_reach(everything, pieces, hidden, reach)
+    visible = np.column_stack([starts, steps])[~hidden]
+    off = distances(points, visible) if len(visible) else np.full(n_points, np.inf)
+    if np.any(np.abs(off - reach) < 1e-2):
+        return  # either is right
+    expected = sort_points(points[off <= reach], (WIDTH, HEIGHT))
+    np.testing.assert_array_equal(kept.points, expected.points)
+    np.testing.assert_array_equal(kept.rows, expected.rows)
+    np.testing.assert_array_equal(everything.points, before)
 
 
 def test_images_of_several_sizes_in_one_array():
