@@ -33,7 +33,7 @@ ORDER = [
         "tracker.footage",
         "tracker.records",
     ],
-    ["tracker.sampling", "tracker.scenery", "tracker.stored_poses", "tracker.twists"],
+    ["tracker.joints", "tracker.sampling", "tracker.scenery", "tracker.stored_poses", "tracker.twists"],
     ["tracker.session_lock", "tracker.annotations", "tracker.body", "tracker.matched", "tracker.silhouette_contour"],
     ["tracker.formats.anipose", "tracker.formats.trc", "tracker.formats.model_toml", "tracker.formats.pose_table"],
     ["tracker.picking", "tracker.sights", "tracker.surfaces"],

@@ -11,7 +11,8 @@ import warnings
 import numpy as np
 
 from tracker import rigid
-from tracker.body import BodyModel, Joint
+from tracker.body import BodyModel
+from tracker.joints import Joint
 from tracker.rigid import Array
 
 

@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body import BodyModel, Joint, Landmark, Part
+from tracker.body import BodyModel
 from tracker.errors import TrackerError
+from tracker.joints import Joint, Landmark, Part
 from tracker.rigid import Array
 
 _LEAST_HEIGHT_M, _MOST_HEIGHT_M = 0.3, 3.0

@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel, Joint
+from tracker.body import BodyModel
 from tracker.confidence import limbs
+from tracker.joints import Joint
 from tracker.kinematics import IntArray
 from tracker.measures import twin
 from tracker.orienting import orient

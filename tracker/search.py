@@ -13,9 +13,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel, SearchGroup
+from tracker.body import BodyModel
 from tracker.chamfer import ChamferCost
 from tracker.errors import TrackerError
+from tracker.joints import SearchGroup
 from tracker.rigid import Array
 
 

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from tracker.body import BodyModel, Joint, Landmark, Part
+from tracker.body import BodyModel
 from tracker.errors import TrackerError
 from tracker.formats.trc import MarkerTable
+from tracker.joints import Joint, Landmark, Part
 from tracker.rigid import Array
 
 _SIDES = ("left", "right")

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from tracker.body import Axis, BodyModel, Joint, Landmark, Part, SearchGroup
+from tracker.body import BodyModel
 from tracker.errors import ModelError
 from tracker.files import parse_toml
+from tracker.joints import Axis, Joint, Landmark, Part, SearchGroup
 
 VERSION = 1
 DEFAULT_HEIGHT_M = 1.75
