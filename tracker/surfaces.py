@@ -70,8 +70,9 @@ def surfaces_of(models: tuple[BodyModel, ...]) -> Surfaces:
         np.linalg.norm(points, axis=1).max(axis=-1),
         profile_sizes,
         table,
-        (points / half_axes[..., None]).astype(np.float32),
-        (normals * half_axes[..., None]).astype(np.float32),
+        # Row by row, which kernels read as whole vectors; as they are stacked they stand point by point.
+        np.ascontiguousarray(points / half_axes[..., None], np.float32),
+        np.ascontiguousarray(normals * half_axes[..., None], np.float32),
         np.sum(points * normals, axis=1).astype(np.float32),
         np.stack([_solid(s) for s in shapes]),
         _adjoining(models),
