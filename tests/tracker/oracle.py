@@ -5,6 +5,8 @@ convex, so its outline is the convex hull of a dense mesh; whether another part 
 along the line of sight.
 """
 
+from functools import lru_cache
+
 import cv2
 import numpy as np
 from scipy.spatial import cKDTree
@@ -42,8 +44,7 @@ def visible_contour(model, values, camera):
 
 def _outline(model, part, T, camera):
     """Closed outline of a part: px (n, 2) float32 in order, and the surface point of each, (n, 3)."""
-    surface = model.shapes[part].grid(80, 120)[0].reshape(-1, 3) + model.centers_part[part]
-    world = surface @ T[:3, :3].T + T[:3, 3]
+    world = _surface(model, part) @ T[:3, :3].T + T[:3, 3]
     px = camera.project(world).astype(np.float32)
     if np.any(camera.depths(world) < 0.05):
         return np.empty((0, 2), np.float32), np.empty((0, 3))
@@ -53,6 +54,12 @@ def _outline(model, part, T, camera):
     at = np.arange(0.0, lengths[-1], SAMPLE_PX)
     even = [np.stack([np.interp(at, lengths, c) for c in points[ring].T], axis=1) for points in (px, world)]
     return even[0].astype(np.float32), even[1]
+
+
+@lru_cache(maxsize=64)
+def _surface(model, part):
+    """The mesh of a part in its own frame, (n, 3): the same in each pose."""
+    return model.shapes[part].grid(80, 120)[0].reshape(-1, 3) + model.centers_part[part]
 
 
 def _meets(model, part, T, eye, points, margin_m):

@@ -9,7 +9,7 @@ import tracker
 
 PROGRAM = """
 import numpy as np
-from tracker import contours, posing, chamfer
+from tracker import occlusion
 from tracker.body import Body
 from tracker.cameras import Camera
 from tracker.formats.model_toml import load_model
@@ -18,8 +18,9 @@ model = load_model("gavrila22")
 R = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 camera = Camera("a", (640, 480), np.array([[520.0, 0, 320], [0, 520, 240], [0, 0, 1]]), np.zeros(0),
                 transform(R, np.array([4.0, 0.0, 0.0])))
-contour = contours.trace([Body(model, model.neutral())], camera)
-print(int(contour.hidden.sum()))
+body = Body(model, model.neutral())
+behind = body.points_world - (0.5, 0.0, 0.0)
+print(int(occlusion.points_hidden([body], [camera], behind).sum()))
 """
 
 
@@ -30,7 +31,7 @@ def run(folder):
 
 
 def test_an_edit_of_one_kernel_reaches_the_kernels_that_call_it(tmp_path):
-    """`trace_view` in contours.py compiles `hide` of hiding.py into itself."""
+    """`_mark_blocked` in occlusion.py compiles `hide` of hiding.py into itself."""
     copy = tmp_path / "tracker"
     shutil.copytree(Path(tracker.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__", "simulate"))
     before = run(tmp_path)
