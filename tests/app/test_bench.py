@@ -47,6 +47,14 @@ def test_work_and_yardstick_are_timed_in_turns():
     assert 0 < timed.work_us < timed.yardstick_us
 
 
+def test_differences_are_taken_in_turns(monkeypatch):
+    """A machine that becomes slower from run to run adds as much to both, and the first run is for nothing."""
+    took_s = {"long": iter((9.0, 3.0, 4.0, 5.0)), "short": iter((1.0, 1.0, 2.0, 3.0))}
+    monkeypatch.setattr(bench_rows, "_seconds", lambda work: work() or 0.0)
+    timed = Yardstick().beside_difference(lambda: next(took_s["long"]), lambda: next(took_s["short"]), 3)
+    assert timed.work_us == 2e6
+
+
 def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
     """Not how fast, only that they run and tell what they should."""
 
@@ -54,7 +62,11 @@ def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
         done = work()
         return bench_rows.Timed(2.0 * (done if isinstance(done, int) else 1), 1.0)
 
+    def beside_difference(self, long, short, runs):
+        return bench_rows.Timed(2.0 * (long() - short()), 1.0)
+
     monkeypatch.setattr(Yardstick, "beside", beside)
+    monkeypatch.setattr(Yardstick, "beside_difference", beside_difference)
     monkeypatch.setattr(bench_rows, "_PIPELINE_FRAMES", range(5, 8))
     cones = frame.with_model("gavrila22_cones")
     rows = [
