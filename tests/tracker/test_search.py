@@ -62,10 +62,6 @@ def steps(gavrila, views, start):
     return list(search(ChamferCost(views, [Body(gavrila, start)]), [start]))
 
 
-ROUNDING = 1e-7
-"""Costs are sums of single precision, which a kernel takes in another order where it is compiled into another."""
-
-
 def test_the_search_goes_stage_by_stage(gavrila, steps):
     order = [s.stage for i, s in enumerate(steps) if i == 0 or s.stage is not steps[i - 1].stage]
     names = ["torso and head", "arms", "legs"]
@@ -92,9 +88,9 @@ def test_a_step_tells_the_truth(gavrila, views, start, steps):
     cost = ChamferCost(views, [Body(gavrila, start)])
     for step in steps[::7]:
         found = cost(step.best)
-        assert found.total_px == pytest.approx(step.best_px, rel=ROUNDING)
-        np.testing.assert_allclose(found.views_px, step.best_views_px, rtol=ROUNDING)
-        assert cost(step.candidate).total_px == pytest.approx(step.candidate_px, rel=ROUNDING)
+        assert found.total_px == pytest.approx(step.best_px, rel=1e-9)
+        np.testing.assert_allclose(found.views_px, step.best_views_px, rtol=1e-9)
+        assert cost(step.candidate).total_px == pytest.approx(step.candidate_px, rel=1e-9)
 
 
 def test_stopping_early_changes_nothing_of_what_was_found(gavrila, views, start, steps):

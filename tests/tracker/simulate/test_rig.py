@@ -41,7 +41,7 @@ def test_impossible_cameras_are_refused(n, size, found):
 @pytest.mark.parametrize("n", [3, 4, 6])
 def test_nothing_in_the_room_hides_a_person_in_its_middle(n):
     u, v = np.meshgrid(np.linspace(-0.9, 0.9, 7), np.linspace(0.1, 1.8, 7))
-    for camera in make_cameras(n, (160, 120), 0):
+    for camera in make_cameras(n, (320, 240), 0):
         # A man-sized screen that faces the camera, arms stretched.
         aside = np.cross(camera.center_world, (0, 0, 1.0))
         screen = u.ravel()[:, None] * aside / np.linalg.norm(aside) + v.ravel()[:, None] * (0, 0, 1.0)
