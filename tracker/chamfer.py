@@ -320,9 +320,10 @@ def _score(
 ) -> None:
     """Fill the directed costs of one pose, (V, 2): model to image and image to model, matched px."""
     d, pixel = scratch.distances, 0
+    contours.place(Ts, surfaces, scratch.pieces)
     for view in range(scene.P.shape[0]):
         width, height, theta = scene.sizes[view, 0], scene.sizes[view, 1], scene.thetas[view]
-        n = contours.trace_pieces(scene.P[view], scene.eyes[view], Ts, surfaces, contours.PIECE_PX, scratch.pieces)
+        n = contours.trace_pieces(scene.P[view], scene.eyes[view], surfaces, contours.PIECE_PX, scratch.pieces)
         n_visible, n_segments = _take_visible(n, scratch.pieces, scratch.visible, scratch.segments)
         image = scene.distances[pixel : pixel + width * height]
         if paper:

@@ -78,7 +78,9 @@ class Pieces(NamedTuple):
     f: FloatArray
     """A function on the grid of a part, (rings * sectors,)."""
     between: FloatArray
-    """From the unit coordinates of one part to those of another, and the eye there, (3, 5)."""
+    """From the unit coordinates of a part to those of one that may hide it, and the eye there, (P, P, 3, 5)."""
+    related: NDArray[np.bool_]
+    """Whether that has been filled, but for the eye, (P, P): most pairs meet in no view, others in several."""
     unit_eye: Array
     """The eye in unit coordinates of one part, (3,)."""
     shared: FloatArray
@@ -134,8 +136,9 @@ def piece_buffer(surfaces: Surfaces, room: int) -> Pieces:
         np.empty(room, np.bool_), np.empty(n_parts + 1, np.int64), np.empty((n_parts, 3, 4)),
         np.empty((n_parts, 3, 5)), np.empty((n_parts, 4)), np.empty(n_parts),
         np.zeros((3, MAX_POINTS + LANES), np.float32), np.empty((3, MAX_POINTS + LANES), np.float32),
-        np.empty((3, MAX_POINTS), np.float32), np.empty(grid_size, np.float32), np.empty((3, 5), np.float32),
-        np.empty(3), np.empty((2, room + LANES), np.float32), np.empty(n_parts, np.bool_),
+        np.empty((3, MAX_POINTS), np.float32), np.empty(grid_size, np.float32),
+        np.empty((n_parts, n_parts, 3, 5), np.float32), np.empty((n_parts, n_parts), np.bool_), np.empty(3),
+        np.empty((2, room + LANES), np.float32), np.empty(n_parts, np.bool_),
     )  # fmt: skip
 
 
@@ -145,27 +148,35 @@ def piece_buffer(surfaces: Surfaces, room: int) -> Pieces:
 
 
 @njit(inline="always", **FAST)
-def place(eye: Array, Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
-    """Fill the motions between the parts' unit coordinates and the world, and their distances from the eye."""
-    to_world, to_unit, distances = out.Ts_world_unit, out.Ts_unit_world, out.distances
+def place(Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
+    """Fill the motions between the parts' unit coordinates and the world, which are the same in all views."""
+    to_world, to_unit = out.Ts_world_unit, out.Ts_unit_world
     centers, half_axes = surfaces.centers, surfaces.half_axes
+    out.related[:] = False
     for part in range(Ts.shape[0]):
-        squared = 0.0
         for i in range(3):
             center = Ts[part, i, 3]
             for k in range(3):
                 to_world[part, i, k] = Ts[part, i, k] * half_axes[part, k]
                 center += Ts[part, i, k] * centers[part, k]
             to_world[part, i, 3] = center
-            squared += (center - eye[i]) ** 2
-        distances[part] = np.sqrt(squared)
         for i in range(3):
             inverse = 1.0 / half_axes[part, i]
-            to_unit[part, i, 3] = to_unit[part, i, 4] = 0.0
+            to_unit[part, i, 3] = 0.0
             for k in range(3):
                 to_unit[part, i, k] = Ts[part, k, i] * inverse
                 to_unit[part, i, 3] -= to_unit[part, i, k] * to_world[part, k, 3]
-                to_unit[part, i, 4] += to_unit[part, i, k] * (eye[k] - to_world[part, k, 3])
+
+
+@njit(inline="always", **FAST)
+def face(eye: Array, out: Pieces) -> None:
+    """Fill where the eye is in the unit coordinates of parts that are placed, and how far it is from them."""
+    to_world, to_unit = out.Ts_world_unit, out.Ts_unit_world
+    for part in range(to_world.shape[0]):
+        x, y, z = eye[0] - to_world[part, 0, 3], eye[1] - to_world[part, 1, 3], eye[2] - to_world[part, 2, 3]
+        out.distances[part] = np.sqrt(x * x + y * y + z * z)
+        for i in range(3):
+            to_unit[part, i, 4] = to_unit[part, i, 0] * x + to_unit[part, i, 1] * y + to_unit[part, i, 2] * z
 
 
 @njit(inline="always", **FAST)
@@ -271,10 +282,10 @@ def hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
         out.firsts,
         surfaces.adjoining,
     )
-    to_unit, to_world, Q, middles, shared, hidden = (
-        out.Ts_unit_world, out.Ts_world_unit, out.between, out.middles, out.shared, out.hidden
+    to_unit, to_world, middles, shared, hidden = (
+        out.Ts_unit_world, out.Ts_world_unit, out.middles, out.shared, out.hidden
     )  # fmt: skip
-    solids, stands = surfaces.solids, out.stands
+    solids, stands, related = surfaces.solids, out.stands, out.related
     for a in range(n_parts):
         if firsts[a] == firsts[a + 1]:
             continue
@@ -285,11 +296,15 @@ def hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
                 continue
             if boxes[b, 0] > u1 or boxes[b, 2] < u0 or boxes[b, 1] > v1 or boxes[b, 3] < v0:
                 continue
+            Q = out.between[a, b]
+            if not related[a, b]:
+                related[a, b] = True
+                for i in range(3):
+                    p, q, r = to_unit[b, i, 0], to_unit[b, i, 1], to_unit[b, i, 2]
+                    for k in range(3):
+                        Q[i, k] = p * to_world[a, 0, k] + q * to_world[a, 1, k] + r * to_world[a, 2, k]
+                    Q[i, 3] = p * to_world[a, 0, 3] + q * to_world[a, 1, 3] + r * to_world[a, 2, 3] + to_unit[b, i, 3]
             for i in range(3):
-                p, q, r = to_unit[b, i, 0], to_unit[b, i, 1], to_unit[b, i, 2]
-                for k in range(3):
-                    Q[i, k] = p * to_world[a, 0, k] + q * to_world[a, 1, k] + r * to_world[a, 2, k]
-                Q[i, 3] = p * to_world[a, 0, 3] + q * to_world[a, 1, 3] + r * to_world[a, 2, 3] + to_unit[b, i, 3]
                 Q[i, 4] = to_unit[b, i, 4]
             margin = JOINT_MARGIN_M / distances[a] if adjoining[a, b] else 0.0
             hide(b, solids, Q, margin, middles, firsts[a], firsts[a + 1], shared, hidden)
@@ -329,11 +344,11 @@ def trace_part(
 
 
 @njit(**FAST)
-def trace_pieces(P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: float, out: Pieces) -> int:
-    """Fill the pieces of one view; returns their number. See `trace_view`."""
-    n_parts, focal = Ts.shape[0], focal_px(P)
+def trace_pieces(P: Array, eye: Array, surfaces: Surfaces, piece_px: float, out: Pieces) -> int:
+    """Fill the pieces of parts that are placed in one view; returns their number. See `trace_view`."""
+    n_parts, focal = surfaces.radii.shape[0], focal_px(P)
     n = edge = 0
-    place(eye, Ts, surfaces, out)
+    face(eye, out)
     for part in range(n_parts):
         out.firsts[part], out.stands[part] = n, False
         n, edge = trace_part(part, P, focal, surfaces, piece_px, n, edge, out)
@@ -357,7 +372,8 @@ def trace_view(P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: fl
         out: room for the pieces; what does not fit is left out.
     """
     pieces = piece_buffer(surfaces, out.parts.shape[0])
-    n = trace_pieces(P, eye, Ts, surfaces, piece_px, pieces)
+    place(Ts, surfaces, pieces)
+    n = trace_pieces(P, eye, surfaces, piece_px, pieces)
     points, W = out.points_world, pieces.Ts_world_unit
     for part in range(Ts.shape[0]):
         for i in range(pieces.firsts[part], pieces.firsts[part + 1]):

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.contours import Pieces, focal_px, hide_all, place, trace_part
+from tracker.contours import Pieces, face, focal_px, hide_all, trace_part
 from tracker.kernels import BORROW, FAST
 from tracker.kinematics import IntArray
 from tracker.outlines import MAX_POINTS
@@ -82,13 +82,12 @@ def remember(Ts: Array, kept: Array) -> None:
 
 
 @njit(**FAST)
-def trace_standing(
-    P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: float, kept: Kept, out: Pieces
-) -> None:
-    """Fill the pieces of one view with those of the parts that stand, as if the others were not there."""
-    n_parts, focal = Ts.shape[0], focal_px(P)
+def trace_standing(P: Array, eye: Array, surfaces: Surfaces, piece_px: float, kept: Kept, out: Pieces) -> None:
+    """Fill the pieces of one view with those of the parts that stand, all being placed, as if the others were not
+    there."""
+    n_parts, focal = kept.moves.shape[0], focal_px(P)
     n = edge = 0
-    place(eye, Ts, surfaces, out)
+    face(eye, out)
     for part in range(n_parts):
         out.firsts[part], out.stands[part] = n, False
         if not kept.moves[part]:
@@ -119,14 +118,12 @@ def keep_pieces(view: int, traced: Pieces, kept: Kept) -> None:
 
 
 @njit(**FAST)
-def trace_moving(
-    view: int, P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: float, kept: Kept, out: Pieces
-) -> int:  # fmt: skip
+def trace_moving(view: int, P: Array, eye: Array, surfaces: Surfaces, piece_px: float, kept: Kept, out: Pieces) -> int:
     """Fill the pieces of one view as `contours.trace_pieces` does, those of what stands as they were kept."""
-    n_parts, room = Ts.shape[0], out.edges.shape[0]
+    n_parts, room = kept.moves.shape[0], out.edges.shape[0]
     # The edges of what stands keep their numbers; there are fewer of them.
     n, edge, focal = 0, n_parts * MAX_POINTS, focal_px(P)
-    place(eye, Ts, surfaces, out)
+    face(eye, out)
     for part in range(n_parts):
         out.firsts[part], out.stands[part] = n, not kept.moves[part]
         if kept.moves[part]:

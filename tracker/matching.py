@@ -319,12 +319,12 @@ def _image_to_model(
 
 @njit(**FAST)
 def _keep(
-    view: int, Ts: Array, surfaces: contours.Surfaces, scene: Scene, turn: float, kept: Kept, scratch: Scratch
-) -> None:
+    view: int, surfaces: contours.Surfaces, scene: Scene, turn: float, kept: Kept, scratch: Scratch
+) -> None:  # fmt: skip
     """Keep the contours of what stands in a view, and what they are nearest to."""
-    trace_standing(scene.P[view], scene.eyes[view], Ts, surfaces, contours.PIECE_PX, kept, scratch.traced)
+    trace_standing(scene.P[view], scene.eyes[view], surfaces, contours.PIECE_PX, kept, scratch.traced)
     keep_pieces(view, scratch.traced, kept)
-    n_segments, segment, visible = _visible(Ts.shape[0], scratch), -1, 0
+    n_segments, segment, visible = _visible(kept.moves.shape[0], scratch), -1, 0
     at = kept.firsts[view, 0]
     for i in range(scratch.traced.firsts[-1]):
         if scratch.traced.hidden[i]:
@@ -377,15 +377,16 @@ def gather(work: Work, derive: bool) -> float:
     sums.outline[:] = 0.0
     pixel, cost, keeps = np.int64(0), 0.0, kept.best.shape[0] > 0  # a bare 0 is a type of its own to the compiler
     anew = keeps and not still_stands(Ts, kept.moves, kept.Ts)
+    contours.place(Ts, surfaces, scratch.traced)
     for view in range(scene.P.shape[0]):
         if anew:
-            _keep(view, Ts, surfaces, scene, turn, kept, scratch)
+            _keep(view, surfaces, scene, turn, kept, scratch)
         if scene.weights[view, 0] > 0.0 or scene.weights[view, 1] > 0.0:
             P, eye, traced = scene.P[view], scene.eyes[view], scratch.traced
             if keeps:
-                trace_moving(view, P, eye, Ts, surfaces, contours.PIECE_PX, kept, traced)
+                trace_moving(view, P, eye, surfaces, contours.PIECE_PX, kept, traced)
             else:
-                contours.trace_pieces(P, eye, Ts, surfaces, contours.PIECE_PX, traced)
+                contours.trace_pieces(P, eye, surfaces, contours.PIECE_PX, traced)
             n_segments = _visible(Ts.shape[0], scratch)
             scratch.pulls[:, : scratch.firsts[-1]] = 0.0
             if scene.weights[view, 0] > 0.0 or not derive:  # whoever asks for the costs of the parts asks for both

@@ -6,7 +6,7 @@ from staging import cameras_around, own_evidence, posed, shaken
 from tracker import contours
 from tracker.body import Body
 from tracker.confidence import limbs
-from tracker.contours import PIECE_PX, contour_room, part_poses, piece_buffer, projection, surfaces_of
+from tracker.contours import PIECE_PX, contour_room, part_poses, piece_buffer, place, projection, surfaces_of
 from tracker.kept import keep_pieces, kept_for, remember, still_stands, trace_moving, trace_standing
 from tracker.refine import ContourMatch, MatchSettings
 
@@ -36,13 +36,15 @@ def traced_with_kept(bodies, then, moves):
     room = contour_room(CAMERAS[0], len(bodies))
     out, kept = piece_buffer(surfaces, room), kept_for(len(CAMERAS), room, 1, moves)
     views = [(i, projection(c), c.center_world) for i, c in enumerate(CAMERAS)]
+    place(part_poses(bodies), surfaces, out)
     for i, P, eye in views:
-        trace_standing(P, eye, part_poses(bodies), surfaces, PIECE_PX, kept, out)
+        trace_standing(P, eye, surfaces, PIECE_PX, kept, out)
         keep_pieces(i, out, kept)
     remember(part_poses(bodies), kept.Ts)
     assert still_stands(part_poses(then), moves, kept.Ts)
+    place(part_poses(then), surfaces, out)
     for i, P, eye in views:
-        n = trace_moving(i, P, eye, part_poses(then), surfaces, PIECE_PX, kept, out)
+        n = trace_moving(i, P, eye, surfaces, PIECE_PX, kept, out)
         yield out.ends[:, :n].T.copy(), out.hidden[:n].copy(), np.repeat(np.arange(len(moves)), np.diff(out.firsts))
 
 
