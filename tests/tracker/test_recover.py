@@ -129,6 +129,31 @@ def test_for_several_places_are_looked_for_once(gavrila, monkeypatch):
     assert n_looked[0] > n_looked[1] == 2
 
 
+def test_a_search_that_promises_nothing_is_given_up(gavrila, monkeypatch):
+    """Before anything is refined where no place looks better, before the whole body is where none costs less."""
+    truth, n_refined = posed(gavrila, 1), []
+    staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["60 degrees off"]))
+    each = Judge.each
+    monkeypatch.setattr(
+        Judge, "each", lambda self, work, poses: n_refined.append(len(poses)) or each(self, work, poses)
+    )
+    arm, leg = (limb_of(gavrila, n) for n in ("left_forearm", "left_calf"))
+
+    def refined(limbs, **settings):
+        """How many poses were refined, the limb alone and the whole body, limb by limb; whether the arm was found."""
+        n_refined.clear()
+        judge = replace(staged.judge, settings=replace(for_several(RecoverSettings()), **settings))
+        best = search_limbs(gavrila, limbs, staged.here, (), judge, 15).best
+        return [n > 0 for n in n_refined], staged.off_m(best, arm.parts) < 0.03
+
+    never = np.inf
+    assert refined([arm]) == ([True, True], True)
+    assert refined([arm], worth=(never, -never)) == refined([arm], worth=(-never, never)) == ([False, False], False)
+    assert refined([arm], worth=(-never, -never), finish=-never) == ([True, False], False)
+    # What one limb leaves may be made good by the next.
+    assert refined([arm, leg], worth=(-never, -never), finish=-never) == ([True, True, True, False], True)
+
+
 def test_best_places_apart(gavrila):
     """One good place does not take all the room: the best pose of each place is there, best first."""
     arm, base = limb_of(gavrila, "left_forearm"), gavrila.neutral()
