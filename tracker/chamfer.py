@@ -138,11 +138,7 @@ class ChamferCost:
 
     def __call__(self, poses: Sequence[Array]) -> Cost:
         """Cost of one pose of everybody; `poses` holds the values of each body."""
-        directed = np.empty((len(self._seen), 2))
-        _score(
-            self._part_poses(poses), self._surfaces, self._scene, self.outliers == "paper", self._scratch(), directed
-        )
-        directed_px = directed / self._scales[:, None]
+        directed_px = self._directed(0, poses[0][None], poses)[0] / self._scales[:, None]
         views_px = self._blank_unseen(directed_px.mean(axis=-1))
         return Cost(float(self._mean(views_px)), views_px, directed_px[:, 0], directed_px[:, 1])
 
@@ -156,6 +152,22 @@ class ChamferCost:
 
         Returns:
             The total costs, (C,), and those of each view, (C, V), px of the footage; NaN for views without edges.
+        """
+        views_px = self._blank_unseen(self._directed(person, candidates, poses).mean(axis=-1) / self._scales)
+        return self._mean(views_px), views_px
+
+    @property
+    def scene_px(self) -> tuple[FloatArray, ...]:
+        """The edge points that count, of each view, (n, 2), matched px."""
+        scene = self._scene
+        return tuple(
+            scene.points[:, first : first + n].T for first, n in zip(scene.firsts[:-1], scene.counts, strict=True)
+        )
+
+    def _directed(self, person: int, candidates: Array, poses: Sequence[Array]) -> Array:
+        """The directed costs of candidates of a person, see `of_person`, (C, V, 2), matched px.
+
+        One kernel for all who ask: another would take the sums of single precision in another order.
         """
         model = self.models[person]
         first = parts_of(self.models, person).start
@@ -178,16 +190,7 @@ class ChamferCost:
                 other.result()
         else:
             score(slice(None))
-        views_px = self._blank_unseen(directed.mean(axis=-1) / self._scales)
-        return self._mean(views_px), views_px
-
-    @property
-    def scene_px(self) -> tuple[FloatArray, ...]:
-        """The edge points that count, of each view, (n, 2), matched px."""
-        scene = self._scene
-        return tuple(
-            scene.points[:, first : first + n].T for first, n in zip(scene.firsts[:-1], scene.counts, strict=True)
-        )
+        return directed
 
     def _part_poses(self, poses: Sequence[Array]) -> Array:
         return contours.part_poses([Body(m, p) for m, p in zip(self.models, poses, strict=True)])
