@@ -204,7 +204,7 @@ class BodyModel:
 
     def points_world(self, values: Array) -> Array:
         """Positions of the body's points (see `point_names`), (n_points, 3), metres."""
-        return self.points_at(self.kinematics(values), np.arange(len(self.point_parts)))
+        return Body(self, values).points_world
 
     def points_at(self, kinematics: Kinematics, points: IntArray) -> Array:
         """Positions of some of the points, given by index (N,), where the parts are known, (N, 3), metres."""

@@ -45,7 +45,7 @@ class RecoverSettings:
     improved: int = 48
     """Of these, how many are improved."""
     scored: int = 48
-    """Of those, how many have their contours scored."""
+    """Of those, how many are improved to the end and have their contours scored."""
     shakes: int = 16
     """Steps that are tried around each of them in a round."""
     shakes_rad: tuple[float, ...] = tuple(np.radians([16.0, 11.0, 7.0, 4.0]).tolist())
@@ -235,18 +235,18 @@ def _candidates(
     looks = np.concatenate(_in_parts(look, proposals))
     best = _best_apart(model, limb, proposals, looks, settings.improved, APART_M)
     dofs, at_hand = np.flatnonzero(limb.dofs), look(here[None])[0]
-    steps = [
-        np.random.default_rng(round_).normal(0.0, spread_rad, (len(best), settings.shakes, len(dofs)))
-        for round_, spread_rad in enumerate(settings.shakes_rad)
-    ]
-    half = len(steps) // 2
+    half = len(settings.shakes_rad) // 2
     # Each improves by itself, so that threads need not wait for one another in between.
-    for rounds, worth in zip((steps[:half], steps[half:]), settings.worth, strict=True):
-        improved = _in_parts(lambda *some: _improved(model, dofs, look, *some), best, *rounds)
+    for rounds, worth in zip((range(half), range(half, len(settings.shakes_rad))), settings.worth, strict=True):
+        steps = [
+            np.random.default_rng(i).normal(0.0, settings.shakes_rad[i], (len(best), settings.shakes, len(dofs)))
+            for i in rounds
+        ]
+        improved = _in_parts(lambda *some: _improved(model, dofs, look, *some), best, *steps)
         best, looks = (np.concatenate(x) for x in zip(*improved, strict=True))
         if looks.max(initial=-np.inf) < at_hand + worth:
             return best[:0]
-    best = best[np.argsort(-looks, kind="stable")[: settings.scored]]
+        best = best[np.argsort(-looks, kind="stable")[: settings.scored]]
     best = np.array([*best, *(_with_limb(model, here, other, limb) for other in others)])
     return _best_apart(model, limb, best, -judge.costs(best), settings.refined, _SAME_M)
 
