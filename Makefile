@@ -15,6 +15,7 @@ run: install
 	$(BIN)/quadrille
 
 # The library's tests take what those of the page leave: these wait a lot, but what they wait for must not come late.
+# Two browsers wait in half the time; what the tests of one file share, a server and its page, stays with one of them.
 test:
 	$(MAKE) --jobs 2 check kernels
 	$(MAKE) --jobs 2 $(if $(filter output-sync,$(.FEATURES)),--output-sync) test-library test-page
@@ -23,7 +24,7 @@ test-library: $(VENV)/.tested
 	nice -n 19 $(BIN)/python -m pytest --ignore tests/browser --numprocesses auto
 
 test-page: $(VENV)/.tested
-	$(BIN)/python -m pytest tests/browser
+	$(BIN)/python -m pytest tests/browser --numprocesses 2 --dist loadfile
 
 # Once, not in each process of the tests at the same time. Modules are found here while pip puts what is installed anew.
 kernels: $(VENV)/.installed
