@@ -1,6 +1,7 @@
 """How the browser tests drive the page and look at it."""
 
 import asyncio
+import json
 from contextlib import asynccontextmanager
 
 from aiohttp import web
@@ -56,6 +57,19 @@ async def handle_of(page, camera, point, person=0):
 async def to_client(page, camera, u, v):
     at = await page.evaluate("([c, u, v]) => quadrille.toClient(c, u, v)", [camera, u, v])
     return at["x"], at["y"]
+
+
+def drags_of(page):
+    """The drag messages that a page sends, as they go; to be asked for before it opens."""
+    sent = []
+
+    def hear(frame):
+        message = json.loads(frame) if isinstance(frame, str) else {}
+        if message.get("type") == "drag":
+            sent.append(message)
+
+    page.on("websocket", lambda socket: socket.on("framesent", hear))
+    return sent
 
 
 async def state_of(page):

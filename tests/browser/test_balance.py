@@ -5,7 +5,7 @@ import asyncio
 import numpy as np
 import pytest
 import pytest_asyncio
-from driving import handle_of, shows, state_of, to_client
+from driving import drags_of, handle_of, shows, state_of, to_client, until
 from running import Program
 
 from tracker.assemble import assemble
@@ -50,14 +50,16 @@ async def program(balance):
 
 
 async def visit(browser, address):
+    """The page as it opens, and the drags that it will send."""
     page = await browser.new_page(viewport={"width": 1440, "height": 900}, color_scheme="dark")
+    sent = drags_of(page)
     await page.goto(address)
     await shows(page, "window.quadrille?.state.overlay && window.quadrille.state.state.cost_px", timeout_s=120)
-    return page
+    return page, sent
 
 
-async def drag(page, camera, point, target):
-    """Drag a joint to an undistorted pixel with the mouse, and wait until the page says that it is saved.
+async def drag(page, sent, camera, point, target):
+    """Drag a joint to an undistorted pixel with the mouse, and wait until the page shows where and that it is saved.
 
     A joint that is there already stays: so short a way is a click.
     """
@@ -68,10 +70,13 @@ async def drag(page, camera, point, target):
     await page.mouse.move(*start)
     await page.mouse.down()
     await page.mouse.move(*end, steps=6)
+    n_before = len(sent)
     await page.mouse.up()
+    await until(lambda: any(message["phase"] == "end" for message in sent[n_before:]))
+    # The drag before, in another view, had the same name; and numbers come before the vectors they belong to.
+    await shows(page, f"quadrille.state.overlay.seq === {sent[-1]['seq']}", 20)
     label = f"drag {point.replace('_', ' ')}"
     await shows(page, f"quadrille.state.state.undo?.startsWith('{label}') && quadrille.state.state.saved", 20)
-    await asyncio.sleep(0.1)
 
 
 async def pose_of(page):
@@ -92,24 +97,24 @@ async def comes(page, condition, timeout_s=15):
             await asyncio.sleep(0.03)
 
 
-async def place(page, targets):
+async def place(page, sent, targets):
     """Pose the model with drags alone, in two views, towards where the joints are."""
     for view in VIEWS:
-        await drag(page, view, "torso", targets[view]["torso"])
+        await drag(page, sent, view, "torso", targets[view]["torso"])
     for joint in JOINTS:
         for side in ("left", "right"):
             for view in VIEWS:
                 name = f"{side}_{joint}"
-                await drag(page, view, name, targets[view][name])
+                await drag(page, sent, view, name, targets[view][name])
 
 
 async def test_the_main_job(browser, balance, program, tmp_path):
     targets = balance[1]
-    page = await visit(browser, program.address)
+    page, sent = await visit(browser, program.address)
     await page.screenshot(path=tmp_path / "before.png")
     before_px = (await state_of(page))["state"]["cost_px"]
 
-    await place(page, targets)
+    await place(page, sent, targets)
     placed = await pose_of(page)
     placed_px = (await state_of(page))["state"]["cost_px"]
     assert placed_px < before_px
@@ -128,7 +133,7 @@ async def test_the_main_job(browser, balance, program, tmp_path):
 
     found = await pose_of(page)
     u, v = found[0, "left_wrist"]
-    await drag(page, 0, "left_wrist", (u + 60, v - 80))
+    await drag(page, sent, 0, "left_wrist", (u + 60, v - 80))
     await comes(page, lambda pose: distance(pose, found) > 50)
     await page.keyboard.press("Control+z")
     await shows(page, "quadrille.state.state.redo?.startsWith('drag left wrist')", 10)
@@ -139,7 +144,7 @@ async def test_the_main_job(browser, balance, program, tmp_path):
     await program.kill()
     await page.close()
     await program.start()
-    page = await visit(browser, program.address)
+    page, _ = await visit(browser, program.address)
     await comes(page, lambda pose: distance(pose, found) < 0.01)
     state = (await state_of(page))["state"]
     assert (state["undo"], state["redo"]) == history
