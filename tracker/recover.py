@@ -246,7 +246,7 @@ def _candidates(
         best, looks = (np.concatenate(x) for x in zip(*improved, strict=True))
         if looks.max(initial=-np.inf) < at_hand + worth:
             return best[:0]
-        best = best[np.argsort(-looks, kind="stable")[: settings.scored]]
+        best = best[np.sort(np.argsort(-looks, kind="stable")[: settings.scored])]
     best = np.array([*best, *(_with_limb(model, here, other, limb) for other in others)])
     return _best_apart(model, limb, best, -judge.costs(best), settings.refined, _SAME_M)
 
