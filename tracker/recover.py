@@ -66,9 +66,6 @@ class RecoverSettings:
     """Weight of the colours against edges; neighbouring pixels say the same, so it is well below 1."""
     trust_rad: float = 1.0
     """Standard deviation of the prediction of a limb that seems lost, rad: nearly none."""
-    worth: tuple[float, float] = (-np.inf, -np.inf)
-    """How much better than the pose at hand the best place must look for the search to go on, after half of the rounds
-    and after all, nats."""
     finish: float = np.inf
     """What a proposal may cost more than the best pose, its limb refined alone, to be refined with the whole body."""
 
@@ -138,18 +135,16 @@ class Searched(NamedTuple):
 
 
 def for_several(settings: RecoverSettings) -> RecoverSettings:
-    """The same with a third of the work in each search: limbs of people who hide each other are searched several times
-    as often, mostly in vain, and who is found is refined again with the others where they are.
+    """The same with half the work in each search: limbs of people who hide each other are searched several times as
+    often, and who is found is refined again with the others where they are.
 
     (Where 86 searches on three recordings found something better, it was always among the 32 that looked best. Of 724
-    searches on 17 simulated couples 64 brought a limb nearer to the truth by 5 cm or more: there the best place looked
-    1.5 nats better than the pose at hand or more after half of the rounds, 7 after all, and cost 4 more than it at most
-    before the whole body was refined. Of somebody alone a limb is searched that is far off, and none of that is so: of
-    222 that came nearer 21 would have been given up.)
+    searches on 17 simulated couples 64 brought a limb nearer to the truth by 5 cm or more: those that did cost 4 more
+    than the pose at hand at most before the whole body was refined, and of 44 of them all were among the 32 that looked
+    best after half of the rounds. How places look is no reason to give up: a leg that stands where the other belongs
+    looks best where it is.)
     """
-    return replace(
-        settings, scored=min(32, settings.scored), anew=False, gain=WORTH_A_STEP, worth=(-5.0, 0.0), finish=10.0
-    )
+    return replace(settings, scored=min(32, settings.scored), anew=False, gain=WORTH_A_STEP, finish=10.0)
 
 
 def search_limbs(
@@ -218,7 +213,7 @@ def _search_limb(
 
     of_limb = judge.of_limb(limb)
     poses = _candidates(model, limb, away, kept[0], others, of_limb)
-    if len(kept) > 1 and len(poses):
+    if len(kept) > 1:
         poses = np.array([*poses, *(_with_limb(model, k, pose, limb) for k in kept[1:] for pose in poses)])
         poses = poses[np.argsort(of_limb.costs(poses), kind="stable")[: judge.settings.refined]]
     tried = [x for x in of_limb.each(alone, poses) if x.cost < enough]
@@ -228,24 +223,21 @@ def _search_limb(
 def _candidates(
     model: BodyModel, limb: Limb, away: list[int], here: Array, others: Sequence[Array], judge: Judge
 ) -> Array:
-    """The few poses of a limb that are worth a refinement, (n, n_values); none where no place looks worth it."""
+    """The few poses of a limb that are worth a refinement, (n, n_values)."""
     settings = judge.settings
     look = judge.colors.look(here, limb.parts, judge.known, away)
     proposals = _proposals(model, limb, here, settings)
     looks = np.concatenate(_in_parts(look, proposals))
     best = _best_apart(model, limb, proposals, looks, settings.improved, APART_M)
-    dofs, at_hand = np.flatnonzero(limb.dofs), look(here[None])[0]
-    half = len(settings.shakes_rad) // 2
+    dofs, n_rounds = np.flatnonzero(limb.dofs), len(settings.shakes_rad)
     # Each improves by itself, so that threads need not wait for one another in between.
-    for rounds, worth in zip((range(half), range(half, len(settings.shakes_rad))), settings.worth, strict=True):
+    for rounds in (range(n_rounds // 2), range(n_rounds // 2, n_rounds)):
         steps = [
             np.random.default_rng(i).normal(0.0, settings.shakes_rad[i], (len(best), settings.shakes, len(dofs)))
             for i in rounds
         ]
         improved = _in_parts(lambda *some: _improved(model, dofs, look, *some), best, *steps)
         best, looks = (np.concatenate(x) for x in zip(*improved, strict=True))
-        if looks.max(initial=-np.inf) < at_hand + worth:
-            return best[:0]
         best = best[np.sort(np.argsort(-looks, kind="stable")[: settings.scored])]
     best = np.array([*best, *(_with_limb(model, here, other, limb) for other in others)])
     return _best_apart(model, limb, best, -judge.costs(best), settings.refined, _SAME_M)

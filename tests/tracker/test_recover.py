@@ -129,8 +129,7 @@ def test_for_several_places_are_looked_for_once(gavrila, monkeypatch):
     assert n_looked[0] > n_looked[1] == 2
 
 
-def test_a_search_that_promises_nothing_is_given_up(gavrila, monkeypatch):
-    """Before anything is refined where no place looks better, before the whole body is where none costs less."""
+def test_the_whole_body_is_refined_only_with_what_comes_near_the_best(gavrila, monkeypatch):
     truth, n_refined = posed(gavrila, 1), []
     staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["60 degrees off"]))
     each = Judge.each
@@ -140,18 +139,28 @@ def test_a_search_that_promises_nothing_is_given_up(gavrila, monkeypatch):
     arm, leg = (limb_of(gavrila, n) for n in ("left_forearm", "left_calf"))
 
     def refined(limbs, **settings):
-        """How many poses were refined, the limb alone and the whole body, limb by limb; whether the arm was found."""
+        """Whether poses were refined, the limb alone and the whole body, limb by limb; whether the arm was found."""
         n_refined.clear()
         judge = replace(staged.judge, settings=replace(for_several(RecoverSettings()), **settings))
         best = search_limbs(gavrila, limbs, staged.here, (), judge, 15).best
         return [n > 0 for n in n_refined], staged.off_m(best, arm.parts) < 0.03
 
-    never = np.inf
     assert refined([arm]) == ([True, True], True)
-    assert refined([arm], worth=(never, -never)) == refined([arm], worth=(-never, never)) == ([False, False], False)
-    assert refined([arm], worth=(-never, -never), finish=-never) == ([True, False], False)
+    assert refined([arm], finish=-np.inf) == ([True, False], False)
     # What one limb leaves may be made good by the next.
-    assert refined([arm, leg], worth=(-never, -never), finish=-never) == ([True, True, True, False], True)
+    assert refined([arm, leg], finish=-np.inf) == ([True, True, True, False], True)
+
+
+def test_the_best_places_are_improved_to_the_end(gavrila, monkeypatch):
+    """As many as are scored; before, all."""
+    truth, rows = posed(gavrila, 1), []
+    staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["60 degrees off"]))
+    improved = recover._improved
+    monkeypatch.setattr(recover, "_in_parts", lambda work, *arrays: [work(*arrays)])
+    monkeypatch.setattr(recover, "_improved", lambda *a: rows.append([len(x) for x in a[3:]]) or improved(*a))
+    staged.judge = replace(staged.judge, settings=RecoverSettings(improved=24, scored=6, shakes_rad=(0.2, 0.1, 0.1)))
+    assert staged.off_m(staged.search(limb_of(gavrila, "left_forearm")), limb_of(gavrila, "left_forearm").parts) < 0.03
+    assert rows == [[24, 24], [6, 6, 6]]
 
 
 def test_best_places_apart(gavrila):
