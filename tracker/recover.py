@@ -67,7 +67,8 @@ class RecoverSettings:
     trust_rad: float = 1.0
     """Standard deviation of the prediction of a limb that seems lost, rad: nearly none."""
     finish: float = np.inf
-    """What a proposal may cost more than the best pose, its limb refined alone, to be refined with the whole body."""
+    """What a proposal may cost more than the best pose, its limb refined alone, to be refined with the whole body; the
+    margin, if that is more, where another limb is searched after it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,10 +167,9 @@ def search_limbs(
     start = _Found(here, judge.cost(here))
     kept = [start]
     for limb in suspects:
-        enough = kept[0].cost + judge.settings.margin
-        kept = [x for x in kept if x.cost < enough]
-        if limb is suspects[-1]:
-            enough = kept[0].cost + judge.settings.finish
+        margin, finish = judge.settings.margin, judge.settings.finish
+        kept = [x for x in kept if x.cost < kept[0].cost + margin]
+        enough = kept[0].cost + (finish if limb is suspects[-1] else max(finish, margin))
         away = [p for x in suspects if x is not limb for p in x.parts]
         poses = [x.fit.values for x in kept]
         together = [[pose] for pose in poses] if judge.settings.anew else [poses]

@@ -149,6 +149,9 @@ def test_the_whole_body_is_refined_only_with_what_comes_near_the_best(gavrila, m
     assert refined([arm], finish=-np.inf) == ([True, False], False)
     # What one limb leaves may be made good by the next.
     assert refined([arm, leg], finish=-np.inf) == ([True, True, True, False], True)
+    # Of somebody alone nothing is left out, whatever the limb: three of a leg that stands where it should.
+    refined([leg, arm], finish=np.inf, margin=1e-6)
+    assert n_refined[1] == RecoverSettings().finished
 
 
 def test_the_best_places_are_improved_to_the_end(gavrila, monkeypatch):
