@@ -11,7 +11,7 @@ from tracker.formats.model_toml import load_model
 from tracker.recording import check_size, read_background, read_mask
 from tracker.session import PALETTE, CameraSource, Person, Session, create_session
 
-DEFAULT_MODEL = "gavrila31"
+DEFAULT_MODEL = "gavrila34"
 
 # Relative difference above which two frame rates are two: 29.97 and 30 differ by twice as much.
 _RATE_TOLERANCE = 5e-4
@@ -45,7 +45,7 @@ def assemble(
         masks: folder of CAM/%06d.png.
         offsets: frames by which to shift a camera: frame k of the session is its frame k + offset.
         people: names of the people to track.
-        models: body model (preset or .toml file) of all people, or by name; the rest have gavrila31.
+        models: body model (preset or .toml file) of all people, or by name; the rest have gavrila34.
         heights: body height of all people, or by name, metres; the rest have their model's own.
         fps: frame rate, 1/s; needed where all footage is folders of images.
         up: world axis that points up.

@@ -125,13 +125,17 @@ def _check(what: str, size_m: float, height_m: float) -> None:
 
 
 def _ends(model: BodyModel, part: int) -> Array:
-    """Joints and landmarks on a part in its frame, its own joint first, (n, 3), fractions of height."""
+    """What lies on a part in its frame, (n, 3), fractions of height: its own joint, and the joints and landmarks on it.
+
+    Of two that are one on each side it is what lies between them: how far they are apart is a width, no length.
+    """
     name = model.parts[part].name
     on_it: Sequence[Joint | Landmark] = [
         *(j for j in model.joints if j.parent == name),
         *(m for m in model.landmarks if m.part == name),
     ]
-    return np.array([(0.0, 0.0, 0.0), *(x.position for x in on_it)])
+    places = {x.name: np.array(x.position) for x in on_it}
+    return np.array([np.zeros(3), *((p + places.get(twin(n) or n, p)) / 2 for n, p in places.items())])
 
 
 def _main_axis(model: BodyModel, part: int) -> int:

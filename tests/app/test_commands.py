@@ -275,11 +275,11 @@ def test_init_takes_a_pose_from_a_table(run, session, tmp_path):
     assert record.keyframe
     assert set(record.sources) == {"imported"}
     assert np.allclose(record.values, read_pose_table(SAMPLE / "truth.csv").values[3])
-    other = load_model("gavrila31", 1.7)
+    other = load_model("gavrila34", 1.7)
     write_pose_table(tmp_path / "other.csv", other, other.neutral()[None])
     assert_refused(
         run("init", session, "--method", "poses", "--poses", tmp_path / "other.csv"),
-        ["'gavrila31'", "without left_hip.elevation, right_hip.elevation, with neck.abduction"],
+        ["'gavrila34'", "without left_hip.elevation, right_hip.elevation, with neck.abduction"],
     )
     assert_refused(run("init", session, "--method", "poses"), ["--poses FILE"])
     few = tmp_path / "few.csv"

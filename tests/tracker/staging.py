@@ -121,8 +121,9 @@ def dressed(bodies, cameras, colors):
 
 
 SUIT = {
-    "torso": (200, 40, 40), "pelvis": (200, 40, 40), "head": (230, 190, 160), "collar": (200, 40, 40),
-    "upper_arm": (250, 250, 240), "forearm": (220, 160, 130), "thigh": (30, 40, 140), "calf": (20, 20, 25),
+    "torso": (200, 40, 40), "abdomen": (200, 40, 40), "pelvis": (200, 40, 40), "head": (230, 190, 160),
+    "collar": (200, 40, 40), "upper_arm": (250, 250, 240), "forearm": (220, 160, 130), "thigh": (30, 40, 140),
+    "calf": (20, 20, 25),
 }  # fmt: skip
 """Colours by which all kinds of parts can be told."""
 

@@ -205,9 +205,9 @@ def test_gavrila_joints_turn_the_way_their_names_say(side, sign):
         np.testing.assert_allclose(found, expected, atol=1e-12, err_msg=str(degrees))
 
 
-def test_gavrila31_has_a_trunk_that_bends():
-    model, plain = MODELS["gavrila31"], MODELS["gavrila22"]
-    assert model.n_dofs == len(model.value_names) == 31
+def test_gavrila34_has_a_trunk_that_bends():
+    model, plain = MODELS["gavrila34"], MODELS["gavrila22"]
+    assert model.n_dofs == len(model.value_names) == 34
     assert sorted(d for g in model.search_groups for d in g.dofs) == sorted(model.dof_names)
     # Standing straight it is the same person: the points that both have are in the same places.
     places = dict(zip(plain.point_names, plain.points_world(plain.neutral()), strict=True))
@@ -220,7 +220,10 @@ def test_gavrila31_has_a_trunk_that_bends():
 @pytest.mark.parametrize(
     ("joint", "degrees", "moving", "way"),
     [
-        # x is forward, y to the left, z up; the legs hang on the pelvis below the waist.
+        # x is forward, y to the left, z up; the legs hang on the pelvis below the waist, which hangs below the spine.
+        ("spine__elevation", 20, "left_ankle", (-1, 0, 0)),
+        ("spine__abduction", 20, "left_ankle", (0, 1, 0)),
+        ("spine__twist", 20, "left_hip", (-1, 0, 0)),
         ("waist__elevation", 20, "left_ankle", (-1, 0, 0)),
         ("waist__abduction", 20, "left_ankle", (0, 1, 0)),
         ("waist__twist", 20, "left_hip", (-1, 0, 0)),
@@ -232,12 +235,12 @@ def test_gavrila31_has_a_trunk_that_bends():
         ("right_collarbone__protraction", 20, "right_shoulder", (1, 0, 0)),
     ],
 )
-def test_gavrila31_joints_turn_the_way_their_names_say(joint, degrees, moving, way):
-    model = MODELS["gavrila31"]
+def test_gavrila34_joints_turn_the_way_their_names_say(joint, degrees, moving, way):
+    model = MODELS["gavrila34"]
     moved = at(model, set_deg(model, **{joint: degrees}), moving) - at(model, model.neutral(), moving)
     assert moved @ way > 0.8 * np.linalg.norm(moved) > 0.01
-    # Arms and head are above the waist, and stay where they are when it bends.
-    if joint.startswith("waist"):
+    # Arms and head are above the spine's joint, and stay where they are when the trunk bends.
+    if joint.startswith(("spine", "waist")):
         np.testing.assert_array_equal(
             at(model, set_deg(model, **{joint: degrees}), "left_wrist"), at(model, model.neutral(), "left_wrist")
         )
@@ -245,9 +248,9 @@ def test_gavrila31_joints_turn_the_way_their_names_say(joint, degrees, moving, w
 
 @pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
 @pytest.mark.parametrize("flexion", [-40, 0, 60, 90, 130])
-def test_gavrila31_abducts_a_leg_alike_however_far_it_is_lifted(side, sign, flexion):
+def test_gavrila34_abducts_a_leg_alike_however_far_it_is_lifted(side, sign, flexion):
     """Abduction is the angle of the thigh with the plane of symmetry, and twist leaves the thigh where it is."""
-    model = MODELS["gavrila31"].with_height(1.0)
+    model = MODELS["gavrila34"].with_height(1.0)
 
     def knee(**angles):
         values = set_deg(model, **{f"{side}_hip__{name}": angle for name, angle in angles.items()})
@@ -262,30 +265,32 @@ def test_gavrila31_abducts_a_leg_alike_however_far_it_is_lifted(side, sign, flex
 
 def test_only_the_papers_hips_lose_a_degree_of_freedom_when_a_leg_is_lifted():
     turns = {}
-    for name, lift in (("gavrila22", "elevation"), ("gavrila31", "flexion")):
+    for name, lift in (("gavrila22", "elevation"), ("gavrila34", "flexion")):
         model = MODELS[name]
         axes = model.kinematics(set_deg(model, **{f"left_hip__{lift}": 90})).axes_world
         turns[name] = np.linalg.svd(axes[[n.startswith("left_hip.") for n in model.dof_names]])[1]
     np.testing.assert_allclose(turns["gavrila22"], [np.sqrt(2), 1, 0], atol=1e-9)
-    np.testing.assert_allclose(turns["gavrila31"], 1, atol=1e-9)
+    np.testing.assert_allclose(turns["gavrila34"], 1, atol=1e-9)
 
 
-def test_gavrila31_bends_its_trunk_farther_forwards_than_backwards():
-    model = MODELS["gavrila31"].with_height(1.0)
-    for way, angle in zip((1, -1), model.limits[model.dof_names.index("waist.elevation")], strict=True):
-        values = set_deg(model, waist__elevation=np.degrees(angle))
+def test_gavrila34_bends_its_trunk_farther_forwards_than_backwards():
+    model = MODELS["gavrila34"].with_height(1.0)
+    ends = [np.degrees(model.limits[model.dof_names.index(f"{joint}.elevation")]) for joint in ("spine", "waist")]
+    for way, angles in zip((1, -1), np.transpose(ends), strict=True):
+        values = set_deg(model, spine__elevation=angles[0], waist__elevation=angles[1])
         T_pelvis_world = np.linalg.inv(model.kinematics(values).Ts_world_part[model.part_index["pelvis"]])
         ahead = (T_pelvis_world @ [*at(model, values, "neck"), 1.0])[0]
         assert way * ahead > 0.05  # x is forward as the pelvis sees it
-        assert abs(np.degrees(angle)) == pytest.approx(75 if way > 0 else 40)
+        assert abs(angles.sum()) == pytest.approx(85 if way > 0 else 50)
 
 
 def test_spreads_are_known_of_what_bends_little():
-    model = MODELS["gavrila31"]
+    model = MODELS["gavrila34"]
     known = {n.split(".")[0] for n, s in zip(model.dof_names, model.spreads, strict=True) if np.isfinite(s)}
-    assert known == {"waist", "neck", "left_collarbone", "right_collarbone"}
+    assert known == {"spine", "waist", "neck", "left_collarbone", "right_collarbone"}
     assert (model.spreads > 0).all()
-    assert model.spreads[model.dof_names.index("waist.twist")] == pytest.approx(np.radians(25))
+    trunk = [model.spreads[model.dof_names.index(f"{joint}.twist")] for joint in ("spine", "waist")]
+    assert np.linalg.norm(trunk) == pytest.approx(np.radians(25), rel=0.02)  # as much as a neck
     assert np.isinf(MODELS["gavrila22"].spreads).all()
     balls = MODELS["balls"]
     assert balls.spreads.shape == (balls.n_dofs,)
@@ -293,7 +298,7 @@ def test_spreads_are_known_of_what_bends_little():
 
 
 def test_parts_of_several_bodies_follow_one_another(gavrila):
-    models = [gavrila, load_model("gavrila31"), gavrila]
+    models = [gavrila, load_model("gavrila34"), gavrila]
     whose = np.repeat(range(3), [len(m.parts) for m in models])
     for person in range(3):
         np.testing.assert_array_equal(np.arange(len(whose))[parts_of(models, person)], np.flatnonzero(whose == person))

@@ -29,7 +29,7 @@ def test_limbs_of_the_papers_body(gavrila):
 
 
 def test_limbs_of_a_trunk_that_bends():
-    model = load_model("gavrila31")
+    model = load_model("gavrila34")
     found = {x.name: x for x in limbs(model)}
     assert names_of(model, found["left_forearm"].parts) == ["left_collar", "left_upper_arm", "left_forearm"]
     assert names_of(model, found["left_calf"].parts) == ["left_thigh", "left_calf"]  # two legs hang on the pelvis

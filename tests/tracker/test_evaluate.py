@@ -227,7 +227,7 @@ def test_body_size_does_not_matter_to_angles(model):
 
 
 def test_bodies_of_other_parts_are_compared_by_the_names_of_parts(model):
-    bending = load_model("gavrila31", 1.6)
+    bending = load_model("gavrila34", 1.6)
     estimate = pose(bending, waist__elevation=20, left_elbow__extension=70)
     found = compared(bending, {0: estimate}, {0: pose(model, left_elbow__extension=60)}, true_model=model)
     assert sorted(found.per_part_axis_deg) == sorted(model.part_index)  # no pelvis, no collars

@@ -56,7 +56,7 @@ def block_of(kind, model, values, rng):
     return PointTargets(points, targets, rng.uniform(0.5, 3.0, 9))
 
 
-@pytest.mark.parametrize("model", [GAVRILA, load_model("gavrila31"), ARM], ids=lambda m: m.name)
+@pytest.mark.parametrize("model", [GAVRILA, load_model("gavrila34"), ARM], ids=lambda m: m.name)
 @pytest.mark.parametrize("kind", ["points", "prior"])
 @pytest.mark.parametrize("seed", range(3))
 def test_blocks_against_finite_differences(kind, model, seed):
@@ -269,15 +269,15 @@ def test_other_sizes_are_fitted_as_well_as_they_can():
 
 
 def test_a_longer_trunk_is_not_bent_to_be_shorter():
-    """Shoulders 4 cm below where this body has them: to buckle at the waist brings it nearer, but nobody stands so."""
-    model = load_model("gavrila31")
+    """Shoulders 4 cm below where this body has them: to buckle in the trunk brings it nearer, but nobody stands so."""
+    model = load_model("gavrila34")
     targets = points_of(model, model.neutral())
     for name in targets:
         if name.endswith(("shoulder", "elbow", "wrist")):
             targets[name][2] -= 0.04
     found = fit_to_points(model, targets).values
-    waist = [model.value_names.index(f"waist.{axis}") for axis in ("abduction", "elevation", "twist")]
-    assert np.degrees(np.abs(found[waist])).max() < 20  # 46 without
+    trunk = [i for i, name in enumerate(model.value_names) if name.startswith(("spine.", "waist."))]
+    assert np.degrees(np.abs(found[trunk])).max() < 10  # 45 without
     assert off(model, found, targets).mean() < 0.02
 
 

@@ -12,7 +12,7 @@ from tracker.interpolate import between
 SHARES = np.linspace(0.0, 1.0, 9)
 
 
-@pytest.fixture(scope="module", params=["gavrila22", "gavrila31"])
+@pytest.fixture(scope="module", params=["gavrila22", "gavrila34"])
 def model(request):
     return load_model(request.param)
 

@@ -35,7 +35,7 @@ def test_sizes_go_there_and_back(name):
 
 
 def test_a_length_is_the_distance_of_the_joints():
-    model = load_model("gavrila31")
+    model = load_model("gavrila34")
     sizes = sizes_of(model)
     assert sizes.parts["left_thigh"].length_m == pytest.approx(distance(model, "left_hip", "left_knee"))
     longer = with_sizes(model, sizes._replace(parts={**sizes.parts, "left_thigh": PartSizes(0.5, (0.07, 0.08))}))

@@ -11,7 +11,7 @@ from tracker.fit import StayNear, solve
 from tracker.formats.model_toml import load_model
 from tracker.pins import ViewPin, pin_block, sigma_px, triangulate
 
-GAVRILA = load_model("gavrila31")
+GAVRILA = load_model("gavrila34")
 CAMERAS = [replace(c, distortion=np.array([-0.2, 0.05, 0.001, -0.001])) for c in cameras_around(4)]
 
 

@@ -13,7 +13,7 @@ from tracker.rebody import rebodied
 @pytest.fixture(scope="module")
 def bodies():
     """A body, and the same with forearms and thighs 1.5 cm longer."""
-    model = load_model("gavrila31")
+    model = load_model("gavrila34")
     sizes = sizes_of(model)
     parts = {
         n: PartSizes(p.length_m + 0.015 * n.endswith(("forearm", "thigh")), p.girths_m) for n, p in sizes.parts.items()

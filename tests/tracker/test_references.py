@@ -78,10 +78,10 @@ def test_a_table_whose_body_is_not_at_hand_is_of_the_persons_own(sample_folder, 
 
 
 def test_a_table_of_another_presets_poses(copy, tmp_path):
-    bending = load_model("gavrila31", 1.6)
+    bending = load_model("gavrila34", 1.6)
     write_pose_table(tmp_path / "poses.csv", bending, bending.neutral()[None])
     found = read_reference(tmp_path / "poses.csv", copy, 0).motion
-    assert (found.model.name, found.model.height_m) == ("gavrila31", 1.6)
+    assert (found.model.name, found.model.height_m) == ("gavrila34", 1.6)
     np.testing.assert_allclose(found.poses[0], bending.neutral(), atol=1e-9)
 
 

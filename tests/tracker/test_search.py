@@ -267,12 +267,12 @@ def test_limbs_apart(gavrila):
         ("torso and head", 5), ("arms: torso", 1), ("arms: left_shoulder", 4), ("arms: right_shoulder", 4),
         ("legs: left_hip", 4), ("legs: right_hip", 4),
     ]  # fmt: skip
-    bending = load_model("gavrila31")
+    bending = load_model("gavrila34")
     leaves = stages([bending], SearchSettings(passes=(1.0,), limbs_apart=True))
     named = {s.name: s.group.dofs for s in leaves}
     assert set(named) == {
         "torso and head: torso", "torso and head: neck", "arms: torso", "arms: left_collarbone",
-        "arms: right_collarbone", "legs: waist", "legs: left_hip", "legs: right_hip",
+        "arms: right_collarbone", "legs: spine", "legs: left_hip", "legs: right_hip",
     }  # fmt: skip
     assert named["arms: left_collarbone"][-1] == "left_elbow.extension"
     assert sorted(d for dofs in named.values() for d in dofs) == sorted(bending.dof_names)
