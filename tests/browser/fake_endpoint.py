@@ -95,6 +95,8 @@ class FakeEndpoint:
     n_frames: int = N_FRAMES
     received: list = field(default_factory=list)
     """Every message of every page, but for what each says when it connects."""
+    frame_s: float = 0.05
+    """How long a run takes for a frame."""
     seek_times: list = field(default_factory=list)
     """When each seek came, s."""
     greetings: list = field(default_factory=list)
@@ -260,12 +262,12 @@ class FakeEndpoint:
         await self.broadcast(self.state)
 
     async def run_track(self):
-        """Some twenty frames a second."""
+        """A frame after the other, at an even pace."""
         track = self.state["track"]
         step = 1 if track["last"] >= track["first"] else -1
         at = track["first"] if track["at"] is None else track["at"] + step
         for frame in range(at, track["last"] + step, step):
-            track |= {"at": frame, "done": track["done"] + 1, "per_second": 20.0}
+            track |= {"at": frame, "done": track["done"] + 1, "per_second": 1 / self.frame_s}
             cell = {
                 "source": "tracked",
                 "cost_px": 1.0,
@@ -280,7 +282,7 @@ class FakeEndpoint:
                 self.state |= self.judged(frame)
                 await self.send_frame()
             await self.broadcast(self.state)
-            await asyncio.sleep(0.05)
+            await asyncio.sleep(self.frame_s)
         track |= NO_TRACK | {"message": f"done: {track['done']} frames"}
         await self.broadcast(self.state)
 
