@@ -1,13 +1,11 @@
 """The web server: the page, its pane socket, and viser behind `/viser/`.
 
 One port serves everything, so that one SSH tunnel is enough, and every request passes `access` before anything else
-sees it: viser itself has no such check and listens on loopback only.
+sees it: viser itself has no such check, and listens where only this program can reach it (`private_viser`).
 """
 
 import asyncio
-import contextlib
 import errno
-import io
 import logging
 import weakref
 from collections.abc import AsyncIterator, Callable
@@ -15,7 +13,6 @@ from pathlib import Path
 from typing import Protocol
 
 import aiohttp
-import viser
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
@@ -41,18 +38,18 @@ class PaneEndpoint(Protocol):
         """Talk to one page until its socket closes."""
 
 
-def create_app(panes: PaneEndpoint, viser_port: int, access: Access, static: Path) -> web.Application:
+def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: Path) -> web.Application:
     """Build the web application.
 
     Args:
         panes: answers the pane sockets, one call for each page that connects.
-        viser_port: where viser listens on 127.0.0.1.
+        viser_socket: the Unix socket that viser listens on.
         access: what every request must show.
         static: the folder of the page (`static_folder`).
     """
     app = web.Application(middlewares=[_guard(access)])
     app[_SOCKETS] = weakref.WeakSet()
-    proxy = viser_proxy.ViserProxy(viser_port)
+    proxy = viser_proxy.ViserProxy(viser_socket)
 
     async def page(request: web.Request) -> web.StreamResponse:
         response = web.FileResponse(static / "index.html")
@@ -135,18 +132,6 @@ def static_folder() -> Path:
         if (folder / "index.html").is_file():
             return folder
     raise TrackerError(f"expected the page's files in '{here / 'static'}', found none; install quadrille again")
-
-
-def start_viser() -> viser.ViserServer:
-    """Start viser on a free port of loopback, without the button that would share it with the internet.
-
-    A later `configure_theme` has to say `show_share_button=False` again.
-    """
-    # viser prints its own address even where it is told to be quiet; the page's is the only one to open.
-    with contextlib.redirect_stdout(io.StringIO()):
-        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    server.gui.configure_theme(show_share_button=False, show_logo=False)
-    return server
 
 
 def _guard(access: Access) -> Middleware:

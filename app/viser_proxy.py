@@ -1,12 +1,14 @@
-"""Hands requests under `/viser/` on to viser, which listens on loopback and checks nobody."""
+"""Hand requests under `/viser/` on to viser, which checks nobody."""
 
 import asyncio
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 from urllib.parse import unquote
 
 import aiohttp
 from aiohttp import web
+from yarl import URL
 
 # viser's client is one page that unpacks itself: inline script and style, WebAssembly, workers from blobs.
 POLICY = (
@@ -20,6 +22,7 @@ POLICY = (
 _PASSED_DOWN = ("Content-Type", "Content-Length", "Content-Encoding")
 _MAX_MESSAGE_BYTES = 256 << 20
 _HEARTBEAT_S = 20.0
+_ORIGIN = "http://viser"  # a name for the Host header; the connection goes to the socket
 
 Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
@@ -32,13 +35,15 @@ def is_viser(path: str) -> bool:
 class ViserProxy:
     """A reverse proxy to one viser server; an asynchronous context that owns its connections."""
 
-    def __init__(self, port: int) -> None:
-        self._origin = f"http://127.0.0.1:{port}"
+    def __init__(self, socket: Path) -> None:
+        self._socket_path = socket
         self._session: aiohttp.ClientSession | None = None
 
     async def __aenter__(self) -> Self:
         # Bodies pass through as compressed as they come.
-        self._session = aiohttp.ClientSession(auto_decompress=False)
+        self._session = aiohttp.ClientSession(
+            _ORIGIN, auto_decompress=False, connector=aiohttp.UnixConnector(path=str(self._socket_path), limit=0)
+        )
         return self
 
     async def __aexit__(
@@ -64,7 +69,7 @@ class ViserProxy:
         assert self._session is not None
         path = request.raw_path.removeprefix("/viser")
         headers = {"Accept-Encoding": request.headers.get("Accept-Encoding", "identity")}
-        async with self._session.get(self._origin + path, headers=headers, allow_redirects=False) as upstream:
+        async with self._session.get(URL(path, encoded=True), headers=headers, allow_redirects=False) as upstream:
             passed = {name: upstream.headers[name] for name in _PASSED_DOWN if name in upstream.headers}
             response = web.StreamResponse(status=upstream.status, headers=passed)
             await response.prepare(request)
@@ -78,7 +83,7 @@ class ViserProxy:
         # viser tells its clients' versions by the subprotocol: ours is whichever viser chose.
         offered = [p.strip() for p in request.headers.get("Sec-WebSocket-Protocol", "").split(",") if p.strip()]
         async with self._session.ws_connect(
-            self._origin, protocols=offered, max_msg_size=_MAX_MESSAGE_BYTES, compress=0
+            "/", protocols=offered, max_msg_size=_MAX_MESSAGE_BYTES, compress=0
         ) as upstream:
             chosen = [upstream.protocol] if upstream.protocol else []
             downstream = web.WebSocketResponse(

@@ -19,9 +19,10 @@ from app.frames import Frames
 from app.gizmos import Gizmos
 from app.panels import Panels
 from app.panes import Panes
+from app.private_viser import PrivateViser
 from app.saving import Saver
 from app.scene import Scene
-from app.server import create_app, serve_forever, start_viser, static_folder
+from app.server import create_app, serve_forever, static_folder
 from tracker.annotations import AnnotationStore
 from tracker.observer import Observer
 from tracker.recording import Recording
@@ -58,12 +59,12 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
         store = AnnotationStore(session.annotations_path)
         frames = Frames(Observer(session.cameras, recording), indexing.proxies(session))
         controller = Controller(session, Saver(session, store, _author()), frames)
-        viser_server = start_viser()
+        viser = PrivateViser()
         try:
-            Scene(viser_server, controller)
-            Gizmos(viser_server, controller)
-            Panels(viser_server, controller)
-            app = create_app(Panes(controller), viser_server.get_port(), access, static)
+            Scene(viser.server, controller)
+            Gizmos(viser.server, controller)
+            Panels(viser.server, controller)
+            app = create_app(Panes(controller), viser.socket_path, access, static)
 
             def ready(address: str) -> None:
                 for name in indexing.stale(session):
@@ -78,7 +79,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
             controller.close()
             if controller.state.save_error is not None:
                 say(f"not everything is saved: {controller.state.save_error}")
-            viser_server.stop()
+            viser.stop()
             store.close()
 
 

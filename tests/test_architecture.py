@@ -77,6 +77,7 @@ ORDER = [
         "app.cells",
         "app.jobs",
         "app.layers",
+        "app.private_viser",
         "app.viser_proxy",
         "app.painting",
         "app.pictures",

@@ -1,6 +1,7 @@
 import asyncio
 import socket
 from contextlib import asynccontextmanager
+from pathlib import Path
 
 import aiohttp
 import pytest
@@ -11,6 +12,7 @@ from app import server
 from app.access import Access
 from tracker.errors import TrackerError
 
+NOBODY = Path("/nowhere/viser")
 NAMED = Access(frozenset({"lab.example.org"}), "secret")
 
 
@@ -48,6 +50,18 @@ class FakeViser:
 
 
 @asynccontextmanager
+async def listening_at(app, path):
+    """Serve on a Unix socket."""
+    runner = web.AppRunner(app, shutdown_timeout=1.0)
+    await runner.setup()
+    await web.UnixSite(runner, path).start()
+    try:
+        yield path
+    finally:
+        await runner.cleanup()
+
+
+@asynccontextmanager
 async def listening(app):
     runner = web.AppRunner(app, shutdown_timeout=1.0)
     await runner.setup()
@@ -59,11 +73,11 @@ async def listening(app):
 
 
 @pytest.fixture
-async def fake_viser():
+async def fake_viser(tmp_path):
     fake = FakeViser()
     app = web.Application()
     app.router.add_get("/{path:.*}", fake.handle)
-    async with listening(app) as fake.port:
+    async with listening_at(app, tmp_path / "viser") as fake.socket_path:
         yield fake
 
 
@@ -74,7 +88,7 @@ def access():
 
 @pytest.fixture
 async def port(fake_viser, access):
-    app = server.create_app(EchoPanes(), fake_viser.port, access, server.static_folder())
+    app = server.create_app(EchoPanes(), fake_viser.socket_path, access, server.static_folder())
     async with listening(app) as port:
         yield port
 
@@ -197,11 +211,8 @@ async def test_a_page_that_leaves_closes_its_viser_socket(client, fake_viser):
     assert fake_viser.close_codes == [1000]
 
 
-async def test_without_viser_the_proxy_says_so():
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        unused = free.getsockname()[1]
-    app = server.create_app(EchoPanes(), unused, Access(), server.static_folder())
+async def test_without_viser_the_proxy_says_so(tmp_path):
+    app = server.create_app(EchoPanes(), tmp_path / "nobody", Access(), server.static_folder())
     async with (
         listening(app) as port,
         aiohttp.ClientSession() as session,
@@ -239,14 +250,14 @@ async def test_serving_a_busy_port_names_it_and_the_remedy():
         busy.bind(("127.0.0.1", 0))
         busy.listen()
         port = busy.getsockname()[1]
-        app = server.create_app(EchoPanes(), 1, Access(), server.static_folder())
+        app = server.create_app(EchoPanes(), NOBODY, Access(), server.static_folder())
         with pytest.raises(TrackerError, match=rf"port {port} .* in use; .*--port"):
             await server.serve_forever(app, Access(), "127.0.0.1", port, lambda _: None)
 
 
 async def test_serving_tells_the_address_and_closes_its_sockets_at_the_end():
     ready = asyncio.get_running_loop().create_future()
-    app = server.create_app(EchoPanes(), 1, Access(), server.static_folder())
+    app = server.create_app(EchoPanes(), NOBODY, Access(), server.static_folder())
     task = asyncio.create_task(server.serve_forever(app, Access(), "127.0.0.1", 0, ready.set_result))
     address = await asyncio.wait_for(ready, 5.0)
     async with aiohttp.ClientSession() as session, session.ws_connect(address + "ws") as sock:
@@ -261,24 +272,3 @@ def test_page_address_carries_name_and_token():
     assert server.page_address(Access(), "127.0.0.1", 8080) == "http://127.0.0.1:8080/"
     assert server.page_address(Access(), "::1", 8080) == "http://[::1]:8080/"
     assert server.page_address(NAMED, "0.0.0.0", 8080) == "http://lab.example.org:8080/?token=secret"
-
-
-def test_viser_listens_on_loopback_only_and_quietly(capsys):
-    started = server.start_viser()
-    assert capsys.readouterr().out == ""
-    try:
-        assert started.get_host() == "127.0.0.1"
-        with pytest.raises(OSError), socket.create_connection((_own_address(), started.get_port()), timeout=0.5):
-            pass
-    finally:
-        started.stop()
-
-
-def _own_address():
-    """Address of this machine that is not loopback; where it has none, one that answers nobody."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect(("192.0.2.1", 9))  # sends nothing: asks which of our addresses would be used
-            return probe.getsockname()[0]
-        except OSError:
-            return "192.0.2.1"

@@ -48,7 +48,7 @@ def _of_a_regular(new_context):
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def blank_viser():
+async def blank_viser(tmp_path):
     """A 3-D view that is an empty page: quick, and the shell's tests need no more."""
 
     async def answer(_request):
@@ -56,8 +56,11 @@ async def blank_viser():
 
     app = web.Application()
     app.router.add_get("/{path:.*}", answer)
-    async with listening(app) as port:
-        yield port
+    runner = web.AppRunner(app, shutdown_timeout=0.1)
+    await runner.setup()
+    await web.UnixSite(runner, tmp_path / "viser").start()
+    yield tmp_path / "viser"
+    await runner.cleanup()
 
 
 @pytest.fixture

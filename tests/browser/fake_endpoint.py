@@ -468,11 +468,12 @@ def room(camera, frame):
 
 async def main(port):
     from app.access import access_for
-    from app.server import create_app, serve_forever, start_viser, static_folder
+    from app.private_viser import PrivateViser
+    from app.server import create_app, serve_forever, static_folder
 
-    scene = start_viser()
+    scene = PrivateViser()
     access = access_for("127.0.0.1")
-    app: web.Application = create_app(FakeEndpoint(n_people=1), scene.get_port(), access, static_folder())
+    app: web.Application = create_app(FakeEndpoint(n_people=1), scene.socket_path, access, static_folder())
     await serve_forever(app, access, "127.0.0.1", port, print)
 
 

@@ -7,7 +7,8 @@ from aiohttp import ClientSession, WSServerHandshakeError
 from driving import dragging, listening, shows, until
 
 from app.access import Access
-from app.server import create_app, start_viser, static_folder
+from app.private_viser import PrivateViser
+from app.server import create_app, static_folder
 
 
 async def test_a_lost_connection_is_said_and_mended_with_the_true_state(browser, endpoint, blank_viser):
@@ -52,16 +53,16 @@ async def test_a_foreign_page_cannot_open_the_socket(browser, endpoint, address)
 
 
 async def test_viser_runs_in_its_frame_behind_the_proxy(browser, endpoint):
-    scene = start_viser()
+    scene = PrivateViser()
     connected = asyncio.Event()
     loop = asyncio.get_running_loop()
-    scene.on_client_connect(lambda _client: loop.call_soon_threadsafe(connected.set))
+    scene.server.on_client_connect(lambda _client: loop.call_soon_threadsafe(connected.set))
     context = await browser.new_context(color_scheme="light")
     page = await context.new_page()
     errors = []
     page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     try:
-        async with listening(create_app(endpoint, scene.get_port(), Access(), static_folder())) as port:
+        async with listening(create_app(endpoint, scene.socket_path, Access(), static_folder())) as port:
             await page.goto(f"http://127.0.0.1:{port}/")
             await asyncio.wait_for(connected.wait(), 30.0)
             assert errors == []

@@ -1,0 +1,88 @@
+"""Start viser where only this program can reach it: on a Unix socket in a folder of this user."""
+
+import contextlib
+import io
+import shutil
+import socket
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import viser
+import websockets.asyncio.server
+
+from tracker.errors import TrackerError
+
+_MAX_PATH_BYTES = 100  # the kernel's limit for the path of a Unix socket is 104 to 108 bytes
+
+
+class PrivateViser:
+    """A viser server that listens on no port.
+
+    viser answers whoever connects, and a browser lets every website connect to every port of this machine. A Unix
+    socket is out of reach for websites and, by the permissions of its folder, for other users. `ViserProxy` hands on
+    the requests that `Access` let pass.
+    """
+
+    def __init__(self) -> None:
+        """Start the server, without the button that would share it with the internet.
+
+        A later `configure_theme` has to pass `show_share_button=False` again.
+
+        Raises:
+            TrackerError: viser did not take the socket; nothing listens then.
+        """
+        self._folder = _private_folder()
+        self.socket_path = self._folder / "viser"
+        """Where it listens; only this user may open it."""
+        try:
+            # viser prints its own address even with verbose=False; the page's address is the only one to open.
+            with _served_on(self.socket_path), contextlib.redirect_stdout(io.StringIO()):
+                self.server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+                """The server, to build the scene with."""
+            if isinstance(self.server.get_port(), int):
+                self.server.stop()
+                raise TrackerError(
+                    "expected viser to listen on a private socket, found it on a port that every website can reach; "
+                    "install the version of viser that constraints.txt names"
+                )
+        except BaseException:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            raise
+        self.server.gui.configure_theme(show_share_button=False, show_logo=False)
+
+    def stop(self) -> None:
+        """Stop the server and remove its socket."""
+        self.server.stop()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def _private_folder() -> Path:
+    """Make a folder that only this user may enter, at a path short enough for a socket."""
+    folder = Path(tempfile.mkdtemp(prefix="quadrille-"))
+    if len(bytes(folder / "viser")) <= _MAX_PATH_BYTES:
+        return folder
+    folder.rmdir()
+    return Path(tempfile.mkdtemp(prefix="quadrille-", dir="/tmp"))
+
+
+@contextlib.contextmanager
+def _served_on(path: Path) -> Iterator[None]:
+    """Let `websockets` serve on a Unix socket at `path`, whatever host and port its caller asks for.
+
+    viser offers no such choice. It starts the server before its constructor returns, so that nothing else is served
+    in the meantime.
+    """
+    original = websockets.asyncio.server.serve
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    listener.bind(str(path))
+
+    def serve(handler: Any, host: str, port: int, **options: Any) -> Any:
+        return original(handler, sock=listener, **options)
+
+    websockets.asyncio.server.serve = serve  # type: ignore[misc, assignment]
+    try:
+        yield
+    finally:
+        websockets.asyncio.server.serve = original  # type: ignore[misc]
