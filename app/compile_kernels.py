@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from app.bench_scenes import FRAME, read_crowd
-from app.compiling import compiled_mark
 from app.samples import bundled
 from tracker.body import BodyModel
+from tracker.compute.kernel_cache import compiled_mark
 from tracker.errors import SessionError
 from tracker.observer import Observer
 from tracker.recording import Recording

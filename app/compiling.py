@@ -5,21 +5,14 @@ import subprocess
 import sys
 import threading
 from collections.abc import Sequence
-from pathlib import Path
-
-import numba
 
 from app.screen import Screen
+from tracker.compute.kernel_cache import compiled_mark
 
 _LOG = logging.getLogger(__name__)
 _LOOK_S = 0.2
 
 COMMAND = (sys.executable, "-m", "app.compile_kernels")
-
-
-def compiled_mark() -> Path:
-    """The file that says that everything was compiled, by this numba for this Python; beside what was compiled."""
-    return Path(numba.config.CACHE_DIR) / f"compiled-{numba.__version__}-{sys.implementation.cache_tag}"
 
 
 class Compiling:

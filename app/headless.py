@@ -10,9 +10,9 @@ from typing import Any, get_args
 import numpy as np
 
 from app.commands import Reporter, Target
-from app.compiling import compiled_mark
 from app.tracked import Keyframes, keyframes_of, told_of, tracked_changes
 from tracker.annotations import AnnotationStore
+from tracker.compute.kernel_cache import compiled_mark
 from tracker.confidence import Status
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model

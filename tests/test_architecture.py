@@ -1,4 +1,4 @@
-"""Imports run one way: each module from those below it, none from beside or above. The order is written down here."""
+"""Imports run one way: a room imports only rooms below it. One line per room, from the bottom up."""
 
 import ast
 from pathlib import Path
@@ -7,130 +7,54 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
-# From the bottom up. A module may import from the rows above its own in this list, never from its own row or further
-# down. A new module takes its place here; one that finds none is two concepts, or in the wrong file.
-ORDER = [
-    [
-        "tracker",
-        "tracker.formats",
-        "tracker.errors",
-        "tracker.kernels",
-        "tracker.quantiles",
-        "tracker.rigid",
-        "tracker.store_schema",
-        "tracker.footage_index",
-    ],
-    ["tracker.footage_listing", "tracker.nearest", "tracker.silhouettes"],
-    [
-        "tracker.cameras",
-        "tracker.floor",
-        "tracker.shapes",
-        "tracker.kinematics",
-        "tracker.probes",
-        "tracker.segments",
-        "tracker.edges",
-        "tracker.files",
-        "tracker.footage",
-        "tracker.records",
-    ],
-    ["tracker.joints", "tracker.sampling", "tracker.scenery", "tracker.stored_poses", "tracker.twists"],
-    ["tracker.session_lock", "tracker.annotations", "tracker.body", "tracker.matched", "tracker.silhouette_contour"],
-    ["tracker.formats.anipose", "tracker.formats.trc", "tracker.formats.model_toml", "tracker.formats.pose_table"],
-    ["tracker.picking", "tracker.sights", "tracker.surfaces"],
-    ["tracker.outlines", "tracker.hiding"],
-    ["tracker.contours", "tracker.fit", "tracker.joint_maps"],
-    ["tracker.orienting"],
-    [
-        "tracker.occlusion",
-        "tracker.part_masks",
-        "tracker.posing",
-        "tracker.sizes",
-        "tracker.evaluate",
-        "tracker.interpolate",
-        "tracker.standing",
-        "tracker.disagree",
-        "tracker.measures",
-    ],
-    ["tracker.occlusion", "tracker.pins", "tracker.posing", "tracker.sizes", "tracker.evaluate"],
-    ["tracker.rebody"],
-    # The session keeps its cameras and models in files of these formats, so it reads and writes by them; a format
-    # knows cameras, bodies and tables, never a session.
-    ["tracker.session", "tracker.proxy"],
-    ["tracker.locks", "tracker.recording", "tracker.references"],
-    ["tracker.foreground"],
-    ["tracker.assemble", "tracker.evidence", "tracker.simulate"],
-    ["tracker.kept", "tracker.observer"],
-    ["tracker.limb_look", "tracker.matching", "tracker.points"],
-    ["tracker.chamfer", "tracker.predict", "tracker.appearance", "tracker.refine", "tracker.apart"],
-    ["tracker.descent", "tracker.sharing", "tracker.surroundings"],
-    ["tracker.search", "tracker.confidence"],
-    ["tracker.recover", "tracker.pose_edits", "tracker.memory"],
-    ["tracker.track_settings"],
-    ["tracker.scene", "tracker.frame_fit", "tracker.ways"],
-    ["tracker.track"],
-    ["tracker.second_pass"],
-    # The program: what the screen shows, then who may change it, then who shows it.
-    [
-        "app",
-        "app.access",
-        "app.allocation",
-        "app.cells",
-        "app.jobs",
-        "app.layers",
-        "app.private_viser",
-        "app.viser_proxy",
-        "app.painting",
-        "app.pictures",
-        "app.recent",
-        "app.tracked",
-        "app.words",
-        "app.writing",
-    ],
-    ["app.centred", "app.expected", "app.floor_picks", "app.trails", "app.view_choice"],
-    ["app.state"],
-    ["app.samples"],
-    ["app.bench_scenes", "app.commands", "app.curves", "app.frames", "app.overlays", "app.saving", "app.server"],
-    ["app.bench_rows", "app.dofs", "app.floor_lines", "app.graspable", "app.pin_marks", "app.runs", "app.screen"],
-    [
-        "app.casting",
-        "app.choosing",
-        "app.hand",
-        "app.history",
-        "app.locks",
-        "app.pose_edits",
-        "app.searching",
-        "app.tracking",
-        "app.disagreements",
-        "app.listing",
-        "app.compiling",
-    ],
-    ["app.compile_kernels", "app.flooring", "app.viewing"],
-    ["app.landscape", "app.pinning", "app.sizing", "app.ranges", "app.replay", "app.search_settings"],
-    ["app.controller", "app.messages", "app.headless", "app.indexing"],
-    ["app.pace"],
-    [
-        "app.body_panel",
-        "app.frusta",
-        "app.gizmos",
-        "app.pose_intentions",
-        "app.snap",
-        "app.view_panel",
-        "app.search_feed",
-        "app.search_intentions",
-        "app.settings_panel",
-    ],
-    ["app.intentions"],
-    ["app.panels", "app.picture_sets"],
-    ["app.panes", "app.scene"],
-    ["app.workbench"],
-    ["app.bench"],
-    ["app.ending"],
-    ["app.__main__"],
+ROOMS = [
+    "tracker",
+    "tracker.compute",
+    "tracker.geometry",
+    "tracker.body",
+    "tracker.motion",
+    "tracker.formats",
+    "tracker.footage",
+    "tracker.session",
+    "tracker.store",
+    "tracker.images",
+    "tracker.contours",
+    "tracker.evidence",
+    "tracker.fitting",
+    "tracker.appearance",
+    "tracker.search",
+    "tracker.tracking",
+    "tracker.tracking.chamfer",
+    "tracker.acquisition",
+    "tracker.posing",
+    "tracker.evaluation",
+    "tracker.simulate.people",
+    "tracker.simulate.motion",
+    "tracker.simulate.stage",
+    "tracker.simulate",
+    "app",
+    "app.runtime",
+    "app.state",
+    "app.storage",
+    "app.drawing",
+    "app.session",
+    "app.control.session",
+    "app.control.view",
+    "app.control.posing",
+    "app.control.search",
+    "app.control.tracking",
+    "app.control",
+    "app.page",
+    "app.scene3d",
+    "app.server",
+    "app.bench",
+    "app.cli",
+    "app.__main__",
 ]
-LEVEL = {module: level for level, row in enumerate(ORDER) for module in row}
+FLOOR = {room: floor for floor, room in enumerate(ROOMS)}
 
 # What a library without a screen does without.
-OF_THE_SCREEN = {"app", "viser", "aiohttp", "tyro", "rich", "webbrowser", "asyncio"}
+OF_THE_SCREEN = {"app", "viser", "aiohttp", "tyro", "webbrowser", "asyncio"}
 
 
 def module_files():
@@ -143,6 +67,13 @@ def module_files():
 
 
 FILES = module_files()
+
+
+def room_of(module):
+    """Name of the room that a module is in."""
+    if module in FLOOR:
+        return module
+    return module.rpartition(".")[0]
 
 
 def imported(tree, known):
@@ -160,65 +91,32 @@ def imported(tree, known):
 
 IMPORTS = {name: imported(ast.parse(path.read_text("utf-8")), FILES) for name, path in FILES.items()}
 OWN = {name: sorted(found & FILES.keys()) for name, found in IMPORTS.items()}
-
-
-def place_of(module):
-    """Level of a module; those within the simulator have the level of the whole."""
-    return LEVEL["tracker.simulate"] if module.startswith("tracker.simulate.") else LEVEL.get(module)
+MOVED = [m for m in FILES if room_of(m) not in ("tracker", "app")]
 
 
 def test_the_walk_sees_imports_of_every_kind():
-    within = "def f():\n    from tracker.body import Body\n    import viser as v\n"
-    text = "import app.state\nfrom tracker import rigid, nothing\n" + within
-    assert imported(ast.parse(text), FILES) == {"app.state", "tracker.rigid", "tracker", "tracker.body", "viser"}
+    within = "def f():\n    from tracker.errors import TrackerError\n    import viser as v\n"
+    text = "import app.__main__\nfrom tracker import files, nothing\n" + within
+    assert imported(ast.parse(text), FILES) == {"app.__main__", "tracker.files", "tracker", "tracker.errors", "viser"}
     assert len(FILES) > 50
 
 
-def test_every_module_has_its_place():
-    assert sorted(m for m in FILES if place_of(m) is None) == [], "give them a row in ORDER"
-    assert sorted(LEVEL.keys() - FILES.keys()) == [], "take them out of ORDER"
-
-
-@pytest.mark.parametrize("module", sorted(FILES))
+@pytest.mark.parametrize("module", sorted(MOVED))
 def test_imports_run_downwards(module):
-    within_simulate = [
-        m for m in OWN[module] if module.startswith("tracker.simulate") and m.startswith("tracker.simulate.")
-    ]
-    wrong = [m for m in OWN[module] if m not in within_simulate and place_of(m) >= place_of(module)]
+    room = room_of(module)
+    wrong = [m for m in OWN[module] if m in MOVED and room_of(m) != room and FLOOR[room_of(m)] >= FLOOR[room]]
     assert wrong == [], f"{module} must not import these"
 
 
-def test_no_circle_within_the_simulator():
-    inner = {
-        m: [i for i in OWN[m] if i.startswith("tracker.simulate.")] for m in FILES if m.startswith("tracker.simulate")
-    }
-    while inner:
-        free = [m for m, needs in inner.items() if not any(n in inner for n in needs)]
-        assert free, f"import circle among {', '.join(inner)}"
+def test_no_circle():
+    left = {m: set(needs) - {m} for m, needs in OWN.items()}
+    while left:
+        free = [m for m, needs in left.items() if not needs & left.keys()]
+        assert free, f"import circle among {', '.join(sorted(left))}"
         for m in free:
-            del inner[m]
+            del left[m]
 
 
 @pytest.mark.parametrize("module", sorted(m for m in FILES if m.split(".")[0] == "tracker"))
 def test_the_tracker_knows_no_screen(module):
     assert {name.split(".")[0] for name in IMPORTS[module]} & OF_THE_SCREEN == set()
-
-
-def test_the_controller_imports_no_view():
-    views = {"app.messages", "app.panes", "app.scene", "app.panels", "app.overlays", "app.server", "app.workbench"}
-    below = ("app.screen", "app.searching", "app.tracking", "app.saving", "app.frames", "app.state", "app.jobs")
-    for module in ("app.controller", *below):
-        assert views & set(OWN[module]) == set(), module
-        assert {name.split(".")[0] for name in IMPORTS[module]} & {"viser", "aiohttp", "tyro"} == set(), module
-
-
-def test_formats_know_no_session():
-    for module in FILES:
-        if module.startswith("tracker.formats"):
-            assert {"tracker.session", "tracker.recording", "tracker.annotations"} & set(OWN[module]) == set(), module
-
-
-def test_the_cost_knows_no_part_edges():
-    """Where parts meet is drawn for the eye and never matched (GD96 Sect. 5)."""
-    for module in ("tracker.chamfer", "tracker.search", "tracker.scene", "tracker.track"):
-        assert "tracker.occlusion" not in OWN[module]

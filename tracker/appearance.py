@@ -14,9 +14,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body import Body, BodyModel, parts_of
+from tracker.compute.numba_options import BORROW
 from tracker.contours import part_poses, projection
 from tracker.evidence import ViewEvidence
-from tracker.kernels import BORROW
 from tracker.kinematics import Kinematics, chain_poses
 from tracker.limb_look import ColorView, LimbLook, Standing
 from tracker.rigid import Array

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from tracker import contours
 from tracker.body import Body, BodyModel, parts_of
+from tracker.compute.numba_options import FAST
+from tracker.compute.threads import helpers
 from tracker.evidence import ViewEvidence
-from tracker.kernels import FAST, helpers
 from tracker.kinematics import Tree, forward_kinematics
 from tracker.nearest import Segments, Sorted, nearest_segment, segment_buffer, sort_points, stack_rows, within_reach
 from tracker.rigid import Array, FloatArray

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from tracker.body import Body
 from tracker.cameras import Camera
+from tracker.compute.numba_options import FAST
 from tracker.hiding import JOINT_MARGIN_M, LANES, hide
-from tracker.kernels import FAST
 from tracker.outlines import MAX_POINTS, grid_outline, revolved_outline
 from tracker.rigid import Array, FloatArray
 from tracker.surfaces import Surfaces, surfaces_of

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from tracker import fit
 from tracker.apart import NOTHING_APART, Apart, KeepApart, KeepBodiesApart, push_apart
 from tracker.body import BodyModel
+from tracker.compute.numba_options import BORROW
 from tracker.fit import AT_LIMIT, FELT_DAMPING, FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING, Block, Fit, StayNear
-from tracker.kernels import BORROW
 from tracker.kinematics import IntArray, Kinematics, Tree, forward_kinematics
 from tracker.matching import DERIVE, Work, gather
 from tracker.refine import ContourMatch

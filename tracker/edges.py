@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.quantiles import quantiles
+from tracker.compute.quantiles import quantiles
 from tracker.rigid import FloatArray
 from tracker.silhouettes import Image, Mask
 

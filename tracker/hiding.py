@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.kernels import FAST
+from tracker.compute.numba_options import FAST
 from tracker.rigid import FloatArray
 from tracker.surfaces import ALONG, N_ALONG, N_SECTION, SECTION
 

@@ -11,8 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.numba_options import BORROW, FAST
 from tracker.contours import Pieces, face, focal_px, hide_all, trace_part
-from tracker.kernels import BORROW, FAST
 from tracker.kinematics import IntArray
 from tracker.outlines import MAX_POINTS
 from tracker.rigid import Array, FloatArray

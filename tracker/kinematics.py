@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.kernels import BORROW
+from tracker.compute.numba_options import BORROW
 from tracker.rigid import Array
 
 IntArray = NDArray[np.int64]

@@ -7,9 +7,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker import contours
+from tracker.compute.numba_options import FAST
 from tracker.evidence import SCENE_SPACING_PX
 from tracker.kept import Kept, keep_pieces, mark_covered, remember, still_stands, trace_moving, trace_standing
-from tracker.kernels import FAST
 from tracker.kinematics import IntArray
 from tracker.nearest import LANES, cells_within
 from tracker.rigid import Array, FloatArray

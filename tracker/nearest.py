@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.kernels import BORROW, FAST
+from tracker.compute.numba_options import BORROW, FAST
 from tracker.rigid import FloatArray
 
 IntArray = NDArray[np.int64]

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from tracker import contours
 from tracker.body import Body
 from tracker.cameras import Camera
+from tracker.compute.numba_options import FAST
 from tracker.hiding import LANES, hide
-from tracker.kernels import FAST
 from tracker.rigid import Array, FloatArray
 from tracker.surfaces import N_RINGS, N_SECTORS
 

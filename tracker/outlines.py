@@ -8,7 +8,7 @@ point of the profile; on other parts the zero line of the function is followed a
 import numpy as np
 from numba import njit
 
-from tracker.kernels import FAST
+from tracker.compute.numba_options import FAST
 from tracker.rigid import Array, FloatArray
 from tracker.surfaces import N_RINGS, N_SECTORS, Surfaces
 

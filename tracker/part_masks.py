@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tracker.body import Body, BodyModel
 from tracker.cameras import Camera
+from tracker.compute.numba_options import FAST
 from tracker.contours import part_poses, projection
-from tracker.kernels import FAST
 from tracker.rigid import Array
 
 _RINGS, _SECTORS = 16, 24

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from tracker import contours
 from tracker.body import Body
+from tracker.compute.numba_options import BORROW
 from tracker.evidence import SCENE_SPACING_PX, ViewEvidence
-from tracker.kernels import BORROW
 from tracker.kinematics import IntArray
 from tracker.rigid import FloatArray
 

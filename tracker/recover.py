@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from tracker.appearance import Colors, PartColors
 from tracker.body import BodyModel
+from tracker.compute.threads import N_HELPERS, dealt_out, helpers
 from tracker.confidence import Limb
 from tracker.descent import solve
 from tracker.fit import Block, Fit
-from tracker.kernels import N_HELPERS, dealt_out, helpers
 from tracker.kinematics import IntArray, chain_poses
 from tracker.refine import WORTH_A_STEP, ContourMatch
 from tracker.rigid import Array

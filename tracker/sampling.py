@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.kernels import FAST
+from tracker.compute.numba_options import FAST
 from tracker.rigid import FloatArray
 
 _ZERO = np.float32(0.0)  # a plain number would turn the kernel's arithmetic into float64

@@ -17,11 +17,11 @@ from tracker import confidence
 from tracker.apart import KeepBodiesApart
 from tracker.appearance import Colors
 from tracker.body import Body
+from tracker.compute.threads import side_by_side
 from tracker.confidence import Limb, Quality, Status
 from tracker.descent import solve
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.fit import Block, Fit, covariance, held
-from tracker.kernels import side_by_side
 from tracker.memory import Memory
 from tracker.recover import LEAST_GAIN, Judge, for_several, search_limbs
 from tracker.refine import WORTH_A_STEP, ContourMatch, PartCosts

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.kernels import FAST
+from tracker.compute.numba_options import FAST
 from tracker.nearest import LANES, Sorted, cells_within, sort_points
 from tracker.rigid import FloatArray
 

@@ -8,7 +8,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body import BodyModel
-from tracker.kernels import BORROW
+from tracker.compute.numba_options import BORROW
 from tracker.rigid import Array
 from tracker.silhouettes import Image
 

@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.quantiles import median
+from tracker.compute.quantiles import median
 
 Image = NDArray[np.uint8]
 Mask = NDArray[np.bool_]

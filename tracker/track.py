@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from tracker.body import Body, BodyModel
 from tracker.cameras import Region
+from tracker.compute.threads import side_by_side
 from tracker.confidence import Quality, Status
 from tracker.evidence import ViewEvidence
-from tracker.kernels import side_by_side
 from tracker.memory import Memory
 from tracker.observer import Observer
 from tracker.predict import PredictSettings

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.kernels import FAST
+from tracker.compute.numba_options import FAST
 from tracker.kinematics import IntArray
 from tracker.rigid import Array, FloatArray
 

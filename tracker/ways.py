@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from tracker.appearance import Colors, PartColors
 from tracker.body import BodyModel
+from tracker.compute.threads import N_HELPERS, dealt_out
 from tracker.descent import solve
 from tracker.fit import Block
-from tracker.kernels import N_HELPERS, dealt_out
 from tracker.recover import APART_M, LEAST_GAIN
 from tracker.refine import WORTH_A_STEP, ContourMatch
 from tracker.rigid import Array

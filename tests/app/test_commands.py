@@ -10,8 +10,8 @@ import pytest
 from command_line import SAMPLE, assert_refused, stored
 
 from app import headless
-from app.compiling import compiled_mark
 from tracker.annotations import AnnotationStore
+from tracker.compute.kernel_cache import compiled_mark
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_table import read_pose_table, write_pose_table
 from tracker.records import PoseChange

@@ -10,8 +10,9 @@ import pytest
 from hands import wait_for
 
 from app import compile_kernels
-from app.compiling import Compiling, compiled_mark
+from app.compiling import Compiling
 from app.screen import Screen
+from tracker.compute.kernel_cache import compiled_mark
 
 WAITS = (sys.executable, "-c", "import time; time.sleep(100)")
 FAILS = (sys.executable, "-c", "raise SystemExit(3)")

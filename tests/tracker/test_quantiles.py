@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tracker.quantiles import median, quantiles
+from tracker.compute.quantiles import median, quantiles
 
 
 @pytest.mark.parametrize("n", [1, 2, 5, 768, 769])

@@ -1,0 +1,1 @@
+"""Numba options, the kernel cache, thread pools and quantiles of small arrays."""
