@@ -3,8 +3,8 @@
 import cv2
 import numpy as np
 
-from tracker.cameras import Camera
-from tracker.rigid import Array
+from tracker.geometry.cameras import Camera
+from tracker.geometry.rigid import Array
 from tracker.silhouettes import Image
 
 _AROUND = (24, 26, 29)

@@ -20,10 +20,10 @@ from tracker.fit import fit_to_points
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_table import PoseTable
 from tracker.formats.trc import MarkerTable
+from tracker.geometry.rigid import Array
 from tracker.joint_maps import LIMB_JOINTS
 from tracker.records import FrameRow, PoseChange, PoseRecord
 from tracker.references import Reference, stored_motion
-from tracker.rigid import Array
 from tracker.session import Person, Session, load_session, save_session
 from tracker.session_lock import SessionLock
 from tracker.sizes import fit_sizes

@@ -15,9 +15,9 @@ from app.samples import bundled
 from tracker.body import BodyModel
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.errors import SessionError
+from tracker.geometry.rigid import Array
 from tracker.observer import Observer
 from tracker.recording import Recording
-from tracker.rigid import Array
 from tracker.session import CameraSource
 from tracker.session_lock import SessionLock
 from tracker.track import track_chamfer

@@ -35,8 +35,8 @@ from app.state import State
 from app.tracking import Tracking
 from app.viewing import Viewing
 from tracker.body import BodyModel
+from tracker.geometry.rigid import Array
 from tracker.records import FrameNumbers
-from tracker.rigid import Array
 from tracker.session import Session
 from tracker.track_settings import TrackSettings
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body import BodyModel
+from tracker.geometry.rigid import Array, FloatArray
 from tracker.records import FrameNumbers
-from tracker.rigid import Array, FloatArray
 
 GROUPS = ("arms", "torso", "legs", "cost")
 

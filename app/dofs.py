@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from tracker.body import BodyModel
 from tracker.confidence import spoken
+from tracker.geometry.rigid import Array
 from tracker.pose_edits import joint_of, limb_of
-from tracker.rigid import Array
 
 
 def factors(model: BodyModel) -> Array:

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from tracker.body import BodyModel
+from tracker.geometry.rigid import Array
 from tracker.predict import PredictSettings, predict
-from tracker.rigid import Array
 
 
 class Prediction(NamedTuple):

@@ -5,11 +5,10 @@ import numpy as np
 from app.floor_picks import Picking
 from app.overlays import EPIPOLAR_COLOR, Path
 from app.state import State
-from tracker.cameras import Camera, epipolar_segment
-from tracker.floor import Floor
-from tracker.rigid import Array
+from tracker.geometry.cameras import Camera, epipolar_segment
+from tracker.geometry.ground_plane import Floor, up_rotation
+from tracker.geometry.rigid import Array
 from tracker.session import Session
-from tracker.standing import up_rotation
 
 FLOOR_COLOR = "#7ee08a"
 _MARK_PX = 7.0

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tracker.cameras import Camera
 from tracker.errors import TrackerError
-from tracker.floor import Floor, floor_through
-from tracker.pins import triangulate
-from tracker.rigid import Array
+from tracker.geometry.cameras import Camera
+from tracker.geometry.ground_plane import Floor, floor_through
+from tracker.geometry.rigid import Array
+from tracker.geometry.triangulation import triangulate
 
 N_POINTS = 3
 

@@ -10,9 +10,8 @@ import numpy as np
 from app.floor_picks import FloorState, Picking, with_mark, with_next, without_last
 from app.screen import Screen
 from tracker.errors import TrackerError
-from tracker.floor import Floor, nearest_axis
+from tracker.geometry.ground_plane import Floor, nearest_axis, up_rotation
 from tracker.session import UPS, save_floor
-from tracker.standing import up_rotation
 
 _KEY = "former_floor"
 """Setting of the session: the floor before the one that is set."""

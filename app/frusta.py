@@ -10,7 +10,7 @@ from app.centred import aspect_around, centred, field_of_view
 from app.controller import Controller
 from app.jobs import Latest
 from app.state import State
-from tracker import rigid
+from tracker.geometry import rigid
 
 _SCALE_M = 0.25
 _COLOR = (120, 130, 140)

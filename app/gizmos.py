@@ -10,9 +10,9 @@ from app.controller import Controller
 from app.jobs import Latest
 from app.pace import Pace
 from app.state import State
-from tracker import rigid
+from tracker.geometry import rigid
+from tracker.geometry.rigid import Array
 from tracker.pose_edits import joint_of
-from tracker.rigid import Array
 
 _ROOT_SCALE, _JOINT_SCALE = 0.3, 0.2
 _REST_S = 0.1

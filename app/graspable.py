@@ -8,7 +8,7 @@ from app.layers import View
 from app.state import State
 from tracker import picking
 from tracker.body import Body
-from tracker.rigid import FloatArray
+from tracker.geometry.rigid import FloatArray
 from tracker.session import Session
 
 

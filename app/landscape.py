@@ -12,7 +12,7 @@ from app.state import Landscape, State
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence import ViewEvidence
-from tracker.rigid import Array
+from tracker.geometry.rigid import Array
 from tracker.track_settings import TrackSettings, pose_cost
 
 SAMPLES = 121

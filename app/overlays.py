@@ -7,13 +7,14 @@ import numpy as np
 
 from app.layers import View
 from app.state import State
-from tracker import contours, occlusion, rigid
+from tracker import contours, occlusion
 from tracker.body import Body, BodyModel
-from tracker.cameras import Camera, epipolar_segment
 from tracker.contours import Contour
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
+from tracker.geometry import rigid
+from tracker.geometry.cameras import Camera, epipolar_segment
+from tracker.geometry.rigid import Array, FloatArray
 from tracker.rebody import rebodied
-from tracker.rigid import Array, FloatArray
 from tracker.segments import accept
 from tracker.session import Person, Session
 from tracker.silhouettes import Mask

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tracker.body import BodyModel
 from tracker.evidence import ViewEvidence
-from tracker.rigid import Array
+from tracker.geometry.rigid import Array
 
 SAMPLE_PX = 4.0
 _RINGS, _SECTORS = 12, 16

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body import Body
-from tracker.cameras import Camera
 from tracker.evidence import ViewEvidence
+from tracker.geometry.cameras import Camera
 from tracker.part_masks import part_labels
 from tracker.silhouettes import Image, Mask
 

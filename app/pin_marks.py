@@ -7,8 +7,8 @@ import numpy as np
 from app.layers import View
 from app.overlays import EPIPOLAR_COLOR, Path
 from app.state import State, finite_or_none
-from tracker.cameras import epipolar_segment
-from tracker.pins import ViewPin, triangulate
+from tracker.geometry.cameras import epipolar_segment
+from tracker.geometry.triangulation import ViewPin, triangulate
 from tracker.session import Session
 
 

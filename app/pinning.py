@@ -11,7 +11,7 @@ from app.screen import Screen, spoken
 from app.state import Shown
 from tracker.errors import TrackerError
 from tracker.frame_fit import fit_frame
-from tracker.pins import ViewPin
+from tracker.geometry.triangulation import ViewPin
 
 _CHECKPOINT_S = 1.0
 """A long drag of a pin is on disk at least this often."""

@@ -10,10 +10,10 @@ from app.screen import Screen, spoken
 from tracker import confidence, posing
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
+from tracker.geometry.rigid import Array
 from tracker.orienting import orient
 from tracker.pose_edits import bent_alike, limb_of, mirrored, taken_over
 from tracker.rebody import rebodied
-from tracker.rigid import Array
 
 _SAME_GESTURE_S = 1.0
 """Changes of one slider, or steps of one joint, within this time of each other are one entry of the history."""

@@ -10,7 +10,7 @@ from app.runs import Run, Runs
 from app.screen import Screen
 from app.state import ReplayState, Shown, finite_or_none
 from tracker.errors import TrackerError
-from tracker.rigid import Array
+from tracker.geometry.rigid import Array
 
 
 class Replay:

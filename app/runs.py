@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body import BodyModel
-from tracker.rigid import Array, FloatArray
+from tracker.geometry.rigid import Array, FloatArray
 from tracker.search import SearchStep, Stage, stages
 from tracker.track_settings import TrackSettings
 

@@ -15,7 +15,8 @@ from tracker.annotations import AnnotationStore
 from tracker.body import BodyModel
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, parse_model
-from tracker.pins import ViewPin
+from tracker.geometry.rigid import Array
+from tracker.geometry.triangulation import ViewPin
 from tracker.rebody import rebodied
 from tracker.records import (
     SOURCES,
@@ -29,7 +30,6 @@ from tracker.records import (
     PoseChange,
     PoseRecord,
 )
-from tracker.rigid import Array
 from tracker.session import Session
 from tracker.track import PoseEstimate
 from tracker.track_settings import TrackSettings

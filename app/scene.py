@@ -17,13 +17,13 @@ from app.state import State
 from app.trails import Trails
 from app.view_choice import View3d
 from app.view_panel import ViewPanel
-from tracker import rigid
 from tracker.body import Body, BodyModel
-from tracker.cameras import Camera, viewed_point
 from tracker.contours import part_poses
-from tracker.rigid import Array
+from tracker.geometry import rigid
+from tracker.geometry.cameras import Camera, viewed_point
+from tracker.geometry.ground_plane import up_rotation
+from tracker.geometry.rigid import Array
 from tracker.session import Session
-from tracker.standing import up_rotation
 
 _REST_S = 0.08
 """Time between updates: drawing the scene costs the browser more than drawing the panes, which go first."""

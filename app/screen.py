@@ -14,12 +14,13 @@ from app.saving import Saver
 from app.state import Shown, State, finite_or_none
 from tracker.body import BodyModel
 from tracker.fit import held
+from tracker.geometry.ground_plane import up_rotation
+from tracker.geometry.rigid import Array
+from tracker.geometry.triangulation import ViewPin
 from tracker.locks import free_of
-from tracker.pins import ViewPin
 from tracker.rebody import rebodied
-from tracker.rigid import Array
 from tracker.session import Session
-from tracker.standing import standing_pose, up_rotation
+from tracker.standing import standing_pose
 from tracker.track_settings import pose_cost
 
 _APART_M = 0.9

@@ -11,7 +11,7 @@ from app.runs import Run, Runs
 from app.screen import Screen
 from app.state import JobState, Shown, finite_or_none
 from tracker.errors import TrackerError
-from tracker.rigid import Array
+from tracker.geometry.rigid import Array
 from tracker.search import SearchStep, stages
 from tracker.track_settings import search_frame
 

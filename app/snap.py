@@ -12,9 +12,9 @@ from app.centred import centred, field_of_view
 from app.controller import Controller
 from app.jobs import Latest
 from app.state import State
-from tracker import rigid
-from tracker.cameras import Camera, viewed_point
-from tracker.rigid import Array
+from tracker.geometry import rigid
+from tracker.geometry.cameras import Camera, viewed_point
+from tracker.geometry.rigid import Array
 from tracker.silhouettes import Image
 
 _MOVED_M = 1e-3

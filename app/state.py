@@ -7,8 +7,8 @@ import numpy as np
 from app.floor_picks import FloorState
 from app.view_choice import View3d
 from tracker.body import BodyModel
-from tracker.pins import ViewPin
-from tracker.rigid import Array
+from tracker.geometry.rigid import Array
+from tracker.geometry.triangulation import ViewPin
 from tracker.track_settings import TrackSettings
 
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from tracker.annotations import AnnotationStore
+from tracker.geometry.rigid import Array
 from tracker.records import Alternative, PoseChange, PoseRecord
-from tracker.rigid import Array
 from tracker.session import Person
 from tracker.track import PoseEstimate
 from tracker.track_settings import TrackSettings

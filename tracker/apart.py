@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from tracker.body import Body, BodyModel, parts_of
 from tracker.fit import Normal
+from tracker.geometry.rigid import Array
 from tracker.kinematics import IntArray, Kinematics
-from tracker.rigid import Array
 from tracker.surfaces import surfaces_of
 
 _SAMPLES = 5

@@ -17,9 +17,9 @@ from tracker.body import Body, BodyModel, parts_of
 from tracker.compute.numba_options import BORROW
 from tracker.contours import part_poses, projection
 from tracker.evidence import ViewEvidence
+from tracker.geometry.rigid import Array
 from tracker.kinematics import Kinematics, chain_poses
 from tracker.limb_look import ColorView, LimbLook, Standing
-from tracker.rigid import Array
 from tracker.sights import (
     ALONG,
     BINS,

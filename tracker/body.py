@@ -13,7 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker import rigid
+from tracker.geometry import rigid
+from tracker.geometry.rigid import Array
+from tracker.geometry.shapes import Shape
 from tracker.joints import Joint, Landmark, Part, SearchGroup
 from tracker.kinematics import (
     BALL,
@@ -25,8 +27,6 @@ from tracker.kinematics import (
     forward_kinematics,
     point_jacobian,
 )
-from tracker.rigid import Array
-from tracker.shapes import Shape
 
 
 class _Ball(NamedTuple):

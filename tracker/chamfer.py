@@ -21,9 +21,17 @@ from tracker.body import Body, BodyModel, parts_of
 from tracker.compute.numba_options import FAST
 from tracker.compute.threads import helpers
 from tracker.evidence import ViewEvidence
+from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.segment_distance import (
+    Segments,
+    Sorted,
+    nearest_segment,
+    segment_buffer,
+    sort_points,
+    stack_rows,
+    within_reach,
+)
 from tracker.kinematics import Tree, forward_kinematics
-from tracker.nearest import Segments, Sorted, nearest_segment, segment_buffer, sort_points, stack_rows, within_reach
-from tracker.rigid import Array, FloatArray
 from tracker.sampling import bilinear
 
 Outliers = Literal["truncated", "paper"]

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from tracker.appearance import ColorScore, PartColors
 from tracker.body import Body, BodyModel
 from tracker.fit import Fit, covariance
+from tracker.geometry.rigid import Array
 from tracker.refine import PartCosts
-from tracker.rigid import Array
 
 Status = Literal["good", "doubtful", "lost"]
 

@@ -16,11 +16,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body import Body
-from tracker.cameras import Camera
 from tracker.compute.numba_options import FAST
+from tracker.geometry.cameras import Camera
+from tracker.geometry.rigid import Array, FloatArray
 from tracker.hiding import JOINT_MARGIN_M, LANES, hide
 from tracker.outlines import MAX_POINTS, grid_outline, revolved_outline
-from tracker.rigid import Array, FloatArray
 from tracker.surfaces import Surfaces, surfaces_of
 
 PIECE_PX = 4.0

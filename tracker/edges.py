@@ -8,7 +8,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.quantiles import quantiles
-from tracker.rigid import FloatArray
+from tracker.geometry.rigid import FloatArray
 from tracker.silhouettes import Image, Mask
 
 STRONG_FRACTION, WEAK_FRACTION = 0.92, 0.80

@@ -7,12 +7,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker import rigid
 from tracker.body import BodyModel
 from tracker.errors import FormatError
 from tracker.formats.trc import MarkerTable
+from tracker.geometry import rigid
+from tracker.geometry.rigid import Array
 from tracker.joint_maps import JOINTS, LIMB_JOINTS
-from tracker.rigid import Array
 
 LOST_M = 0.15
 """A frame with a limb joint farther off than this is lost, metres."""

@@ -12,9 +12,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.cameras import Camera, Region
 from tracker.edges import Edges
-from tracker.rigid import FloatArray
+from tracker.geometry.cameras import Camera, Region
+from tracker.geometry.rigid import FloatArray
 from tracker.sampling import distance_image
 from tracker.scenery import Scenery
 from tracker.segments import Samples, Segments, accept, link_edges, sampled

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
+from tracker.geometry.rigid import Array
 from tracker.kinematics import IntArray, Kinematics
-from tracker.rigid import Array
 
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e8
 FELT_DAMPING = 1e-2

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker import silhouettes
-from tracker.cameras import Region
+from tracker.geometry.cameras import Region
+from tracker.geometry.rigid import FloatArray
 from tracker.matched import MatchedView
 from tracker.probes import Probes, Readings
 from tracker.recording import read_background, read_mask
-from tracker.rigid import FloatArray
 from tracker.session import CameraSource
 from tracker.silhouettes import Changes, Image
 

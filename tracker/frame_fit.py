@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body import Body, BodyModel
-from tracker.cameras import Camera
 from tracker.descent import solve
 from tracker.evidence import ViewEvidence
 from tracker.fit import Block, of_values
-from tracker.pins import PinBlock, ViewPin, pin_block
+from tracker.geometry.cameras import Camera
+from tracker.geometry.rigid import Array
+from tracker.geometry.triangulation import ViewPin
+from tracker.pins import PinBlock, pin_block
 from tracker.refine import ContourMatch
-from tracker.rigid import Array
 from tracker.track_settings import TrackSettings, prior_blocks
 
 _REACHES = (2.0, 1.0)

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.numba_options import FAST
-from tracker.rigid import FloatArray
+from tracker.geometry.rigid import FloatArray
 from tracker.surfaces import ALONG, N_ALONG, N_SECTION, SECTION
 
 JOINT_MARGIN_M = 0.03

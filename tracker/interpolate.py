@@ -10,10 +10,10 @@ import warnings
 
 import numpy as np
 
-from tracker import rigid
 from tracker.body import BodyModel
+from tracker.geometry import rigid
+from tracker.geometry.rigid import Array
 from tracker.joints import Joint
-from tracker.rigid import Array
 
 
 def between(model: BodyModel, start: Array, end: Array, shares: Array) -> Array:

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from tracker.shapes import Ellipsoid, EllipticalCone, Shape, TaperedSuperquadric
+from tracker.geometry.shapes import Ellipsoid, EllipticalCone, Shape, TaperedSuperquadric
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.numba_options import BORROW
-from tracker.rigid import Array
+from tracker.geometry.rigid import Array
 
 IntArray = NDArray[np.int64]
 

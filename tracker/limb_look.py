@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from tracker.body import BodyModel
 from tracker.compute.numba_options import BORROW
+from tracker.geometry.rigid import Array, FloatArray
 from tracker.kinematics import IntArray, Kinematics, chain_poses
-from tracker.rigid import Array, FloatArray
 from tracker.sights import ALONG, BINS, NEAREST_M, along_axis, bin_of, hidden, pixel_on_axis, place_before, see_axis
 from tracker.silhouettes import Image
 

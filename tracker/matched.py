@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.cameras import Camera, Region
-from tracker.rigid import Array
+from tracker.geometry.cameras import Camera, Region
+from tracker.geometry.rigid import Array
 from tracker.silhouettes import Image, Mask
 
 MATCH_AREA_PX = 640 * 480

@@ -12,8 +12,8 @@ import numpy as np
 
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
+from tracker.geometry.rigid import Array
 from tracker.joints import Joint, Landmark, Part
-from tracker.rigid import Array
 
 _LEAST_HEIGHT_M, _MOST_HEIGHT_M = 0.3, 3.0
 _LEAST_M, _MOST_SHARE = 0.005, 0.7

@@ -10,8 +10,8 @@ from tracker.appearance import Colors, PartColors
 from tracker.body import BodyModel
 from tracker.confidence import Limb, Quality, Status
 from tracker.fit import held
+from tracker.geometry.rigid import Array
 from tracker.predict import PredictSettings, predict
-from tracker.rigid import Array
 
 _LONGEST_PAUSE = 8
 """A limb that seems lost and is not found is searched at least every so many frames."""

@@ -14,13 +14,13 @@ import cv2
 import numpy as np
 
 from tracker import silhouettes
-from tracker.cameras import Camera, Region
 from tracker.edges import detect_edges, levels
 from tracker.evidence import Look, ViewEvidence, default_theta_px, expecting, silhouette_evidence
 from tracker.foreground import Foreground, Prepared
+from tracker.geometry.cameras import Camera, Region
+from tracker.geometry.rigid import FloatArray
 from tracker.matched import fit_region
 from tracker.recording import Recording
-from tracker.rigid import FloatArray
 from tracker.scenery import Scenery
 from tracker.segments import link_edges, sampled
 from tracker.session import CameraSource

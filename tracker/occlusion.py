@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from tracker import contours
 from tracker.body import Body
-from tracker.cameras import Camera
 from tracker.compute.numba_options import FAST
+from tracker.geometry.cameras import Camera
+from tracker.geometry.rigid import Array, FloatArray
 from tracker.hiding import LANES, hide
-from tracker.rigid import Array, FloatArray
 from tracker.surfaces import N_RINGS, N_SECTORS
 
 _LIFT_M = 0.012

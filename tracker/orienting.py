@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from tracker.body import BodyModel
 from tracker.fit import Normal, normal_of, solve
+from tracker.geometry.rigid import Array
 from tracker.kinematics import Kinematics
-from tracker.rigid import Array
 
 
 @dataclass(frozen=True, eq=False)

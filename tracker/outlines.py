@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from tracker.compute.numba_options import FAST
-from tracker.rigid import Array, FloatArray
+from tracker.geometry.rigid import Array, FloatArray
 from tracker.surfaces import N_RINGS, N_SECTORS, Surfaces
 
 MAX_POINTS = 512

@@ -9,10 +9,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body import Body, BodyModel
-from tracker.cameras import Camera
 from tracker.compute.numba_options import FAST
 from tracker.contours import part_poses, projection
-from tracker.rigid import Array
+from tracker.geometry.cameras import Camera
+from tracker.geometry.rigid import Array
 
 _RINGS, _SECTORS = 16, 24
 _NEAREST_M = 0.05

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from tracker import rigid
 from tracker.body import Body, BodyModel
-from tracker.cameras import Camera
-from tracker.rigid import Array, FloatArray
-from tracker.shapes import Shape
+from tracker.geometry import rigid
+from tracker.geometry.cameras import Camera
+from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.shapes import Shape
 
 _NEAREST_M = 0.05
 """A part that reaches nearer to the camera than this has no outline."""

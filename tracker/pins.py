@@ -6,41 +6,15 @@ Positions are undistorted pixels here; the store keeps original ones.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from tracker.body import BodyModel
-from tracker.cameras import Camera
 from tracker.fit import Normal, normal_of
+from tracker.geometry.cameras import Camera
+from tracker.geometry.rigid import Array
+from tracker.geometry.triangulation import _NEAREST_M, ViewPin, sigma_px
 from tracker.kinematics import IntArray, Kinematics
-from tracker.rigid import Array
-
-_SIGMA_SHARE = 0.001
-"""Standard deviation of a pin against the longer side of the image: 0.64 px of 640. A hand is off by three times as
-much; but where edges and a pin disagree the edges of a body of another shape are wrong together, and the hand is to
-win. Large pictures are shown smaller, so that a hand is off by more of their pixels."""
-_NEAREST_M = 0.05
-"""Depths below this count as this: what lies behind a camera pulls as if it were just before it."""
-_LEAST_ANGLE_RAD = np.radians(1.0)
-"""Lines of sight that differ less than this say nothing of the depth at which they meet: with pins 2 px off in images
-of 640 px, a point 4 m away would be uncertain by more than 1 m."""
-
-
-class ViewPin(NamedTuple):
-    """Where one view shows a point of the body, as a person says."""
-
-    point: str
-    """One of the body model's `point_names`."""
-    camera: int
-    """Index of the view."""
-    place_px: tuple[float, float]
-    """Where the point is seen, undistorted px."""
-
-
-def sigma_px(camera: Camera) -> float:
-    """Standard deviation of a pin in a view, px: how far off a hand is."""
-    return _SIGMA_SHARE * max(camera.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,78 +68,3 @@ def pin_block(model: BodyModel, cameras: Sequence[Camera], pins: Sequence[ViewPi
     seen_by = tuple(cameras[p.camera].pinhole for p in pins)
     points = np.array([model.point_names.index(p.point) for p in pins], dtype=np.int64)
     return PinBlock(seen_by, points, np.array([p.place_px for p in pins]), np.array([sigma_px(c) for c in seen_by]))
-
-
-class Triangulation(NamedTuple):
-    """Where in space the pins of one point meet."""
-
-    point_world: Array | None
-    """The point, (3,), metres; None where the pins do not tell."""
-    errors_px: Array
-    """Distance of each pin from the image of the point, (N,), px; NaN where there is no point."""
-    why: str
-    """Why there is no point, and what to do; empty where there is one."""
-
-
-def triangulate(cameras: Sequence[Camera], places_px: Array) -> Triangulation:
-    """Find the point in space whose images are nearest to where it was seen.
-
-    It starts where the lines of sight come nearest to each other and minimizes the squared distances in the images,
-    in standard deviations of a pin, by Gauss-Newton.
-
-    Args:
-        cameras: the camera of each pin.
-        places_px: where the point is seen, undistorted px, (N, 2).
-    """
-    places_px = np.asarray(places_px, dtype=np.float64).reshape(-1, 2)
-    views = [c.pinhole for c in cameras]
-    rays = np.array([c.rays(p) for c, p in zip(views, places_px, strict=True)]).reshape(-1, 3)
-    if len(views) < 2:
-        return _nowhere(views, "one view does not tell the depth: pin the joint in another view too")
-    # Two views that face each other are as bad as two that stand side by side.
-    sines = np.linalg.norm(np.cross(rays[:, None], rays[None]), axis=-1)
-    if sines.max() < np.sin(_LEAST_ANGLE_RAD):
-        return _nowhere(views, "the lines of sight are almost parallel: pin the joint in a view from another side")
-    across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
-    centers = np.stack([c.center_world for c in views])
-    point = np.linalg.solve(across.sum(axis=0), (across @ centers[..., None]).sum(axis=0)[:, 0])
-    point = _nearest_in_the_images(views, places_px, point)
-    behind = [c.name for c in views if c.depths(point) < _NEAREST_M]
-    if behind:
-        return _nowhere(views, f"the lines of sight meet behind {' and '.join(behind)}: check the pins of this joint")
-    return Triangulation(point, np.linalg.norm(_residuals(views, places_px, point)[0], axis=1), "")
-
-
-def _nowhere(views: Sequence[Camera], why: str) -> Triangulation:
-    return Triangulation(None, np.full(len(views), np.nan), why)
-
-
-def _residuals(views: Sequence[Camera], places_px: Array, point: Array) -> tuple[Array, Array]:
-    """Image minus pin in each view, (N, 2), px, and its derivative by the point, (N, 2, 3)."""
-    T, K = np.stack([c.T_camera_world for c in views]), np.stack([c.K for c in views])
-    x = T[:, :3, :3] @ point + T[:, :3, 3]
-    z = x[:, 2:]
-    slopes = x[:, :2] / z
-    J = (T[:, :2, :3] - slopes[:, :, None] * T[:, 2:3, :3]) / z[:, :, None]
-    r = np.einsum("nij,nj->ni", K[:, :2, :2], slopes) + K[:, :2, 2] - places_px
-    return r, K[:, :2, :2] @ J
-
-
-def _nearest_in_the_images(views: Sequence[Camera], places_px: Array, point: Array) -> Array:
-    """Gauss-Newton on the distances in the images, from a point on; it stays where a step would go behind a camera."""
-    weights = 1 / np.array([sigma_px(c) for c in views])[:, None]
-    if min(c.depths(point) for c in views) < _NEAREST_M:
-        return point
-    r, J = _residuals(views, places_px, point)
-    for _ in range(20):
-        rows = (J * weights[:, :, None]).reshape(-1, 3)
-        step = -np.linalg.lstsq(rows, (r * weights).ravel(), rcond=None)[0]
-        if min(c.depths(point + step) for c in views) < _NEAREST_M:
-            break
-        there = _residuals(views, places_px, point + step)
-        if np.sum((there[0] * weights) ** 2) >= np.sum((r * weights) ** 2):
-            break
-        point, (r, J) = point + step, there
-        if np.linalg.norm(step) < 1e-7:
-            break
-    return point

@@ -14,8 +14,8 @@ from tracker import contours
 from tracker.body import Body
 from tracker.compute.numba_options import BORROW
 from tracker.evidence import SCENE_SPACING_PX, ViewEvidence
+from tracker.geometry.rigid import FloatArray
 from tracker.kinematics import IntArray
-from tracker.rigid import FloatArray
 
 N_COLUMNS = 7
 """u, v, the normal's u and v, the weight, and how many points it stands for: in all, and of the silhouette."""

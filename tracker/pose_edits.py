@@ -5,11 +5,11 @@ from numpy.typing import NDArray
 
 from tracker.body import BodyModel
 from tracker.confidence import limbs
+from tracker.geometry.rigid import Array
 from tracker.joints import Joint
 from tracker.kinematics import IntArray
 from tracker.measures import twin
 from tracker.orienting import orient
-from tracker.rigid import Array
 
 _MIRROR = np.diag([1.0, -1.0, 1.0])
 """What swaps the body's left and right: y points to the left in every part's frame."""

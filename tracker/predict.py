@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
-from tracker.rigid import Array
+from tracker.geometry.rigid import Array
 
 MOST_ORDER = 2
 

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.rigid import FloatArray
+from tracker.geometry.rigid import FloatArray
 from tracker.silhouettes import SMOOTHING_PX, Image
 
 SPACING_PX = 20

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body import BodyModel
-from tracker.cameras import Camera
 from tracker.fit import Block, PointTargets, StayNear, solve
-from tracker.pins import ViewPin, pin_block
-from tracker.rigid import Array
+from tracker.geometry.cameras import Camera
+from tracker.geometry.rigid import Array
+from tracker.geometry.triangulation import ViewPin
+from tracker.pins import pin_block
 
 _JOINT_M = 0.005
 """Standard deviation of a joint's place, metres."""

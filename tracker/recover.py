@@ -21,9 +21,9 @@ from tracker.compute.threads import N_HELPERS, dealt_out, helpers
 from tracker.confidence import Limb
 from tracker.descent import solve
 from tracker.fit import Block, Fit
+from tracker.geometry.rigid import Array
 from tracker.kinematics import IntArray, chain_poses
 from tracker.refine import WORTH_A_STEP, ContourMatch
-from tracker.rigid import Array
 
 T = TypeVar("T")
 

@@ -25,12 +25,12 @@ from tracker import contours
 from tracker.body import Body, BodyModel, parts_of
 from tracker.evidence import ViewEvidence
 from tracker.fit import Normal
+from tracker.geometry.rigid import Array
+from tracker.geometry.segment_distance import sort_points, stack_rows
 from tracker.kept import Kept, kept_for
 from tracker.kinematics import IntArray, Kinematics, Tree, forward_kinematics
 from tracker.matching import SUM_UP, Scene, Sums, Work, gather, scratch_for
-from tracker.nearest import sort_points, stack_rows
 from tracker.points import points_to_match
-from tracker.rigid import Array
 from tracker.twists import to_dofs
 
 _CAPTURE = 2.0

@@ -22,10 +22,10 @@ from tracker.confidence import Limb, Quality, Status
 from tracker.descent import solve
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.fit import Block, Fit, covariance, held
+from tracker.geometry.rigid import Array
 from tracker.memory import Memory
 from tracker.recover import LEAST_GAIN, Judge, for_several, search_limbs
 from tracker.refine import WORTH_A_STEP, ContourMatch, PartCosts
-from tracker.rigid import Array
 from tracker.scenery import Scenery
 from tracker.search import BEFORE_REFINEMENT, SearchSettings
 from tracker.sharing import Shares, Sharing

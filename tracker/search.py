@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from tracker.body import BodyModel
 from tracker.chamfer import ChamferCost
 from tracker.errors import TrackerError
+from tracker.geometry.rigid import Array
 from tracker.joints import SearchGroup
-from tracker.rigid import Array
 
 
 @dataclass(frozen=True)

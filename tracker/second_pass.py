@@ -20,10 +20,10 @@ from tracker.body import Body, BodyModel
 from tracker.confidence import Status
 from tracker.evidence import ViewEvidence
 from tracker.fit import held
+from tracker.geometry.rigid import Array
 from tracker.memory import Memory
 from tracker.observer import Observer
 from tracker.refine import ContourMatch
-from tracker.rigid import Array
 from tracker.scene import Scene
 from tracker.surroundings import regions, visible_outline
 from tracker.track import PoseEstimate, summed_up, track_chamfer

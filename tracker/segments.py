@@ -13,8 +13,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.numba_options import FAST
-from tracker.nearest import LANES, Sorted, cells_within, sort_points
-from tracker.rigid import FloatArray
+from tracker.geometry.rigid import FloatArray
+from tracker.geometry.segment_distance import LANES, Sorted, cells_within, sort_points
 
 IntArray = NDArray[np.int64]
 

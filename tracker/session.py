@@ -23,13 +23,13 @@ import numpy as np
 import tomli_w
 
 from tracker.body import BodyModel
-from tracker.cameras import Camera
 from tracker.errors import SessionError
 from tracker.files import read_toml, write_text_whole
-from tracker.floor import Floor
 from tracker.footage import open_footage
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model, load_model
+from tracker.geometry.cameras import Camera
+from tracker.geometry.ground_plane import Floor
 
 VERSION = 2
 _VERSION_WITHOUT_FLOOR = 1

@@ -19,7 +19,7 @@ from tracker import contours
 from tracker.body import Body
 from tracker.contours import PIECE_PX, Contour, trace_view
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence, findable, unfiltered, with_segments
-from tracker.rigid import Array, FloatArray
+from tracker.geometry.rigid import Array, FloatArray
 from tracker.segments import MAX_ANGLE_RAD, Samples, Segments, nearest_alongside, sampled
 from tracker.surfaces import Surfaces
 

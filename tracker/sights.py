@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tracker.body import BodyModel
 from tracker.compute.numba_options import BORROW
-from tracker.rigid import Array
+from tracker.geometry.rigid import Array
 from tracker.silhouettes import Image
 
 ALONG = 7

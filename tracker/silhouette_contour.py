@@ -8,7 +8,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.edges import Edges
-from tracker.rigid import FloatArray
+from tracker.geometry.rigid import FloatArray
 from tracker.silhouettes import Mask
 
 LEAST_LENGTH = 24

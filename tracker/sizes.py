@@ -7,8 +7,8 @@ import numpy as np
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
 from tracker.formats.trc import MarkerTable
+from tracker.geometry.rigid import Array
 from tracker.joints import Joint, Landmark, Part
-from tracker.rigid import Array
 
 _SIDES = ("left", "right")
 _SEGMENTS = (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))

@@ -5,33 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from tracker.body import BodyModel
-from tracker.cameras import Camera, viewed_point
 from tracker.fit import fit_to_points
-from tracker.floor import Floor
-from tracker.rigid import Array
+from tracker.geometry.cameras import Camera, viewed_point
+from tracker.geometry.rigid import Array
 
 _STRAIGHT_DOWN = 0.1
 """A camera whose axis has a smaller level component than this looks from above, or from below."""
-
-UP_ROTATIONS = {
-    "z": np.eye(3),
-    "-z": np.diag([1.0, -1.0, -1.0]),
-    "y": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
-    "-y": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
-    "x": np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]]),
-    "-x": np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]]),
-}
-"""Rotations that turn the body's z axis to the world axis that points up."""
-
-
-def up_rotation(up: str, floor: Floor | None) -> Array:
-    """Rotation whose z axis points up from the floor, (3, 3).
-
-    Args:
-        up: world axis that points up, or is nearest to it.
-        floor: as a person has set it; None for the plane through the world's origin.
-    """
-    return UP_ROTATIONS[up] if floor is None else floor.turned(UP_ROTATIONS[up])
 
 
 def standing_pose(

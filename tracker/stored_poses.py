@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from tracker.geometry.rigid import Array
 from tracker.records import SOURCES, STATUSES, Alternative, FrameNumbers, FrameRow, PoseRecord
-from tracker.rigid import Array
 
 SHOWN = "FROM poses p JOIN pose_changes c ON c.id = p.change"
 """The rows of the poses that the head of the history shows, `c`, with their key, `p`."""

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body import BodyModel
-from tracker.rigid import Array, FloatArray
-from tracker.shapes import Shape, TaperedSuperquadric
+from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.shapes import Shape, TaperedSuperquadric
 
 N_RINGS, N_SECTORS = 14, 24
 """Of the grid on a part that is no solid of revolution."""

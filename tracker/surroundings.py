@@ -6,9 +6,9 @@ import numpy as np
 
 from tracker import contours
 from tracker.body import Body
-from tracker.cameras import Camera, Region
+from tracker.geometry.cameras import Camera, Region
+from tracker.geometry.rigid import FloatArray
 from tracker.matched import region_around
-from tracker.rigid import FloatArray
 
 _NEAREST_M = 0.3
 """Bodies nearer to a camera, and those behind it, count as this near."""

@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body import Body, BodyModel
-from tracker.cameras import Region
 from tracker.compute.threads import side_by_side
 from tracker.confidence import Quality, Status
 from tracker.evidence import ViewEvidence
+from tracker.geometry.cameras import Region
+from tracker.geometry.rigid import Array
 from tracker.memory import Memory
 from tracker.observer import Observer
 from tracker.predict import PredictSettings
-from tracker.rigid import Array
 from tracker.scene import Found, Scene
 from tracker.scenery import Scenery
 from tracker.surroundings import confirmed, regions, regions_ahead, visible_outline

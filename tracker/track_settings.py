@@ -12,10 +12,10 @@ from tracker.body import Body, BodyModel
 from tracker.chamfer import ChamferCost, Outliers
 from tracker.evidence import ViewEvidence
 from tracker.fit import Block, StayNear
+from tracker.geometry.rigid import Array
 from tracker.predict import PredictSettings
 from tracker.recover import RecoverSettings
 from tracker.refine import MatchSettings
-from tracker.rigid import Array
 from tracker.search import SearchSettings, SearchStep, search
 
 Estimation = Literal["refine", "search"]

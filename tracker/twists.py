@@ -9,8 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.numba_options import FAST
+from tracker.geometry.rigid import Array, FloatArray
 from tracker.kinematics import IntArray
-from tracker.rigid import Array, FloatArray
 
 
 @njit(**FAST)

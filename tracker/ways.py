@@ -18,9 +18,9 @@ from tracker.body import BodyModel
 from tracker.compute.threads import N_HELPERS, dealt_out
 from tracker.descent import solve
 from tracker.fit import Block
+from tracker.geometry.rigid import Array
 from tracker.recover import APART_M, LEAST_GAIN
 from tracker.refine import WORTH_A_STEP, ContourMatch
-from tracker.rigid import Array
 from tracker.track_settings import TrackSettings, prior_blocks
 
 ROUNDS = 2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.centred import aspect_around, centred, field_of_view
-from tracker.cameras import Camera
+from tracker.geometry.cameras import Camera
 
 K = np.array([[610.0, 3.0, 250.0], [0.0, 590.0, 291.0], [0.0, 0.0, 1.0]])
 """Off the middle by 70 and 51 px, with oblong and slanted pixels."""

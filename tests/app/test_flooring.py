@@ -6,11 +6,10 @@ import pytest
 from app import intentions
 from app.floor_lines import floor_lines
 from app.messages import state as state_message
-from tracker import rigid
 from tracker.errors import TrackerError
-from tracker.floor import Floor, nearest_axis
+from tracker.geometry import rigid
+from tracker.geometry.ground_plane import UP_ROTATIONS, Floor, nearest_axis, up_rotation
 from tracker.session import load_session
-from tracker.standing import UP_ROTATIONS, up_rotation
 
 TILT = rigid.so3_exp(np.array([0.05, -0.03, 0.0]))
 HEIGHT_M = 0.12

@@ -8,7 +8,7 @@ import pytest
 from hands import drag, wait_for
 
 from app.gizmos import Gizmos
-from tracker import rigid
+from tracker.geometry import rigid
 
 
 class Handle:

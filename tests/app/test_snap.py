@@ -10,7 +10,7 @@ import pytest
 from hands import wait_for
 
 from app.snap import SnapView
-from tracker import rigid
+from tracker.geometry import rigid
 
 START = (np.array([3.0, 3.0, 2.0]), np.array([1.0, 0.0, 0.0, 0.0]))
 

@@ -12,9 +12,9 @@ import pytest
 import tomli_w
 from command_line import SAMPLE, assert_refused, stored
 
-from tracker import rigid
-from tracker.cameras import Camera
 from tracker.formats.anipose import write_calibration
+from tracker.geometry import rigid
+from tracker.geometry.cameras import Camera
 from tracker.session_lock import SessionLock
 from tracker.simulate.encode import VideoWriter
 

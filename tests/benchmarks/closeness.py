@@ -20,9 +20,9 @@ from true_starts import read_simulated
 from tracker.body import BodyModel
 from tracker.evaluate import evaluate_joints, joints_of_poses
 from tracker.formats.trc import MarkerTable
+from tracker.geometry.rigid import Array
 from tracker.observer import Observer
 from tracker.recording import Recording
-from tracker.rigid import Array
 from tracker.session import Session
 from tracker.simulate import simulate
 from tracker.track import track_chamfer

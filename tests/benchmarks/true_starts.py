@@ -10,9 +10,9 @@ from tracker.body import BodyModel
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
+from tracker.geometry.rigid import Array
 from tracker.joint_maps import LIMB_JOINTS
 from tracker.references import read_joints
-from tracker.rigid import Array
 from tracker.session import Session, load_session
 
 

@@ -14,12 +14,12 @@ import pytest_asyncio
 from driving import shows, state_of, to_client
 from running import Program
 
-from tracker import rigid
 from tracker.annotations import AnnotationStore
 from tracker.body import Body
-from tracker.cameras import Camera, viewed_point
 from tracker.contours import part_poses
 from tracker.formats.model_toml import format_model, load_model
+from tracker.geometry import rigid
+from tracker.geometry.cameras import Camera, viewed_point
 from tracker.records import PoseChange, PoseRecord
 from tracker.session import CameraSource, Person, create_session, load_session
 from tracker.standing import standing_pose

@@ -9,10 +9,10 @@ from tracker.body import BodyModel
 from tracker.evidence import ViewEvidence
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import load_model
+from tracker.geometry.rigid import Array
 from tracker.observer import Observer
 from tracker.recording import Recording
 from tracker.references import read_joints
-from tracker.rigid import Array
 from tracker.session import load_session
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"

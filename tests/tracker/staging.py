@@ -8,9 +8,9 @@ from scipy.spatial import cKDTree
 
 from tracker import contours
 from tracker.body import Body
-from tracker.cameras import Camera
 from tracker.evidence import view_evidence
 from tracker.formats.model_toml import parse_model
+from tracker.geometry.cameras import Camera
 from tracker.observer import Observer
 from tracker.session import CameraSource
 

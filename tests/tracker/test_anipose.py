@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 import tomli_w
 
-from tracker import rigid
-from tracker.cameras import Camera
 from tracker.errors import CalibrationError
 from tracker.formats.anipose import read_calibration, write_calibration
+from tracker.geometry import rigid
+from tracker.geometry.cameras import Camera
 
 
 def section(**changes):

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from clips import SIZE, encode, write_images
 
-from tracker import rigid
 from tracker.assemble import assemble
-from tracker.cameras import Camera
 from tracker.errors import CalibrationError, ModelError, RecordingError, SessionError
 from tracker.formats.anipose import write_calibration
+from tracker.geometry import rigid
+from tracker.geometry.cameras import Camera
 from tracker.recording import Recording
 from tracker.session import load_session
 

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracker import rigid
 from tracker.body import parts_of
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
+from tracker.geometry import rigid
 
 BALLS = """
 version = 1

@@ -2,9 +2,9 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker import rigid
-from tracker.cameras import Camera, epipolar_segment, viewed_point
 from tracker.errors import CalibrationError
+from tracker.geometry import rigid
+from tracker.geometry.cameras import Camera, epipolar_segment, viewed_point
 
 K = np.array([[600.0, 0.0, 315.3], [0.0, 610.0, 244.7], [0.0, 0.0, 1.0]])
 DISTORTIONS = {

@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tracker import rigid
 from tracker.errors import FormatError
 from tracker.evaluate import (
     Motion,
@@ -16,6 +15,7 @@ from tracker.evaluate import (
 )
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
+from tracker.geometry import rigid
 from tracker.joint_maps import JOINTS, LIMB_JOINTS
 
 

@@ -7,7 +7,6 @@ from staging import camera_at
 
 from tracker import contours
 from tracker.body import Body
-from tracker.cameras import Camera
 from tracker.errors import RecordingError
 from tracker.evidence import (
     SCENE_SPACING_PX,
@@ -15,6 +14,7 @@ from tracker.evidence import (
     default_theta_px,
     view_evidence,
 )
+from tracker.geometry.cameras import Camera
 from tracker.matched import MatchedView, match_scale, region_around
 from tracker.observer import FOREGROUND_MARGIN, Observer
 from tracker.recording import Recording

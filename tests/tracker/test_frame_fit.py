@@ -10,9 +10,9 @@ from tracker.body import Body
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import load_model
 from tracker.frame_fit import fit_frame
+from tracker.geometry.triangulation import ViewPin
 from tracker.joint_maps import LIMB_JOINTS
 from tracker.observer import Observer
-from tracker.pins import ViewPin
 from tracker.recording import Recording
 from tracker.references import read_joints
 from tracker.session import load_session

@@ -4,7 +4,7 @@ from test_body import BALLS
 
 from tracker.errors import ModelError
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M, PRESETS, format_model, load_model, parse_model
-from tracker.shapes import Ellipsoid, EllipticalCone
+from tracker.geometry.shapes import Ellipsoid, EllipticalCone
 
 SMALL = """
 version = 1

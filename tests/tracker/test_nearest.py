@@ -3,7 +3,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracker.nearest import LANES, STRIP_PX, Segments, nearest_segment, sort_points, stack_rows, within_reach
+from tracker.geometry.segment_distance import (
+    LANES,
+    STRIP_PX,
+    Segments,
+    nearest_segment,
+    sort_points,
+    stack_rows,
+    within_reach,
+)
 
 WIDTH, HEIGHT = 3 * STRIP_PX - 50, 200
 

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 from staging import camera_at, in_posture
 
-from tracker import rigid
 from tracker.body import Body
+from tracker.geometry import rigid
 from tracker.picking import part_outlines, place_on_part
 
 SIDE = camera_at("side", (3.0, 2.5, 1.0))

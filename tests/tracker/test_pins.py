@@ -9,7 +9,8 @@ from test_fit import ARM
 
 from tracker.fit import StayNear, solve
 from tracker.formats.model_toml import load_model
-from tracker.pins import ViewPin, pin_block, sigma_px, triangulate
+from tracker.geometry.triangulation import ViewPin, sigma_px, triangulate
+from tracker.pins import pin_block
 
 GAVRILA = load_model("gavrila34")
 CAMERAS = [replace(c, distortion=np.array([-0.2, 0.05, 0.001, -0.001])) for c in cameras_around(4)]

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from staging import camera_at, cameras_around, shaken
 
-from tracker import posing, rigid
+from tracker import posing
 from tracker.body import Body
 from tracker.fit import solve
 from tracker.formats.model_toml import load_model
+from tracker.geometry import rigid
 from tracker.picking import part_outlines
 from tracker.posing import drag, grab, grab_part, hold_anew, minor_points, push, turn
 

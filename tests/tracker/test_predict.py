@@ -4,9 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_body import BALLS
 
-from tracker import rigid
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import load_model, parse_model
+from tracker.geometry import rigid
 from tracker.predict import PredictSettings, predict, unwrapped
 
 GAVRILA = load_model("gavrila22")

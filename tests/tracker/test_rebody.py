@@ -5,8 +5,8 @@ import pytest
 from staging import cameras_around, posed
 
 from tracker.formats.model_toml import load_model
+from tracker.geometry.triangulation import ViewPin
 from tracker.measures import PartSizes, sizes_of, with_sizes
-from tracker.pins import ViewPin
 from tracker.rebody import rebodied
 
 

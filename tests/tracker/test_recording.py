@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from clips import SIZE, encode, number, picture, write_images
 
-from tracker.cameras import Camera
 from tracker.errors import RecordingError
 from tracker.formats.anipose import read_calibration
+from tracker.geometry.cameras import Camera
 from tracker.recording import Recording, read_background, read_mask
 from tracker.session import CameraSource
 

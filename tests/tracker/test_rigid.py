@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tracker import rigid
+from tracker.geometry import rigid
 
 coordinates = st.floats(-10, 10, allow_nan=False)
 vectors = st.tuples(coordinates, coordinates, coordinates).map(np.array)

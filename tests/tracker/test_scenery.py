@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from tracker.cameras import Camera
 from tracker.evidence import unfiltered, view_evidence
+from tracker.geometry.cameras import Camera
 from tracker.scenery import Scenery
 from tracker.segments import Segments
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from clips import SIZE, encode
 
-from tracker import rigid
-from tracker.cameras import Camera
 from tracker.errors import CalibrationError, ModelError, SessionError
 from tracker.formats.model_toml import load_model
+from tracker.geometry import rigid
+from tracker.geometry.cameras import Camera
 from tracker.session import CameraSource, Person, create_session, load_session, save_session
 
 K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tracker.shapes import Ellipsoid, EllipticalCone, TaperedSuperquadric
+from tracker.geometry.shapes import Ellipsoid, EllipticalCone, TaperedSuperquadric
 
 SHAPES = {
     "sphere": TaperedSuperquadric((0.3, 0.3, 0.3), (1.0, 1.0)),

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from staging import camera_at, cameras_around
 
-from tracker import rigid
-from tracker.standing import UP_ROTATIONS, standing_pose
+from tracker.geometry import rigid
+from tracker.geometry.ground_plane import UP_ROTATIONS
+from tracker.standing import standing_pose
 
 
 def place(model, values, point):

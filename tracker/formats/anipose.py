@@ -12,11 +12,11 @@ from typing import Any, Literal
 import numpy as np
 import tomli_w
 
-from tracker import rigid
-from tracker.cameras import DISTORTION_COUNTS, Camera
 from tracker.errors import CalibrationError
 from tracker.files import read_toml, write_text_whole
-from tracker.rigid import Array
+from tracker.geometry import rigid
+from tracker.geometry.cameras import DISTORTION_COUNTS, Camera
+from tracker.geometry.rigid import Array
 
 Units = Literal["m", "mm"]
 

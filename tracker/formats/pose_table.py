@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from tracker.body import BodyModel
 from tracker.errors import FormatError
 from tracker.files import write_text_whole
-from tracker.rigid import Array
+from tracker.geometry.rigid import Array
 
 VERSION = 1
 

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from tracker import rigid
 from tracker.body import BodyModel, IntArray
-from tracker.rigid import Array
+from tracker.geometry import rigid
+from tracker.geometry.rigid import Array
 from tracker.simulate.anatomy import ANKLE_HEIGHT
 from tracker.simulate.builds import MAN, Build
 from tracker.simulate.outfit import Outfit

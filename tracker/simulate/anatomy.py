@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker import rigid
 from tracker.body import BodyModel
-from tracker.rigid import Array
+from tracker.geometry import rigid
+from tracker.geometry.rigid import Array
 from tracker.simulate.skeleton import Factors
 
 Point = tuple[float, float, float]

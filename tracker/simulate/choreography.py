@@ -6,9 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from tracker import rigid
 from tracker.body import BodyModel
-from tracker.rigid import Array
+from tracker.geometry import rigid
+from tracker.geometry.rigid import Array
 from tracker.simulate.acting import Posture, ramp, stance, standing_height
 
 ARM_DOFS = ("shoulder.abduction", "shoulder.elevation", "shoulder.twist", "elbow.extension")

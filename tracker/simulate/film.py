@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body import IntArray
-from tracker.rigid import Array
+from tracker.geometry.rigid import Array
 from tracker.simulate.render import Figure, cast, lit, pixel_means, vertex_normals
 from tracker.simulate.room import LAMP_WORLD, Backdrop, floor_shadow
 

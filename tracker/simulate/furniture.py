@@ -5,8 +5,8 @@ from typing import Literal
 
 import numpy as np
 
-from tracker import rigid
-from tracker.rigid import Array
+from tracker.geometry import rigid
+from tracker.geometry.rigid import Array
 from tracker.simulate.textures import value_noise
 
 Vector = tuple[float, float, float]

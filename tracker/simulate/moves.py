@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from tracker.rigid import Array
+from tracker.geometry.rigid import Array
 from tracker.simulate.acting import ramp
 from tracker.simulate.choreography import SIDES, Choreography, Track, glide
 

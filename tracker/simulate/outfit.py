@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.rigid import Array
+from tracker.geometry.rigid import Array
 from tracker.simulate.textures import value_noise
 
 Color = tuple[float, float, float]

@@ -6,8 +6,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from tracker import rigid
 from tracker.body import BodyModel
+from tracker.geometry import rigid
 from tracker.simulate.acting import Posture, Reach
 from tracker.simulate.choreography import SIDES, Choreography, Track
 

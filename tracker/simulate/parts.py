@@ -5,9 +5,9 @@ from functools import cached_property
 
 import numpy as np
 
-from tracker import rigid
 from tracker.body import BodyModel, IntArray
-from tracker.rigid import Array
+from tracker.geometry import rigid
+from tracker.geometry.rigid import Array
 
 
 @dataclass(frozen=True, eq=False)

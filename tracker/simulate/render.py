@@ -7,8 +7,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body import IntArray
-from tracker.cameras import Camera
-from tracker.rigid import Array
+from tracker.geometry.cameras import Camera
+from tracker.geometry.rigid import Array
 
 SAMPLES = 2
 """Samples per pixel along each axis. The colour of a pixel is the mean over its area, which is centred at integers."""

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tracker.cameras import Camera
 from tracker.errors import TrackerError
-from tracker.rigid import Array
+from tracker.geometry.cameras import Camera
+from tracker.geometry.rigid import Array
 from tracker.simulate.furniture import HALF_WIDTH_M
 
 CORNER_NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")

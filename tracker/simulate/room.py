@@ -9,8 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body import IntArray
-from tracker.cameras import Camera
-from tracker.rigid import Array
+from tracker.geometry.cameras import Camera
+from tracker.geometry.rigid import Array
 from tracker.simulate.furniture import HALF_WIDTH_M, furnished
 from tracker.simulate.render import DIRECT, SAMPLES, covered, lit, pixel_means
 

@@ -6,9 +6,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from tracker import rigid
 from tracker.body import BodyModel
 from tracker.errors import TrackerError
+from tracker.geometry import rigid
 from tracker.simulate.acting import Posture, Role, ramp, stance, standing_height
 from tracker.simulate.builds import MAN, WOMAN
 from tracker.simulate.moves import dance, exercise, leaving, mingling, reach_and_cross

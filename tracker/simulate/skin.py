@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from tracker import rigid
 from tracker.body import BodyModel, IntArray
-from tracker.rigid import Array
+from tracker.geometry import rigid
+from tracker.geometry.rigid import Array
 from tracker.simulate.anatomy import Lobe, bone_names, bone_poses
 from tracker.simulate.builds import MAN, Build
 from tracker.simulate.outfit import Outfit

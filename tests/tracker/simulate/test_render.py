@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from tracker import rigid
-from tracker.cameras import Camera
+from tracker.geometry import rigid
+from tracker.geometry.cameras import Camera
 from tracker.simulate.acting import perform
 from tracker.simulate.render import SAMPLES, cast, pixel_means, vertex_normals
 from tracker.simulate.rig import make_cameras

@@ -1,7 +1,7 @@
 import numpy as np
 import trimesh
 
-from tracker import rigid
+from tracker.geometry import rigid
 from tracker.simulate.acting import perform
 from tracker.simulate.anatomy import ANKLE_HEIGHT, bone_names
 from tracker.simulate.scenes import cast_of

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker import rigid
 from tracker.errors import CalibrationError
-from tracker.rigid import Array
+from tracker.geometry import rigid
+from tracker.geometry.rigid import Array
 
 DISTORTION_COUNTS = (0, 4, 5, 8)
 

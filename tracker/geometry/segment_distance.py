@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.numba_options import BORROW, FAST
-from tracker.rigid import FloatArray
+from tracker.geometry.rigid import FloatArray
 
 IntArray = NDArray[np.int64]
 

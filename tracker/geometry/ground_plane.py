@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracker.errors import TrackerError
-from tracker.rigid import Array, so3_exp
+from tracker.geometry.rigid import Array, so3_exp
 
 _LEAST_HEIGHT_M = 0.2
 """Three points whose triangle is flatter than this do not say how a floor lies: a click a few cm off would tilt it."""
@@ -63,3 +63,24 @@ def nearest_axis(normal: Array) -> str:
     """The world axis nearest to a direction: x, y or z, with a minus sign where it points the other way."""
     index = int(np.argmax(np.abs(normal)))
     return ("-" if normal[index] < 0 else "") + "xyz"[index]
+
+
+UP_ROTATIONS = {
+    "z": np.eye(3),
+    "-z": np.diag([1.0, -1.0, -1.0]),
+    "y": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
+    "-y": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+    "x": np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]]),
+    "-x": np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]]),
+}
+"""Rotations that turn the body's z axis to the world axis that points up."""
+
+
+def up_rotation(up: str, floor: Floor | None) -> Array:
+    """Rotation whose z axis points up from the floor, (3, 3).
+
+    Args:
+        up: world axis that points up, or is nearest to it.
+        floor: as a person has set it; None for the plane through the world's origin.
+    """
+    return UP_ROTATIONS[up] if floor is None else floor.turned(UP_ROTATIONS[up])

@@ -1,0 +1,1 @@
+"""Space without people: rotations and rigid motions, cameras, planes, solid primitives, distances to line segments."""
