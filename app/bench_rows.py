@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from app.bench_scenes import BenchCrowd, BenchFrame, pose_at
 from app.painting import PaintedCost
 from tracker import contours
-from tracker.body import Body, BodyModel
+from tracker.body.model import Body, BodyModel
 from tracker.chamfer import ChamferCost
 from tracker.descent import solve
 from tracker.fit import Block, Fit, StayNear, damped_step

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tracker.body import Body, BodyModel
+from tracker.body.model import Body, BodyModel
 from tracker.chamfer import ChamferCost
 from tracker.evidence import ViewEvidence
 from tracker.fit import fit_to_points

@@ -10,8 +10,8 @@ import viser
 
 from app.controller import Controller
 from app.state import State
+from tracker.body.dimensions import PartSizes, sizes_of, spoken, twin
 from tracker.errors import TrackerError
-from tracker.measures import PartSizes, sizes_of, spoken, twin
 
 _REFIT, _KEEP = "refit keyframes", "keep poses"
 _HEADING = "**length · half depth · half width**, cm"

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from app.bench_scenes import FRAME, read_crowd
 from app.samples import bundled
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.errors import SessionError
 from tracker.geometry.rigid import Array

@@ -34,7 +34,7 @@ from app.sizing import Sizing
 from app.state import State
 from app.tracking import Tracking
 from app.viewing import Viewing
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array
 from tracker.records import FrameNumbers
 from tracker.session import Session

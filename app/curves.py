@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.records import FrameNumbers
 

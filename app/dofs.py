@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel
-from tracker.confidence import spoken
+from tracker.body.limbs import spoken
+from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array
 from tracker.pose_edits import joint_of, limb_of
 

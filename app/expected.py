@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array
 from tracker.predict import PredictSettings, predict
 

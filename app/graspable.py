@@ -7,7 +7,7 @@ import numpy as np
 from app.layers import View
 from app.state import State
 from tracker import picking
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.geometry.rigid import FloatArray
 from tracker.session import Session
 

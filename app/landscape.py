@@ -9,7 +9,7 @@ import numpy as np
 from app.jobs import Latest
 from app.screen import Screen, spoken
 from app.state import Landscape, State
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence import ViewEvidence
 from tracker.geometry.rigid import Array

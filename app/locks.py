@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection
 from contextlib import AbstractContextManager
 
 from app.screen import Screen
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.locks import SETTING, kept_locks, to_keep
 
 

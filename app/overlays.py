@@ -8,7 +8,7 @@ import numpy as np
 from app.layers import View
 from app.state import State
 from tracker import contours, occlusion
-from tracker.body import Body, BodyModel
+from tracker.body.model import Body, BodyModel
 from tracker.contours import Contour
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry import rigid

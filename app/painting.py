@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.evidence import ViewEvidence
 from tracker.geometry.rigid import Array
 

@@ -13,7 +13,7 @@ from app.jobs import Latest
 from app.pace import Pace
 from app.settings_panel import SettingsPanel
 from app.state import State
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 
 _REACH_M = 6.0

@@ -7,7 +7,7 @@ from app import messages, overlays, pictures
 from app.controller import Controller
 from app.layers import EVIDENCE, Picture, View
 from app.state import State
-from tracker.body import Body
+from tracker.body.model import Body
 
 Key = tuple[Picture, int]
 """Layer and camera."""

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.evidence import ViewEvidence
 from tracker.geometry.cameras import Camera
 from tracker.part_masks import part_labels

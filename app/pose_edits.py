@@ -8,7 +8,7 @@ import numpy as np
 
 from app.screen import Screen, spoken
 from tracker import confidence, posing
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry.rigid import Array
 from tracker.orienting import orient

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.search import SearchStep, Stage, stages
 from tracker.track_settings import TrackSettings

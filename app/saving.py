@@ -12,7 +12,7 @@ from app.state import Shown, State
 from app.tracked import keyframes_of, tracked_changes
 from app.writing import Writing
 from tracker.annotations import AnnotationStore
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, parse_model
 from tracker.geometry.rigid import Array

@@ -17,7 +17,7 @@ from app.state import State
 from app.trails import Trails
 from app.view_choice import View3d
 from app.view_panel import ViewPanel
-from tracker.body import Body, BodyModel
+from tracker.body.model import Body, BodyModel
 from tracker.contours import part_poses
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera, viewed_point

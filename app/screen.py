@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from app.frames import Frames
 from app.saving import Saver
 from app.state import Shown, State, finite_or_none
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.fit import held
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.rigid import Array

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.screen import spoken
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.search import SearchSettings, stages
 from tracker.track_settings import TrackSettings

@@ -10,9 +10,9 @@ import numpy as np
 from app.runs import Runs
 from app.screen import Screen
 from app.state import SizeDraft
-from tracker.body import BodyModel
+from tracker.body.dimensions import BodySizes, PartSizes, scaled, sizes_of, twin, with_sizes
+from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.measures import BodySizes, PartSizes, scaled, sizes_of, twin, with_sizes
 from tracker.rebody import rebodied
 from tracker.records import Change, PoseChange
 from tracker.session import save_model

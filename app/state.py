@@ -6,7 +6,7 @@ import numpy as np
 
 from app.floor_picks import FloorState
 from app.view_choice import View3d
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import ViewPin
 from tracker.track_settings import TrackSettings

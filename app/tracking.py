@@ -12,7 +12,7 @@ from app.jobs import Job
 from app.screen import Screen
 from app.state import Shown, TrackState, finite_or_none
 from tracker import confidence
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.confidence import Status
 from tracker.errors import TrackerError
 from tracker.geometry.rigid import Array

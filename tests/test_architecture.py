@@ -11,7 +11,7 @@ ROOMS = [
     "tracker",
     "tracker.compute",
     "tracker.geometry",
-    "tracker.body",
+    "tracker.body.model",
     "tracker.motion",
     "tracker.formats",
     "tracker.footage",

@@ -13,10 +13,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body import Body, BodyModel, parts_of
+from tracker.body.kinematics import IntArray, Kinematics
+from tracker.body.model import Body, BodyModel, parts_of
 from tracker.fit import Normal
 from tracker.geometry.rigid import Array
-from tracker.kinematics import IntArray, Kinematics
 from tracker.surfaces import surfaces_of
 
 _SAMPLES = 5

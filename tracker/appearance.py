@@ -13,12 +13,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body import Body, BodyModel, parts_of
+from tracker.body.kinematics import Kinematics, chain_poses
+from tracker.body.model import Body, BodyModel, parts_of
 from tracker.compute.numba_options import BORROW
 from tracker.contours import part_poses, projection
 from tracker.evidence import ViewEvidence
 from tracker.geometry.rigid import Array
-from tracker.kinematics import Kinematics, chain_poses
 from tracker.limb_look import ColorView, LimbLook, Standing
 from tracker.sights import (
     ALONG,

@@ -17,7 +17,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker import contours
-from tracker.body import Body, BodyModel, parts_of
+from tracker.body.kinematics import Tree, forward_kinematics
+from tracker.body.model import Body, BodyModel, parts_of
 from tracker.compute.numba_options import FAST
 from tracker.compute.threads import helpers
 from tracker.evidence import ViewEvidence
@@ -31,7 +32,6 @@ from tracker.geometry.segment_distance import (
     stack_rows,
     within_reach,
 )
-from tracker.kinematics import Tree, forward_kinematics
 from tracker.sampling import bilinear
 
 Outliers = Literal["truncated", "paper"]

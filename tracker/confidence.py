@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.appearance import ColorScore, PartColors
-from tracker.body import Body, BodyModel
+from tracker.body.limbs import limbs, spoken
+from tracker.body.model import Body
 from tracker.fit import Fit, covariance
 from tracker.geometry.rigid import Array
 from tracker.refine import PartCosts
@@ -38,17 +39,6 @@ there is doubt: it costs time, and a limb that is left astray leads the frames a
 half of all limbs are in doubt, and what is searched in vain may find what is another's."""
 _LOST_FORWARD = 0.6
 """Of a body whose contours are farther than this from all edges, in outlier distances, nothing holds."""
-
-
-class Limb(NamedTuple):
-    """A chain of parts that can be lost by itself."""
-
-    name: str
-    """Name of its last part."""
-    parts: NDArray[np.int64]
-    """Indices of its parts, from the trunk outwards."""
-    dofs: NDArray[np.bool_]
-    """The degrees of freedom of its joints, (n_dofs,)."""
 
 
 class LimbFigures(NamedTuple):
@@ -127,22 +117,6 @@ def _log_odds(found: Quality) -> Array:
     odds = np.array([_WEIGHTS @ [*evidence(found, x), 1.0] for x in found.limbs])
     odds.flags.writeable = False
     return odds
-
-
-@lru_cache(maxsize=32)
-def limbs(model: BodyModel) -> tuple[Limb, ...]:
-    """The chains from the leaves of the joint tree up to where it branches."""
-    children = np.bincount(np.array(model.parents)[1:], minlength=len(model.parts))
-    out = []
-    for leaf in np.flatnonzero(children == 0):
-        chain, part = [int(leaf)], model.parents[leaf]
-        while part > 0 and children[part] == 1:
-            chain.append(part)
-            part = model.parents[part]
-        dofs = np.isin(model.dof_joint, chain)
-        if chain != [0] and dofs.any():
-            out.append(Limb(model.parts[leaf].name, np.array(chain[::-1]), dofs))
-    return tuple(out)
 
 
 def quality(
@@ -228,11 +202,6 @@ def reason(found: Quality) -> str:
     if odds.max() <= _DOUBTFUL:
         return "part of the silhouette unexplained"
     return f"{spoken(found.limbs[int(odds.argmax())].name)} uncertain"
-
-
-def spoken(limb: str) -> str:
-    """The name of a limb as people say it."""
-    return limb.replace("forearm", "arm").replace("calf", "leg").replace("_", " ")
 
 
 def worst(statuses: Sequence[Status]) -> Status:

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.compute.numba_options import FAST
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array, FloatArray

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from tracker import fit
 from tracker.apart import NOTHING_APART, Apart, KeepApart, KeepBodiesApart, push_apart
-from tracker.body import BodyModel
+from tracker.body.kinematics import IntArray, Kinematics, Tree, forward_kinematics
+from tracker.body.model import BodyModel
 from tracker.compute.numba_options import BORROW
 from tracker.fit import AT_LIMIT, FELT_DAMPING, FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING, Block, Fit, StayNear
 from tracker.geometry.rigid import Array
-from tracker.kinematics import IntArray, Kinematics, Tree, forward_kinematics
 from tracker.matching import DERIVE, Work, gather
 from tracker.refine import ContourMatch
 from tracker.twists import to_dofs

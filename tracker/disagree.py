@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array
 
 _MOST_M_S2 = 90.0

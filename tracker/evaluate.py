@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.errors import FormatError
 from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import Body, BodyModel
+from tracker.body.model import Body, BodyModel
 from tracker.descent import solve
 from tracker.evidence import ViewEvidence
 from tracker.fit import Block, of_values

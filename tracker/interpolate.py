@@ -10,10 +10,10 @@ import warnings
 
 import numpy as np
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
+from tracker.body.parts import Joint
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array
-from tracker.joints import Joint
 
 
 def between(model: BodyModel, start: Array, end: Array, shares: Array) -> Array:

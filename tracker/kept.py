@@ -11,10 +11,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.body.kinematics import IntArray
 from tracker.compute.numba_options import BORROW, FAST
 from tracker.contours import Pieces, face, focal_px, hide_all, trace_part
 from tracker.geometry.rigid import Array, FloatArray
-from tracker.kinematics import IntArray
 from tracker.outlines import MAX_POINTS
 from tracker.surfaces import Surfaces
 

@@ -12,10 +12,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel
+from tracker.body.kinematics import IntArray, Kinematics, chain_poses
+from tracker.body.model import BodyModel
 from tracker.compute.numba_options import BORROW
 from tracker.geometry.rigid import Array, FloatArray
-from tracker.kinematics import IntArray, Kinematics, chain_poses
 from tracker.sights import ALONG, BINS, NEAREST_M, along_axis, bin_of, hidden, pixel_on_axis, place_before, see_axis
 from tracker.silhouettes import Image
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.session import Person
 
 SETTING = "locked"

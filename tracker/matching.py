@@ -7,12 +7,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker import contours
+from tracker.body.kinematics import IntArray
 from tracker.compute.numba_options import FAST
 from tracker.evidence import SCENE_SPACING_PX
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.geometry.segment_distance import LANES, cells_within
 from tracker.kept import Kept, keep_pieces, mark_covered, remember, still_stands, trace_moving, trace_standing
-from tracker.kinematics import IntArray
 from tracker.sampling import bilinear
 from tracker.twists import add_twists
 

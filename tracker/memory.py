@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from tracker import confidence
 from tracker.appearance import Colors, PartColors
-from tracker.body import BodyModel
-from tracker.confidence import Limb, Quality, Status
+from tracker.body.limbs import Limb
+from tracker.body.model import BodyModel
+from tracker.confidence import Quality, Status
 from tracker.fit import held
 from tracker.geometry.rigid import Array
 from tracker.predict import PredictSettings, predict

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel
+from tracker.body.kinematics import Kinematics
+from tracker.body.model import BodyModel
 from tracker.fit import Normal, normal_of, solve
 from tracker.geometry.rigid import Array
-from tracker.kinematics import Kinematics
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body import Body, BodyModel
+from tracker.body.model import Body, BodyModel
 from tracker.compute.numba_options import FAST
 from tracker.contours import part_poses, projection
 from tracker.geometry.cameras import Camera

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from tracker.body import Body, BodyModel
+from tracker.body.model import Body, BodyModel
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array, FloatArray

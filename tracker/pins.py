@@ -9,12 +9,12 @@ from functools import cached_property
 
 import numpy as np
 
-from tracker.body import BodyModel
+from tracker.body.kinematics import IntArray, Kinematics
+from tracker.body.model import BodyModel
 from tracker.fit import Normal, normal_of
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import _NEAREST_M, ViewPin, sigma_px
-from tracker.kinematics import IntArray, Kinematics
 
 
 @dataclass(frozen=True, eq=False)

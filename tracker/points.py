@@ -11,11 +11,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker import contours
-from tracker.body import Body
+from tracker.body.kinematics import IntArray
+from tracker.body.model import Body
 from tracker.compute.numba_options import BORROW
 from tracker.evidence import SCENE_SPACING_PX, ViewEvidence
 from tracker.geometry.rigid import FloatArray
-from tracker.kinematics import IntArray
 
 N_COLUMNS = 7
 """u, v, the normal's u and v, the weight, and how many points it stands for: in all, and of the silhouette."""

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel
-from tracker.confidence import limbs
+from tracker.body.dimensions import twin
+from tracker.body.kinematics import IntArray
+from tracker.body.limbs import limbs
+from tracker.body.model import BodyModel
+from tracker.body.parts import Joint
 from tracker.geometry.rigid import Array
-from tracker.joints import Joint
-from tracker.kinematics import IntArray
-from tracker.measures import twin
 from tracker.orienting import orient
 
 _MIRROR = np.diag([1.0, -1.0, 1.0])

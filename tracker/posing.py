@@ -7,13 +7,13 @@ from typing import TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import Body, BodyModel
+from tracker.body.kinematics import Kinematics
+from tracker.body.model import Body, BodyModel
 from tracker.errors import TrackerError
 from tracker.fit import Block, Normal, StayNear, normal_of, solve
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array
-from tracker.kinematics import Kinematics
 from tracker.orienting import orient
 from tracker.picking import place_on_part
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry.rigid import Array
 

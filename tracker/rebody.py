@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.fit import Block, PointTargets, StayNear, solve
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array

@@ -16,13 +16,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.appearance import Colors, PartColors
-from tracker.body import BodyModel
+from tracker.body.kinematics import IntArray, chain_poses
+from tracker.body.limbs import Limb
+from tracker.body.model import BodyModel
 from tracker.compute.threads import N_HELPERS, dealt_out, helpers
-from tracker.confidence import Limb
 from tracker.descent import solve
 from tracker.fit import Block, Fit
 from tracker.geometry.rigid import Array
-from tracker.kinematics import IntArray, chain_poses
 from tracker.refine import WORTH_A_STEP, ContourMatch
 
 T = TypeVar("T")

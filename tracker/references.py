@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.annotations import AnnotationStore
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.errors import FormatError, SessionError
 from tracker.evaluate import Motion, at_rate, joints_of_poses, remap_axes
 from tracker.formats.model_toml import PRESETS, load_model, parse_model

@@ -22,13 +22,13 @@ import numpy as np
 from numba import njit
 
 from tracker import contours
-from tracker.body import Body, BodyModel, parts_of
+from tracker.body.kinematics import IntArray, Kinematics, Tree, forward_kinematics
+from tracker.body.model import Body, BodyModel, parts_of
 from tracker.evidence import ViewEvidence
 from tracker.fit import Normal
 from tracker.geometry.rigid import Array
 from tracker.geometry.segment_distance import sort_points, stack_rows
 from tracker.kept import Kept, kept_for
-from tracker.kinematics import IntArray, Kinematics, Tree, forward_kinematics
 from tracker.matching import SUM_UP, Scene, Sums, Work, gather, scratch_for
 from tracker.points import points_to_match
 from tracker.twists import to_dofs

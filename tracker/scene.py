@@ -16,9 +16,10 @@ import numpy as np
 from tracker import confidence
 from tracker.apart import KeepBodiesApart
 from tracker.appearance import Colors
-from tracker.body import Body
+from tracker.body.limbs import Limb
+from tracker.body.model import Body
 from tracker.compute.threads import side_by_side
-from tracker.confidence import Limb, Quality, Status
+from tracker.confidence import Quality, Status
 from tracker.descent import solve
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.fit import Block, Fit, covariance, held

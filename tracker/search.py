@@ -13,11 +13,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
+from tracker.body.parts import SearchGroup
 from tracker.chamfer import ChamferCost
 from tracker.errors import TrackerError
 from tracker.geometry.rigid import Array
-from tracker.joints import SearchGroup
 
 
 @dataclass(frozen=True)

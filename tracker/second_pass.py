@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tracker.apart import KeepBodiesApart
 from tracker.appearance import Colors, PartColors
-from tracker.body import Body, BodyModel
+from tracker.body.model import Body, BodyModel
 from tracker.confidence import Status
 from tracker.evidence import ViewEvidence
 from tracker.fit import held

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.errors import SessionError
 from tracker.files import read_toml, write_text_whole
 from tracker.footage import open_footage

@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker import contours
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.contours import PIECE_PX, Contour, trace_view
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence, findable, unfiltered, with_segments
 from tracker.geometry.rigid import Array, FloatArray

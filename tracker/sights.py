@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.compute.numba_options import BORROW
 from tracker.geometry.rigid import Array
 from tracker.silhouettes import Image

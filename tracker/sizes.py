@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
+from tracker.body.parts import Joint, Landmark, Part
 from tracker.errors import TrackerError
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
-from tracker.joints import Joint, Landmark, Part
 
 _SIDES = ("left", "right")
 _SEGMENTS = (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tracker import contours
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.geometry.cameras import Camera, Region
 from tracker.geometry.rigid import FloatArray
 from tracker.matched import region_around

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import Body, BodyModel
+from tracker.body.model import Body, BodyModel
 from tracker.compute.threads import side_by_side
 from tracker.confidence import Quality, Status
 from tracker.evidence import ViewEvidence

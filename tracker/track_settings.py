@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.apart import KeepApart
-from tracker.body import Body, BodyModel
+from tracker.body.model import Body, BodyModel
 from tracker.chamfer import ChamferCost, Outliers
 from tracker.evidence import ViewEvidence
 from tracker.fit import Block, StayNear

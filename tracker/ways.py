@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.appearance import Colors, PartColors
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.compute.threads import N_HELPERS, dealt_out
 from tracker.descent import solve
 from tracker.fit import Block

@@ -9,7 +9,7 @@ from viser._gui_handles import GuiEvent
 
 from app import body_panel
 from app.body_panel import BodyPanel
-from tracker.measures import sizes_of
+from tracker.body.dimensions import sizes_of
 
 
 @pytest.fixture

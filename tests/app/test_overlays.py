@@ -10,7 +10,7 @@ from app.layers import View
 from app.overlays import Path
 from app.state import Shown
 from tracker import contours
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.evidence import ViewEvidence
 from tracker.segments import Segments
 

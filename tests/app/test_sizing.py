@@ -8,8 +8,8 @@ from hands import PAGE, drag, pixel_of, wait_for
 
 from app import layers, messages
 from tracker.annotations import AnnotationStore
+from tracker.body.dimensions import PartSizes, sizes_of
 from tracker.errors import TrackerError
-from tracker.measures import PartSizes, sizes_of
 from tracker.session import load_session
 
 FRAMES = (0, 3)

@@ -17,7 +17,7 @@ from sections import measured, put_section, table
 from true_starts import read_simulated, start_of
 
 from tracker.assemble import assemble
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.evaluate import evaluate_joints, joints_of_poses
 from tracker.formats.trc import MarkerTable
 from tracker.observer import Observer

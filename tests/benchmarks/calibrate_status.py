@@ -22,7 +22,7 @@ from scipy.optimize import minimize
 from true_starts import read_simulated
 
 from tracker import confidence
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.confidence import Status
 from tracker.geometry.rigid import Array
 from tracker.joint_maps import LIMB_JOINTS

@@ -17,7 +17,7 @@ import numpy as np
 from sections import measured, put_section, table
 from true_starts import read_simulated
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.evaluate import evaluate_joints, joints_of_poses
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scripted_user import LIMBS, TRUNK, ScriptedUser
 
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_table import read_pose_table, write_pose_table
 from tracker.occlusion import points_hidden

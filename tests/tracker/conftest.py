@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import pytest
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.evidence import ViewEvidence
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import load_model

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tracker import contours
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.evidence import view_evidence
 from tracker.formats.model_toml import parse_model
 from tracker.geometry.cameras import Camera

@@ -3,7 +3,7 @@ import pytest
 from staging import at, posed, shaken, solid
 
 from tracker.apart import KeepApart, KeepBodiesApart
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.fit import StayNear, solve
 
 BALL, ROD = solid((0.1, 0.1, 0.1)), solid((0.05, 0.05, 0.3))

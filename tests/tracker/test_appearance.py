@@ -7,7 +7,7 @@ from staging import SUIT, at, camera_at, cameras_around, dressed, own_evidence, 
 
 from tracker import appearance
 from tracker.appearance import Colors
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.sights import BINS
 
 GRAY = dict.fromkeys(SUIT, (120, 120, 120))

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracker.body import parts_of
+from tracker.body.model import parts_of
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 from tracker.geometry import rigid
 

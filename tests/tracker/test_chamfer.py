@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 from staging import at, camera_at, cameras_around, own_evidence, shaken, solid
 
 from tracker import contours
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.chamfer import ChamferCost
 from tracker.evidence import ViewEvidence, default_theta_px, view_evidence
 from tracker.formats.model_toml import load_model

@@ -8,8 +8,9 @@ from staging import SUIT, cameras_around, dressed, own_evidence, posed
 from test_body import BALLS
 
 from tracker.appearance import Colors
-from tracker.body import Body
-from tracker.confidence import LimbFigures, Quality, judge, limbs, quality, reason, worst
+from tracker.body.limbs import limbs
+from tracker.body.model import Body
+from tracker.confidence import LimbFigures, Quality, judge, quality, reason, worst
 from tracker.fit import StayNear, solve
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 from tracker.refine import ContourMatch

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 from staging import at, camera_at, cameras_around, solid
 
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.contours import PIECE_PX, trace
 from tracker.formats.model_toml import parse_model
 from tracker.hiding import JOINT_MARGIN_M

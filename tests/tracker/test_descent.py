@@ -6,8 +6,8 @@ from staging import cameras_around, own_evidence, posed, shaken
 
 from tracker import descent, fit
 from tracker.apart import KeepApart, KeepBodiesApart
-from tracker.body import Body
-from tracker.confidence import limbs
+from tracker.body.limbs import limbs
+from tracker.body.model import Body
 from tracker.descent import solve
 from tracker.fit import PointTargets, StayNear
 from tracker.formats.model_toml import load_model

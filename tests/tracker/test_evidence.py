@@ -6,7 +6,7 @@ import pytest
 from staging import camera_at
 
 from tracker import contours
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.errors import RecordingError
 from tracker.evidence import (
     SCENE_SPACING_PX,

@@ -6,7 +6,7 @@ from staging import cameras_around, own_evidence, posed, shaken
 from test_fit import ARM
 from test_pins import seen
 
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import load_model
 from tracker.frame_fit import fit_frame

@@ -4,8 +4,8 @@ from match_oracle import MatchOracle, without_ties
 from staging import cameras_around, own_evidence, posed, shaken
 
 from tracker import contours
-from tracker.body import Body
-from tracker.confidence import limbs
+from tracker.body.limbs import limbs
+from tracker.body.model import Body
 from tracker.contours import PIECE_PX, contour_room, part_poses, piece_buffer, place, projection, surfaces_of
 from tracker.kept import keep_pieces, kept_for, remember, still_stands, trace_moving, trace_standing
 from tracker.refine import ContourMatch, MatchSettings

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from test_body import MODELS
 
-from tracker.confidence import limbs
-from tracker.kinematics import chain_poses
+from tracker.body.kinematics import chain_poses
+from tracker.body.limbs import limbs
 
 
 @pytest.mark.parametrize("name", MODELS)

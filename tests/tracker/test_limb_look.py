@@ -5,8 +5,8 @@ import pytest
 from staging import SUIT, at, camera_at, cameras_around, dressed, posed, solid
 
 from tracker.appearance import Colors
-from tracker.body import Body
-from tracker.confidence import limbs
+from tracker.body.limbs import limbs
+from tracker.body.model import Body
 from tracker.contours import projection
 
 BINS, SAMPLES = 12, 7

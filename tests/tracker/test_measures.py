@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from tracker.body.dimensions import PartSizes, scaled, sizes_of, twin, with_sizes
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import PRESETS, format_model, load_model, parse_model
-from tracker.measures import PartSizes, scaled, sizes_of, twin, with_sizes
 
 
 def points(model):

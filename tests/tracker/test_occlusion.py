@@ -3,7 +3,7 @@ from scipy.spatial import cKDTree
 from staging import at, camera_at, own_evidence, solid
 
 from tracker import contours
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.chamfer import ChamferCost
 from tracker.occlusion import part_edges, points_hidden
 

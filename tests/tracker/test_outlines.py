@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial import cKDTree
 from staging import camera_at, solid
 
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.contours import trace
 from tracker.formats.model_toml import parse_model
 

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from staging import camera_at, in_posture
 
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.geometry import rigid
 from tracker.picking import part_outlines, place_on_part
 

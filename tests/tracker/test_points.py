@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from staging import at, camera_at, cameras_around, own_evidence, posed, solid
 
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.evidence import Silhouette, ViewEvidence
 from tracker.formats.model_toml import load_model
 from tracker.points import N_COLUMNS, points_to_match

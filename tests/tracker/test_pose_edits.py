@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from staging import shaken
 
+from tracker.body.parts import Axis
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
-from tracker.joints import Axis
 from tracker.orienting import orient
 from tracker.pose_edits import bent_alike, joint_of, limb_of, mirrored, taken_over
 

@@ -5,7 +5,7 @@ import pytest
 from staging import camera_at, cameras_around, shaken
 
 from tracker import posing
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.fit import solve
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from staging import cameras_around, posed
 
+from tracker.body.dimensions import PartSizes, sizes_of, with_sizes
 from tracker.formats.model_toml import load_model
 from tracker.geometry.triangulation import ViewPin
-from tracker.measures import PartSizes, sizes_of, with_sizes
 from tracker.rebody import rebodied
 
 

@@ -7,8 +7,8 @@ from staging import SUIT, cameras_around, dressed, own_evidence, posed
 
 from tracker import recover
 from tracker.appearance import Colors
-from tracker.body import Body
-from tracker.confidence import limbs
+from tracker.body.limbs import limbs
+from tracker.body.model import Body
 from tracker.fit import StayNear, solve
 from tracker.formats.model_toml import load_model
 from tracker.recover import Judge, RecoverSettings, for_several, search_limbs

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from staging import at, cameras_around, own_evidence, shaken, solid
 
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.chamfer import ChamferCost
 from tracker.fit import StayNear, solve
 from tracker.formats.model_toml import load_model

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from staging import SUIT, Shown, cameras_around, dressed, posed
 
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.second_pass import Followed, Tracked, follow_back, stretches
 from tracker.track_settings import TrackSettings
 from tracker.ways import ROUNDS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from staging import at, cameras_around, filmed, own_evidence, posed, solid
 
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.fit import solve
 from tracker.memory import Memory
 from tracker.predict import PredictSettings

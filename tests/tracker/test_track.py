@@ -5,7 +5,7 @@ import pytest
 from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_evidence, posed, shaken, solid
 
 from tracker.assemble import assemble
-from tracker.body import Body
+from tracker.body.model import Body
 from tracker.evaluate import evaluate_joints, joints_of_poses
 from tracker.evidence import view_evidence
 from tracker.fit import fit_to_points

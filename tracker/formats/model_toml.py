@@ -1,7 +1,7 @@
 """Body models as TOML files: read, checked, written.
 
 Positions and sizes are fractions of body height, angles are in degrees; `height_m` is written with a fitted model
-and left out of a preset. See `tracker/models/gavrila22.toml` for an example.
+and left out of a preset. See `tracker/body/models/gavrila22.toml` for an example.
 """
 
 from fnmatch import fnmatchcase
@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
+from tracker.body.parts import Axis, Joint, Landmark, Part, SearchGroup
 from tracker.errors import ModelError
 from tracker.files import parse_toml
-from tracker.joints import Axis, Joint, Landmark, Part, SearchGroup
 
 VERSION = 1
 DEFAULT_HEIGHT_M = 1.75
 PRESETS = tuple(
-    sorted(f.name[:-5] for f in (resources.files("tracker") / "models").iterdir() if f.name.endswith(".toml"))
+    sorted(f.name[:-5] for f in (resources.files("tracker") / "body" / "models").iterdir() if f.name.endswith(".toml"))
 )
 
 
@@ -35,7 +35,7 @@ def load_model(name_or_path: str | Path, height_m: float | None = None) -> BodyM
         ModelError: the model is unknown, unreadable or malformed.
     """
     if str(name_or_path) in PRESETS:
-        text = (resources.files("tracker") / "models" / f"{name_or_path}.toml").read_text("utf-8")
+        text = (resources.files("tracker") / "body" / "models" / f"{name_or_path}.toml").read_text("utf-8")
     else:
         path = Path(name_or_path)
         if path.suffix != ".toml" or not path.is_file():
@@ -71,7 +71,7 @@ def parse_model(text: str, source: str, height_m: float | None = None) -> BodyMo
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         what = f"the key {error} is missing" if isinstance(error, KeyError) else str(error)
         raise ModelError(
-            f"body model {source} is malformed: {what}; compare it with tracker/models/gavrila22.toml"
+            f"body model {source} is malformed: {what}; compare it with tracker/body/models/gavrila22.toml"
         ) from error
     if not 0.3 <= height <= 3.0:
         raise ModelError(f"body model {source}: expected a height of 0.3 to 3 metres, found {height:g}")

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.errors import FormatError
 from tracker.files import write_text_whole
 from tracker.geometry.rigid import Array

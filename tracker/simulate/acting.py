@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from tracker.body import BodyModel, IntArray
+from tracker.body.model import BodyModel, IntArray
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array
 from tracker.simulate.anatomy import ANKLE_HEIGHT

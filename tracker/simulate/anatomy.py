@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array
 from tracker.simulate.skeleton import Factors

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.simulate.anatomy import Lobe, lobes
 from tracker.simulate.skeleton import BONE_FACTORS, Factors
 

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array
 from tracker.simulate.acting import Posture, ramp, stance, standing_height

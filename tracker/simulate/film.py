@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body import IntArray
+from tracker.body.model import IntArray
 from tracker.geometry.rigid import Array
 from tracker.simulate.render import Figure, cast, lit, pixel_means, vertex_normals
 from tracker.simulate.room import LAMP_WORLD, Backdrop, floor_shadow

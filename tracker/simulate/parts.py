@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tracker.body import BodyModel, IntArray
+from tracker.body.model import BodyModel, IntArray
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array
 

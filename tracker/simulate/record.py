@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import cv2
 import numpy as np
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.errors import SessionError, TrackerError
 from tracker.files import write_text_whole
 from tracker.footage import open_footage

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body import IntArray
+from tracker.body.model import IntArray
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array
 from tracker.simulate.furniture import HALF_WIDTH_M, furnished

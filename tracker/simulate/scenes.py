@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from tracker.body import BodyModel
+from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry import rigid
 from tracker.simulate.acting import Posture, Role, ramp, stance, standing_height

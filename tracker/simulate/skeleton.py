@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
-from tracker.body import BodyModel
-from tracker.joints import Joint, Landmark, Part
+from tracker.body.model import BodyModel
+from tracker.body.parts import Joint, Landmark, Part
 
 Factors = tuple[float, float, float]
 """Factors along x, y, z."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from tracker.body import BodyModel, IntArray
+from tracker.body.model import BodyModel, IntArray
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array
 from tracker.simulate.anatomy import Lobe, bone_names, bone_poses

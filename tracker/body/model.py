@@ -13,11 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.geometry import rigid
-from tracker.geometry.rigid import Array
-from tracker.geometry.shapes import Shape
-from tracker.joints import Joint, Landmark, Part, SearchGroup
-from tracker.kinematics import (
+from tracker.body.kinematics import (
     BALL,
     REVOLVE,
     TRANSLATE,
@@ -27,6 +23,10 @@ from tracker.kinematics import (
     forward_kinematics,
     point_jacobian,
 )
+from tracker.body.parts import Joint, Landmark, Part, SearchGroup
+from tracker.geometry import rigid
+from tracker.geometry.rigid import Array
+from tracker.geometry.shapes import Shape
 
 
 class _Ball(NamedTuple):

@@ -1,0 +1,41 @@
+"""The limbs of a body: chains of parts that are judged and searched as one."""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.body.model import BodyModel
+
+
+class Limb(NamedTuple):
+    """A chain of parts that can be lost by itself."""
+
+    name: str
+    """Name of its last part."""
+    parts: NDArray[np.int64]
+    """Indices of its parts, from the trunk outwards."""
+    dofs: NDArray[np.bool_]
+    """The degrees of freedom of its joints, (n_dofs,)."""
+
+
+@lru_cache(maxsize=32)
+def limbs(model: BodyModel) -> tuple[Limb, ...]:
+    """The chains from the leaves of the joint tree up to where it branches."""
+    children = np.bincount(np.array(model.parents)[1:], minlength=len(model.parts))
+    out = []
+    for leaf in np.flatnonzero(children == 0):
+        chain, part = [int(leaf)], model.parents[leaf]
+        while part > 0 and children[part] == 1:
+            chain.append(part)
+            part = model.parents[part]
+        dofs = np.isin(model.dof_joint, chain)
+        if chain != [0] and dofs.any():
+            out.append(Limb(model.parts[leaf].name, np.array(chain[::-1]), dofs))
+    return tuple(out)
+
+
+def spoken(limb: str) -> str:
+    """The name of a limb as people say it."""
+    return limb.replace("forearm", "arm").replace("calf", "leg").replace("_", " ")
