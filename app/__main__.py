@@ -235,7 +235,7 @@ def track(
         json: print one JSON object.
     """
     from app import headless
-    from tracker.predict import PredictSettings
+    from tracker.motion.prediction import PredictSettings
     from tracker.search import SearchSettings
     from tracker.track_settings import TrackSettings
 

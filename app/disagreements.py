@@ -7,7 +7,7 @@ import numpy as np
 from app.jobs import Latest
 from app.screen import Screen
 from app.state import State
-from tracker.disagree import disagreeing
+from tracker.motion.consistency import disagreeing
 
 _REST_S = 0.3
 """A tracker writes twice a second: no need to look more often."""

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array
-from tracker.predict import PredictSettings, predict
+from tracker.motion.prediction import PredictSettings, predict
 
 
 class Prediction(NamedTuple):

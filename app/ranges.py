@@ -13,7 +13,7 @@ from app.screen import Screen
 from app.state import RangeState
 from app.tracking import Tracking
 from tracker.errors import TrackerError
-from tracker.interpolate import between
+from tracker.motion.interpolation import between
 from tracker.records import Change, FrameRow, MarkChange, PoseChange, PoseRecord
 
 Mark = Literal["keyframe", "reviewed", "unreviewed", "none"]

@@ -8,7 +8,7 @@ import viser
 
 from app.controller import Controller
 from tracker.errors import TrackerError
-from tracker.predict import MOST_ORDER, PredictSettings
+from tracker.motion.prediction import MOST_ORDER, PredictSettings
 from tracker.recover import RecoverSettings
 from tracker.search import SearchSettings
 from tracker.track_settings import Estimation, TrackSettings

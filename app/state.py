@@ -248,7 +248,7 @@ class State:
     """Of each person the degrees of freedom that neither hand nor search nor fit moves, by index."""
     ranges: RangeState = field(default_factory=RangeState)
     disagreeing: tuple[int, ...] = ()
-    """Frames whose poses do not go together with those around them, ascending (see `tracker.disagree`)."""
+    """Frames whose poses do not go together with those around them, ascending (see `tracker.motion.consistency`)."""
     pins: tuple[tuple[ViewPin, ...], ...] = ()
     """The pins of each person on the frame, by point and camera."""
     holds_pin: bool = False

@@ -12,7 +12,7 @@ from tracker.body.model import BodyModel
 from tracker.confidence import Quality, Status
 from tracker.fit import held
 from tracker.geometry.rigid import Array
-from tracker.predict import PredictSettings, predict
+from tracker.motion.prediction import PredictSettings, predict
 
 _LONGEST_PAUSE = 8
 """A limb that seems lost and is not found is searched at least every so many frames."""

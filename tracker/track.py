@@ -13,8 +13,8 @@ from tracker.evidence import ViewEvidence
 from tracker.geometry.cameras import Region
 from tracker.geometry.rigid import Array
 from tracker.memory import Memory
+from tracker.motion.prediction import PredictSettings
 from tracker.observer import Observer
-from tracker.predict import PredictSettings
 from tracker.scene import Found, Scene
 from tracker.scenery import Scenery
 from tracker.surroundings import confirmed, regions, regions_ahead, visible_outline

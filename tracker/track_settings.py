@@ -13,7 +13,7 @@ from tracker.chamfer import ChamferCost, Outliers
 from tracker.evidence import ViewEvidence
 from tracker.fit import Block, StayNear
 from tracker.geometry.rigid import Array
-from tracker.predict import PredictSettings
+from tracker.motion.prediction import PredictSettings
 from tracker.recover import RecoverSettings
 from tracker.refine import MatchSettings
 from tracker.search import SearchSettings, SearchStep, search

@@ -7,7 +7,7 @@ from hands import drag, wait_for
 from app import ranges
 from tracker.annotations import AnnotationStore
 from tracker.errors import TrackerError
-from tracker.interpolate import between
+from tracker.motion.interpolation import between
 
 
 @pytest.fixture

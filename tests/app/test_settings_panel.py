@@ -4,7 +4,7 @@ import viser
 
 from app.settings_panel import SettingsPanel, settings_of
 from tracker.errors import TrackerError
-from tracker.predict import PredictSettings
+from tracker.motion.prediction import PredictSettings
 from tracker.track_settings import TrackSettings
 
 SHOWN = {

@@ -8,7 +8,7 @@ import pytest
 from app.expected import prediction
 from app.trails import Trails
 from tracker.formats.model_toml import load_model
-from tracker.predict import PredictSettings
+from tracker.motion.prediction import PredictSettings
 
 
 @pytest.fixture(scope="module")

@@ -20,8 +20,8 @@ from tracker.assemble import assemble
 from tracker.body.model import BodyModel
 from tracker.evaluate import evaluate_joints, joints_of_poses
 from tracker.formats.trc import MarkerTable
+from tracker.motion.prediction import PredictSettings
 from tracker.observer import Observer
-from tracker.predict import PredictSettings
 from tracker.recording import Recording
 from tracker.references import read_joints
 from tracker.refine import MatchSettings

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tracker.disagree import disagreeing, steps_off_m, threshold_m
 from tracker.formats.model_toml import load_model
+from tracker.motion.consistency import disagreeing, steps_off_m, threshold_m
 
 FPS = 30.0
 N = 40

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 from tracker.formats.model_toml import load_model
-from tracker.interpolate import between
+from tracker.motion.interpolation import between
 
 SHARES = np.linspace(0.0, 1.0, 9)
 

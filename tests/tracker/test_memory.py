@@ -3,7 +3,7 @@ import pytest
 
 from tracker.confidence import LimbFigures, Quality
 from tracker.memory import Memory
-from tracker.predict import PredictSettings
+from tracker.motion.prediction import PredictSettings
 
 CLEAR, ASTRAY = (1.0, 0.0, 1.2, 0.05, 0.6, 0.5), (-2.0, 3.0, 4.0, 0.3, 0.2, 0.1)
 

@@ -7,7 +7,7 @@ from test_body import BALLS
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import load_model, parse_model
 from tracker.geometry import rigid
-from tracker.predict import PredictSettings, predict, unwrapped
+from tracker.motion.prediction import PredictSettings, predict, unwrapped
 
 GAVRILA = load_model("gavrila22")
 BALL_MODEL = parse_model(BALLS, "balls")

@@ -9,8 +9,8 @@ import pytest
 
 from tracker.confidence import Status
 from tracker.formats.pose_table import read_pose_table
+from tracker.motion.prediction import predict
 from tracker.observer import Observer
-from tracker.predict import predict
 from tracker.recording import Recording
 from tracker.session import Session
 from tracker.simulate.record import simulate

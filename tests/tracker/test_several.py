@@ -9,7 +9,7 @@ from staging import at, cameras_around, filmed, own_evidence, posed, solid
 from tracker.body.model import Body
 from tracker.fit import solve
 from tracker.memory import Memory
-from tracker.predict import PredictSettings
+from tracker.motion.prediction import PredictSettings
 from tracker.recover import search_limbs
 from tracker.scene import Scene
 from tracker.track import track_chamfer

@@ -10,8 +10,8 @@ from tracker.evaluate import evaluate_joints, joints_of_poses
 from tracker.evidence import view_evidence
 from tracker.fit import fit_to_points
 from tracker.joint_maps import LIMB_JOINTS
+from tracker.motion.prediction import PredictSettings
 from tracker.observer import Observer
-from tracker.predict import PredictSettings
 from tracker.recording import Recording
 from tracker.recover import Searched
 from tracker.references import read_joints

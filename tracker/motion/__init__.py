@@ -1,0 +1,1 @@
+"""Poses over time, no images: prediction, interpolation, frames that disagree with their neighbours."""
