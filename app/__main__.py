@@ -184,7 +184,7 @@ def init(
         axes: the file's axes in the session's order, such as x,-z,y.
         json: print one JSON object.
     """
-    from tracker.formats.pose_table import read_pose_table
+    from tracker.formats.pose_csv import read_pose_table
     from tracker.references import read_joints
 
     at = commands.target(session, person, several=False)

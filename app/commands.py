@@ -17,11 +17,11 @@ from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError, TrackerError
 from tracker.evaluate import Alignment, evaluate_joints, evaluate_poses
 from tracker.fit import fit_to_points
+from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import format_model
-from tracker.formats.pose_table import PoseTable
+from tracker.formats.pose_csv import PoseTable
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
-from tracker.joint_maps import LIMB_JOINTS
 from tracker.records import FrameRow, PoseChange, PoseRecord
 from tracker.references import Reference, stored_motion
 from tracker.session import Person, Session, load_session, save_session

@@ -11,11 +11,11 @@ from tracker.annotations import AnnotationStore
 from tracker.body.model import BodyModel
 from tracker.errors import FormatError, SessionError
 from tracker.evaluate import Motion, at_rate, joints_of_poses, remap_axes
+from tracker.formats.joint_maps import joints_of, read_joint_map
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
-from tracker.formats.pose_table import PoseTable, read_pose_table
+from tracker.formats.pose_csv import PoseTable, read_pose_table
 from tracker.formats.trc import MarkerTable, read_trc
 from tracker.geometry.rigid import Array
-from tracker.joint_maps import joints_of, read_joint_map
 from tracker.session import SESSION_FILE, Session, load_session
 
 

@@ -13,7 +13,7 @@ from app import headless
 from tracker.annotations import AnnotationStore
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.formats.model_toml import load_model
-from tracker.formats.pose_table import read_pose_table, write_pose_table
+from tracker.formats.pose_csv import read_pose_table, write_pose_table
 from tracker.records import PoseChange
 from tracker.second_pass import Followed
 from tracker.session import load_session

@@ -24,8 +24,8 @@ from true_starts import read_simulated
 from tracker import confidence
 from tracker.body.model import BodyModel
 from tracker.confidence import Status
+from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.rigid import Array
-from tracker.joint_maps import LIMB_JOINTS
 from tracker.observer import Observer
 from tracker.recording import Recording
 from tracker.simulate import simulate

@@ -8,10 +8,10 @@ import numpy as np
 from tracker.assemble import DEFAULT_MODEL
 from tracker.body.model import BodyModel
 from tracker.fit import fit_to_points
+from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
-from tracker.joint_maps import LIMB_JOINTS
 from tracker.references import read_joints
 from tracker.session import Session, load_session
 

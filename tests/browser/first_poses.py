@@ -14,7 +14,7 @@ from scripted_user import LIMBS, TRUNK, ScriptedUser
 
 from tracker.body.model import Body
 from tracker.formats.model_toml import load_model
-from tracker.formats.pose_table import read_pose_table, write_pose_table
+from tracker.formats.pose_csv import read_pose_table, write_pose_table
 from tracker.occlusion import points_hidden
 from tracker.posing import drag, grab
 from tracker.session import load_session

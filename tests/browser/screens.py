@@ -23,7 +23,7 @@ from running import ROOT, Program
 from tracker.annotations import AnnotationStore
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import format_model
-from tracker.formats.pose_table import read_pose_table
+from tracker.formats.pose_csv import read_pose_table
 from tracker.records import PoseChange, PoseRecord
 from tracker.references import read_joints
 from tracker.session import Session, load_session, save_session

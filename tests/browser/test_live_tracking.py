@@ -10,7 +10,7 @@ from running import ROOT, Program, visited
 
 from tracker.annotations import AnnotationStore
 from tracker.formats.model_toml import format_model
-from tracker.formats.pose_table import read_pose_table
+from tracker.formats.pose_csv import read_pose_table
 from tracker.records import PoseChange, PoseRecord
 from tracker.session import load_session
 

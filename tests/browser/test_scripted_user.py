@@ -18,7 +18,7 @@ from scripted_user import TRUNK, ScriptedUser
 
 from tracker.annotations import AnnotationStore
 from tracker.formats.model_toml import format_model
-from tracker.formats.pose_table import read_pose_table
+from tracker.formats.pose_csv import read_pose_table
 from tracker.observer import Observer
 from tracker.recording import Recording
 from tracker.records import PoseChange, PoseRecord

@@ -13,10 +13,10 @@ from tracker.evaluate import (
     joints_of_poses,
     remap_axes,
 )
+from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid
-from tracker.joint_maps import JOINTS, LIMB_JOINTS
 
 
 def table(points, frames=None, names=JOINTS, rate=30.0):

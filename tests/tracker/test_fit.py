@@ -6,9 +6,9 @@ from staging import at, posed, shaken, solid
 
 from tracker.errors import TrackerError
 from tracker.fit import PointTargets, StayNear, covariance, fit_to_points, normal_of, solve
+from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model, parse_model
 from tracker.geometry import rigid
-from tracker.joint_maps import LIMB_JOINTS
 
 GAVRILA = load_model("gavrila22")
 ARM = parse_model(

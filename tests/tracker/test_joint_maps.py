@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from tracker.errors import FormatError
+from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS, guess_joint_map, joints_of, read_joint_map
 from tracker.formats.model_toml import PRESETS, load_model
 from tracker.formats.trc import MarkerTable, read_trc
-from tracker.joint_maps import JOINTS, LIMB_JOINTS, guess_joint_map, joints_of, read_joint_map
 
 COCO = ["nose", "left_eye", "right_eye", "left_ear", "right_ear"] + [
     f"{s}_{j}" for j in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for s in ("left", "right")

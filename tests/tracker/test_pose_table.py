@@ -3,7 +3,7 @@ import pytest
 
 from tracker.errors import FormatError
 from tracker.formats.model_toml import load_model, parse_model
-from tracker.formats.pose_table import read_pose_table, write_pose_table
+from tracker.formats.pose_csv import read_pose_table, write_pose_table
 
 BALL = """
 version = 1

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tracker.confidence import Status
-from tracker.formats.pose_table import read_pose_table
+from tracker.formats.pose_csv import read_pose_table
 from tracker.motion.prediction import predict
 from tracker.observer import Observer
 from tracker.recording import Recording

@@ -9,7 +9,7 @@ from tracker.body.model import Body
 from tracker.evaluate import evaluate_joints, joints_of_poses
 from tracker.evidence import view_evidence
 from tracker.fit import fit_to_points
-from tracker.joint_maps import LIMB_JOINTS
+from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.motion.prediction import PredictSettings
 from tracker.observer import Observer
 from tracker.recording import Recording

@@ -16,7 +16,7 @@ from tracker.errors import SessionError, TrackerError
 from tracker.files import write_text_whole
 from tracker.footage import open_footage
 from tracker.formats.model_toml import format_model, load_model
-from tracker.formats.pose_table import write_pose_table
+from tracker.formats.pose_csv import write_pose_table
 from tracker.formats.trc import write_trc
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array

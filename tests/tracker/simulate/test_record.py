@@ -4,7 +4,7 @@ import pytest
 from tracker.errors import SessionError, TrackerError
 from tracker.footage import open_footage, read_image
 from tracker.formats.model_toml import load_model
-from tracker.formats.pose_table import read_pose_table
+from tracker.formats.pose_csv import read_pose_table
 from tracker.formats.trc import read_trc
 from tracker.session import load_session
 from tracker.simulate.record import simulate

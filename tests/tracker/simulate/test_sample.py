@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tracker.footage import open_footage
+from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
-from tracker.formats.pose_table import read_pose_table
+from tracker.formats.pose_csv import read_pose_table
 from tracker.formats.trc import read_trc
-from tracker.joint_maps import LIMB_JOINTS
 from tracker.session import load_session
 from tracker.simulate.acting import perform
 from tracker.simulate.film import film, freeze
