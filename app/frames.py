@@ -14,9 +14,9 @@ from app import pictures
 from app.recent import Recent
 from tracker.errors import RecordingError
 from tracker.evidence import ViewEvidence
+from tracker.footage.proxy import Proxy
 from tracker.matched import MatchedView
 from tracker.observer import Observer
-from tracker.proxy import Proxy
 from tracker.silhouettes import Image
 
 _LOG = logging.getLogger(__name__)

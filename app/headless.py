@@ -15,11 +15,11 @@ from tracker.annotations import AnnotationStore
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.confidence import Status
 from tracker.errors import SessionError
+from tracker.footage.recording import Recording
 from tracker.formats.model_toml import format_model
 from tracker.geometry.rigid import Array
 from tracker.locks import free_of, kept_locks
 from tracker.observer import Observer
-from tracker.recording import Recording
 from tracker.records import PoseChange, PoseRecord
 from tracker.second_pass import Followed, Tracked, follow_back
 from tracker.session import Person

@@ -4,9 +4,10 @@ from contextlib import closing
 from typing import Any
 
 from app.commands import Reporter
-from tracker.footage import ImageFolder, open_footage
-from tracker.proxy import FOLDER, Proxy
-from tracker.session import CameraSource, Session
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.proxy import FOLDER, Proxy
+from tracker.footage.video import ImageFolder, open_footage
+from tracker.session import Session
 from tracker.session_lock import SessionLock
 
 

@@ -24,8 +24,8 @@ from app.saving import Saver
 from app.scene import Scene
 from app.server import create_app, serve_forever, static_folder
 from tracker.annotations import AnnotationStore
+from tracker.footage.recording import Recording
 from tracker.observer import Observer
-from tracker.recording import Recording
 from tracker.session import load_session
 from tracker.session_lock import SessionLock
 

@@ -14,7 +14,7 @@ ROOMS = [
     "tracker.body.model",
     "tracker.motion",
     "tracker.formats",
-    "tracker.footage",
+    "tracker.footage.video",
     "tracker.session",
     "tracker.store",
     "tracker.images",

@@ -4,12 +4,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from tracker.errors import RecordingError, SessionError
-from tracker.footage import IMAGE_SUFFIXES, Footage, open_footage
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.recording import check_size, read_background, read_mask
+from tracker.footage.video import IMAGE_SUFFIXES, Footage, open_footage
 from tracker.formats.anipose import Units, read_calibration
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
-from tracker.recording import check_size, read_background, read_mask
-from tracker.session import PALETTE, CameraSource, Person, Session, create_session
+from tracker.session import PALETTE, Person, Session, create_session
 
 DEFAULT_MODEL = "gavrila34"
 

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker import silhouettes
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.recording import read_background, read_mask
 from tracker.geometry.cameras import Region
 from tracker.geometry.rigid import FloatArray
 from tracker.matched import MatchedView
 from tracker.probes import Probes, Readings
-from tracker.recording import read_background, read_mask
-from tracker.session import CameraSource
 from tracker.silhouettes import Changes, Image
 
 

@@ -16,14 +16,14 @@ import numpy as np
 from tracker import silhouettes
 from tracker.edges import detect_edges, levels
 from tracker.evidence import Look, ViewEvidence, default_theta_px, expecting, silhouette_evidence
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.recording import Recording
 from tracker.foreground import Foreground, Prepared
 from tracker.geometry.cameras import Camera, Region
 from tracker.geometry.rigid import FloatArray
 from tracker.matched import fit_region
-from tracker.recording import Recording
 from tracker.scenery import Scenery
 from tracker.segments import link_edges, sampled
-from tracker.session import CameraSource
 
 FOREGROUND_MARGIN = 0.012
 """How far around the silhouette edges are kept, as a fraction of the longer side of the image."""

@@ -25,10 +25,10 @@ import tomli_w
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
 from tracker.files import read_toml, write_text_whole
-from tracker.footage import open_footage
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.video import open_footage
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model, load_model
-from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import Floor
 
 VERSION = 2
@@ -45,21 +45,6 @@ _KEYS = {"version", "name", "fps", "n_frames", "up", "floor", "calibration", "ca
 _FLOOR_KEYS = {"normal", "offset_m"}
 _CAMERA_KEYS = {"name", "footage", "background", "masks", "offset"}
 _PERSON_KEYS = {"name", "model", "color"}
-
-
-@dataclass(frozen=True, eq=False)
-class CameraSource:
-    """A camera and what it saw."""
-
-    camera: Camera
-    footage: Path
-    """Video file, or folder of images; absolute."""
-    background: Path | None = None
-    """Image, video, or folder of images of the empty scene in original pixels; absolute."""
-    masks: Path | None = None
-    """Folder of %06d.png by video frame: 0 background, 255 anyone, 1..K person K; original pixels; absolute."""
-    offset: int = 0
-    """Frame k of the session is frame k + offset of the footage; not negative."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,8 @@ from app.controller import Controller
 from app.frames import Frames
 from app.saving import Saver
 from tracker.annotations import AnnotationStore
+from tracker.footage.recording import Recording
 from tracker.observer import Observer
-from tracker.recording import Recording
 from tracker.session import load_session
 
 

@@ -5,8 +5,8 @@ from hands import wait_for
 
 from app import indexing
 from app.frames import Frames
+from tracker.footage.recording import Recording
 from tracker.observer import Observer
-from tracker.recording import Recording
 from tracker.session import load_session
 
 

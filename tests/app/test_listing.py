@@ -9,19 +9,19 @@ from app.controller import Controller
 from app.frames import Frames
 from app.saving import Saver
 from app.state import FootageState
-from tracker import footage_listing
 from tracker.annotations import AnnotationStore
 from tracker.errors import RecordingError, TrackerError
-from tracker.footage import VideoFile
+from tracker.footage import packet_scan
+from tracker.footage.recording import Recording
+from tracker.footage.video import VideoFile
 from tracker.observer import Observer
-from tracker.recording import Recording
 from tracker.session import load_session
 
 
 @pytest.fixture
 def gate(monkeypatch):
     """Keeps the lists back after some twenty frames, until it is set."""
-    monkeypatch.setattr(footage_listing, "_EVERY_PACKETS", 20)
+    monkeypatch.setattr(packet_scan, "_EVERY_PACKETS", 20)
     gate, real = threading.Event(), VideoFile._grow
 
     def grow(self, listed):
@@ -70,7 +70,7 @@ def test_what_is_wrong_with_a_file_is_said_when_it_comes_out(session, monkeypatc
     def fail(container, where, report=None):
         raise RecordingError(f"{where} is truncated; copy it again")
 
-    monkeypatch.setattr(footage_listing, "list_frames", fail)
+    monkeypatch.setattr(packet_scan, "list_frames", fail)
     loaded = load_session(session)
     with Recording(loaded.cameras, in_background=True) as recording:
         store = AnnotationStore(loaded.annotations_path)

@@ -19,14 +19,15 @@ from true_starts import read_simulated, start_of
 from tracker.assemble import assemble
 from tracker.body.model import BodyModel
 from tracker.evaluate import evaluate_joints, joints_of_poses
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.motion.prediction import PredictSettings
 from tracker.observer import Observer
-from tracker.recording import Recording
 from tracker.references import read_joints
 from tracker.refine import MatchSettings
 from tracker.search import SearchSettings
-from tracker.session import CameraSource, load_session
+from tracker.session import load_session
 from tracker.simulate import simulate
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings

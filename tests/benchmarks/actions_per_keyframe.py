@@ -24,8 +24,8 @@ from app.frames import Frames  # noqa: E402
 from app.saving import Saver  # noqa: E402
 from tracker.annotations import AnnotationStore  # noqa: E402
 from tracker.assemble import assemble  # noqa: E402
+from tracker.footage.recording import Recording  # noqa: E402
 from tracker.observer import Observer  # noqa: E402
-from tracker.recording import Recording  # noqa: E402
 
 VIEWS = (0, 1)
 EVERY = 10

@@ -32,8 +32,8 @@ from running import Program  # noqa: E402
 from app import pictures  # noqa: E402
 from app.commands import Reporter  # noqa: E402
 from app.indexing import index  # noqa: E402
+from tracker.footage.recording import Recording  # noqa: E402
 from tracker.matched import MatchedView  # noqa: E402
-from tracker.recording import Recording  # noqa: E402
 from tracker.session import load_session, save_session  # noqa: E402
 
 REDUCTION = 1.7

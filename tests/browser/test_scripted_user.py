@@ -17,10 +17,10 @@ from running import ROOT, Program, visited
 from scripted_user import TRUNK, ScriptedUser
 
 from tracker.annotations import AnnotationStore
+from tracker.footage.recording import Recording
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.observer import Observer
-from tracker.recording import Recording
 from tracker.records import PoseChange, PoseRecord
 from tracker.session import load_session
 from tracker.track_settings import TrackSettings, pose_cost

@@ -8,10 +8,10 @@ import pytest
 from tracker.body.model import BodyModel
 from tracker.evidence import ViewEvidence
 from tracker.fit import fit_to_points
+from tracker.footage.recording import Recording
 from tracker.formats.model_toml import load_model
 from tracker.geometry.rigid import Array
 from tracker.observer import Observer
-from tracker.recording import Recording
 from tracker.references import read_joints
 from tracker.session import load_session
 

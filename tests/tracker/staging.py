@@ -9,10 +9,10 @@ from scipy.spatial import cKDTree
 from tracker import contours
 from tracker.body.model import Body
 from tracker.evidence import view_evidence
+from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import parse_model
 from tracker.geometry.cameras import Camera
 from tracker.observer import Observer
-from tracker.session import CameraSource
 
 SIZE = (640, 480)
 

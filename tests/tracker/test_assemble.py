@@ -7,10 +7,10 @@ from clips import SIZE, encode, write_images
 
 from tracker.assemble import assemble
 from tracker.errors import CalibrationError, ModelError, RecordingError, SessionError
+from tracker.footage.recording import Recording
 from tracker.formats.anipose import write_calibration
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
-from tracker.recording import Recording
 from tracker.session import load_session
 
 K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])

@@ -14,13 +14,14 @@ from tracker.evidence import (
     default_theta_px,
     view_evidence,
 )
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
 from tracker.matched import MatchedView, match_scale, region_around
 from tracker.observer import FOREGROUND_MARGIN, Observer
-from tracker.recording import Recording
 from tracker.scenery import Scenery
 from tracker.segments import link_edges
-from tracker.session import CameraSource, load_session
+from tracker.session import load_session
 
 
 class Frames:

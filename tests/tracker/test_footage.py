@@ -9,7 +9,7 @@ import pytest
 from clips import SIZE, N, encode, number, write_images
 
 from tracker.errors import RecordingError
-from tracker.footage import ImageFolder, VideoFile, open_footage
+from tracker.footage.video import ImageFolder, VideoFile, open_footage
 
 
 def decode_all(path):

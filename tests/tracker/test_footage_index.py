@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from clips import N, encode, number
 
-from tracker.footage import VideoFile
+from tracker.footage.video import VideoFile
 
 
 @pytest.fixture

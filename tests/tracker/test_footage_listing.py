@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from clips import encode
 
-from tracker import footage_listing
 from tracker.errors import RecordingError
-from tracker.footage import VideoFile
+from tracker.footage import packet_scan
+from tracker.footage.video import VideoFile
 
 
 @pytest.fixture
 def in_steps(monkeypatch):
     """Lets a listing go on a few packets at a time: `step()` lets the next report through."""
-    monkeypatch.setattr(footage_listing, "_EVERY_PACKETS", 20)
+    monkeypatch.setattr(packet_scan, "_EVERY_PACKETS", 20)
     gate, real = threading.Semaphore(0), VideoFile._grow
 
     def grow(self, listed):

@@ -7,8 +7,8 @@ import pytest
 from clips import N, encode, number
 
 from tracker.errors import RecordingError
-from tracker.footage import VideoFile
-from tracker.proxy import Proxy
+from tracker.footage.proxy import Proxy
+from tracker.footage.video import VideoFile
 
 
 @pytest.fixture

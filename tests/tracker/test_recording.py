@@ -7,10 +7,10 @@ import pytest
 from clips import SIZE, encode, number, picture, write_images
 
 from tracker.errors import RecordingError
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.recording import Recording, read_background, read_mask
 from tracker.formats.anipose import read_calibration
 from tracker.geometry.cameras import Camera
-from tracker.recording import Recording, read_background, read_mask
-from tracker.session import CameraSource
 
 K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])
 FRAME_BYTES = SIZE[0] * SIZE[1] * 3

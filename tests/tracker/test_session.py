@@ -5,10 +5,11 @@ import pytest
 from clips import SIZE, encode
 
 from tracker.errors import CalibrationError, ModelError, SessionError
+from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
-from tracker.session import CameraSource, Person, create_session, load_session, save_session
+from tracker.session import Person, create_session, load_session, save_session
 
 K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])
 

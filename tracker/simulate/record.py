@@ -14,13 +14,14 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError, TrackerError
 from tracker.files import write_text_whole
-from tracker.footage import open_footage
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.video import open_footage
 from tracker.formats.model_toml import format_model, load_model
 from tracker.formats.pose_csv import write_pose_table
 from tracker.formats.trc import write_trc
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array
-from tracker.session import PALETTE, CameraSource, Person, Session, load_session, save_session
+from tracker.session import PALETTE, Person, Session, load_session, save_session
 from tracker.simulate.acting import Role, perform
 from tracker.simulate.encode import VideoWriter
 from tracker.simulate.film import Image, exposed, film, freeze

@@ -2,7 +2,7 @@ import av
 import numpy as np
 import pytest
 
-from tracker.footage import open_footage
+from tracker.footage.video import open_footage
 from tracker.simulate.encode import GROUP_OF_PICTURES, VideoWriter
 
 

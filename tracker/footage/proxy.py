@@ -22,8 +22,8 @@ import numpy as np
 
 from tracker.errors import RecordingError
 from tracker.files import write_text_whole
-from tracker.footage import Footage, Image
-from tracker.footage_index import stamp_of
+from tracker.footage.frame_index import stamp_of
+from tracker.footage.video import Footage, Image
 
 FOLDER = "proxies"
 VERSION = 1

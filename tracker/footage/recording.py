@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import RecordingError
-from tracker.footage import IMAGE_SUFFIXES, Image, open_footage, read_image
-from tracker.session import CameraSource
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.video import IMAGE_SUFFIXES, Image, open_footage, read_image
 
 DEFAULT_CACHE_BYTES = 256 * 2**20
 

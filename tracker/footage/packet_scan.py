@@ -10,7 +10,7 @@ from av.container import InputContainer
 from av.video.stream import VideoStream
 
 from tracker.errors import RecordingError
-from tracker.footage_index import Index
+from tracker.footage.frame_index import Index
 
 _EVERY_PACKETS = 4000
 """Packets between two reports."""

@@ -19,10 +19,10 @@ from av.video.frame import VideoFrame
 from av.video.reformatter import VideoReformatter
 from numpy.typing import NDArray
 
-from tracker import footage_index, footage_listing
 from tracker.errors import RecordingError
-from tracker.footage_index import Index
-from tracker.footage_listing import Listed
+from tracker.footage import frame_index, packet_scan
+from tracker.footage.frame_index import Index
+from tracker.footage.packet_scan import Listed
 
 Image = NDArray[np.uint8]
 
@@ -72,7 +72,7 @@ class VideoFile:
             raise RecordingError(f"{self._where} not found; check the path")
         try:
             self._open()
-            kept = footage_index.load(path, indices)
+            kept = frame_index.load(path, indices)
             if kept is not None:
                 self._finish(kept)
             elif not in_background:
@@ -188,8 +188,8 @@ class VideoFile:
     def _list(self, report: Callable[[Listed], None] | None = None) -> None:
         """List the frames, by a decoder of its own."""
         with av.open(str(self.path)) as container:
-            index = footage_listing.list_frames(container, self._where, report)
-        footage_index.save(self.path, self._indices, index)
+            index = packet_scan.list_frames(container, self._where, report)
+        frame_index.save(self.path, self._indices, index)
         self._finish(index)
 
     def _list_beside(self) -> None:

@@ -1,0 +1,21 @@
+"""One camera of a session: calibration and where its images are."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from tracker.geometry.cameras import Camera
+
+
+@dataclass(frozen=True, eq=False)
+class CameraSource:
+    """A camera and what it saw."""
+
+    camera: Camera
+    footage: Path
+    """Video file, or folder of images; absolute."""
+    background: Path | None = None
+    """Image, video, or folder of images of the empty scene in original pixels; absolute."""
+    masks: Path | None = None
+    """Folder of %06d.png by video frame: 0 background, 255 anyone, 1..K person K; original pixels; absolute."""
+    offset: int = 0
+    """Frame k of the session is frame k + offset of the footage; not negative."""
