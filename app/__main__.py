@@ -87,7 +87,7 @@ def new(
         up: world axis that points up.
         units: unit of the calibration's translations.
     """
-    from tracker.assemble import DEFAULT_MODEL, assemble
+    from tracker.session.assemble import DEFAULT_MODEL, assemble
 
     made = assemble(
         session,
@@ -115,7 +115,7 @@ def info(session: SessionArg, /, json: bool = False) -> None:
         session: session folder.
         json: print one JSON object.
     """
-    from tracker.session import load_session
+    from tracker.session.session import load_session
 
     found = commands.info(load_session(session))
     if json:
@@ -143,7 +143,7 @@ def index(session: SessionArg, /, json: bool = False) -> None:
         json: print one JSON object.
     """
     from app.indexing import index as make
-    from tracker.session import load_session
+    from tracker.session.session import load_session
 
     found = make(load_session(session), Reporter(silent=json))
     if json:

@@ -23,7 +23,7 @@ from tracker.geometry.rigid import Array
 from tracker.observer import Observer
 from tracker.refine import ContourMatch
 from tracker.search import BEFORE_REFINEMENT, SearchSettings, search
-from tracker.session import Session
+from tracker.session.session import Session
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings
 

@@ -15,7 +15,7 @@ from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
 from tracker.observer import Observer
 from tracker.references import read_joints
-from tracker.session import Session, load_session
+from tracker.session.session import Session, load_session
 
 FRAME = 25
 _SEED = 11

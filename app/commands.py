@@ -24,8 +24,8 @@ from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
 from tracker.records import FrameRow, PoseChange, PoseRecord
 from tracker.references import Reference, stored_motion
-from tracker.session import Person, Session, load_session, save_session
-from tracker.session_lock import SessionLock
+from tracker.session.lock import SessionLock
+from tracker.session.session import Person, Session, load_session, save_session
 from tracker.sizes import fit_sizes
 
 

@@ -19,7 +19,7 @@ from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.rigid import Array
 from tracker.observer import Observer
-from tracker.session_lock import SessionLock
+from tracker.session.lock import SessionLock
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings
 

@@ -37,7 +37,7 @@ from app.viewing import Viewing
 from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array
 from tracker.records import FrameNumbers
-from tracker.session import Session
+from tracker.session.session import Session
 from tracker.track_settings import TrackSettings
 
 

@@ -8,7 +8,7 @@ from app.state import State
 from tracker.geometry.cameras import Camera, epipolar_segment
 from tracker.geometry.ground_plane import Floor, up_rotation
 from tracker.geometry.rigid import Array
-from tracker.session import Session
+from tracker.session.session import Session
 
 FLOOR_COLOR = "#7ee08a"
 _MARK_PX = 7.0

@@ -11,7 +11,7 @@ from app.floor_picks import FloorState, Picking, with_mark, with_next, without_l
 from app.screen import Screen
 from tracker.errors import TrackerError
 from tracker.geometry.ground_plane import Floor, nearest_axis, up_rotation
-from tracker.session import UPS, save_floor
+from tracker.session.session import UPS, save_floor
 
 _KEY = "former_floor"
 """Setting of the session: the floor before the one that is set."""

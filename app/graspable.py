@@ -9,7 +9,7 @@ from app.state import State
 from tracker import picking
 from tracker.body.model import Body
 from tracker.geometry.rigid import FloatArray
-from tracker.session import Session
+from tracker.session.session import Session
 
 
 class Outline(NamedTuple):

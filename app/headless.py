@@ -18,12 +18,12 @@ from tracker.errors import SessionError
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import format_model
 from tracker.geometry.rigid import Array
-from tracker.locks import free_of, kept_locks
 from tracker.observer import Observer
 from tracker.records import PoseChange, PoseRecord
 from tracker.second_pass import Followed, Tracked, follow_back
-from tracker.session import Person
-from tracker.session_lock import SessionLock
+from tracker.session.lock import SessionLock
+from tracker.session.locked_dofs import free_of, kept_locks
+from tracker.session.session import Person
 from tracker.track import PoseEstimate, track_chamfer
 from tracker.track_settings import TrackSettings
 

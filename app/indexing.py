@@ -7,8 +7,8 @@ from app.commands import Reporter
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.proxy import FOLDER, Proxy
 from tracker.footage.video import ImageFolder, open_footage
-from tracker.session import Session
-from tracker.session_lock import SessionLock
+from tracker.session.lock import SessionLock
+from tracker.session.session import Session
 
 
 def index(session: Session, progress: Reporter) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager
 
 from app.screen import Screen
 from tracker.body.model import BodyModel
-from tracker.locks import SETTING, kept_locks, to_keep
+from tracker.session.locked_dofs import SETTING, kept_locks, to_keep
 
 
 class Locks:

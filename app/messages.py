@@ -17,7 +17,7 @@ from app.state import JobState, ReplayState, State, TrackState
 from tracker.evidence import ViewEvidence
 from tracker.posing import minor_points
 from tracker.records import SOURCES, STATUSES, FrameNumbers, HistoryEntry
-from tracker.session import Session
+from tracker.session.session import Session
 
 _FEW_CELLS = 2000
 """Cells of the timeline that travel by name; more go as columns, a tenth of the bytes and of the work."""

@@ -16,7 +16,7 @@ from tracker.geometry.cameras import Camera, epipolar_segment
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.rebody import rebodied
 from tracker.segments import accept
-from tracker.session import Person, Session
+from tracker.session.session import Person, Session
 from tracker.silhouettes import Mask
 
 CANDIDATE_COLOR = "#ffffff"

@@ -9,7 +9,7 @@ from app.overlays import EPIPOLAR_COLOR, Path
 from app.state import State, finite_or_none
 from tracker.geometry.cameras import epipolar_segment
 from tracker.geometry.triangulation import ViewPin, triangulate
-from tracker.session import Session
+from tracker.session.session import Session
 
 
 class PinMark(NamedTuple):

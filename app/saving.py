@@ -30,7 +30,7 @@ from tracker.records import (
     PoseChange,
     PoseRecord,
 )
-from tracker.session import Session
+from tracker.session.session import Session
 from tracker.track import PoseEstimate
 from tracker.track_settings import TrackSettings
 

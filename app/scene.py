@@ -23,7 +23,7 @@ from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera, viewed_point
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.rigid import Array
-from tracker.session import Session
+from tracker.session.session import Session
 
 _REST_S = 0.08
 """Time between updates: drawing the scene costs the browser more than drawing the panes, which go first."""

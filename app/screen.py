@@ -17,9 +17,9 @@ from tracker.fit import held
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import ViewPin
-from tracker.locks import free_of
 from tracker.rebody import rebodied
-from tracker.session import Session
+from tracker.session.locked_dofs import free_of
+from tracker.session.session import Session
 from tracker.standing import standing_pose
 from tracker.track_settings import pose_cost
 

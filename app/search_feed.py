@@ -10,7 +10,7 @@ from app.controller import Controller
 from app.messages import binary
 from app.runs import Run
 from app.state import Landscape, ReplayState, State, finite_or_none
-from tracker.session import Session
+from tracker.session.session import Session
 
 _COLUMNS = 4
 """Figures of a step: evaluations, cost of the candidate, least cost, index of the stage."""

@@ -15,7 +15,7 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.rebody import rebodied
 from tracker.records import Change, PoseChange
-from tracker.session import save_model
+from tracker.session.session import save_model
 
 _KEY = "sizes_edits"
 """Setting of the session: by entry of the history the name of the person whose sizes it changed, and the revisions

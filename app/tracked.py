@@ -9,7 +9,7 @@ import numpy as np
 from tracker.annotations import AnnotationStore
 from tracker.geometry.rigid import Array
 from tracker.records import Alternative, PoseChange, PoseRecord
-from tracker.session import Person
+from tracker.session.session import Person
 from tracker.track import PoseEstimate
 from tracker.track_settings import TrackSettings
 

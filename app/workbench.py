@@ -26,8 +26,8 @@ from app.server import create_app, serve_forever, static_folder
 from tracker.annotations import AnnotationStore
 from tracker.footage.recording import Recording
 from tracker.observer import Observer
-from tracker.session import load_session
-from tracker.session_lock import SessionLock
+from tracker.session.lock import SessionLock
+from tracker.session.session import load_session
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ ROOMS = [
     "tracker.motion",
     "tracker.formats",
     "tracker.footage.video",
-    "tracker.session",
+    "tracker.session.session",
     "tracker.store",
     "tracker.images",
     "tracker.contours",

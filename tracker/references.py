@@ -16,7 +16,7 @@ from tracker.formats.model_toml import PRESETS, load_model, parse_model
 from tracker.formats.pose_csv import PoseTable, read_pose_table
 from tracker.formats.trc import MarkerTable, read_trc
 from tracker.geometry.rigid import Array
-from tracker.session import SESSION_FILE, Session, load_session
+from tracker.session.session import SESSION_FILE, Session, load_session
 
 
 class Reference(NamedTuple):

@@ -16,7 +16,7 @@ from app.saving import Saver
 from tracker.annotations import AnnotationStore
 from tracker.footage.recording import Recording
 from tracker.observer import Observer
-from tracker.session import load_session
+from tracker.session.session import load_session
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
 from tracker.records import PoseChange
 from tracker.second_pass import Followed
-from tracker.session import load_session
+from tracker.session.session import load_session
 
 
 def test_new_info_init_track_evaluate(run, tmp_path):

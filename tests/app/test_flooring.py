@@ -9,7 +9,7 @@ from app.messages import state as state_message
 from tracker.errors import TrackerError
 from tracker.geometry import rigid
 from tracker.geometry.ground_plane import UP_ROTATIONS, Floor, nearest_axis, up_rotation
-from tracker.session import load_session
+from tracker.session.session import load_session
 
 TILT = rigid.so3_exp(np.array([0.05, -0.03, 0.0]))
 HEIGHT_M = 0.12

@@ -7,7 +7,7 @@ from app import indexing
 from app.frames import Frames
 from tracker.footage.recording import Recording
 from tracker.observer import Observer
-from tracker.session import load_session
+from tracker.session.session import load_session
 
 
 def test_index_makes_a_proxy_of_every_camera(run, session):

@@ -15,7 +15,7 @@ from tracker.footage import packet_scan
 from tracker.footage.recording import Recording
 from tracker.footage.video import VideoFile
 from tracker.observer import Observer
-from tracker.session import load_session
+from tracker.session.session import load_session
 
 
 @pytest.fixture

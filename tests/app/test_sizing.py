@@ -10,7 +10,7 @@ from app import layers, messages
 from tracker.annotations import AnnotationStore
 from tracker.body.dimensions import PartSizes, sizes_of
 from tracker.errors import TrackerError
-from tracker.session import load_session
+from tracker.session.session import load_session
 
 FRAMES = (0, 3)
 

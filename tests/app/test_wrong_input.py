@@ -15,7 +15,7 @@ from command_line import SAMPLE, assert_refused, stored
 from tracker.formats.anipose import write_calibration
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
-from tracker.session_lock import SessionLock
+from tracker.session.lock import SessionLock
 from tracker.simulate.encode import VideoWriter
 
 SIZE = (64, 48)

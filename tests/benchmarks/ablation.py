@@ -16,7 +16,6 @@ from pathlib import Path
 from sections import measured, put_section, table
 from true_starts import read_simulated, start_of
 
-from tracker.assemble import assemble
 from tracker.body.model import BodyModel
 from tracker.evaluate import evaluate_joints, joints_of_poses
 from tracker.footage.camera_source import CameraSource
@@ -27,7 +26,8 @@ from tracker.observer import Observer
 from tracker.references import read_joints
 from tracker.refine import MatchSettings
 from tracker.search import SearchSettings
-from tracker.session import load_session
+from tracker.session.assemble import assemble
+from tracker.session.session import load_session
 from tracker.simulate import simulate
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings

@@ -23,7 +23,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
 from tracker.observer import Observer
-from tracker.session import Session
+from tracker.session.session import Session
 from tracker.simulate import simulate
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings

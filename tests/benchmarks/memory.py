@@ -21,7 +21,7 @@ from app.headless import track
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
 from tracker.references import read_joints
-from tracker.session import Session, load_session, save_session
+from tracker.session.session import Session, load_session, save_session
 from tracker.simulate.encode import VideoWriter
 from tracker.track_settings import TrackSettings
 

@@ -34,7 +34,7 @@ from app.commands import Reporter  # noqa: E402
 from app.indexing import index  # noqa: E402
 from tracker.footage.recording import Recording  # noqa: E402
 from tracker.matched import MatchedView  # noqa: E402
-from tracker.session import load_session, save_session  # noqa: E402
+from tracker.session.session import load_session, save_session  # noqa: E402
 
 REDUCTION = 1.7
 """Pixels of the footage, along either side, for one of a pane, with four of them in a window of 1280x720."""

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.assemble import DEFAULT_MODEL
 from tracker.body.model import BodyModel
 from tracker.fit import fit_to_points
 from tracker.formats.joint_maps import LIMB_JOINTS
@@ -13,7 +12,8 @@ from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
 from tracker.references import read_joints
-from tracker.session import Session, load_session
+from tracker.session.assemble import DEFAULT_MODEL
+from tracker.session.session import Session, load_session
 
 
 class Simulated(NamedTuple):

@@ -17,7 +17,7 @@ from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
 from tracker.occlusion import points_hidden
 from tracker.posing import drag, grab
-from tracker.session import load_session
+from tracker.session.session import load_session
 from tracker.standing import standing_pose
 
 FRAME = 0

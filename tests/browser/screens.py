@@ -26,7 +26,7 @@ from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.records import PoseChange, PoseRecord
 from tracker.references import read_joints
-from tracker.session import Session, load_session, save_session
+from tracker.session.session import Session, load_session, save_session
 from tracker.simulate.record import simulate
 
 SAMPLES = ROOT / "sample_sessions"

@@ -8,10 +8,10 @@ import pytest_asyncio
 from driving import drags_of, handle_of, shows, state_of, to_client, until
 from running import Program
 
-from tracker.assemble import assemble
 from tracker.fit import fit_to_points
 from tracker.references import read_joints
-from tracker.session import load_session
+from tracker.session.assemble import assemble
+from tracker.session.session import load_session
 
 JOINTS = ("shoulder", "knee", "ankle", "elbow", "wrist")
 VIEWS = (0, 2)

@@ -12,7 +12,7 @@ from tracker.annotations import AnnotationStore
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.records import PoseChange, PoseRecord
-from tracker.session import load_session
+from tracker.session.session import load_session
 
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 START = 8

@@ -22,7 +22,7 @@ from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera, viewed_point
 from tracker.records import PoseChange, PoseRecord
-from tracker.session import Person, create_session, load_session
+from tracker.session.session import Person, create_session, load_session
 from tracker.standing import standing_pose
 
 SIZE = (640, 480)

@@ -22,7 +22,7 @@ from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.observer import Observer
 from tracker.records import PoseChange, PoseRecord
-from tracker.session import load_session
+from tracker.session.session import load_session
 from tracker.track_settings import TrackSettings, pose_cost
 
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"

@@ -13,7 +13,7 @@ from tracker.formats.model_toml import load_model
 from tracker.geometry.rigid import Array
 from tracker.observer import Observer
 from tracker.references import read_joints
-from tracker.session import load_session
+from tracker.session.session import load_session
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"
 

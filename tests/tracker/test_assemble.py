@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from clips import SIZE, encode, write_images
 
-from tracker.assemble import assemble
 from tracker.errors import CalibrationError, ModelError, RecordingError, SessionError
 from tracker.footage.recording import Recording
 from tracker.formats.anipose import write_calibration
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
-from tracker.session import load_session
+from tracker.session.assemble import assemble
+from tracker.session.session import load_session
 
 K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])
 

@@ -21,7 +21,7 @@ from tracker.matched import MatchedView, match_scale, region_around
 from tracker.observer import FOREGROUND_MARGIN, Observer
 from tracker.scenery import Scenery
 from tracker.segments import link_edges
-from tracker.session import load_session
+from tracker.session.session import load_session
 
 
 class Frames:

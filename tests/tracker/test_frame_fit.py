@@ -15,7 +15,7 @@ from tracker.frame_fit import fit_frame
 from tracker.geometry.triangulation import ViewPin
 from tracker.observer import Observer
 from tracker.references import read_joints
-from tracker.session import load_session
+from tracker.session.session import load_session
 from tracker.track_settings import TrackSettings
 
 GAVRILA = load_model("gavrila22")

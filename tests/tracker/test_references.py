@@ -13,7 +13,7 @@ from tracker.formats.pose_csv import write_pose_table
 from tracker.formats.trc import read_trc, write_trc
 from tracker.records import PoseChange, PoseRecord
 from tracker.references import read_joints, read_reference, stored_motion
-from tracker.session import Person, create_session, load_session
+from tracker.session.session import Person, create_session, load_session
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.pose_csv import read_pose_table
 from tracker.motion.prediction import predict
 from tracker.observer import Observer
-from tracker.session import Session
+from tracker.session.session import Session
 from tracker.simulate.record import simulate
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings

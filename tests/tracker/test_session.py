@@ -9,7 +9,7 @@ from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
-from tracker.session import Person, create_session, load_session, save_session
+from tracker.session.session import Person, create_session, load_session, save_session
 
 K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])
 
@@ -140,7 +140,7 @@ def test_nothing_half_written_when_writing_fails(tmp_path, cameras, monkeypatch)
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("tracker.session.format_model", full)
+    monkeypatch.setattr("tracker.session.session.format_model", full)
     with pytest.raises(SessionError, match="No space left"):
         make(tmp_path, cameras)
     assert list(tmp_path.iterdir()) == []

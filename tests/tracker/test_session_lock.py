@@ -8,7 +8,7 @@ import textwrap
 import pytest
 
 from tracker.errors import SessionError
-from tracker.session_lock import LOCK_FILE, SessionLock
+from tracker.session.lock import LOCK_FILE, SessionLock
 
 HOLDER = textwrap.dedent("""
     import sys, time

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_evidence, posed, shaken, solid
 
-from tracker.assemble import assemble
 from tracker.body.model import Body
 from tracker.evaluate import evaluate_joints, joints_of_poses
 from tracker.evidence import view_evidence
@@ -16,7 +15,8 @@ from tracker.observer import Observer
 from tracker.recover import Searched
 from tracker.references import read_joints
 from tracker.search import SearchSettings
-from tracker.session import load_session
+from tracker.session.assemble import assemble
+from tracker.session.session import load_session
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings, pose_cost, search_frame
 

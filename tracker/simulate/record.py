@@ -21,7 +21,7 @@ from tracker.formats.pose_csv import write_pose_table
 from tracker.formats.trc import write_trc
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array
-from tracker.session import PALETTE, Person, Session, load_session, save_session
+from tracker.session.session import PALETTE, Person, Session, load_session, save_session
 from tracker.simulate.acting import Role, perform
 from tracker.simulate.encode import VideoWriter
 from tracker.simulate.film import Image, exposed, film, freeze

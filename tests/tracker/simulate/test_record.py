@@ -6,7 +6,7 @@ from tracker.footage.video import open_footage, read_image
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.formats.trc import read_trc
-from tracker.session import load_session
+from tracker.session.session import load_session
 from tracker.simulate.record import simulate
 
 SIZE = (160, 120)

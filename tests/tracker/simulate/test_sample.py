@@ -12,7 +12,7 @@ from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.formats.trc import read_trc
-from tracker.session import load_session
+from tracker.session.session import load_session
 from tracker.simulate.acting import perform
 from tracker.simulate.film import film, freeze
 from tracker.simulate.rig import make_cameras

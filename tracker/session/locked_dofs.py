@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.session import Person
+from tracker.session.session import Person
 
 SETTING = "locked"
 """Setting of the session: by name of the person the names of the degrees of freedom."""

@@ -10,7 +10,7 @@ from tracker.footage.video import IMAGE_SUFFIXES, Footage, open_footage
 from tracker.formats.anipose import Units, read_calibration
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
-from tracker.session import PALETTE, Person, Session, create_session
+from tracker.session.session import PALETTE, Person, Session, create_session
 
 DEFAULT_MODEL = "gavrila34"
 
