@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from itertools import takewhile
 
-from tracker.records import SOURCES, FrameRow
+from tracker.store.records import SOURCES, FrameRow
 
 _WORST_FIRST = ("lost", "doubtful", "good", "")
 

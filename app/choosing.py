@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager
 
 from app.screen import Screen
 from tracker.errors import TrackerError
-from tracker.records import Alternative, PoseChange, PoseRecord
+from tracker.store.records import Alternative, PoseChange, PoseRecord
 
 
 class Choosing:

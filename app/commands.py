@@ -13,7 +13,6 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError, TrackerError
 from tracker.evaluate import Alignment, evaluate_joints, evaluate_poses
 from tracker.fit import fit_to_points
@@ -22,11 +21,12 @@ from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import PoseTable
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
-from tracker.records import FrameRow, PoseChange, PoseRecord
 from tracker.references import Reference, stored_motion
 from tracker.session.lock import SessionLock
 from tracker.session.session import Person, Session, load_session, save_session
 from tracker.sizes import fit_sizes
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import FrameRow, PoseChange, PoseRecord
 
 
 class Target(NamedTuple):

@@ -36,8 +36,8 @@ from app.tracking import Tracking
 from app.viewing import Viewing
 from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array
-from tracker.records import FrameNumbers
 from tracker.session.session import Session
+from tracker.store.records import FrameNumbers
 from tracker.track_settings import TrackSettings
 
 

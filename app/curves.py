@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array, FloatArray
-from tracker.records import FrameNumbers
+from tracker.store.records import FrameNumbers
 
 GROUPS = ("arms", "torso", "legs", "cost")
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from app.commands import Reporter, Target
 from app.tracked import Keyframes, keyframes_of, told_of, tracked_changes
-from tracker.annotations import AnnotationStore
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.confidence import Status
 from tracker.errors import SessionError
@@ -19,11 +18,12 @@ from tracker.footage.recording import Recording
 from tracker.formats.model_toml import format_model
 from tracker.geometry.rigid import Array
 from tracker.observer import Observer
-from tracker.records import PoseChange, PoseRecord
 from tracker.second_pass import Followed, Tracked, follow_back
 from tracker.session.lock import SessionLock
 from tracker.session.locked_dofs import free_of, kept_locks
 from tracker.session.session import Person
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange, PoseRecord
 from tracker.track import PoseEstimate, track_chamfer
 from tracker.track_settings import TrackSettings
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 
 from app.screen import Screen
-from tracker.records import HistoryEntry
+from tracker.store.records import HistoryEntry
 
 
 class History:

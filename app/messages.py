@@ -16,8 +16,8 @@ from app.layers import View
 from app.state import JobState, ReplayState, State, TrackState
 from tracker.evidence import ViewEvidence
 from tracker.posing import minor_points
-from tracker.records import SOURCES, STATUSES, FrameNumbers, HistoryEntry
 from tracker.session.session import Session
+from tracker.store.records import SOURCES, STATUSES, FrameNumbers, HistoryEntry
 
 _FEW_CELLS = 2000
 """Cells of the timeline that travel by name; more go as columns, a tenth of the bytes and of the work."""

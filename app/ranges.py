@@ -14,7 +14,7 @@ from app.state import RangeState
 from app.tracking import Tracking
 from tracker.errors import TrackerError
 from tracker.motion.interpolation import between
-from tracker.records import Change, FrameRow, MarkChange, PoseChange, PoseRecord
+from tracker.store.records import Change, FrameRow, MarkChange, PoseChange, PoseRecord
 
 Mark = Literal["keyframe", "reviewed", "unreviewed", "none"]
 """`unreviewed` leaves keyframes, which a person has vouched for; `none` takes that away too."""

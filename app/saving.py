@@ -11,14 +11,15 @@ from app.cells import Cells
 from app.state import Shown, State
 from app.tracked import keyframes_of, tracked_changes
 from app.writing import Writing
-from tracker.annotations import AnnotationStore
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, parse_model
 from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import ViewPin
 from tracker.rebody import rebodied
-from tracker.records import (
+from tracker.session.session import Session
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import (
     SOURCES,
     Alternative,
     Change,
@@ -30,7 +31,6 @@ from tracker.records import (
     PoseChange,
     PoseRecord,
 )
-from tracker.session.session import Session
 from tracker.track import PoseEstimate
 from tracker.track_settings import TrackSettings
 

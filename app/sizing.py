@@ -14,8 +14,8 @@ from tracker.body.dimensions import BodySizes, PartSizes, scaled, sizes_of, twin
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.rebody import rebodied
-from tracker.records import Change, PoseChange
 from tracker.session.session import save_model
+from tracker.store.records import Change, PoseChange
 
 _KEY = "sizes_edits"
 """Setting of the session: by entry of the history the name of the person whose sizes it changed, and the revisions

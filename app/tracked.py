@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from tracker.annotations import AnnotationStore
 from tracker.geometry.rigid import Array
-from tracker.records import Alternative, PoseChange, PoseRecord
 from tracker.session.session import Person
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import Alternative, PoseChange, PoseRecord
 from tracker.track import PoseEstimate
 from tracker.track_settings import TrackSettings
 

@@ -23,11 +23,11 @@ from app.private_viser import PrivateViser
 from app.saving import Saver
 from app.scene import Scene
 from app.server import create_app, serve_forever, static_folder
-from tracker.annotations import AnnotationStore
 from tracker.footage.recording import Recording
 from tracker.observer import Observer
 from tracker.session.lock import SessionLock
 from tracker.session.session import load_session
+from tracker.store.annotation_store import AnnotationStore
 
 
 @dataclass(frozen=True)

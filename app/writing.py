@@ -7,9 +7,9 @@ to the disk with the next edit or when the user says so.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tracker.annotations import AnnotationStore
 from tracker.errors import TrackerError
-from tracker.records import Change, PinChange, PoseChange
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import Change, PinChange, PoseChange
 
 
 @dataclass

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.annotations import AnnotationStore
 from tracker.body.model import BodyModel
 from tracker.errors import FormatError, SessionError
 from tracker.evaluate import Motion, at_rate, joints_of_poses, remap_axes
@@ -17,6 +16,7 @@ from tracker.formats.pose_csv import PoseTable, read_pose_table
 from tracker.formats.trc import MarkerTable, read_trc
 from tracker.geometry.rigid import Array
 from tracker.session.session import SESSION_FILE, Session, load_session
+from tracker.store.annotation_store import AnnotationStore
 
 
 class Reference(NamedTuple):

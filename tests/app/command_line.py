@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tracker.annotations import AnnotationStore
+from tracker.store.annotation_store import AnnotationStore
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"
 

@@ -5,9 +5,9 @@ import pytest
 
 from app import overlays
 from app.layers import View
-from tracker.annotations import AnnotationStore
 from tracker.errors import TrackerError
-from tracker.records import Alternative, PoseChange, PoseRecord
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import Alternative, PoseChange, PoseRecord
 
 ANN, BOB = 0, 1
 VIEW = View(frozenset(("contours",)), (1, 1, 1, 1))

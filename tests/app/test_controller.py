@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from hands import FRONT, PAGE, drag, pixel_of, wait_for
 
-from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
 from tracker.search import SearchSettings
+from tracker.store.annotation_store import AnnotationStore
 from tracker.track_settings import TrackSettings
 
 

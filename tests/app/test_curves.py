@@ -3,7 +3,7 @@ import pytest
 
 from app.curves import GROUPS, Plot, plots_of, samples
 from tracker.formats.model_toml import load_model, parse_model
-from tracker.records import FrameNumbers
+from tracker.store.records import FrameNumbers
 
 CAMERAS = ("front", "left")
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hands import FRONT, PAGE, drag, pixel_of, wait_for
 
-from tracker.annotations import AnnotationStore
 from tracker.errors import TrackerError
+from tracker.store.annotation_store import AnnotationStore
 
 RIGHT, BACK = 1, 2
 

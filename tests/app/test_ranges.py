@@ -5,9 +5,9 @@ import pytest
 from hands import drag, wait_for
 
 from app import ranges
-from tracker.annotations import AnnotationStore
 from tracker.errors import TrackerError
 from tracker.motion.interpolation import between
+from tracker.store.annotation_store import AnnotationStore
 
 
 @pytest.fixture

@@ -7,10 +7,10 @@ import pytest
 from hands import PAGE, drag, pixel_of, wait_for
 
 from app import layers, messages
-from tracker.annotations import AnnotationStore
 from tracker.body.dimensions import PartSizes, sizes_of
 from tracker.errors import TrackerError
 from tracker.session.session import load_session
+from tracker.store.annotation_store import AnnotationStore
 
 FRAMES = (0, 3)
 

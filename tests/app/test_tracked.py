@@ -2,7 +2,7 @@ import numpy as np
 from fake_tracker import Estimate
 
 from app.tracked import tracked_changes
-from tracker.annotations import AnnotationStore
+from tracker.store.annotation_store import AnnotationStore
 from tracker.track import OtherPose
 from tracker.track_settings import TrackSettings
 

@@ -9,9 +9,9 @@ import pytest
 from fake_tracker import STEP_M
 from hands import FRONT, PAGE, drag, wait_for
 
-from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError, TrackerError
 from tracker.second_pass import Followed
+from tracker.store.annotation_store import AnnotationStore
 
 
 def at(controller, frame):

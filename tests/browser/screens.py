@@ -20,14 +20,14 @@ from driving import handle_of, shows, to_client
 from playwright.async_api import Browser, Page, async_playwright
 from running import ROOT, Program
 
-from tracker.annotations import AnnotationStore
 from tracker.fit import fit_to_points
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
-from tracker.records import PoseChange, PoseRecord
 from tracker.references import read_joints
 from tracker.session.session import Session, load_session, save_session
 from tracker.simulate.record import simulate
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange, PoseRecord
 
 SAMPLES = ROOT / "sample_sessions"
 LAPTOP, LARGE = (1280, 720), (1920, 1080)

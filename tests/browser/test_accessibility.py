@@ -3,7 +3,7 @@
 import pytest
 from driving import dragging, shows, state_of, until
 
-from tracker.records import SOURCES
+from tracker.store.records import SOURCES
 
 LUMINANCE = """(color) => {
   const context = new OffscreenCanvas(1, 1).getContext('2d');

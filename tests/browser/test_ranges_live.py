@@ -6,7 +6,7 @@ import pytest_asyncio
 from driving import dragging, shows, state_of
 from running import ROOT, Program
 
-from tracker.annotations import AnnotationStore
+from tracker.store.annotation_store import AnnotationStore
 
 
 @pytest_asyncio.fixture(loop_scope="session")

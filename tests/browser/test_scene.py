@@ -14,16 +14,16 @@ import pytest_asyncio
 from driving import shows, state_of, to_client
 from running import Program
 
-from tracker.annotations import AnnotationStore
 from tracker.body.model import Body
 from tracker.contours import part_poses
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera, viewed_point
-from tracker.records import PoseChange, PoseRecord
 from tracker.session.session import Person, create_session, load_session
 from tracker.standing import standing_pose
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange, PoseRecord
 
 SIZE = (640, 480)
 PAINTED = 4

@@ -16,13 +16,13 @@ from first_poses import true_body, views_of
 from running import ROOT, Program, visited
 from scripted_user import TRUNK, ScriptedUser
 
-from tracker.annotations import AnnotationStore
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.observer import Observer
-from tracker.records import PoseChange, PoseRecord
 from tracker.session.session import load_session
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange, PoseRecord
 from tracker.track_settings import TrackSettings, pose_cost
 
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
-from tracker.records import Alternative, FrameRow, MarkChange, Pin, PinChange, PoseChange, PoseRecord
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import Alternative, FrameRow, MarkChange, Pin, PinChange, PoseChange, PoseRecord
 
 
 @pytest.fixture

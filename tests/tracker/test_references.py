@@ -4,16 +4,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tracker.annotations import AnnotationStore
 from tracker.errors import FormatError, SessionError
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.joint_maps import JOINTS
 from tracker.formats.model_toml import format_model, load_model
 from tracker.formats.pose_csv import write_pose_table
 from tracker.formats.trc import read_trc, write_trc
-from tracker.records import PoseChange, PoseRecord
 from tracker.references import read_joints, read_reference, stored_motion
 from tracker.session.session import Person, create_session, load_session
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange, PoseRecord
 
 
 @pytest.fixture

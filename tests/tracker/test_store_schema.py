@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tracker import store_schema
-from tracker.annotations import AnnotationStore
 from tracker.errors import SessionError
-from tracker.records import Alternative, MarkChange, Pin, PoseChange, PoseRecord
-from tracker.store_schema import VERSION
+from tracker.store import schema
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import Alternative, MarkChange, Pin, PoseChange, PoseRecord
+from tracker.store.schema import VERSION
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def written(path, script):
 def upgraded(path, version, change):
     """Bring a store to the next version, as the program of that version did, and change it there."""
     with closing(sqlite3.connect(path)) as db:
-        for statement in (*store_schema._UPGRADES[version], change, f"PRAGMA user_version = {version + 1}"):
+        for statement in (*schema._UPGRADES[version], change, f"PRAGMA user_version = {version + 1}"):
             db.execute(statement)
         db.commit()
     return path
@@ -172,8 +172,8 @@ def test_settings_are_kept_once(path):
 
 def test_upgrade_is_whole_or_not_at_all(version_1, monkeypatch):
     before = version_1.read_bytes()
-    broken = (*store_schema._UPGRADES[1][:2], "ALTER TABLE no_such_table ADD COLUMN x TEXT")
-    monkeypatch.setitem(store_schema._UPGRADES, 1, broken)
+    broken = (*schema._UPGRADES[1][:2], "ALTER TABLE no_such_table ADD COLUMN x TEXT")
+    monkeypatch.setitem(schema._UPGRADES, 1, broken)
     with pytest.raises(SessionError, match="no_such_table"):
         AnnotationStore(version_1)
     monkeypatch.undo()

@@ -4,7 +4,7 @@
       session.toml         version, name, fps, n_frames, up, floor, per camera its footage, the people
       calibration.toml     anipose / Pose2Sim layout, metres
       models/NAME.toml     a person's body model
-      annotations.sqlite   poses (see `tracker.annotations`)
+      annotations.sqlite   poses (see `tracker.store.annotation_store`)
 
 Footage may stay where it is. Paths in session.toml are relative to the session folder for what lies in it or
 beside it, so that the two can move together, and absolute for the rest.

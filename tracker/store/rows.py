@@ -1,4 +1,4 @@
-"""A pose as a row of the store, both ways: `tracker.annotations` writes and reads by these."""
+"""A pose as a row of the store, both ways: `tracker.store.annotation_store` writes and reads by these."""
 
 import json
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tracker.geometry.rigid import Array
-from tracker.records import SOURCES, STATUSES, Alternative, FrameNumbers, FrameRow, PoseRecord
+from tracker.store.records import SOURCES, STATUSES, Alternative, FrameNumbers, FrameRow, PoseRecord
 
 SHOWN = "FROM poses p JOIN pose_changes c ON c.id = p.change"
 """The rows of the poses that the head of the history shows, `c`, with their key, `p`."""

@@ -16,9 +16,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from tracker import store_schema, stored_poses
 from tracker.errors import SessionError
-from tracker.records import (
+from tracker.store import rows as stored_poses
+from tracker.store import schema
+from tracker.store.records import (
     Alternative,
     Change,
     Committed,
@@ -68,11 +69,11 @@ class AnnotationStore:
             self._db.execute("PRAGMA synchronous = EXTRA")
             self._db.execute("PRAGMA foreign_keys = ON")
             version = self._prepared(read_only)
-        if version != store_schema.VERSION:
+        if version != schema.VERSION:
             self._db.close()
             what = "is not a store of annotations" if version == 0 else f"has version {version}"
             raise SessionError(
-                f"annotations {path} {what}, this program reads up to version {store_schema.VERSION}; upgrade quadrille"
+                f"annotations {path} {what}, this program reads up to version {schema.VERSION}; upgrade quadrille"
             )
 
     def close(self) -> None:
@@ -248,11 +249,11 @@ class AnnotationStore:
         An older store that is only to be read stays as it is on the disk and is read as if it were new.
         """
         if read_only:
-            return store_schema.show_as_new(self._db)
-        version = store_schema.version(self._db)
-        if version < store_schema.VERSION:
+            return schema.show_as_new(self._db)
+        version = schema.version(self._db)
+        if version < schema.VERSION:
             with self._transaction():  # all of it or nothing: a power cut leaves the older file
-                version = store_schema.upgrade(self._db)
+                version = schema.upgrade(self._db)
         return version
 
     def _apply(self, edit: int, changes: Sequence[Change], by_program: bool) -> tuple[tuple[str, int], ...]:
