@@ -15,9 +15,9 @@ from app.recent import Recent
 from tracker.errors import RecordingError
 from tracker.evidence import ViewEvidence
 from tracker.footage.proxy import Proxy
-from tracker.matched import MatchedView
+from tracker.images.background_subtraction import Image
+from tracker.images.matching_view import MatchedView
 from tracker.observer import Observer
-from tracker.silhouettes import Image
 
 _LOG = logging.getLogger(__name__)
 _IMAGE_BYTES = 16 * 2**20

@@ -14,10 +14,10 @@ from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera, epipolar_segment
 from tracker.geometry.rigid import Array, FloatArray
+from tracker.images.background_subtraction import Mask
+from tracker.images.edge_segments import accept
 from tracker.rebody import rebodied
-from tracker.segments import accept
 from tracker.session.session import Person, Session
-from tracker.silhouettes import Mask
 
 CANDIDATE_COLOR = "#ffffff"
 COMPARED_COLOR = "#ff9df2"

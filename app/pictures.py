@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from tracker.body.model import Body
 from tracker.evidence import ViewEvidence
 from tracker.geometry.cameras import Camera
+from tracker.images.background_subtraction import Image, Mask
 from tracker.part_masks import part_labels
-from tracker.silhouettes import Image, Mask
 
 SILHOUETTE_COLOR = "#4ae08c"
 _JPEG_QUALITY = 85

@@ -15,7 +15,7 @@ from app.state import State
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera, viewed_point
 from tracker.geometry.rigid import Array
-from tracker.silhouettes import Image
+from tracker.images.background_subtraction import Image
 
 _MOVED_M = 1e-3
 _MOVED_RAD = 1e-3

@@ -19,13 +19,13 @@ from tracker.compute.numba_options import BORROW
 from tracker.contours import part_poses, projection
 from tracker.evidence import ViewEvidence
 from tracker.geometry.rigid import Array
+from tracker.images.background_subtraction import Image
+from tracker.images.color_histogram import BINS, bin_of
 from tracker.limb_look import ColorView, LimbLook, Standing
 from tracker.sights import (
     ALONG,
-    BINS,
     NEAREST_M,
     along_axis,
-    bin_of,
     ellipsoids,
     hidden,
     pixel_on_axis,
@@ -33,7 +33,6 @@ from tracker.sights import (
     see_axis,
     unit_balls,
 )
-from tracker.silhouettes import Image
 
 _SMOOTHING_BINS = 0.7
 _ACROSS = 3

@@ -32,7 +32,7 @@ from tracker.geometry.segment_distance import (
     stack_rows,
     within_reach,
 )
-from tracker.sampling import bilinear
+from tracker.images.distance_transform import bilinear
 
 Outliers = Literal["truncated", "paper"]
 

@@ -12,15 +12,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.edges import Edges
 from tracker.geometry.cameras import Camera, Region
 from tracker.geometry.rigid import FloatArray
-from tracker.sampling import distance_image
-from tracker.scenery import Scenery
-from tracker.segments import Samples, Segments, accept, link_edges, sampled
-from tracker.sights import BINS, count_colors
-from tracker.silhouette_contour import Outline, trace_outline, trust_outline
-from tracker.silhouettes import Image, Mask
+from tracker.images.background_subtraction import Image, Mask
+from tracker.images.color_histogram import BINS, count_colors
+from tracker.images.distance_transform import distance_image
+from tracker.images.edge_segments import Samples, Segments, accept, link_edges, sampled
+from tracker.images.edges import Edges
+from tracker.images.silhouette_outline import Outline, trace_outline, trust_outline
+from tracker.images.static_edges import Scenery
 
 SCENE_SPACING_PX = 4
 """Scene edges are thinned to one point per cell of this many pixels a side."""

@@ -6,14 +6,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker import silhouettes
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import read_background, read_mask
 from tracker.geometry.cameras import Region
 from tracker.geometry.rigid import FloatArray
-from tracker.matched import MatchedView
-from tracker.probes import Probes, Readings
-from tracker.silhouettes import Changes, Image
+from tracker.images import background_subtraction
+from tracker.images.background_subtraction import Changes, Image
+from tracker.images.image_statistics import Probes, Readings
+from tracker.images.matching_view import MatchedView
 
 
 class Prepared(NamedTuple):
@@ -71,13 +71,13 @@ class Foreground:
         readings = self._probes.read(frame)
         if empty is None:
             return Prepared(frame, mask, readings.strengths, 0.0, np.ones(3, np.float32))
-        gain = silhouettes.exposure_gain(readings.colors[empty.usable], empty.readings.colors[empty.usable])
+        gain = background_subtraction.exposure_gain(readings.colors[empty.usable], empty.readings.colors[empty.usable])
         differences = np.abs(readings.colors - gain * empty.readings.colors).max(axis=-1)
-        return Prepared(frame, mask, readings.strengths, silhouettes.change_threshold(differences), gain)
+        return Prepared(frame, mask, readings.strengths, background_subtraction.change_threshold(differences), gain)
 
     def smoothed(self, prepared: Prepared, box: Region) -> Image:
         """A region of the frame, smoothed, in matched pixels, (H, W, 3)."""
-        return silhouettes.smoothed(self.view.image(prepared.frame, box))
+        return background_subtraction.smoothed(self.view.image(prepared.frame, box))
 
     def changes(self, prepared: Prepared, smooth: Image, box: Region) -> Changes | None:
         """What is new in a region, whose smoothed image is given, by its mask or before its background.
@@ -91,12 +91,12 @@ class Foreground:
             return Changes(inside, inside)
         if empty is None:
             return None
-        background = silhouettes.brightened(empty.smooth[v0:v1, u0:u1], prepared.gain)
-        return silhouettes.subtract_background(smooth, background, prepared.threshold)
+        background = background_subtraction.brightened(empty.smooth[v0:v1, u0:u1], prepared.gain)
+        return background_subtraction.subtract_background(smooth, background, prepared.threshold)
 
     def _empty_scene(self, background: Image | None) -> _Empty | None:
         if background is None:
             return None
-        smooth = silhouettes.smoothed(self.view.image(background, self.view.whole))
+        smooth = background_subtraction.smoothed(self.view.image(background, self.view.whole))
         readings = self._probes.read(background)
-        return _Empty(smooth, readings, np.flatnonzero(silhouettes.tells_exposure(readings.colors)))
+        return _Empty(smooth, readings, np.flatnonzero(background_subtraction.tells_exposure(readings.colors)))

@@ -12,8 +12,8 @@ from tracker.compute.numba_options import FAST
 from tracker.evidence import SCENE_SPACING_PX
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.geometry.segment_distance import LANES, cells_within
+from tracker.images.distance_transform import bilinear
 from tracker.kept import Kept, keep_pieces, mark_covered, remember, still_stands, trace_moving, trace_standing
-from tracker.sampling import bilinear
 from tracker.twists import add_twists
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernel's arithmetic into float64

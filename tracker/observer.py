@@ -13,17 +13,17 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from tracker import silhouettes
-from tracker.edges import detect_edges, levels
 from tracker.evidence import Look, ViewEvidence, default_theta_px, expecting, silhouette_evidence
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.foreground import Foreground, Prepared
 from tracker.geometry.cameras import Camera, Region
 from tracker.geometry.rigid import FloatArray
-from tracker.matched import fit_region
-from tracker.scenery import Scenery
-from tracker.segments import link_edges, sampled
+from tracker.images import background_subtraction
+from tracker.images.edge_segments import link_edges, sampled
+from tracker.images.edges import detect_edges, levels
+from tracker.images.matching_view import fit_region
+from tracker.images.static_edges import Scenery
 
 FOREGROUND_MARGIN = 0.012
 """How far around the silhouette edges are kept, as a fraction of the longer side of the image."""
@@ -160,7 +160,7 @@ class Observer:
         smooth = view.smoothed(prepared, box)
         changes = view.changes(prepared, smooth, box)
         margin_px = FOREGROUND_MARGIN * max(matched.size)
-        foreground = None if changes is None else silhouettes.grow(changes.anything, margin_px)
+        foreground = None if changes is None else background_subtraction.grow(changes.anything, margin_px)
         # Texture that stands still need not be kept out by thresholds, which would keep out the weaker edges of bodies.
         edges = detect_edges(smooth, levels(prepared.strengths, restricted=changes is not None or still), foreground)
         segments = link_edges(edges.found, edges.gradients)

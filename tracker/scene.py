@@ -24,10 +24,10 @@ from tracker.descent import solve
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.fit import Block, Fit, covariance, held
 from tracker.geometry.rigid import Array
+from tracker.images.static_edges import Scenery
 from tracker.memory import Memory
 from tracker.recover import LEAST_GAIN, Judge, for_several, search_limbs
 from tracker.refine import WORTH_A_STEP, ContourMatch, PartCosts
-from tracker.scenery import Scenery
 from tracker.search import BEFORE_REFINEMENT, SearchSettings
 from tracker.sharing import Shares, Sharing
 from tracker.surroundings import px_per_m, visible_outline

@@ -20,7 +20,7 @@ from tracker.body.model import Body
 from tracker.contours import PIECE_PX, Contour, trace_view
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence, findable, unfiltered, with_segments
 from tracker.geometry.rigid import Array, FloatArray
-from tracker.segments import MAX_ANGLE_RAD, Samples, Segments, nearest_alongside, sampled
+from tracker.images.edge_segments import MAX_ANGLE_RAD, Samples, Segments, nearest_alongside, sampled
 from tracker.surfaces import Surfaces
 
 _CLEARLY = 0.5

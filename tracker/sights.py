@@ -10,12 +10,9 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel
 from tracker.compute.numba_options import BORROW
 from tracker.geometry.rigid import Array
-from tracker.silhouettes import Image
 
 ALONG = 7
 """Samples along the axis of each part."""
-BINS = 12
-"""Bins of colours along each channel."""
 NEAREST_M = 0.05
 """What comes nearer to the camera's plane is not seen, metres."""
 
@@ -113,18 +110,3 @@ def pixel_on_axis(axis: Array, along_m: float) -> tuple[float, float, float, flo
     u = (axis[1, 0] + along_m * axis[2, 0]) * near
     v = (axis[1, 1] + along_m * axis[2, 1]) * near
     return u, v, (axis[3, 0] - u * axis[3, 2]) * near, (axis[3, 1] - v * axis[3, 2]) * near
-
-
-@njit(**BORROW)
-def bin_of(image: Image, v: int, u: int) -> int:
-    """Index of a pixel's colour."""
-    r, g, b = image[v, u, 0] * BINS // 256, image[v, u, 1] * BINS // 256, image[v, u, 2] * BINS // 256
-    return (r * BINS + g) * BINS + b
-
-
-@njit(**BORROW)
-def count_colors(image: Image, counts: NDArray[np.int64]) -> None:
-    """Count the pixels of an image, (H, W, 3), by their colour: add to the counts, (BINS^3,)."""
-    for v in range(image.shape[0]):
-        for u in range(image.shape[1]):
-            counts[bin_of(image, v, u)] += 1

@@ -8,7 +8,7 @@ from tracker import contours
 from tracker.body.model import Body
 from tracker.geometry.cameras import Camera, Region
 from tracker.geometry.rigid import FloatArray
-from tracker.matched import region_around
+from tracker.images.matching_view import region_around
 
 _NEAREST_M = 0.3
 """Bodies nearer to a camera, and those behind it, count as this near."""

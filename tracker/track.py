@@ -12,11 +12,11 @@ from tracker.confidence import Quality, Status
 from tracker.evidence import ViewEvidence
 from tracker.geometry.cameras import Region
 from tracker.geometry.rigid import Array
+from tracker.images.static_edges import Scenery
 from tracker.memory import Memory
 from tracker.motion.prediction import PredictSettings
 from tracker.observer import Observer
 from tracker.scene import Found, Scene
-from tracker.scenery import Scenery
 from tracker.surroundings import confirmed, regions, regions_ahead, visible_outline
 from tracker.track_settings import TrackSettings, pose_cost
 

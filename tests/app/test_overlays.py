@@ -12,7 +12,7 @@ from app.state import Shown
 from tracker import contours
 from tracker.body.model import Body
 from tracker.evidence import ViewEvidence
-from tracker.segments import Segments
+from tracker.images.edge_segments import Segments
 
 
 def kinds_of(paths, kind, camera=0):

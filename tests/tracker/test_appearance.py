@@ -8,7 +8,7 @@ from staging import SUIT, at, camera_at, cameras_around, dressed, own_evidence, 
 from tracker import appearance
 from tracker.appearance import Colors
 from tracker.body.model import Body
-from tracker.sights import BINS
+from tracker.images.color_histogram import BINS
 
 GRAY = dict.fromkeys(SUIT, (120, 120, 120))
 CAMERAS = cameras_around()

@@ -2,9 +2,9 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker.edges import Levels, detect_edges, levels
-from tracker.probes import Probes
-from tracker.silhouettes import smoothed
+from tracker.images.background_subtraction import smoothed
+from tracker.images.edges import Levels, detect_edges, levels
+from tracker.images.image_statistics import Probes
 
 COLUMN = 30
 

@@ -17,10 +17,10 @@ from tracker.evidence import (
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
-from tracker.matched import MatchedView, match_scale, region_around
+from tracker.images.edge_segments import link_edges
+from tracker.images.matching_view import MatchedView, match_scale, region_around
+from tracker.images.static_edges import Scenery
 from tracker.observer import FOREGROUND_MARGIN, Observer
-from tracker.scenery import Scenery
-from tracker.segments import link_edges
 from tracker.session.session import load_session
 
 

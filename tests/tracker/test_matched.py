@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from staging import camera_at
 
-from tracker.matched import MIN_REGION_PX, MatchedView, fit_region, region_around
+from tracker.images.matching_view import MIN_REGION_PX, MatchedView, fit_region, region_around
 
 LENS = np.array([-0.1, 0.02, 0.001, -0.001])
 

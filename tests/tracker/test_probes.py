@@ -2,9 +2,9 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker.edges import Levels, detect_edges
-from tracker.probes import SPACING_PX, Probes
-from tracker.silhouettes import smoothed
+from tracker.images.background_subtraction import smoothed
+from tracker.images.edges import Levels, detect_edges
+from tracker.images.image_statistics import SPACING_PX, Probes
 
 
 def picture(size, blur=1.5, seed=0):

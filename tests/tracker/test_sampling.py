@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from match_oracle import bilinear as obvious
 
-from tracker.sampling import bilinear, distance_image
+from tracker.images.distance_transform import bilinear, distance_image
 
 RNG = np.random.default_rng(4)
 IMAGE = RNG.uniform(0, 30, (12, 17)).astype(np.float32)

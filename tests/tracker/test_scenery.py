@@ -3,8 +3,8 @@ import pytest
 
 from tracker.evidence import unfiltered, view_evidence
 from tracker.geometry.cameras import Camera
-from tracker.scenery import Scenery
-from tracker.segments import Segments
+from tracker.images.edge_segments import Segments
+from tracker.images.static_edges import Scenery
 
 SIZE = (80, 60)
 NOBODY = np.empty((0, 4), np.float32)

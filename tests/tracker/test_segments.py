@@ -2,9 +2,9 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker.edges import Levels, detect_edges
-from tracker.segments import MAX_LENGTH, Segments, accept, link_edges, sampled
-from tracker.silhouettes import smoothed
+from tracker.images.background_subtraction import smoothed
+from tracker.images.edge_segments import MAX_LENGTH, Segments, accept, link_edges, sampled
+from tracker.images.edges import Levels, detect_edges
 
 
 def linked(image):

@@ -6,9 +6,9 @@ from staging import at, camera_at, own_evidence, solid
 
 from tracker import contours
 from tracker.evidence import Silhouette, with_segments
-from tracker.segments import Segments
+from tracker.images.edge_segments import Segments
+from tracker.images.silhouette_outline import Outline
 from tracker.sharing import Shares, Sharing, _tell_apart
-from tracker.silhouette_contour import Outline
 
 BALL = solid((0.15, 0.15, 0.3))
 FRONT = camera_at("front", (4.0, 0.0, 0.0))

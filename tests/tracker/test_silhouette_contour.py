@@ -2,9 +2,9 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker.edges import Levels, detect_edges
-from tracker.silhouette_contour import trace_outline, trust_outline
-from tracker.silhouettes import smoothed
+from tracker.images.background_subtraction import smoothed
+from tracker.images.edges import Levels, detect_edges
+from tracker.images.silhouette_outline import trace_outline, trust_outline
 
 BOUNDS = Levels(60.0, 30.0)
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tracker.silhouettes import (
+from tracker.images.background_subtraction import (
     MIN_DIFFERENCE,
     brightened,
     change_threshold,

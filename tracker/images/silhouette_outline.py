@@ -7,9 +7,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.edges import Edges
 from tracker.geometry.rigid import FloatArray
-from tracker.silhouettes import Mask
+from tracker.images.background_subtraction import Mask
+from tracker.images.edges import Edges
 
 LEAST_LENGTH = 24
 """Contours of fewer pixels go around specks and pinholes, and are left out."""

@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.geometry.rigid import FloatArray
-from tracker.silhouettes import SMOOTHING_PX, Image
+from tracker.images.background_subtraction import SMOOTHING_PX, Image
 
 SPACING_PX = 20
 """Distance between neighbouring probes, matched px."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tracker.geometry.cameras import Camera, Region
 from tracker.geometry.rigid import Array
-from tracker.silhouettes import Image, Mask
+from tracker.images.background_subtraction import Image, Mask
 
 MATCH_AREA_PX = 640 * 480
 """Frames are matched at a scale at which they have about this many pixels, and never enlarged."""

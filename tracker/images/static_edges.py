@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.geometry.rigid import FloatArray
-from tracker.segments import Segments
+from tracker.images.edge_segments import Segments
 
 _MEMORY = 4
 """Frames that count: an edge is known at first sight, and three frames later where its place was seen without it."""

@@ -1,0 +1,26 @@
+"""Color histograms of pixels."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tracker.compute.numba_options import BORROW
+from tracker.images.background_subtraction import Image
+
+BINS = 12
+"""Bins of colours along each channel."""
+
+
+@njit(**BORROW)
+def bin_of(image: Image, v: int, u: int) -> int:
+    """Index of a pixel's colour."""
+    r, g, b = image[v, u, 0] * BINS // 256, image[v, u, 1] * BINS // 256, image[v, u, 2] * BINS // 256
+    return (r * BINS + g) * BINS + b
+
+
+@njit(**BORROW)
+def count_colors(image: Image, counts: NDArray[np.int64]) -> None:
+    """Count the pixels of an image, (H, W, 3), by their colour: add to the counts, (BINS^3,)."""
+    for v in range(image.shape[0]):
+        for u in range(image.shape[1]):
+            counts[bin_of(image, v, u)] += 1
