@@ -12,9 +12,9 @@ from scipy.optimize import least_squares
 
 from app.bench_scenes import BenchCrowd, BenchFrame, pose_at
 from app.painting import PaintedCost
-from tracker import contours
 from tracker.body.model import Body, BodyModel
 from tracker.chamfer import ChamferCost
+from tracker.contours import occluding_contours
 from tracker.descent import solve
 from tracker.fit import Block, Fit, StayNear, damped_step
 from tracker.footage.recording import Recording
@@ -207,7 +207,7 @@ def _edge_distances(cost: ChamferCost, frame: BenchFrame, values: Array) -> list
     """Distance of each edge point to the nearest visible piece of contour, cut off, (n,) for each view, px."""
     out: list[Array] = []
     for view, scene in zip(frame.views, cost.scene_px, strict=True):
-        contour = contours.trace([Body(frame.model, values)], view.camera)
+        contour = occluding_contours.trace([Body(frame.model, values)], view.camera)
         pieces = contour.pieces_px[~contour.hidden]
         middles = 0.5 * (pieces[:, :2] + pieces[:, 2:])
         squared = np.sum((scene[:, None] - middles) ** 2, axis=-1).min(axis=1)
@@ -277,7 +277,7 @@ def _pipeline(
             for found in islice(tracked, n - 1):
                 bodies = [Body(m, p) for m, p in zip(models, found.poses, strict=True)]
                 for camera in observer.matched_cameras:
-                    contours.trace(bodies, camera)
+                    occluding_contours.trace(bodies, camera)
             spent.append(time.perf_counter() - start)
 
     timed = yardstick.beside(run, 3)

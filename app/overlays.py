@@ -7,9 +7,9 @@ import numpy as np
 
 from app.layers import View
 from app.state import State
-from tracker import contours, occlusion
 from tracker.body.model import Body, BodyModel
-from tracker.contours import Contour
+from tracker.contours import occluding_contours, part_edges
+from tracker.contours.occluding_contours import Contour
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera, epipolar_segment
@@ -100,7 +100,7 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
             if ghost is not None:
                 out += _outlined(session, ghost, camera, index, "ghost", color)
         if "part_edges" in view.layers:
-            out.append(Path(index, 0, "part_edge", PART_EDGE_COLOR, occlusion.part_edges(bodies, camera)))
+            out.append(Path(index, 0, "part_edge", PART_EDGE_COLOR, part_edges.part_edges(bodies, camera)))
         if views is not None:
             out += [s for s in _segments(bodies, views[index], index, view) if s.kind in view.layers]
     if state.drag is not None and "epipolar" in view.layers:
@@ -113,7 +113,7 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
     bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     points = [b.points_world for b in bodies]
     seen = {index: session.cameras[index].camera.pinhole for index in sorted(cameras)}
-    out, hidden_by_view = [], occlusion.points_hidden(bodies, list(seen.values()), np.concatenate(points))
+    out, hidden_by_view = [], part_edges.points_hidden(bodies, list(seen.values()), np.concatenate(points))
     for (index, camera), hidden in zip(seen.items(), hidden_by_view, strict=True):
         first = 0
         for person, body in enumerate(bodies):
@@ -132,7 +132,7 @@ def part_colors(people: Sequence[Person]) -> list[str]:
 
 
 def _traced(bodies: Sequence[Body], camera: Camera) -> Contour:
-    return contours.trace(bodies, camera, contours.PIECE_PX * max(1.0, max(camera.size) / 640))
+    return occluding_contours.trace(bodies, camera, occluding_contours.PIECE_PX * max(1.0, max(camera.size) / 640))
 
 
 def _model(session: Session, bodies: Sequence[Body], camera: Camera, index: int, view: View) -> list[Path]:
@@ -183,7 +183,7 @@ def _by_person(
     bodies: Sequence[Body], contour: Contour, those: Mask, index: int, kind: str, colors: Sequence[str]
 ) -> list[Path]:
     """Those pieces of a contour, one path for each person."""
-    people = contours.surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
+    people = occluding_contours.surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
     return [
         Path(index, person, kind, colors[person], contour.pieces_px[those & (people == person)])
         for person in range(len(bodies))
@@ -194,7 +194,7 @@ def _by_part(
     session: Session, bodies: Sequence[Body], contour: Contour, those: Mask, index: int, kind: str
 ) -> list[Path]:
     """Those pieces of a contour, one path for each part that has any."""
-    people, colors = contours.surfaces_of(tuple(b.model for b in bodies)).people, part_colors(session.people)
+    people, colors = occluding_contours.surfaces_of(tuple(b.model for b in bodies)).people, part_colors(session.people)
     return [
         Path(index, int(people[part]), kind, colors[part], contour.pieces_px[those & (contour.parts == part)])
         for part in np.unique(contour.parts[those])
@@ -208,7 +208,7 @@ def _segments(bodies: Sequence[Body], view: ViewEvidence, index: int, shown: Vie
     segments, samples = view.segments, view.samples
     if segments is None or samples is None or not len(segments.points_px):
         return []
-    contour = contours.trace(bodies, view.camera)
+    contour = occluding_contours.trace(bodies, view.camera)
     chosen = accept(samples, contour.pieces_px[~contour.hidden], ACCEPTED_SHARE * view.theta_px)
     lengths = np.diff(segments.firsts)
     owners = np.repeat(np.arange(len(lengths)), lengths)

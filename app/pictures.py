@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import Body
+from tracker.contours.label_image import part_labels
 from tracker.evidence import ViewEvidence
 from tracker.geometry.cameras import Camera
 from tracker.images.background_subtraction import Image, Mask
-from tracker.part_masks import part_labels
 
 SILHOUETTE_COLOR = "#4ae08c"
 _JPEG_QUALITY = 85

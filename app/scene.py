@@ -18,7 +18,7 @@ from app.trails import Trails
 from app.view_choice import View3d
 from app.view_panel import ViewPanel
 from tracker.body.model import Body, BodyModel
-from tracker.contours import part_poses
+from tracker.contours.occluding_contours import part_poses
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera, viewed_point
 from tracker.geometry.ground_plane import up_rotation

@@ -18,7 +18,7 @@ ROOMS = [
     "tracker.session.session",
     "tracker.store",
     "tracker.images",
-    "tracker.contours",
+    "tracker.contours.occluding_contours",
     "tracker.evidence",
     "tracker.fitting",
     "tracker.appearance",

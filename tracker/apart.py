@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from tracker.body.kinematics import IntArray, Kinematics
 from tracker.body.model import Body, BodyModel, parts_of
+from tracker.contours.surfaces import surfaces_of
 from tracker.fit import Normal
 from tracker.geometry.rigid import Array
-from tracker.surfaces import surfaces_of
 
 _SAMPLES = 5
 """Points along the axis of each part that are asked whether they lie within another part."""

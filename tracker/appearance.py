@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import Kinematics, chain_poses
 from tracker.body.model import Body, BodyModel, parts_of
 from tracker.compute.numba_options import BORROW
-from tracker.contours import part_poses, projection
+from tracker.contours.occluding_contours import part_poses, projection
 from tracker.evidence import ViewEvidence
 from tracker.geometry.rigid import Array
 from tracker.images.background_subtraction import Image

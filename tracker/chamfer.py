@@ -16,11 +16,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker import contours
 from tracker.body.kinematics import Tree, forward_kinematics
 from tracker.body.model import Body, BodyModel, parts_of
 from tracker.compute.numba_options import FAST
 from tracker.compute.threads import helpers
+from tracker.contours import occluding_contours
 from tracker.evidence import ViewEvidence
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.geometry.segment_distance import (
@@ -83,7 +83,7 @@ class _Scene(NamedTuple):
 class _Scratch(NamedTuple):
     """Room that the kernels work in."""
 
-    pieces: contours.Pieces
+    pieces: occluding_contours.Pieces
     segments: Segments
     """Visible pieces, joined where they are straight."""
     visible: FloatArray
@@ -125,13 +125,16 @@ class ChamferCost:
         self._threads = min(threads, os.cpu_count() or 1)
         self.models: tuple[BodyModel, ...] = tuple(b.model for b in predicted)
         self.outliers = outliers
-        self._surfaces = contours.surfaces_of(self.models)
+        self._surfaces = occluding_contours.surfaces_of(self.models)
         self._scales = np.array([v.scale for v in views])
         thetas = [v.outlier_px(theta_px) for v in views]
-        near = [_near(v, contours.trace(predicted, v.camera), theta) for v, theta in zip(views, thetas, strict=True)]
+        near = [
+            _near(v, occluding_contours.trace(predicted, v.camera), theta)
+            for v, theta in zip(views, thetas, strict=True)
+        ]
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
         self._scene = _Scene(
-            np.stack([contours.projection(v.camera) for v in views]),
+            np.stack([occluding_contours.projection(v.camera) for v in views]),
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
             _distances(tuple(views)),
@@ -142,7 +145,7 @@ class ChamferCost:
             np.array(thetas),
         )
         widest = max((v.camera for v in views), key=lambda camera: camera.width)
-        self._room = max(contours.contour_room(widest, len(self.models)), self._scene.points.shape[1])
+        self._room = max(occluding_contours.contour_room(widest, len(self.models)), self._scene.points.shape[1])
         self._own = threading.local()
 
     def __call__(self, poses: Sequence[Array]) -> Cost:
@@ -202,7 +205,7 @@ class ChamferCost:
         return directed
 
     def _part_poses(self, poses: Sequence[Array]) -> Array:
-        return contours.part_poses([Body(m, p) for m, p in zip(self.models, poses, strict=True)])
+        return occluding_contours.part_poses([Body(m, p) for m, p in zip(self.models, poses, strict=True)])
 
     def _scratch(self) -> _Scratch:
         """Room of the calling thread's own: several threads may score at a time."""
@@ -210,7 +213,7 @@ class ChamferCost:
         if scratch is None:
             room = self._room
             scratch = self._own.scratch = _Scratch(
-                contours.piece_buffer(self._surfaces, room), segment_buffer(room), np.empty((3, room), np.float32),
+                occluding_contours.piece_buffer(self._surfaces, room), segment_buffer(room), np.empty((3, room), np.float32),
                 np.empty(room, np.float32), np.empty(room, np.float32), np.ones(room, np.float32),
             )  # fmt: skip
         return scratch
@@ -232,7 +235,7 @@ def _distances(views: tuple[ViewEvidence, ...]) -> FloatArray:
     return np.concatenate([v.distance.ravel() for v in views])
 
 
-def _near(view: ViewEvidence, contour: contours.Contour, theta: float) -> Sorted:
+def _near(view: ViewEvidence, contour: occluding_contours.Contour, theta: float) -> Sorted:
     """Edge points within theta of the visible model contour."""
     everything = sort_points(view.points_px, view.camera.size)
     return within_reach(everything, contour.pieces_px, contour.hidden, theta)
@@ -303,7 +306,9 @@ def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: fl
 
 
 @njit(**FAST)
-def _take_visible(n: int, pieces: contours.Pieces, visible: FloatArray, segments: Segments) -> tuple[int, int]:
+def _take_visible(
+    n: int, pieces: occluding_contours.Pieces, visible: FloatArray, segments: Segments
+) -> tuple[int, int]:
     """Take the visible ones of n pieces, and join them to segments; the number of both."""
     ends, hidden, edges = pieces.ends, pieces.hidden, pieces.edges
     su, sv, du, dv = segments.u, segments.v, segments.du, segments.dv
@@ -328,14 +333,16 @@ def _take_visible(n: int, pieces: contours.Pieces, visible: FloatArray, segments
 
 @njit(**FAST)
 def _score(
-    Ts: Array, surfaces: contours.Surfaces, scene: _Scene, paper: bool, scratch: _Scratch, directed: Array
+    Ts: Array, surfaces: occluding_contours.Surfaces, scene: _Scene, paper: bool, scratch: _Scratch, directed: Array
 ) -> None:
     """Fill the directed costs of one pose, (V, 2): model to image and image to model, matched px."""
     d, pixel = scratch.distances, 0
-    contours.place(Ts, surfaces, scratch.pieces)
+    occluding_contours.place(Ts, surfaces, scratch.pieces)
     for view in range(scene.P.shape[0]):
         width, height, theta = scene.sizes[view, 0], scene.sizes[view, 1], scene.thetas[view]
-        n = contours.trace_pieces(scene.P[view], scene.eyes[view], surfaces, contours.PIECE_PX, scratch.pieces)
+        n = occluding_contours.trace_pieces(
+            scene.P[view], scene.eyes[view], surfaces, occluding_contours.PIECE_PX, scratch.pieces
+        )
         n_visible, n_segments = _take_visible(n, scratch.pieces, scratch.visible, scratch.segments)
         image = scene.distances[pixel : pixel + width * height]
         if paper:
@@ -351,7 +358,7 @@ def _score(
 
 @njit(nogil=True, cache=True)
 def _score_candidates(
-    candidates: Array, first: int, n_dofs: int, tree: Tree, Ts: Array, surfaces: contours.Surfaces, scene: _Scene,
+    candidates: Array, first: int, n_dofs: int, tree: Tree, Ts: Array, surfaces: occluding_contours.Surfaces, scene: _Scene,
     paper: bool, scratch: _Scratch, directed: Array,
 ) -> None:  # fmt: skip
     """`_score` for many poses of the person whose parts begin at `first`; directed is (C, V, 2)."""

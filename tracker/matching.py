@@ -6,14 +6,22 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker import contours
 from tracker.body.kinematics import IntArray
 from tracker.compute.numba_options import FAST
+from tracker.contours import occluding_contours
+from tracker.contours.static_cache import (
+    Kept,
+    keep_pieces,
+    mark_covered,
+    remember,
+    still_stands,
+    trace_moving,
+    trace_standing,
+)
 from tracker.evidence import SCENE_SPACING_PX
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.geometry.segment_distance import LANES, cells_within
 from tracker.images.distance_transform import bilinear
-from tracker.kept import Kept, keep_pieces, mark_covered, remember, still_stands, trace_moving, trace_standing
 from tracker.twists import add_twists
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernel's arithmetic into float64
@@ -49,7 +57,7 @@ class Scene(NamedTuple):
 class Scratch(NamedTuple):
     """Room that the kernel works in."""
 
-    traced: contours.Pieces
+    traced: occluding_contours.Pieces
     pieces: FloatArray
     """Visible pieces, part by part: u, v of the middle, length, normal's u, v, and the middle's x, y, z in the unit
     coordinates of its part, (8, room)."""
@@ -73,10 +81,10 @@ class Scratch(NamedTuple):
     """What each edge point's residual weighs, (room,)."""
 
 
-def scratch_for(surfaces: contours.Surfaces, room: int, n_points: int) -> Scratch:
+def scratch_for(surfaces: occluding_contours.Surfaces, room: int, n_points: int) -> Scratch:
     """Uninitialized room for as many pieces in a view and points in all."""
     return Scratch(
-        contours.piece_buffer(surfaces, room), np.empty((8, room), np.float32),
+        occluding_contours.piece_buffer(surfaces, room), np.empty((8, room), np.float32),
         np.empty(len(surfaces.radii) + 1, np.int64), np.empty((7, room)), np.empty((7, room), np.float32),
         np.empty((3, room), np.int32), np.empty(room, np.bool_), np.empty(n_points, np.float32),
         np.empty(n_points, np.int32), np.empty(n_points, np.float32),
@@ -319,10 +327,10 @@ def _image_to_model(
 
 @njit(**FAST)
 def _keep(
-    view: int, surfaces: contours.Surfaces, scene: Scene, turn: float, kept: Kept, scratch: Scratch
+    view: int, surfaces: occluding_contours.Surfaces, scene: Scene, turn: float, kept: Kept, scratch: Scratch
 ) -> None:  # fmt: skip
     """Keep the contours of what stands in a view, and what they are nearest to."""
-    trace_standing(scene.P[view], scene.eyes[view], surfaces, contours.PIECE_PX, kept, scratch.traced)
+    trace_standing(scene.P[view], scene.eyes[view], surfaces, occluding_contours.PIECE_PX, kept, scratch.traced)
     keep_pieces(view, scratch.traced, kept)
     n_segments, segment, visible = _visible(kept.moves.shape[0], scratch), -1, 0
     at = kept.firsts[view, 0]
@@ -348,7 +356,7 @@ class Work(NamedTuple):
     """Index of the first part that is matched."""
     last: int
     """Index after the last of them; the others hide, and draw the points that are nearer to them."""
-    surfaces: contours.Surfaces
+    surfaces: occluding_contours.Surfaces
     scene: Scene
     scale: float
     """See `refine.MatchSettings`."""
@@ -377,16 +385,16 @@ def gather(work: Work, derive: bool) -> float:
     sums.outline[:] = 0.0
     pixel, cost, keeps = np.int64(0), 0.0, kept.best.shape[0] > 0  # a bare 0 is a type of its own to the compiler
     anew = keeps and not still_stands(Ts, kept.moves, kept.Ts)
-    contours.place(Ts, surfaces, scratch.traced)
+    occluding_contours.place(Ts, surfaces, scratch.traced)
     for view in range(scene.P.shape[0]):
         if anew:
             _keep(view, surfaces, scene, turn, kept, scratch)
         if scene.weights[view, 0] > 0.0 or scene.weights[view, 1] > 0.0:
             P, eye, traced = scene.P[view], scene.eyes[view], scratch.traced
             if keeps:
-                trace_moving(view, P, eye, surfaces, contours.PIECE_PX, kept, traced)
+                trace_moving(view, P, eye, surfaces, occluding_contours.PIECE_PX, kept, traced)
             else:
-                contours.trace_pieces(P, eye, surfaces, contours.PIECE_PX, traced)
+                occluding_contours.trace_pieces(P, eye, surfaces, occluding_contours.PIECE_PX, traced)
             n_segments = _visible(Ts.shape[0], scratch)
             scratch.pulls[:, : scratch.firsts[-1]] = 0.0
             if scene.weights[view, 0] > 0.0 or not derive:  # whoever asks for the costs of the parts asks for both

@@ -10,10 +10,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker import contours
 from tracker.body.kinematics import IntArray
 from tracker.body.model import Body
 from tracker.compute.numba_options import BORROW
+from tracker.contours import occluding_contours
 from tracker.evidence import SCENE_SPACING_PX, ViewEvidence
 from tracker.geometry.rigid import FloatArray
 
@@ -50,7 +50,7 @@ def points_to_match(
         n = _merge(points, n_edges, np.full(cells, -1, np.int64))
     if np.isinf(reach_px):
         return points[:n]
-    contour = contours.trace(bodies, view.camera)
+    contour = occluding_contours.trace(bodies, view.camera)
     near = np.zeros((view.camera.height // _AREA_PX + 1, view.camera.width // _AREA_PX + 1), np.bool_)
     _mark(contour.pieces_px, contour.hidden, int(np.ceil(reach_px / _AREA_PX)), near)
     return points[: _pack(points[:n], near)]

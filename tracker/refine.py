@@ -21,14 +21,14 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from tracker import contours
 from tracker.body.kinematics import IntArray, Kinematics, Tree, forward_kinematics
 from tracker.body.model import Body, BodyModel, parts_of
+from tracker.contours import occluding_contours
+from tracker.contours.static_cache import Kept, kept_for
 from tracker.evidence import ViewEvidence
 from tracker.fit import Normal
 from tracker.geometry.rigid import Array
 from tracker.geometry.segment_distance import sort_points, stack_rows
-from tracker.kept import Kept, kept_for
 from tracker.matching import SUM_UP, Scene, Sums, Work, gather, scratch_for
 from tracker.points import points_to_match
 from tracker.twists import to_dofs
@@ -112,7 +112,7 @@ class ContourMatch:
         self._outline_points = np.array([0 if v.silhouette is None else len(v.silhouette.points_px) for v in views])
         weights = settings.information_per_px * np.array([settings.model_to_image, settings.image_to_model])
         scene = Scene(
-            np.stack([contours.projection(v.camera) for v in views]),
+            np.stack([occluding_contours.projection(v.camera) for v in views]),
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
             np.concatenate([v.distance.ravel() for v in views]),
@@ -124,8 +124,12 @@ class ContourMatch:
             np.array([weights if len(v.points_px) else 0 * weights for v in views]),
         )
         widest = max((v.camera for v in views), key=lambda camera: camera.width)
-        self._most_pieces = contours.contour_room(widest, len(bodies))
-        surfaces, Ts, own = contours.surfaces_of(tuple(b.model for b in bodies)), contours.part_poses(bodies), self._own
+        self._most_pieces = occluding_contours.contour_room(widest, len(bodies))
+        surfaces, Ts, own = (
+            occluding_contours.surfaces_of(tuple(b.model for b in bodies)),
+            occluding_contours.part_poses(bodies),
+            self._own,
+        )
         self._work = Work(
             Ts, own.start, own.stop, surfaces, scene, settings.scale, settings.turn,
             self._keep_all_but(np.arange(own.start, own.stop), len(Ts), scene),

@@ -15,13 +15,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker import contours
 from tracker.body.model import Body
-from tracker.contours import PIECE_PX, Contour, trace_view
+from tracker.contours import occluding_contours
+from tracker.contours.occluding_contours import PIECE_PX, Contour, trace_view
+from tracker.contours.surfaces import Surfaces
 from tracker.evidence import ACCEPTED_SHARE, ViewEvidence, findable, unfiltered, with_segments
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.images.edge_segments import MAX_ANGLE_RAD, Samples, Segments, nearest_alongside, sampled
-from tracker.surfaces import Surfaces
 
 _CLEARLY = 0.5
 """What is another's is nearer to that body than this share of its distance from one's own."""
@@ -79,7 +79,10 @@ class Shares:
 
     @cached_property
     def _views(self) -> list["_View"]:
-        surfaces, Ts = contours.surfaces_of(tuple(b.model for b in self._bodies)), contours.part_poses(self._bodies)
+        surfaces, Ts = (
+            occluding_contours.surfaces_of(tuple(b.model for b in self._bodies)),
+            occluding_contours.part_poses(self._bodies),
+        )
         sharing = self._sharing
         return [_View(v, *s, surfaces, Ts) for v, s in zip(sharing.views, sharing.samples, strict=True)]
 
@@ -120,8 +123,8 @@ class _View:
             np.zeros(n_people, np.bool_),
         )  # fmt: skip
         _tell_apart(
-            contours.projection(view.camera), view.camera.center_world, self._Ts, self._surfaces,
-            contours.contour_buffer(view.camera, n_people), edges, outline, view.theta_px, out,
+            occluding_contours.projection(view.camera), view.camera.center_world, self._Ts, self._surfaces,
+            occluding_contours.contour_buffer(view.camera, n_people), edges, outline, view.theta_px, out,
         )  # fmt: skip
         return out
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tracker import contours
 from tracker.body.model import Body
+from tracker.contours import occluding_contours
 from tracker.geometry.cameras import Camera, Region
 from tracker.geometry.rigid import FloatArray
 from tracker.images.matching_view import region_around
@@ -59,7 +59,7 @@ def _holds(outer: Region | None, inner: Region | None) -> bool:
 
 def visible_outline(bodies: Sequence[Body], camera: Camera) -> FloatArray:
     """Visible pieces of the contours, x0, y0, x1, y1, (M, 4), px."""
-    contour = contours.trace(bodies, camera)
+    contour = occluding_contours.trace(bodies, camera)
     return contour.pieces_px[~contour.hidden]
 
 

@@ -9,8 +9,8 @@ from app import overlays
 from app.layers import View
 from app.overlays import Path
 from app.state import Shown
-from tracker import contours
 from tracker.body.model import Body
+from tracker.contours import occluding_contours
 from tracker.evidence import ViewEvidence
 from tracker.images.edge_segments import Segments
 
@@ -76,7 +76,9 @@ def test_segments_lie_in_undistorted_pixels_of_the_whole_image(controller):
 
 def test_visible_and_hidden_contours_are_what_the_tracing_says(controller):
     state, session = controller.state, controller.session
-    traced = contours.trace([Body(session.people[0].model, state.poses[0])], session.cameras[1].camera.pinhole)
+    traced = occluding_contours.trace(
+        [Body(session.people[0].model, state.poses[0])], session.cameras[1].camera.pinhole
+    )
     assert 0 < traced.hidden.sum() < len(traced.hidden)
     paths = drawn(controller, state, view=view_of("contours", "hidden"))
     for kind, those in (("hidden", traced.hidden), ("model", ~traced.hidden)):

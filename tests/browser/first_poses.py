@@ -13,9 +13,9 @@ import numpy as np
 from scripted_user import LIMBS, TRUNK, ScriptedUser
 
 from tracker.body.model import Body
+from tracker.contours.part_edges import points_hidden
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
-from tracker.occlusion import points_hidden
 from tracker.posing import drag, grab
 from tracker.session.session import load_session
 from tracker.standing import standing_pose

@@ -15,7 +15,7 @@ from driving import shows, state_of, to_client
 from running import Program
 
 from tracker.body.model import Body
-from tracker.contours import part_poses
+from tracker.contours.occluding_contours import part_poses
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry import rigid

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker import contours
+from tracker.contours import occluding_contours
 from tracker.evidence import SCENE_SPACING_PX
 
 
@@ -39,7 +39,7 @@ def without_ties(views, bodies, settings, theta_px):
     """The views without the edge points of which rounding decides what piece they belong to."""
     out = []
     for view in views:
-        seen = contours.trace(bodies, view.camera)
+        seen = occluding_contours.trace(bodies, view.camera)
         squared = np.sort(squared_distances(view, seen.pieces_px[~seen.hidden].astype(float), settings, theta_px)[0])
         clear = squared[:, 1] - squared[:, 0] > 1e-3 if squared.shape[1] > 1 else np.ones(len(squared), bool)
         out.append(replace(view, points_px=view.points_px[clear], normals=view.normals[clear]))
@@ -70,8 +70,8 @@ class MatchOracle:
         for view in views:
             if not len(view.points_px):
                 continue
-            seen = contours.trace(bodies, view.camera)
-            seen = contours.Contour(*(a[~seen.hidden].astype(float) for a in seen))
+            seen = occluding_contours.trace(bodies, view.camera)
+            seen = occluding_contours.Contour(*(a[~seen.hidden].astype(float) for a in seen))
             own = (seen.parts >= first) & (seen.parts < first + len(T))
             ends = seen.pieces_px.reshape(-1, 2, 2)
             steps = ends[:, 1] - ends[:, 0]

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tracker import contours
 from tracker.body.model import Body
+from tracker.contours import occluding_contours
 from tracker.evidence import view_evidence
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import parse_model
@@ -64,7 +64,7 @@ def at(model, *place, turns=(0.0, 0.0, 0.0)):
 
 def edge_map(bodies, camera):
     """The visible contours of bodies as edges, one pixel thin, (H, W) bool."""
-    seen = contours.trace(bodies, camera)
+    seen = occluding_contours.trace(bodies, camera)
     image = np.zeros((camera.height, camera.width), np.uint8)
     # Without the shift cv2.line would round the ends: half a pixel is much for what is measured here.
     ends = np.round(seen.pieces_px[~seen.hidden] * 16).astype(int)
@@ -80,7 +80,7 @@ def own_evidence(bodies, cameras):
 
 def _across(view, bodies):
     """The same view, the normal of each edge point across the piece of contour that it was drawn from."""
-    seen = contours.trace(bodies, view.camera)
+    seen = occluding_contours.trace(bodies, view.camera)
     pieces = seen.pieces_px[~seen.hidden]
     if not len(pieces) or not len(view.points_px):
         return view

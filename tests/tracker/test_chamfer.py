@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial import cKDTree
 from staging import at, camera_at, cameras_around, own_evidence, shaken, solid
 
-from tracker import contours
 from tracker.body.model import Body
 from tracker.chamfer import ChamferCost
+from tracker.contours import occluding_contours
 from tracker.evidence import ViewEvidence, default_theta_px, view_evidence
 from tracker.formats.model_toml import load_model
 
@@ -104,7 +104,7 @@ def test_outside_the_image_the_way_to_the_border_counts():
     # The ball is at the right border: 0.3 m of 520 px at 4 m lie beyond it at y = 2.46 m.
     ball = at(BALL.model, 0, 2.46 + 0.15, 0)
     cost = ChamferCost([ViewEvidence(camera, 1.0, ring(0).astype(np.float32), distance)], [ball], 1e3)([ball.values])
-    pieces = contours.trace([ball], camera).pieces_px
+    pieces = occluding_contours.trace([ball], camera).pieces_px
     middles, lengths = (pieces[:, :2] + pieces[:, 2:]) / 2, np.hypot(*(pieces[:, 2:] - pieces[:, :2]).T)
     beyond = np.maximum(0, middles[:, 0] - 639)
     assert (beyond > 10).any()
@@ -272,7 +272,7 @@ def by_hand(cost, views, model, values, piece_px):
     total = []
     for view in range(len(views)):
         v, theta = views[view], default_theta_px(views[view].camera)
-        contour = contours.trace([Body(model, values)], v.camera, piece_px)
+        contour = occluding_contours.trace([Body(model, values)], v.camera, piece_px)
         pieces = contour.pieces_px[~contour.hidden]
         middles, lengths = (pieces[:, :2] + pieces[:, 2:]) / 2, np.linalg.norm(pieces[:, 2:] - pieces[:, :2], axis=1)
         inside = np.clip(middles, 0, np.array(v.camera.size) - 1)

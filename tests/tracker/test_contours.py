@@ -6,10 +6,10 @@ from scipy.spatial import cKDTree
 from staging import at, camera_at, cameras_around, solid
 
 from tracker.body.model import Body
-from tracker.contours import PIECE_PX, trace
+from tracker.contours.occluding_contours import PIECE_PX, trace
+from tracker.contours.surfaces import N_SECTORS
+from tracker.contours.visibility import JOINT_MARGIN_M
 from tracker.formats.model_toml import parse_model
-from tracker.hiding import JOINT_MARGIN_M
-from tracker.surfaces import N_SECTORS
 
 FRONT = camera_at("front", (4.0, 0.0, 0.0))
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from staging import camera_at
 
-from tracker import contours
 from tracker.body.model import Body
+from tracker.contours import occluding_contours
 from tracker.errors import RecordingError
 from tracker.evidence import (
     SCENE_SPACING_PX,
@@ -319,7 +319,7 @@ def test_what_is_wrong_with_a_frame_read_ahead_is_told_when_it_is_asked_for():
 
 
 def visible_contours(real_frame, camera):
-    seen = contours.trace([Body(real_frame.model, real_frame.values)], camera)
+    seen = occluding_contours.trace([Body(real_frame.model, real_frame.values)], camera)
     return seen.pieces_px[~seen.hidden]
 
 

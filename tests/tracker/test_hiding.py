@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tracker.contours import surfaces_of
+from tracker.contours.occluding_contours import surfaces_of
+from tracker.contours.visibility import LANES, hide
 from tracker.formats.model_toml import parse_model
-from tracker.hiding import LANES, hide
 
 PARTS = {
     "cone": 'shape = "cone", half_axes = [0.06, 0.1, 0.25], taper = 0.5',

@@ -3,11 +3,19 @@ import pytest
 from match_oracle import MatchOracle, without_ties
 from staging import cameras_around, own_evidence, posed, shaken
 
-from tracker import contours
 from tracker.body.limbs import limbs
 from tracker.body.model import Body
-from tracker.contours import PIECE_PX, contour_room, part_poses, piece_buffer, place, projection, surfaces_of
-from tracker.kept import keep_pieces, kept_for, remember, still_stands, trace_moving, trace_standing
+from tracker.contours import occluding_contours
+from tracker.contours.occluding_contours import (
+    PIECE_PX,
+    contour_room,
+    part_poses,
+    piece_buffer,
+    place,
+    projection,
+    surfaces_of,
+)
+from tracker.contours.static_cache import keep_pieces, kept_for, remember, still_stands, trace_moving, trace_standing
 from tracker.refine import ContourMatch, MatchSettings
 
 CAMERAS = cameras_around()
@@ -57,7 +65,7 @@ def test_pieces_of_a_limb_that_moves_among_kept_ones_are_those_of_a_trace_of_eve
         moves = np.zeros(N_PEOPLE * len(gavrila.parts), bool)
         moves[limb.parts] = True
         for camera, (pieces, hidden, parts) in zip(CAMERAS, traced_with_kept(bodies, then, moves), strict=True):
-            expected, before = (contours.trace(b, camera) for b in (then, bodies))
+            expected, before = (occluding_contours.trace(b, camera) for b in (then, bodies))
             np.testing.assert_array_equal(parts, expected.parts)
             np.testing.assert_allclose(pieces, expected.pieces_px, atol=1e-3)
             assert np.count_nonzero(hidden != expected.hidden) <= 1  # one that grazes, by rounding

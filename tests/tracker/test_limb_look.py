@@ -7,7 +7,7 @@ from staging import SUIT, at, camera_at, cameras_around, dressed, posed, solid
 from tracker.appearance import Colors
 from tracker.body.limbs import limbs
 from tracker.body.model import Body
-from tracker.contours import projection
+from tracker.contours.occluding_contours import projection
 
 BINS, SAMPLES = 12, 7
 

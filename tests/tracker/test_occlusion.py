@@ -2,10 +2,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 from staging import at, camera_at, own_evidence, solid
 
-from tracker import contours
 from tracker.body.model import Body
 from tracker.chamfer import ChamferCost
-from tracker.occlusion import part_edges, points_hidden
+from tracker.contours import occluding_contours
+from tracker.contours.part_edges import part_edges, points_hidden
 
 FRONT = camera_at("front", (4.0, 0.0, 0.0))
 RADIUS, HALF_APART = 0.2, 0.12
@@ -55,7 +55,7 @@ def test_no_part_edges_between_parts_apart():
 def test_part_edges_never_enter_the_cost():
     bodies = two_balls()
     # The seam runs far from the outlines, of which alone the edges are made: were it scored, it would cost.
-    seen = contours.trace(bodies, FRONT)
+    seen = occluding_contours.trace(bodies, FRONT)
     apart = cKDTree(dense(seen.pieces_px[~seen.hidden])).query(dense(part_edges(bodies, FRONT)))[0]
     assert apart.mean() > 8
     cost = ChamferCost(own_evidence(bodies, [FRONT]), bodies)([b.values for b in bodies])

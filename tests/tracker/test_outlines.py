@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from staging import camera_at, solid
 
 from tracker.body.model import Body
-from tracker.contours import trace
+from tracker.contours.occluding_contours import trace
 from tracker.formats.model_toml import parse_model
 
 CONE = """

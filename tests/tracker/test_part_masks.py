@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from staging import SIZE, at, camera_at, solid
 
-from tracker.part_masks import part_labels
+from tracker.contours.label_image import part_labels
 
 FRONT = camera_at("front", (4.0, 0.0, 0.0))
 RADIUS = 0.2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from staging import at, camera_at, own_evidence, solid
 
-from tracker import contours
+from tracker.contours import occluding_contours
 from tracker.evidence import Silhouette, with_segments
 from tracker.images.edge_segments import Segments
 from tracker.images.silhouette_outline import Outline
@@ -25,7 +25,7 @@ def seen(bodies, camera=FRONT):
 
 def off_px(points, body):
     """Distance of each point from the contour of a body that stands alone, px."""
-    pieces = contours.trace([body], FRONT).pieces_px
+    pieces = occluding_contours.trace([body], FRONT).pieces_px
     return np.linalg.norm(points[:, None] - 0.5 * (pieces[:, :2] + pieces[:, 2:]), axis=-1).min(axis=1)
 
 
@@ -45,8 +45,8 @@ def mean_distances(segments, pieces, reach_px):
 
 def own_segments(view, bodies, person):
     """Which segments the simple version leaves a person, (S,), and how far from the bounds the decision is, (S,)."""
-    contour, theta = contours.trace(bodies, view.camera), view.theta_px
-    owners = contours.surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
+    contour, theta = occluding_contours.trace(bodies, view.camera), view.theta_px
+    owners = occluding_contours.surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
     own, others = (
         mean_distances(view.segments, contour.pieces_px[~contour.hidden & of], 2 * theta)
         for of in (owners == person, owners != person)
@@ -155,7 +155,11 @@ def test_a_hidden_contour_explains_nothing():
     """What the other would explain if nothing stood before it is not the other's."""
     near, far = at(BALL, 0.8, 0, 0), at(solid((0.05, 0.05, 0.1)), -0.5, 0.0, 0)
     stripe = seen([far])  # edges as of the hidden one, on the near one
-    assert contours.trace([near, far], FRONT).hidden[contours.trace([near, far], FRONT).parts == 1].all()
+    assert (
+        occluding_contours.trace([near, far], FRONT)
+        .hidden[occluding_contours.trace([near, far], FRONT).parts == 1]
+        .all()
+    )
     (own,) = Shares(Sharing([stripe]), [near, far]).own(0)
     assert len(own.points_px) == len(stripe.points_px)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tracker.body.model import Body, BodyModel
 from tracker.compute.numba_options import FAST
-from tracker.contours import part_poses, projection
+from tracker.contours.occluding_contours import part_poses, projection
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array
 

@@ -6,13 +6,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker import contours
 from tracker.body.model import Body
 from tracker.compute.numba_options import FAST
+from tracker.contours import occluding_contours
+from tracker.contours.surfaces import N_RINGS, N_SECTORS
+from tracker.contours.visibility import LANES, hide
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array, FloatArray
-from tracker.hiding import LANES, hide
-from tracker.surfaces import N_RINGS, N_SECTORS
 
 _LIFT_M = 0.012
 """How far a curve is lifted off the surfaces to see whether they hide it, metres."""
@@ -26,8 +26,8 @@ def points_hidden(bodies: Sequence[Body], cameras: Sequence[Camera], points_worl
         cameras: the views.
         points_world: (n, 3), metres.
     """
-    surfaces = contours.surfaces_of(tuple(b.model for b in bodies))
-    Ts = contours.part_poses(bodies)
+    surfaces = occluding_contours.surfaces_of(tuple(b.model for b in bodies))
+    Ts = occluding_contours.part_poses(bodies)
     shapes = [s for b in bodies for s in b.model.shapes]
     holds = np.stack(
         [
@@ -47,8 +47,8 @@ def part_edges(bodies: Sequence[Body], camera: Camera) -> FloatArray:
     Returns:
         End points x0, y0, x1, y1 in undistorted px, (N, 4).
     """
-    surfaces = contours.surfaces_of(tuple(b.model for b in bodies))
-    Ts = contours.part_poses(bodies)
+    surfaces = occluding_contours.surfaces_of(tuple(b.model for b in bodies))
+    Ts = occluding_contours.part_poses(bodies)
     shapes = [s for b in bodies for s in b.model.shapes]
     grids = [s.grid(N_RINGS, N_SECTORS)[0] + c for s, c in zip(shapes, surfaces.centers, strict=True)]
     segments = np.empty((6 * (N_RINGS + N_SECTORS), 2, 3), np.float32)
@@ -82,7 +82,7 @@ def _cut(segments: Array, camera: Camera) -> tuple[FloatArray, Array]:
         return np.empty((0, 4), np.float32), np.empty((0, 3))
     px = camera.project(segments.reshape(-1, 3)).reshape(-1, 2, 2)
     lengths = np.linalg.norm(px[:, 1] - px[:, 0], axis=1)
-    counts = np.maximum(1, np.ceil(lengths / contours.PIECE_PX)).astype(int)
+    counts = np.maximum(1, np.ceil(lengths / occluding_contours.PIECE_PX)).astype(int)
     which = np.repeat(np.arange(len(segments)), counts)
     starts = (np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[which]
     along = starts[:, None] + [0.0, 0.5, 1.0] / counts[which, None]  # (N, 3)
@@ -124,7 +124,7 @@ def _zero_line(f: FloatArray, g: FloatArray, segments: FloatArray) -> int:
 
 
 def _blocked(
-    camera: Camera, Ts: Array, surfaces: contours.Surfaces, points: Array, ignored: NDArray[np.bool_]
+    camera: Camera, Ts: Array, surfaces: occluding_contours.Surfaces, points: Array, ignored: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """Whether some part lies before each point (n, 3), but for the parts ignored for it, (P, n)."""
     n = len(points)

@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 
 from tracker.compute.numba_options import FAST
+from tracker.contours.surfaces import N_RINGS, N_SECTORS, Surfaces
 from tracker.geometry.rigid import Array, FloatArray
-from tracker.surfaces import N_RINGS, N_SECTORS, Surfaces
 
 MAX_POINTS = 512
 """Room for the points of one curve."""
