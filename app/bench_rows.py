@@ -16,11 +16,11 @@ from tracker.body.model import Body, BodyModel
 from tracker.chamfer import ChamferCost
 from tracker.contours import occluding_contours
 from tracker.descent import solve
+from tracker.evidence.observer import Observer
 from tracker.fit import Block, Fit, StayNear, damped_step
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
-from tracker.observer import Observer
 from tracker.refine import ContourMatch
 from tracker.search import BEFORE_REFINEMENT, SearchSettings, search
 from tracker.session.session import Session

@@ -7,13 +7,13 @@ import numpy as np
 
 from tracker.body.model import Body, BodyModel
 from tracker.chamfer import ChamferCost
-from tracker.evidence import ViewEvidence
+from tracker.evidence.observer import Observer
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fit import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
-from tracker.observer import Observer
 from tracker.references import read_joints
 from tracker.session.session import Session, load_session
 

@@ -15,10 +15,10 @@ from app.samples import bundled
 from tracker.body.model import BodyModel
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.errors import SessionError
+from tracker.evidence.observer import Observer
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.rigid import Array
-from tracker.observer import Observer
 from tracker.session.lock import SessionLock
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings

@@ -13,11 +13,11 @@ import cv2
 from app import pictures
 from app.recent import Recent
 from tracker.errors import RecordingError
-from tracker.evidence import ViewEvidence
+from tracker.evidence.observer import Observer
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.footage.proxy import Proxy
 from tracker.images.background_subtraction import Image
 from tracker.images.matching_view import MatchedView
-from tracker.observer import Observer
 
 _LOG = logging.getLogger(__name__)
 _IMAGE_BYTES = 16 * 2**20

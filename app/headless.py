@@ -14,10 +14,10 @@ from app.tracked import Keyframes, keyframes_of, told_of, tracked_changes
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.confidence import Status
 from tracker.errors import SessionError
+from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import format_model
 from tracker.geometry.rigid import Array
-from tracker.observer import Observer
 from tracker.second_pass import Followed, Tracked, follow_back
 from tracker.session.lock import SessionLock
 from tracker.session.locked_dofs import free_of, kept_locks

@@ -11,7 +11,7 @@ from app.screen import Screen, spoken
 from app.state import Landscape, State
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.rigid import Array
 from tracker.track_settings import TrackSettings, pose_cost
 

@@ -14,7 +14,7 @@ from app.floor_lines import floor_lines
 from app.floor_picks import Picking
 from app.layers import View
 from app.state import JobState, ReplayState, State, TrackState
-from tracker.evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.posing import minor_points
 from tracker.session.session import Session
 from tracker.store.records import SOURCES, STATUSES, FrameNumbers, HistoryEntry

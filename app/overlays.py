@@ -10,7 +10,7 @@ from app.state import State
 from tracker.body.model import Body, BodyModel
 from tracker.contours import occluding_contours, part_edges
 from tracker.contours.occluding_contours import Contour
-from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
+from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera, epipolar_segment
 from tracker.geometry.rigid import Array, FloatArray

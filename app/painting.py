@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.rigid import Array
 
 SAMPLE_PX = 4.0

@@ -17,7 +17,7 @@ from app.layers import View
 from app.search_feed import SearchFeed
 from app.state import State
 from tracker.errors import TrackerError
-from tracker.evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence
 
 _LOG = logging.getLogger(__name__)
 _READABLE_S = 0.2

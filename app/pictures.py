@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tracker.body.model import Body
 from tracker.contours.label_image import part_labels
-from tracker.evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.cameras import Camera
 from tracker.images.background_subtraction import Image, Mask
 

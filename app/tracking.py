@@ -15,8 +15,8 @@ from tracker import confidence
 from tracker.body.model import BodyModel
 from tracker.confidence import Status
 from tracker.errors import TrackerError
+from tracker.evidence.observer import Observer
 from tracker.geometry.rigid import Array
-from tracker.observer import Observer
 from tracker.second_pass import Followed, Tracked, follow_back
 from tracker.track import PoseEstimate, track_chamfer
 from tracker.track_settings import TrackSettings

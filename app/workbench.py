@@ -23,8 +23,8 @@ from app.private_viser import PrivateViser
 from app.saving import Saver
 from app.scene import Scene
 from app.server import create_app, serve_forever, static_folder
+from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
-from tracker.observer import Observer
 from tracker.session.lock import SessionLock
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore

@@ -19,7 +19,7 @@ ROOMS = [
     "tracker.store",
     "tracker.images",
     "tracker.contours.occluding_contours",
-    "tracker.evidence",
+    "tracker.evidence.view_evidence",
     "tracker.fitting",
     "tracker.appearance",
     "tracker.search",

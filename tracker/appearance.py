@@ -17,7 +17,7 @@ from tracker.body.kinematics import Kinematics, chain_poses
 from tracker.body.model import Body, BodyModel, parts_of
 from tracker.compute.numba_options import BORROW
 from tracker.contours.occluding_contours import part_poses, projection
-from tracker.evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.rigid import Array
 from tracker.images.background_subtraction import Image
 from tracker.images.color_histogram import BINS, bin_of

@@ -21,7 +21,7 @@ from tracker.body.model import Body, BodyModel, parts_of
 from tracker.compute.numba_options import FAST
 from tracker.compute.threads import helpers
 from tracker.contours import occluding_contours
-from tracker.evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.geometry.segment_distance import (
     Segments,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tracker.body.model import Body, BodyModel
 from tracker.descent import solve
-from tracker.evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fit import Block, of_values
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array

@@ -18,7 +18,7 @@ from tracker.contours.static_cache import (
     trace_moving,
     trace_standing,
 )
-from tracker.evidence import SCENE_SPACING_PX
+from tracker.evidence.view_evidence import SCENE_SPACING_PX
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.geometry.segment_distance import LANES, cells_within
 from tracker.images.distance_transform import bilinear

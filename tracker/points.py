@@ -14,7 +14,7 @@ from tracker.body.kinematics import IntArray
 from tracker.body.model import Body
 from tracker.compute.numba_options import BORROW
 from tracker.contours import occluding_contours
-from tracker.evidence import SCENE_SPACING_PX, ViewEvidence
+from tracker.evidence.view_evidence import SCENE_SPACING_PX, ViewEvidence
 from tracker.geometry.rigid import FloatArray
 
 N_COLUMNS = 7

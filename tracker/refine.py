@@ -25,7 +25,7 @@ from tracker.body.kinematics import IntArray, Kinematics, Tree, forward_kinemati
 from tracker.body.model import Body, BodyModel, parts_of
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import Kept, kept_for
-from tracker.evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fit import Normal
 from tracker.geometry.rigid import Array
 from tracker.geometry.segment_distance import sort_points, stack_rows

@@ -21,7 +21,7 @@ from tracker.body.model import Body
 from tracker.compute.threads import side_by_side
 from tracker.confidence import Quality, Status
 from tracker.descent import solve
-from tracker.evidence import ACCEPTED_SHARE, ViewEvidence
+from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.fit import Block, Fit, covariance, held
 from tracker.geometry.rigid import Array
 from tracker.images.static_edges import Scenery

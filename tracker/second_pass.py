@@ -18,11 +18,11 @@ from tracker.apart import KeepBodiesApart
 from tracker.appearance import Colors, PartColors
 from tracker.body.model import Body, BodyModel
 from tracker.confidence import Status
-from tracker.evidence import ViewEvidence
+from tracker.evidence.observer import Observer
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fit import held
 from tracker.geometry.rigid import Array
 from tracker.memory import Memory
-from tracker.observer import Observer
 from tracker.refine import ContourMatch
 from tracker.scene import Scene
 from tracker.surroundings import regions, visible_outline

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from tracker.body.model import Body, BodyModel
 from tracker.compute.threads import side_by_side
 from tracker.confidence import Quality, Status
-from tracker.evidence import ViewEvidence
+from tracker.evidence.observer import Observer
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.cameras import Region
 from tracker.geometry.rigid import Array
 from tracker.images.static_edges import Scenery
 from tracker.memory import Memory
 from tracker.motion.prediction import PredictSettings
-from tracker.observer import Observer
 from tracker.scene import Found, Scene
 from tracker.surroundings import confirmed, regions, regions_ahead, visible_outline
 from tracker.track_settings import TrackSettings, pose_cost

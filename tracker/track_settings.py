@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tracker.apart import KeepApart
 from tracker.body.model import Body, BodyModel
 from tracker.chamfer import ChamferCost, Outliers
-from tracker.evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fit import Block, StayNear
 from tracker.geometry.rigid import Array
 from tracker.motion.prediction import PredictSettings

@@ -13,8 +13,8 @@ from app import __main__
 from app.controller import Controller
 from app.frames import Frames
 from app.saving import Saver
+from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
-from tracker.observer import Observer
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 

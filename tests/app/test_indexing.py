@@ -5,8 +5,8 @@ from hands import wait_for
 
 from app import indexing
 from app.frames import Frames
+from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
-from tracker.observer import Observer
 from tracker.session.session import load_session
 
 

@@ -10,10 +10,10 @@ from app.frames import Frames
 from app.saving import Saver
 from app.state import FootageState
 from tracker.errors import RecordingError, TrackerError
+from tracker.evidence.observer import Observer
 from tracker.footage import packet_scan
 from tracker.footage.recording import Recording
 from tracker.footage.video import VideoFile
-from tracker.observer import Observer
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 

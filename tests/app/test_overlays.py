@@ -11,7 +11,7 @@ from app.overlays import Path
 from app.state import Shown
 from tracker.body.model import Body
 from tracker.contours import occluding_contours
-from tracker.evidence import ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.images.edge_segments import Segments
 
 

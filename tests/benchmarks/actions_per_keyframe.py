@@ -22,8 +22,8 @@ from scripted_user import LIMBS, ScriptedUser  # noqa: E402
 from app.controller import Controller  # noqa: E402
 from app.frames import Frames  # noqa: E402
 from app.saving import Saver  # noqa: E402
+from tracker.evidence.observer import Observer  # noqa: E402
 from tracker.footage.recording import Recording  # noqa: E402
-from tracker.observer import Observer  # noqa: E402
 from tracker.session.assemble import assemble  # noqa: E402
 from tracker.store.annotation_store import AnnotationStore  # noqa: E402
 

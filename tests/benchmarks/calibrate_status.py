@@ -24,10 +24,10 @@ from true_starts import read_simulated
 from tracker import confidence
 from tracker.body.model import BodyModel
 from tracker.confidence import Status
+from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.rigid import Array
-from tracker.observer import Observer
 from tracker.simulate import simulate
 from tracker.simulate.scenes import cast_of
 from tracker.track import PoseEstimate, track_chamfer

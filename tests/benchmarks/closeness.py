@@ -19,10 +19,10 @@ from true_starts import read_simulated
 
 from tracker.body.model import BodyModel
 from tracker.evaluate import evaluate_joints, joints_of_poses
+from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
-from tracker.observer import Observer
 from tracker.session.session import Session
 from tracker.simulate import simulate
 from tracker.track import track_chamfer

@@ -16,10 +16,10 @@ from first_poses import true_body, views_of
 from running import ROOT, Program, visited
 from scripted_user import TRUNK, ScriptedUser
 
+from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
-from tracker.observer import Observer
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord

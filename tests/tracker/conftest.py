@@ -6,12 +6,12 @@ from typing import NamedTuple
 import pytest
 
 from tracker.body.model import BodyModel
-from tracker.evidence import ViewEvidence
+from tracker.evidence.observer import Observer
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fit import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import load_model
 from tracker.geometry.rigid import Array
-from tracker.observer import Observer
 from tracker.references import read_joints
 from tracker.session.session import load_session
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.contours import occluding_contours
-from tracker.evidence import SCENE_SPACING_PX
+from tracker.evidence.view_evidence import SCENE_SPACING_PX
 
 
 class Matches(NamedTuple):

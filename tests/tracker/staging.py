@@ -8,11 +8,11 @@ from scipy.spatial import cKDTree
 
 from tracker.body.model import Body
 from tracker.contours import occluding_contours
-from tracker.evidence import view_evidence
+from tracker.evidence.observer import Observer
+from tracker.evidence.view_evidence import view_evidence
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import parse_model
 from tracker.geometry.cameras import Camera
-from tracker.observer import Observer
 
 SIZE = (640, 480)
 

@@ -8,7 +8,7 @@ from staging import at, camera_at, cameras_around, own_evidence, shaken, solid
 from tracker.body.model import Body
 from tracker.chamfer import ChamferCost
 from tracker.contours import occluding_contours
-from tracker.evidence import ViewEvidence, default_theta_px, view_evidence
+from tracker.evidence.view_evidence import ViewEvidence, default_theta_px, view_evidence
 from tracker.formats.model_toml import load_model
 
 THETA = 15.0

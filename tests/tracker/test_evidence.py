@@ -8,19 +8,14 @@ from staging import camera_at
 from tracker.body.model import Body
 from tracker.contours import occluding_contours
 from tracker.errors import RecordingError
-from tracker.evidence import (
-    SCENE_SPACING_PX,
-    accepted,
-    default_theta_px,
-    view_evidence,
-)
+from tracker.evidence.observer import FOREGROUND_MARGIN, Observer
+from tracker.evidence.view_evidence import SCENE_SPACING_PX, accepted, default_theta_px, view_evidence
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
 from tracker.images.edge_segments import link_edges
 from tracker.images.matching_view import MatchedView, match_scale, region_around
 from tracker.images.static_edges import Scenery
-from tracker.observer import FOREGROUND_MARGIN, Observer
 from tracker.session.session import load_session
 
 
@@ -292,7 +287,7 @@ def test_what_is_looked_at_ahead_is_what_would_be_found_later(sample, real_frame
     boxes = [region_around(p.reshape(-1, 2), 40, (640, 480)) for p in predicted]
     scenery = None if background else [Scenery(c.size) for c in observer.matched_cameras]
     expected = observer.evidence(25, boxes, predicted, scenery)
-    monkeypatch.setattr("tracker.observer.link_edges", lambda *a: linked.append(a) or link_edges(*a))
+    monkeypatch.setattr("tracker.evidence.observer.link_edges", lambda *a: linked.append(a) or link_edges(*a))
 
     def look_ahead(regions, still):
         observer.prefetch(25, regions, still)

@@ -7,13 +7,13 @@ from test_fit import ARM
 from test_pins import seen
 
 from tracker.body.model import Body
+from tracker.evidence.observer import Observer
 from tracker.fit import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.frame_fit import fit_frame
 from tracker.geometry.triangulation import ViewPin
-from tracker.observer import Observer
 from tracker.references import read_joints
 from tracker.session.session import load_session
 from tracker.track_settings import TrackSettings

@@ -5,7 +5,7 @@ import pytest
 from staging import at, camera_at, cameras_around, own_evidence, posed, solid
 
 from tracker.body.model import Body
-from tracker.evidence import Silhouette, ViewEvidence
+from tracker.evidence.view_evidence import Silhouette, ViewEvidence
 from tracker.formats.model_toml import load_model
 from tracker.images.silhouette_outline import Outline
 from tracker.points import N_COLUMNS, points_to_match

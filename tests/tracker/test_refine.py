@@ -6,7 +6,7 @@ from match_oracle import MatchOracle, without_ties
 from staging import at, camera_at, cameras_around, edge_map, own_evidence, posed, shaken, solid
 
 from tracker.body.model import Body
-from tracker.evidence import SCENE_SPACING_PX, Silhouette, ViewEvidence, view_evidence
+from tracker.evidence.view_evidence import SCENE_SPACING_PX, Silhouette, ViewEvidence, view_evidence
 from tracker.fit import StayNear, solve
 from tracker.formats.model_toml import PRESETS, load_model
 from tracker.refine import ContourMatch, MatchSettings

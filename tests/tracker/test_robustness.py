@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tracker.confidence import Status
+from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.pose_csv import read_pose_table
 from tracker.motion.prediction import predict
-from tracker.observer import Observer
 from tracker.session.session import Session
 from tracker.simulate.record import simulate
 from tracker.track import track_chamfer

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tracker.evidence import unfiltered, view_evidence
+from tracker.evidence.view_evidence import unfiltered, view_evidence
 from tracker.geometry.cameras import Camera
 from tracker.images.edge_segments import Segments
 from tracker.images.static_edges import Scenery

@@ -5,7 +5,7 @@ import pytest
 from staging import at, camera_at, own_evidence, solid
 
 from tracker.contours import occluding_contours
-from tracker.evidence import Silhouette, with_segments
+from tracker.evidence.view_evidence import Silhouette, with_segments
 from tracker.images.edge_segments import Segments
 from tracker.images.silhouette_outline import Outline
 from tracker.sharing import Shares, Sharing, _tell_apart

@@ -6,12 +6,12 @@ from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_eviden
 
 from tracker.body.model import Body
 from tracker.evaluate import evaluate_joints, joints_of_poses
-from tracker.evidence import view_evidence
+from tracker.evidence.observer import Observer
+from tracker.evidence.view_evidence import view_evidence
 from tracker.fit import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.motion.prediction import PredictSettings
-from tracker.observer import Observer
 from tracker.recover import Searched
 from tracker.references import read_joints
 from tracker.search import SearchSettings

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from tracker.evidence import Look, ViewEvidence, default_theta_px, expecting, silhouette_evidence
+from tracker.evidence.foreground import Foreground, Prepared
+from tracker.evidence.view_evidence import Look, ViewEvidence, default_theta_px, expecting, silhouette_evidence
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
-from tracker.foreground import Foreground, Prepared
 from tracker.geometry.cameras import Camera, Region
 from tracker.geometry.rigid import FloatArray
 from tracker.images import background_subtraction
