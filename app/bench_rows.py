@@ -15,13 +15,13 @@ from app.painting import PaintedCost
 from tracker.body.model import Body, BodyModel
 from tracker.chamfer import ChamferCost
 from tracker.contours import occluding_contours
-from tracker.descent import solve
 from tracker.evidence.observer import Observer
-from tracker.fit import Block, Fit, StayNear, damped_step
+from tracker.fitting.contour_residuals import ContourMatch
+from tracker.fitting.gauss_newton import Block, Fit, StayNear, damped_step
+from tracker.fitting.gauss_newton_compiled import solve
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
-from tracker.refine import ContourMatch
 from tracker.search import BEFORE_REFINEMENT, SearchSettings, search
 from tracker.session.session import Session
 from tracker.track import track_chamfer

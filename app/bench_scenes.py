@@ -9,7 +9,7 @@ from tracker.body.model import Body, BodyModel
 from tracker.chamfer import ChamferCost
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fit import fit_to_points
+from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable

@@ -15,7 +15,7 @@ from rich.text import Text
 
 from tracker.errors import SessionError, TrackerError
 from tracker.evaluate import Alignment, evaluate_joints, evaluate_poses
-from tracker.fit import fit_to_points
+from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import PoseTable

@@ -13,7 +13,7 @@ from app.frames import Frames
 from app.saving import Saver
 from app.state import Shown, State, finite_or_none
 from tracker.body.model import BodyModel
-from tracker.fit import held
+from tracker.fitting.gauss_newton import held
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import ViewPin

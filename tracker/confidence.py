@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from tracker.appearance import ColorScore, PartColors
 from tracker.body.limbs import limbs, spoken
 from tracker.body.model import Body
-from tracker.fit import Fit, covariance
+from tracker.fitting.contour_residuals import PartCosts
+from tracker.fitting.gauss_newton import Fit, covariance
 from tracker.geometry.rigid import Array
-from tracker.refine import PartCosts
 
 Status = Literal["good", "doubtful", "lost"]
 

@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import Body, BodyModel
-from tracker.descent import solve
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fit import Block, of_values
+from tracker.fitting.contour_residuals import ContourMatch
+from tracker.fitting.gauss_newton import Block, of_values
+from tracker.fitting.gauss_newton_compiled import solve
+from tracker.fitting.pins import PinBlock, pin_block
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import ViewPin
-from tracker.pins import PinBlock, pin_block
-from tracker.refine import ContourMatch
 from tracker.track_settings import TrackSettings, prior_blocks
 
 _REACHES = (2.0, 1.0)

@@ -10,7 +10,7 @@ from tracker.appearance import Colors, PartColors
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
 from tracker.confidence import Quality, Status
-from tracker.fit import held
+from tracker.fitting.gauss_newton import held
 from tracker.geometry.rigid import Array
 from tracker.motion.prediction import PredictSettings, predict
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
-from tracker.fit import Normal, normal_of, solve
+from tracker.fitting.gauss_newton import Normal, normal_of, solve
 from tracker.geometry.rigid import Array
 
 

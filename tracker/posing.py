@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import Body, BodyModel
 from tracker.errors import TrackerError
-from tracker.fit import Block, Normal, StayNear, normal_of, solve
+from tracker.fitting.gauss_newton import Block, Normal, StayNear, normal_of, solve
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.fit import Block, PointTargets, StayNear, solve
+from tracker.fitting.gauss_newton import Block, PointTargets, StayNear, solve
+from tracker.fitting.pins import pin_block
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import ViewPin
-from tracker.pins import pin_block
 
 _JOINT_M = 0.005
 """Standard deviation of a joint's place, metres."""

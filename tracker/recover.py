@@ -20,10 +20,10 @@ from tracker.body.kinematics import IntArray, chain_poses
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
 from tracker.compute.threads import N_HELPERS, dealt_out, helpers
-from tracker.descent import solve
-from tracker.fit import Block, Fit
+from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch
+from tracker.fitting.gauss_newton import Block, Fit
+from tracker.fitting.gauss_newton_compiled import solve
 from tracker.geometry.rigid import Array
-from tracker.refine import WORTH_A_STEP, ContourMatch
 
 T = TypeVar("T")
 

@@ -14,20 +14,20 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker import confidence
-from tracker.apart import KeepBodiesApart
 from tracker.appearance import Colors
 from tracker.body.limbs import Limb
 from tracker.body.model import Body
 from tracker.compute.threads import side_by_side
 from tracker.confidence import Quality, Status
-from tracker.descent import solve
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
-from tracker.fit import Block, Fit, covariance, held
+from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch, PartCosts
+from tracker.fitting.gauss_newton import Block, Fit, covariance, held
+from tracker.fitting.gauss_newton_compiled import solve
+from tracker.fitting.interpenetration import KeepBodiesApart
 from tracker.geometry.rigid import Array
 from tracker.images.static_edges import Scenery
 from tracker.memory import Memory
 from tracker.recover import LEAST_GAIN, Judge, for_several, search_limbs
-from tracker.refine import WORTH_A_STEP, ContourMatch, PartCosts
 from tracker.search import BEFORE_REFINEMENT, SearchSettings
 from tracker.sharing import Shares, Sharing
 from tracker.surroundings import px_per_m, visible_outline

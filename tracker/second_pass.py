@@ -14,16 +14,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.apart import KeepBodiesApart
 from tracker.appearance import Colors, PartColors
 from tracker.body.model import Body, BodyModel
 from tracker.confidence import Status
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fit import held
+from tracker.fitting.contour_residuals import ContourMatch
+from tracker.fitting.gauss_newton import held
+from tracker.fitting.interpenetration import KeepBodiesApart
 from tracker.geometry.rigid import Array
 from tracker.memory import Memory
-from tracker.refine import ContourMatch
 from tracker.scene import Scene
 from tracker.surroundings import regions, visible_outline
 from tracker.track import PoseEstimate, summed_up, track_chamfer

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.fit import fit_to_points
+from tracker.fitting.gauss_newton import fit_to_points
 from tracker.geometry.cameras import Camera, viewed_point
 from tracker.geometry.rigid import Array
 

@@ -7,15 +7,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.apart import KeepApart
 from tracker.body.model import Body, BodyModel
 from tracker.chamfer import ChamferCost, Outliers
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fit import Block, StayNear
+from tracker.fitting.contour_residuals import MatchSettings
+from tracker.fitting.gauss_newton import Block, StayNear
+from tracker.fitting.interpenetration import KeepApart
 from tracker.geometry.rigid import Array
 from tracker.motion.prediction import PredictSettings
 from tracker.recover import RecoverSettings
-from tracker.refine import MatchSettings
 from tracker.search import SearchSettings, SearchStep, search
 
 Estimation = Literal["refine", "search"]

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from tracker.appearance import Colors, PartColors
 from tracker.body.model import BodyModel
 from tracker.compute.threads import N_HELPERS, dealt_out
-from tracker.descent import solve
-from tracker.fit import Block
+from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch
+from tracker.fitting.gauss_newton import Block
+from tracker.fitting.gauss_newton_compiled import solve
 from tracker.geometry.rigid import Array
 from tracker.recover import APART_M, LEAST_GAIN
-from tracker.refine import WORTH_A_STEP, ContourMatch
 from tracker.track_settings import TrackSettings, prior_blocks
 
 ROUNDS = 2

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.fit import fit_to_points
+from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable

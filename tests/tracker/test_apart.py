@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from staging import at, posed, shaken, solid
 
-from tracker.apart import KeepApart, KeepBodiesApart
 from tracker.body.model import Body
-from tracker.fit import StayNear, solve
+from tracker.fitting.gauss_newton import StayNear, solve
+from tracker.fitting.interpenetration import KeepApart, KeepBodiesApart
 
 BALL, ROD = solid((0.1, 0.1, 0.1)), solid((0.05, 0.05, 0.3))
 

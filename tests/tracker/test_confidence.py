@@ -11,9 +11,9 @@ from tracker.appearance import Colors
 from tracker.body.limbs import limbs
 from tracker.body.model import Body
 from tracker.confidence import LimbFigures, Quality, judge, quality, reason, worst
-from tracker.fit import StayNear, solve
+from tracker.fitting.contour_residuals import ContourMatch
+from tracker.fitting.gauss_newton import StayNear, solve
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
-from tracker.refine import ContourMatch
 
 
 def names_of(model, parts):

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from staging import cameras_around, own_evidence, posed, shaken
 
-from tracker import descent, fit
-from tracker.apart import KeepApart, KeepBodiesApart
 from tracker.body.limbs import limbs
 from tracker.body.model import Body
-from tracker.descent import solve
-from tracker.fit import PointTargets, StayNear
+from tracker.fitting import gauss_newton, gauss_newton_compiled
+from tracker.fitting.contour_residuals import ContourMatch
+from tracker.fitting.gauss_newton import PointTargets, StayNear
+from tracker.fitting.gauss_newton_compiled import solve
+from tracker.fitting.interpenetration import KeepApart, KeepBodiesApart
 from tracker.formats.model_toml import load_model
-from tracker.refine import ContourMatch
 
 CAMERAS = cameras_around(4)
 
@@ -58,9 +58,9 @@ def staged(request):
 def both(staged, blocks, start=None, free=None, **how):
     """What is found by the compiled version, with no help, and by the readable one."""
     start = staged.start if start is None else start
-    expected = fit.solve(staged.model, start, blocks, free, **how)
+    expected = gauss_newton.solve(staged.model, start, blocks, free, **how)
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(fit, "solve", None)
+        patched.setattr(gauss_newton, "solve", None)
         return solve(staged.model, start, blocks, free, **how), expected
 
 
@@ -101,7 +101,7 @@ class Asked:
 
     def normal(self, model, values, kinematics):
         self.times += 1
-        return fit.Normal(0.0, np.zeros(model.n_dofs), np.zeros((model.n_dofs, model.n_dofs)))
+        return gauss_newton.Normal(0.0, np.zeros(model.n_dofs), np.zeros((model.n_dofs, model.n_dofs)))
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -114,7 +114,7 @@ def test_whole_descents_without_images_are_the_same(staged, seed, how):
     blank = [replace(v, points_px=v.points_px[:0], normals=v.normals[:0]) for v in staged.views]
     match, prior = ContourMatch(blank, deep), StayNear(staged.expected, np.full(n, 2.0))
     blocks = [match, prior, KeepApart(), KeepBodiesApart(deep, 0, 1.0)]
-    expected = fit.solve(model, staged.start, [*blocks, asked], **how)
+    expected = gauss_newton.solve(model, staged.start, [*blocks, asked], **how)
     found = solve(model, staged.start, blocks, **how)
     assert expected.iterations > 1
     assert how.get("gain") or asked.times > expected.iterations + 3
@@ -160,8 +160,8 @@ def test_steps_are_those_of_the_readable_version(n):
     for H in (J.T @ J, -J.T @ J):
         own = H[:n, :n]
         damping = 0.1 * (np.diag(own) + 1e-6 * max(1e-12, np.trace(own) / n))
-        expected = fit.damped_step(own, g[:n], damping)
-        promised = descent._damped_step(g, H, moving, 0.1, np.empty((6, 6)), step)
+        expected = gauss_newton.damped_step(own, g[:n], damping)
+        promised = gauss_newton_compiled._damped_step(g, H, moving, 0.1, np.empty((6, 6)), step)
         np.testing.assert_allclose(step[:n], expected, rtol=1e-9)
         assert promised == pytest.approx(-(g[:n] + 0.5 * own @ expected) @ expected)
 
@@ -180,6 +180,6 @@ def test_what_it_does_not_know_is_left_to_the_readable_version(staged, monkeypat
         joints = list(model.joints)
         joints[shoulder] = replace(joints[shoulder], kind="ball", axes=())
         model = replace(model, joints=tuple(joints))
-    monkeypatch.setattr(fit, "solve", lambda *args: asked.append(args))
+    monkeypatch.setattr(gauss_newton, "solve", lambda *args: asked.append(args))
     solve(model, model.neutral(), blocks)
     assert len(asked) == 1

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from staging import at, posed, shaken, solid
 
 from tracker.errors import TrackerError
-from tracker.fit import PointTargets, StayNear, covariance, fit_to_points, normal_of, solve
+from tracker.fitting.gauss_newton import PointTargets, StayNear, covariance, fit_to_points, normal_of, solve
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model, parse_model
 from tracker.geometry import rigid

@@ -8,7 +8,7 @@ from test_pins import seen
 
 from tracker.body.model import Body
 from tracker.evidence.observer import Observer
-from tracker.fit import fit_to_points
+from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model

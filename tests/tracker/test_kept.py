@@ -16,7 +16,7 @@ from tracker.contours.occluding_contours import (
     surfaces_of,
 )
 from tracker.contours.static_cache import keep_pieces, kept_for, remember, still_stands, trace_moving, trace_standing
-from tracker.refine import ContourMatch, MatchSettings
+from tracker.fitting.contour_residuals import ContourMatch, MatchSettings
 
 CAMERAS = cameras_around()
 THETA = 20.0

@@ -7,10 +7,10 @@ import pytest
 from staging import camera_at, cameras_around, posed, shaken
 from test_fit import ARM
 
-from tracker.fit import StayNear, solve
+from tracker.fitting.gauss_newton import StayNear, solve
+from tracker.fitting.pins import pin_block
 from tracker.formats.model_toml import load_model
 from tracker.geometry.triangulation import ViewPin, sigma_px, triangulate
-from tracker.pins import pin_block
 
 GAVRILA = load_model("gavrila34")
 CAMERAS = [replace(c, distortion=np.array([-0.2, 0.05, 0.001, -0.001])) for c in cameras_around(4)]

@@ -6,9 +6,9 @@ from staging import at, camera_at, cameras_around, own_evidence, posed, solid
 
 from tracker.body.model import Body
 from tracker.evidence.view_evidence import Silhouette, ViewEvidence
+from tracker.fitting.match_points import N_COLUMNS, points_to_match
 from tracker.formats.model_toml import load_model
 from tracker.images.silhouette_outline import Outline
-from tracker.points import N_COLUMNS, points_to_match
 
 FRONT = camera_at("front", (4.0, 0.0, 0.0))
 BALL = [at(solid((0.3, 0.3, 0.3)), 0, 0, 0)]

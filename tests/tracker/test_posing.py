@@ -6,7 +6,7 @@ from staging import camera_at, cameras_around, shaken
 
 from tracker import posing
 from tracker.body.model import Body
-from tracker.fit import solve
+from tracker.fitting.gauss_newton import solve
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
 from tracker.picking import part_outlines

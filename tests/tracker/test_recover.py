@@ -9,10 +9,10 @@ from tracker import recover
 from tracker.appearance import Colors
 from tracker.body.limbs import limbs
 from tracker.body.model import Body
-from tracker.fit import StayNear, solve
+from tracker.fitting.contour_residuals import ContourMatch
+from tracker.fitting.gauss_newton import StayNear, solve
 from tracker.formats.model_toml import load_model
 from tracker.recover import Judge, RecoverSettings, for_several, search_limbs
-from tracker.refine import ContourMatch
 
 
 def limb_of(model, name):

@@ -7,9 +7,9 @@ from staging import at, camera_at, cameras_around, edge_map, own_evidence, posed
 
 from tracker.body.model import Body
 from tracker.evidence.view_evidence import SCENE_SPACING_PX, Silhouette, ViewEvidence, view_evidence
-from tracker.fit import StayNear, solve
+from tracker.fitting.contour_residuals import ContourMatch, MatchSettings
+from tracker.fitting.gauss_newton import StayNear, solve
 from tracker.formats.model_toml import PRESETS, load_model
-from tracker.refine import ContourMatch, MatchSettings
 
 MODELS = {"box": solid((0.15, 0.2, 0.5), (0.3, 0.6)), "egg": solid((0.15, 0.2, 0.3)), "drop": solid((0.2, 0.2, 0.5))}
 MODELS |= {name: load_model(name) for name in PRESETS}

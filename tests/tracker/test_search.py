@@ -4,9 +4,9 @@ from staging import at, cameras_around, own_evidence, shaken, solid
 
 from tracker.body.model import Body
 from tracker.chamfer import ChamferCost
-from tracker.fit import StayNear, solve
+from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch
+from tracker.fitting.gauss_newton import StayNear, solve
 from tracker.formats.model_toml import load_model
-from tracker.refine import WORTH_A_STEP, ContourMatch
 from tracker.search import BEFORE_REFINEMENT, SearchSettings, search, stages
 
 COARSE = SearchSettings(passes=(1.0,))

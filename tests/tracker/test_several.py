@@ -7,7 +7,7 @@ import pytest
 from staging import at, cameras_around, filmed, own_evidence, posed, solid
 
 from tracker.body.model import Body
-from tracker.fit import solve
+from tracker.fitting.gauss_newton import solve
 from tracker.memory import Memory
 from tracker.motion.prediction import PredictSettings
 from tracker.recover import search_limbs

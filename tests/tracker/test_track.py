@@ -8,7 +8,7 @@ from tracker.body.model import Body
 from tracker.evaluate import evaluate_joints, joints_of_poses
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import view_evidence
-from tracker.fit import fit_to_points
+from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.motion.prediction import PredictSettings

@@ -26,12 +26,12 @@ from tracker.body.model import Body, BodyModel, parts_of
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import Kept, kept_for
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fit import Normal
+from tracker.fitting.contour_kernels import SUM_UP, Scene, Sums, Work, gather, scratch_for
+from tracker.fitting.gauss_newton import Normal
+from tracker.fitting.match_points import points_to_match
+from tracker.fitting.twists import to_dofs
 from tracker.geometry.rigid import Array
 from tracker.geometry.segment_distance import sort_points, stack_rows
-from tracker.matching import SUM_UP, Scene, Sums, Work, gather, scratch_for
-from tracker.points import points_to_match
-from tracker.twists import to_dofs
 
 _CAPTURE = 2.0
 """Edge points farther than this many outlier distances from the predicted contours are left out for good."""

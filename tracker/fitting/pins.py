@@ -11,7 +11,7 @@ import numpy as np
 
 from tracker.body.kinematics import IntArray, Kinematics
 from tracker.body.model import BodyModel
-from tracker.fit import Normal, normal_of
+from tracker.fitting.gauss_newton import Normal, normal_of
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import _NEAREST_M, ViewPin, sigma_px

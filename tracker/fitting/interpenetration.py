@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import IntArray, Kinematics
 from tracker.body.model import Body, BodyModel, parts_of
 from tracker.contours.surfaces import surfaces_of
-from tracker.fit import Normal
+from tracker.fitting.gauss_newton import Normal
 from tracker.geometry.rigid import Array
 
 _SAMPLES = 5

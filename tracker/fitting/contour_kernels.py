@@ -19,10 +19,10 @@ from tracker.contours.static_cache import (
     trace_standing,
 )
 from tracker.evidence.view_evidence import SCENE_SPACING_PX
+from tracker.fitting.twists import add_twists
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.geometry.segment_distance import LANES, cells_within
 from tracker.images.distance_transform import bilinear
-from tracker.twists import add_twists
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernel's arithmetic into float64
 _FAR2 = np.float32(1e12)

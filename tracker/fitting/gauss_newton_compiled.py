@@ -12,16 +12,25 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker import fit
-from tracker.apart import NOTHING_APART, Apart, KeepApart, KeepBodiesApart, push_apart
 from tracker.body.kinematics import IntArray, Kinematics, Tree, forward_kinematics
 from tracker.body.model import BodyModel
 from tracker.compute.numba_options import BORROW
-from tracker.fit import AT_LIMIT, FELT_DAMPING, FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING, Block, Fit, StayNear
+from tracker.fitting import gauss_newton
+from tracker.fitting.contour_kernels import DERIVE, Work, gather
+from tracker.fitting.contour_residuals import ContourMatch
+from tracker.fitting.gauss_newton import (
+    AT_LIMIT,
+    FELT_DAMPING,
+    FIRST_DAMPING,
+    LEAST_DAMPING,
+    MOST_DAMPING,
+    Block,
+    Fit,
+    StayNear,
+)
+from tracker.fitting.interpenetration import NOTHING_APART, Apart, KeepApart, KeepBodiesApart, push_apart
+from tracker.fitting.twists import to_dofs
 from tracker.geometry.rigid import Array
-from tracker.matching import DERIVE, Work, gather
-from tracker.refine import ContourMatch
-from tracker.twists import to_dofs
 
 _KNOWN = (ContourMatch, StayNear, KeepApart, KeepBodiesApart)
 
@@ -75,7 +84,7 @@ def solve(
     """Minimize the summed cost of all blocks within the joint limits, as `fit.solve` does, to rounding."""
     compiled = _compiled(model, blocks)
     if compiled is None:
-        return fit.solve(model, values, blocks, free, max_iterations, tolerance, gain)
+        return gauss_newton.solve(model, values, blocks, free, max_iterations, tolerance, gain)
     may_move = np.ones(model.n_dofs, dtype=bool) if free is None else free
     found, hessian = np.where(may_move, model.clip(values), values), np.empty((model.n_dofs, model.n_dofs))
     cost, iterations = _descend(compiled, found, may_move, max_iterations, tolerance, gain, hessian)
