@@ -21,7 +21,7 @@ ROOMS = [
     "tracker.contours.occluding_contours",
     "tracker.evidence.view_evidence",
     "tracker.fitting",
-    "tracker.appearance",
+    "tracker.appearance.part_colors",
     "tracker.search",
     "tracker.tracking",
     "tracker.tracking.chamfer",

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.appearance import ColorScore, PartColors
+from tracker.appearance.part_colors import ColorScore, PartColors
 from tracker.body.limbs import limbs, spoken
 from tracker.body.model import Body
 from tracker.fitting.contour_residuals import PartCosts

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker import confidence
-from tracker.appearance import Colors, PartColors
+from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
 from tracker.confidence import Quality, Status

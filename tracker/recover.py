@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.appearance import Colors, PartColors
+from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.kinematics import IntArray, chain_poses
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel

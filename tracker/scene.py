@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker import confidence
-from tracker.appearance import Colors
+from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import Limb
 from tracker.body.model import Body
 from tracker.compute.threads import side_by_side

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.appearance import Colors, PartColors
+from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.model import Body, BodyModel
 from tracker.confidence import Status
 from tracker.evidence.observer import Observer

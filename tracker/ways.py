@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.appearance import Colors, PartColors
+from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.model import BodyModel
 from tracker.compute.threads import N_HELPERS, dealt_out
 from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from staging import SUIT, cameras_around, dressed, own_evidence, posed
 from test_body import BALLS
 
-from tracker.appearance import Colors
+from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import limbs
 from tracker.body.model import Body
 from tracker.confidence import LimbFigures, Quality, judge, quality, reason, worst

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from staging import SUIT, at, camera_at, cameras_around, dressed, posed, solid
 
-from tracker.appearance import Colors
+from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import limbs
 from tracker.body.model import Body
 from tracker.contours.occluding_contours import projection

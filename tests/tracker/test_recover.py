@@ -6,7 +6,7 @@ import pytest
 from staging import SUIT, cameras_around, dressed, own_evidence, posed
 
 from tracker import recover
-from tracker.appearance import Colors
+from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import limbs
 from tracker.body.model import Body
 from tracker.fitting.contour_residuals import ContourMatch

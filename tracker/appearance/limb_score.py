@@ -12,13 +12,21 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.appearance.axis_visibility import (
+    ALONG,
+    NEAREST_M,
+    along_axis,
+    hidden,
+    pixel_on_axis,
+    place_before,
+    see_axis,
+)
 from tracker.body.kinematics import IntArray, Kinematics, chain_poses
 from tracker.body.model import BodyModel
 from tracker.compute.numba_options import BORROW
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.images.background_subtraction import Image
 from tracker.images.color_histogram import BINS, bin_of
-from tracker.sights import ALONG, NEAREST_M, along_axis, hidden, pixel_on_axis, place_before, see_axis
 
 _STEP_PX = 2
 """Size of a cell, matched px."""

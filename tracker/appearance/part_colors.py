@@ -13,16 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import Kinematics, chain_poses
-from tracker.body.model import Body, BodyModel, parts_of
-from tracker.compute.numba_options import BORROW
-from tracker.contours.occluding_contours import part_poses, projection
-from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.rigid import Array
-from tracker.images.background_subtraction import Image
-from tracker.images.color_histogram import BINS, bin_of
-from tracker.limb_look import ColorView, LimbLook, Standing
-from tracker.sights import (
+from tracker.appearance.axis_visibility import (
     ALONG,
     NEAREST_M,
     along_axis,
@@ -33,6 +24,15 @@ from tracker.sights import (
     see_axis,
     unit_balls,
 )
+from tracker.appearance.limb_score import ColorView, LimbLook, Standing
+from tracker.body.kinematics import Kinematics, chain_poses
+from tracker.body.model import Body, BodyModel, parts_of
+from tracker.compute.numba_options import BORROW
+from tracker.contours.occluding_contours import part_poses, projection
+from tracker.evidence.view_evidence import ViewEvidence
+from tracker.geometry.rigid import Array
+from tracker.images.background_subtraction import Image
+from tracker.images.color_histogram import BINS, bin_of
 
 _SMOOTHING_BINS = 0.7
 _ACROSS = 3
