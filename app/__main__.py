@@ -236,7 +236,7 @@ def track(
     """
     from app import headless
     from tracker.motion.prediction import PredictSettings
-    from tracker.search import SearchSettings
+    from tracker.search.best_first import SearchSettings
     from tracker.track_settings import TrackSettings
 
     at = commands.target(session, person, several=True)

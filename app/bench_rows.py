@@ -13,7 +13,6 @@ from scipy.optimize import least_squares
 from app.bench_scenes import BenchCrowd, BenchFrame, pose_at
 from app.painting import PaintedCost
 from tracker.body.model import Body, BodyModel
-from tracker.chamfer import ChamferCost
 from tracker.contours import occluding_contours
 from tracker.evidence.observer import Observer
 from tracker.fitting.contour_residuals import ContourMatch
@@ -22,7 +21,8 @@ from tracker.fitting.gauss_newton_compiled import solve
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
-from tracker.search import BEFORE_REFINEMENT, SearchSettings, search
+from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings, search
+from tracker.search.chamfer_cost import ChamferCost
 from tracker.session.session import Session
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from tracker.body.model import Body, BodyModel
-from tracker.chamfer import ChamferCost
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import fit_to_points
@@ -15,6 +14,7 @@ from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
 from tracker.references import read_joints
+from tracker.search.chamfer_cost import ChamferCost
 from tracker.session.session import Session, load_session
 
 FRAME = 25

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array, FloatArray
-from tracker.search import SearchStep, Stage, stages
+from tracker.search.best_first import SearchStep, Stage, stages
 from tracker.track_settings import TrackSettings
 
 KEPT_STEPS = 10_000

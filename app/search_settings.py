@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from app.screen import spoken
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.search import SearchSettings, stages
+from tracker.search.best_first import SearchSettings, stages
 from tracker.track_settings import TrackSettings
 
 _PLAIN = ("bound_rad", "bound_m", "step_rad", "step_m")

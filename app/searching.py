@@ -12,7 +12,7 @@ from app.screen import Screen
 from app.state import JobState, Shown, finite_or_none
 from tracker.errors import TrackerError
 from tracker.geometry.rigid import Array
-from tracker.search import SearchStep, stages
+from tracker.search.best_first import SearchStep, stages
 from tracker.track_settings import search_frame
 
 _SAVE_S = 0.5

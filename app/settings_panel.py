@@ -10,7 +10,7 @@ from app.controller import Controller
 from tracker.errors import TrackerError
 from tracker.motion.prediction import MOST_ORDER, PredictSettings
 from tracker.recover import RecoverSettings
-from tracker.search import SearchSettings
+from tracker.search.best_first import SearchSettings
 from tracker.track_settings import Estimation, TrackSettings
 
 _METHODS: dict[Estimation, str] = {"refine": "refine, else search", "search": "search alone (paper)"}

@@ -22,7 +22,7 @@ ROOMS = [
     "tracker.evidence.view_evidence",
     "tracker.fitting",
     "tracker.appearance.part_colors",
-    "tracker.search",
+    "tracker.search.best_first",
     "tracker.tracking",
     "tracker.tracking.chamfer",
     "tracker.acquisition",

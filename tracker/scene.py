@@ -28,7 +28,7 @@ from tracker.geometry.rigid import Array
 from tracker.images.static_edges import Scenery
 from tracker.memory import Memory
 from tracker.recover import LEAST_GAIN, Judge, for_several, search_limbs
-from tracker.search import BEFORE_REFINEMENT, SearchSettings
+from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings
 from tracker.sharing import Shares, Sharing
 from tracker.surroundings import px_per_m, visible_outline
 from tracker.track_settings import TrackSettings, prior_blocks, search_frame

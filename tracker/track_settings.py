@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import Body, BodyModel
-from tracker.chamfer import ChamferCost, Outliers
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MatchSettings
 from tracker.fitting.gauss_newton import Block, StayNear
@@ -16,7 +15,8 @@ from tracker.fitting.interpenetration import KeepApart
 from tracker.geometry.rigid import Array
 from tracker.motion.prediction import PredictSettings
 from tracker.recover import RecoverSettings
-from tracker.search import SearchSettings, SearchStep, search
+from tracker.search.best_first import SearchSettings, SearchStep, search
+from tracker.search.chamfer_cost import ChamferCost, Outliers
 
 Estimation = Literal["refine", "search"]
 

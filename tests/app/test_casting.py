@@ -7,7 +7,7 @@ from hands import FRONT, PAGE, drag, pixel_of, wait_for
 from app import graspable, overlays, pin_marks
 from app.layers import View
 from tracker.errors import TrackerError
-from tracker.search import SearchSettings
+from tracker.search.best_first import SearchSettings
 from tracker.track import TrackSettings
 
 ANN, BOB = 0, 1

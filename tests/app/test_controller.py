@@ -8,7 +8,7 @@ import pytest
 from hands import FRONT, PAGE, drag, pixel_of, wait_for
 
 from tracker.errors import SessionError
-from tracker.search import SearchSettings
+from tracker.search.best_first import SearchSettings
 from tracker.store.annotation_store import AnnotationStore
 from tracker.track_settings import TrackSettings
 

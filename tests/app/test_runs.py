@@ -6,7 +6,7 @@ import pytest
 from app import runs
 from app.runs import Run, Runs
 from tracker.formats.model_toml import load_model
-from tracker.search import SearchStep
+from tracker.search.best_first import SearchStep
 from tracker.track_settings import TrackSettings
 
 MODEL = load_model("gavrila22")

@@ -25,7 +25,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.motion.prediction import PredictSettings
 from tracker.references import read_joints
-from tracker.search import SearchSettings
+from tracker.search.best_first import SearchSettings
 from tracker.session.assemble import assemble
 from tracker.session.session import load_session
 from tracker.simulate import simulate

@@ -6,10 +6,10 @@ from scipy.spatial import cKDTree
 from staging import at, camera_at, cameras_around, own_evidence, shaken, solid
 
 from tracker.body.model import Body
-from tracker.chamfer import ChamferCost
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence, default_theta_px, view_evidence
 from tracker.formats.model_toml import load_model
+from tracker.search.chamfer_cost import ChamferCost
 
 THETA = 15.0
 FRONT = camera_at("front", (4.0, 0.0, 0.0))

@@ -3,9 +3,9 @@ from scipy.spatial import cKDTree
 from staging import at, camera_at, own_evidence, solid
 
 from tracker.body.model import Body
-from tracker.chamfer import ChamferCost
 from tracker.contours import occluding_contours
 from tracker.contours.part_edges import part_edges, points_hidden
+from tracker.search.chamfer_cost import ChamferCost
 
 FRONT = camera_at("front", (4.0, 0.0, 0.0))
 RADIUS, HALF_APART = 0.2, 0.12

@@ -3,11 +3,11 @@ import pytest
 from staging import at, cameras_around, own_evidence, shaken, solid
 
 from tracker.body.model import Body
-from tracker.chamfer import ChamferCost
 from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch
 from tracker.fitting.gauss_newton import StayNear, solve
 from tracker.formats.model_toml import load_model
-from tracker.search import BEFORE_REFINEMENT, SearchSettings, search, stages
+from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings, search, stages
+from tracker.search.chamfer_cost import ChamferCost
 
 COARSE = SearchSettings(passes=(1.0,))
 

@@ -14,7 +14,7 @@ from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.motion.prediction import PredictSettings
 from tracker.recover import Searched
 from tracker.references import read_joints
-from tracker.search import SearchSettings
+from tracker.search.best_first import SearchSettings
 from tracker.session.assemble import assemble
 from tracker.session.session import load_session
 from tracker.track import track_chamfer

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
 from tracker.body.parts import SearchGroup
-from tracker.chamfer import ChamferCost
 from tracker.errors import TrackerError
 from tracker.geometry.rigid import Array
+from tracker.search.chamfer_cost import ChamferCost
 
 
 @dataclass(frozen=True)

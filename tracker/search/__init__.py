@@ -1,0 +1,1 @@
+"""GD96: the robust chamfer cost and best-first search over a decomposed pose space."""
