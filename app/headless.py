@@ -12,7 +12,6 @@ import numpy as np
 from app.commands import Reporter, Target
 from app.tracked import Keyframes, keyframes_of, told_of, tracked_changes
 from tracker.compute.kernel_cache import compiled_mark
-from tracker.confidence import Status
 from tracker.errors import SessionError
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
@@ -24,8 +23,10 @@ from tracker.session.locked_dofs import free_of, kept_locks
 from tracker.session.session import Person
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
-from tracker.track import PoseEstimate, track_chamfer
+from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings
+from tracker.tracking.confidence import Status
+from tracker.tracking.estimate import PoseEstimate
 
 _SAVE_FRAMES = 10
 """A tracking run is on disk at least every so many frames."""

@@ -7,13 +7,14 @@ from contextlib import AbstractContextManager, contextmanager
 import numpy as np
 
 from app.screen import Screen, spoken
-from tracker import confidence, posing
+from tracker import posing
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry.rigid import Array
 from tracker.orienting import orient
 from tracker.pose_edits import bent_alike, limb_of, mirrored, taken_over
 from tracker.rebody import rebodied
+from tracker.tracking import confidence
 
 _SAME_GESTURE_S = 1.0
 """Changes of one slider, or steps of one joint, within this time of each other are one entry of the history."""

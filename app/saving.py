@@ -31,8 +31,8 @@ from tracker.store.records import (
     PoseChange,
     PoseRecord,
 )
-from tracker.track import PoseEstimate
 from tracker.track_settings import TrackSettings
+from tracker.tracking.estimate import PoseEstimate
 
 _BY_HAND = ("manual", "pinned", "fitted")
 """Sources of a person's own edits: a frame that a person's word was fitted to is a keyframe as one set by drags is."""

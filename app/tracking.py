@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 from app.jobs import Job
 from app.screen import Screen
 from app.state import Shown, TrackState, finite_or_none
-from tracker import confidence
 from tracker.body.model import BodyModel
-from tracker.confidence import Status
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.rigid import Array
 from tracker.second_pass import Followed, Tracked, follow_back
-from tracker.track import PoseEstimate, track_chamfer
+from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings
+from tracker.tracking import confidence
+from tracker.tracking.confidence import Status
+from tracker.tracking.estimate import PoseEstimate
 
 _SAVE_S = 0.5
 """A running tracker is on disk at least this often, and writes no more often of its own accord."""

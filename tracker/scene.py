@@ -13,12 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker import confidence
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import Limb
 from tracker.body.model import Body
 from tracker.compute.threads import side_by_side
-from tracker.confidence import Quality, Status
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch, PartCosts
 from tracker.fitting.gauss_newton import Block, Fit, covariance, held
@@ -26,12 +24,14 @@ from tracker.fitting.gauss_newton_compiled import solve
 from tracker.fitting.interpenetration import KeepBodiesApart
 from tracker.geometry.rigid import Array
 from tracker.images.static_edges import Scenery
-from tracker.memory import Memory
 from tracker.recover import LEAST_GAIN, Judge, for_several, search_limbs
 from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings
-from tracker.sharing import Shares, Sharing
-from tracker.surroundings import px_per_m, visible_outline
 from tracker.track_settings import TrackSettings, prior_blocks, search_frame
+from tracker.tracking import confidence
+from tracker.tracking.confidence import Quality, Status
+from tracker.tracking.evidence_assignment import Shares, Sharing
+from tracker.tracking.person_memory import Memory
+from tracker.tracking.view_regions import px_per_m, visible_outline
 
 _ITERATIONS = 15
 _TOLERANCE = 1e-3  # rad or metres: a tenth of a pixel on a limb

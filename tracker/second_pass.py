@@ -16,18 +16,19 @@ from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.model import Body, BodyModel
-from tracker.confidence import Status
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import ContourMatch
 from tracker.fitting.gauss_newton import held
 from tracker.fitting.interpenetration import KeepBodiesApart
 from tracker.geometry.rigid import Array
-from tracker.memory import Memory
 from tracker.scene import Scene
-from tracker.surroundings import regions, visible_outline
-from tracker.track import PoseEstimate, summed_up, track_chamfer
+from tracker.track import summed_up, track_chamfer
 from tracker.track_settings import TrackSettings
+from tracker.tracking.confidence import Status
+from tracker.tracking.estimate import PoseEstimate
+from tracker.tracking.person_memory import Memory
+from tracker.tracking.view_regions import regions, visible_outline
 from tracker.ways import ROUNDS, Candidates, Sight, carry, cheapest_way
 
 _TRUSTED = 3

@@ -1,59 +1,23 @@
 """The chamfer tracker of GD96: predict, observe, estimate, judge, one frame at a time (see `scene`)."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import Body, BodyModel
 from tracker.compute.threads import side_by_side
-from tracker.confidence import Quality, Status
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.cameras import Region
 from tracker.geometry.rigid import Array
 from tracker.images.static_edges import Scenery
-from tracker.memory import Memory
 from tracker.motion.prediction import PredictSettings
 from tracker.scene import Found, Scene
-from tracker.surroundings import confirmed, regions, regions_ahead, visible_outline
 from tracker.track_settings import TrackSettings, pose_cost
-
-
-class OtherPose(NamedTuple):
-    """A pose of a person that the evidence goes as well with."""
-
-    values: Array
-    """Pose, (n_values,)."""
-    cost_px: float
-    """What `PoseEstimate.cost_px` would be, px; where two people may be exchanged, with both exchanged."""
-
-
-class PoseEstimate(NamedTuple):
-    """Poses found on one frame."""
-
-    frame: int
-    poses: tuple[Array, ...]
-    """Pose of each person, (n_values,) each."""
-    cost_px: float
-    """Cost of the poses against all edges near them, px of the footage."""
-    views_px: Array
-    """The same for each view, (V,); NaN for a view without edges."""
-    evaluations: int
-    """Poses that the best-first search scored to find them."""
-    statuses: tuple[Status, ...]
-    """How sure the tracker is of each person."""
-    remarks: tuple[str, ...]
-    """What was out of the ordinary with each person; empty where nothing was."""
-    parts_px: tuple[Array, ...]
-    """Mean distance of the contour of each person's parts to the edges, (n_parts,) each, px; NaN where hidden."""
-    covariances: tuple[Array, ...]
-    """Covariance of each pose, (n_dofs, n_dofs) each, rad and metres; of a pose that was given, zero."""
-    qualities: tuple[Quality | None, ...]
-    """What the statuses were judged by; None for a pose that was given."""
-    alternatives: tuple[tuple[OtherPose, ...], ...]
-    """Of each person poses that are about as good, best first; where there are any, the status is at most doubtful."""
+from tracker.tracking.estimate import OtherPose, PoseEstimate
+from tracker.tracking.person_memory import Memory
+from tracker.tracking.view_regions import confirmed, regions, regions_ahead, visible_outline
 
 
 def track_chamfer(

@@ -3,8 +3,8 @@ from fake_tracker import Estimate
 
 from app.tracked import tracked_changes
 from tracker.store.annotation_store import AnnotationStore
-from tracker.track import OtherPose
 from tracker.track_settings import TrackSettings
+from tracker.tracking.estimate import OtherPose
 
 
 def test_what_is_about_as_good_goes_to_the_store_with_the_pose(tmp_path):

@@ -1,4 +1,4 @@
-"""How sure the tracker may be of itself: the weights and thresholds of `tracker/confidence.py`, fitted and checked.
+"""How sure the tracker may be of itself: the weights and thresholds of `tracker/tracking/confidence.py`, fitted and checked.
 
 `python tests/benchmarks/calibrate_status.py` makes simulated scenes (people whose shape is not the model's, clutter,
 noise), tracks them with and without the search for lost limbs, fits the logistic function of the evidence to the
@@ -21,17 +21,18 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from true_starts import read_simulated
 
-from tracker import confidence
 from tracker.body.model import BodyModel
-from tracker.confidence import Status
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.rigid import Array
 from tracker.simulate import simulate
 from tracker.simulate.scenes import cast_of
-from tracker.track import PoseEstimate, track_chamfer
+from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings
+from tracker.tracking import confidence
+from tracker.tracking.confidence import Status
+from tracker.tracking.estimate import PoseEstimate
 
 VGA, SMALL = (640, 480), (320, 240)
 

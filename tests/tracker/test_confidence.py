@@ -10,10 +10,10 @@ from test_body import BALLS
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import limbs
 from tracker.body.model import Body
-from tracker.confidence import LimbFigures, Quality, judge, quality, reason, worst
 from tracker.fitting.contour_residuals import ContourMatch
 from tracker.fitting.gauss_newton import StayNear, solve
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
+from tracker.tracking.confidence import LimbFigures, Quality, judge, quality, reason, worst
 
 
 def names_of(model, parts):

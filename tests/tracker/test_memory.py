@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from tracker.confidence import LimbFigures, Quality
-from tracker.memory import Memory
 from tracker.motion.prediction import PredictSettings
+from tracker.tracking.confidence import LimbFigures, Quality
+from tracker.tracking.person_memory import Memory
 
 CLEAR, ASTRAY = (1.0, 0.0, 1.2, 0.05, 0.6, 0.5), (-2.0, 3.0, 4.0, 0.3, 0.2, 0.1)
 

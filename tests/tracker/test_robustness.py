@@ -7,7 +7,6 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker.confidence import Status
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.pose_csv import read_pose_table
@@ -16,6 +15,7 @@ from tracker.session.session import Session
 from tracker.simulate.record import simulate
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings
+from tracker.tracking.confidence import Status
 
 N = 6
 BAD = 3

@@ -8,12 +8,12 @@ from staging import at, cameras_around, filmed, own_evidence, posed, solid
 
 from tracker.body.model import Body
 from tracker.fitting.gauss_newton import solve
-from tracker.memory import Memory
 from tracker.motion.prediction import PredictSettings
 from tracker.recover import search_limbs
 from tracker.scene import Scene
 from tracker.track import track_chamfer
 from tracker.track_settings import TrackSettings
+from tracker.tracking.person_memory import Memory
 
 N_FRAMES = 3
 APART_M = 1.0

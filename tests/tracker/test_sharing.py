@@ -8,7 +8,7 @@ from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import Silhouette, with_segments
 from tracker.images.edge_segments import Segments
 from tracker.images.silhouette_outline import Outline
-from tracker.sharing import Shares, Sharing, _tell_apart
+from tracker.tracking.evidence_assignment import Shares, Sharing, _tell_apart
 
 BALL = solid((0.15, 0.15, 0.3))
 FRONT = camera_at("front", (4.0, 0.0, 0.0))
@@ -81,7 +81,9 @@ def test_the_shares_of_three_are_those_of_the_simple_version(person):
 def test_distances_are_measured_once_for_all(monkeypatch):
     """Of two people in one pose each, whoever asks first."""
     bodies, told = [at(BALL, 0, -0.25, 0), at(BALL, 0, 0.25, 0)], []
-    monkeypatch.setattr("tracker.sharing._tell_apart", lambda *a: told.append(a) or _tell_apart(*a))
+    monkeypatch.setattr(
+        "tracker.tracking.evidence_assignment._tell_apart", lambda *a: told.append(a) or _tell_apart(*a)
+    )
     shares = Shares(Sharing([seen(bodies)]), bodies)
     views = [shares.own(person, everywhere) for person in (0, 1) for everywhere in (False, True)]
     assert len(told) == 1

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from staging import at, camera_at, solid
 
-from tracker.surroundings import confirmed, regions, regions_ahead
+from tracker.tracking.view_regions import confirmed, regions, regions_ahead
 
 BALL = solid((0.1, 0.1, 0.1))
 CAMERAS = [camera_at("front", (4.0, 0.0, 0.0)), camera_at("near", (0.3, 0.0, 0.0))]

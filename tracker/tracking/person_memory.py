@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker import confidence
 from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
-from tracker.confidence import Quality, Status
 from tracker.fitting.gauss_newton import held
 from tracker.geometry.rigid import Array
 from tracker.motion.prediction import PredictSettings, predict
+from tracker.tracking import confidence
+from tracker.tracking.confidence import Quality, Status
 
 _LONGEST_PAUSE = 8
 """A limb that seems lost and is not found is searched at least every so many frames."""
