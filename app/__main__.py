@@ -237,7 +237,7 @@ def track(
     from app import headless
     from tracker.motion.prediction import PredictSettings
     from tracker.search.best_first import SearchSettings
-    from tracker.track_settings import TrackSettings
+    from tracker.tracking.chamfer.settings import TrackSettings
 
     at = commands.target(session, person, several=True)
     wanted: Sequence[int] = commands.frame_range(frames, at.session)

@@ -24,8 +24,8 @@ from tracker.geometry.rigid import Array
 from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings, search
 from tracker.search.chamfer_cost import ChamferCost
 from tracker.session.session import Session
-from tracker.track import track_chamfer
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.chamfer.tracker import track_chamfer
 
 _CANDIDATES = 100
 _PIPELINE_FRAMES = range(5, 45)
@@ -153,7 +153,7 @@ def _searched_and_refined(frame: BenchFrame, start: Array) -> Fit:
 
 
 def _refined(frame: BenchFrame, start: Array, predicted: Array) -> Fit:
-    """Refine as the tracker does; see `tracker.scene`."""
+    """Refine as the tracker does; see `tracker.tracking.chamfer.frame_estimator`."""
     model = frame.model
     match = ContourMatch(frame.views, [Body(model, start)])
     sigma = np.where(model.dof_is_length, _SETTINGS.trust_m, _SETTINGS.trust_rad)

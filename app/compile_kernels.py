@@ -20,8 +20,8 @@ from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.rigid import Array
 from tracker.session.lock import SessionLock
-from tracker.track import track_chamfer
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.chamfer.tracker import track_chamfer
 
 _FRAMES = 3
 """Frames that are tracked: from the second there is a motion, and what was lost."""

@@ -38,7 +38,7 @@ from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array
 from tracker.session.session import Session
 from tracker.store.records import FrameNumbers
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
 
 
 class Controller:

@@ -17,14 +17,14 @@ from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import format_model
 from tracker.geometry.rigid import Array
-from tracker.second_pass import Followed, Tracked, follow_back
 from tracker.session.lock import SessionLock
 from tracker.session.locked_dofs import free_of, kept_locks
 from tracker.session.session import Person
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
-from tracker.track import track_chamfer
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.backward_pass import Followed, Tracked, follow_back
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.chamfer.tracker import track_chamfer
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import PoseEstimate
 

@@ -13,7 +13,7 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.rigid import Array
-from tracker.track_settings import TrackSettings, pose_cost
+from tracker.tracking.chamfer.settings import TrackSettings, pose_cost
 
 SAMPLES = 121
 _REACH_M, _REACH_RAD = 0.5, float(np.pi)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.search.best_first import SearchStep, Stage, stages
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
 
 KEPT_STEPS = 10_000
 """Steps of a run that are kept at most; beyond, every other one that found nothing better is dropped."""

@@ -31,7 +31,7 @@ from tracker.store.records import (
     PoseChange,
     PoseRecord,
 )
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimate import PoseEstimate
 
 _BY_HAND = ("manual", "pinned", "fitted")

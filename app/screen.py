@@ -21,7 +21,7 @@ from tracker.rebody import rebodied
 from tracker.session.locked_dofs import free_of
 from tracker.session.session import Session
 from tracker.standing import standing_pose
-from tracker.track_settings import pose_cost
+from tracker.tracking.chamfer.settings import pose_cost
 
 _APART_M = 0.9
 """How far from each other people stand whom nobody has placed, metres: each can be seen and taken by itself."""

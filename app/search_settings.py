@@ -11,7 +11,7 @@ from app.screen import spoken
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.search.best_first import SearchSettings, stages
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
 
 _PLAIN = ("bound_rad", "bound_m", "step_rad", "step_m")
 

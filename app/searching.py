@@ -13,7 +13,7 @@ from app.state import JobState, Shown, finite_or_none
 from tracker.errors import TrackerError
 from tracker.geometry.rigid import Array
 from tracker.search.best_first import SearchStep, stages
-from tracker.track_settings import search_frame
+from tracker.tracking.chamfer.settings import search_frame
 
 _SAVE_S = 0.5
 """A running search is on disk at least this often."""

@@ -9,7 +9,7 @@ from app.view_choice import View3d
 from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import ViewPin
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
 
 
 @dataclass(frozen=True, eq=False)

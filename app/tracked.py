@@ -10,7 +10,7 @@ from tracker.geometry.rigid import Array
 from tracker.session.session import Person
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import Alternative, PoseChange, PoseRecord
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimate import PoseEstimate
 
 Keyframes = Mapping[int, Mapping[int, Array]]

@@ -15,10 +15,10 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.rigid import Array
-from tracker.second_pass import Followed, Tracked, follow_back
-from tracker.track import track_chamfer
-from tracker.track_settings import TrackSettings
 from tracker.tracking import confidence
+from tracker.tracking.chamfer.backward_pass import Followed, Tracked, follow_back
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.chamfer.tracker import track_chamfer
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import PoseEstimate
 

@@ -21,7 +21,7 @@ from tracker.fitting.pins import PinBlock, pin_block
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import ViewPin
-from tracker.track_settings import TrackSettings, prior_blocks
+from tracker.tracking.chamfer.settings import TrackSettings, prior_blocks
 
 _REACHES = (2.0, 1.0)
 """Outlier distances of one round after the other, in those of the settings."""

@@ -8,7 +8,7 @@ from app import graspable, overlays, pin_marks
 from app.layers import View
 from tracker.errors import TrackerError
 from tracker.search.best_first import SearchSettings
-from tracker.track import TrackSettings
+from tracker.tracking.chamfer.tracker import TrackSettings
 
 ANN, BOB = 0, 1
 QUICK = TrackSettings(search=SearchSettings(passes=(1.0,), max_expansions=2))

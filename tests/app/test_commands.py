@@ -13,10 +13,10 @@ from app import headless
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
-from tracker.second_pass import Followed
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange
+from tracker.tracking.chamfer.backward_pass import Followed
 
 
 def test_new_info_init_track_evaluate(run, tmp_path):

@@ -10,7 +10,7 @@ from hands import FRONT, PAGE, drag, pixel_of, wait_for
 from tracker.errors import SessionError
 from tracker.search.best_first import SearchSettings
 from tracker.store.annotation_store import AnnotationStore
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
 
 
 def test_a_fresh_session_shows_a_draft_that_is_not_stored(opened):

@@ -6,7 +6,7 @@ from hands import drag, wait_for
 
 from app.landscape import SAMPLES, landscape
 from tracker.errors import TrackerError
-from tracker.track_settings import pose_cost
+from tracker.tracking.chamfer.settings import pose_cost
 
 
 @pytest.mark.parametrize("name", ["left_shoulder.abduction", "torso.x", "torso.twist"])

@@ -7,7 +7,7 @@ from app import runs
 from app.runs import Run, Runs
 from tracker.formats.model_toml import load_model
 from tracker.search.best_first import SearchStep
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
 
 MODEL = load_model("gavrila22")
 START = MODEL.neutral()

@@ -6,7 +6,7 @@ import pytest
 from app.search_settings import changed, differences, leaves
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import load_model
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
 
 MODELS = [load_model("gavrila22")]
 BEFORE = TrackSettings()

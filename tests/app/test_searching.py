@@ -8,7 +8,7 @@ from hands import drag, wait_for
 
 from tracker.errors import TrackerError
 from tracker.search.best_first import SearchSettings
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
 
 QUICK = TrackSettings(search=SearchSettings(passes=(1.0,), max_expansions=3))
 

@@ -5,7 +5,7 @@ import viser
 from app.settings_panel import SettingsPanel, settings_of
 from tracker.errors import TrackerError
 from tracker.motion.prediction import PredictSettings
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
 
 SHOWN = {
     "method": "search alone (paper)", "order": "constant acceleration", "window": 5, "recover": False,

@@ -3,7 +3,7 @@ from fake_tracker import Estimate
 
 from app.tracked import tracked_changes
 from tracker.store.annotation_store import AnnotationStore
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimate import OtherPose
 
 

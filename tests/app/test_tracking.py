@@ -10,8 +10,8 @@ from fake_tracker import STEP_M
 from hands import FRONT, PAGE, drag, wait_for
 
 from tracker.errors import SessionError, TrackerError
-from tracker.second_pass import Followed
 from tracker.store.annotation_store import AnnotationStore
+from tracker.tracking.chamfer.backward_pass import Followed
 
 
 def at(controller, frame):

@@ -29,8 +29,8 @@ from tracker.search.best_first import SearchSettings
 from tracker.session.assemble import assemble
 from tracker.session.session import load_session
 from tracker.simulate import simulate
-from tracker.track import track_chamfer
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.chamfer.tracker import track_chamfer
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "ablation.md"
 DEFAULT = TrackSettings()

@@ -28,9 +28,9 @@ from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.rigid import Array
 from tracker.simulate import simulate
 from tracker.simulate.scenes import cast_of
-from tracker.track import track_chamfer
-from tracker.track_settings import TrackSettings
 from tracker.tracking import confidence
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.chamfer.tracker import track_chamfer
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import PoseEstimate
 

@@ -25,8 +25,8 @@ from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
 from tracker.session.session import Session
 from tracker.simulate import simulate
-from tracker.track import track_chamfer
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.chamfer.tracker import track_chamfer
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "ablation.md"
 DEFAULT = TrackSettings()

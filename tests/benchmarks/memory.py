@@ -23,7 +23,7 @@ from tracker.footage.video import open_footage
 from tracker.references import read_joints
 from tracker.session.session import Session, load_session, save_session
 from tracker.simulate.encode import VideoWriter
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"
 EVERY = 100

@@ -23,7 +23,7 @@ from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
-from tracker.track_settings import TrackSettings, pose_cost
+from tracker.tracking.chamfer.settings import TrackSettings, pose_cost
 
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 TANGO = ROOT / "sample_sessions" / "tango"

@@ -16,7 +16,7 @@ from tracker.frame_fit import fit_frame
 from tracker.geometry.triangulation import ViewPin
 from tracker.references import read_joints
 from tracker.session.session import load_session
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
 
 GAVRILA = load_model("gavrila22")
 CAMERAS = cameras_around(3)

@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 from staging import SUIT, cameras_around, dressed, own_evidence, posed
 
-from tracker import recover
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import limbs
 from tracker.body.model import Body
 from tracker.fitting.contour_residuals import ContourMatch
 from tracker.fitting.gauss_newton import StayNear, solve
 from tracker.formats.model_toml import load_model
-from tracker.recover import Judge, RecoverSettings, for_several, search_limbs
+from tracker.tracking.chamfer import limb_recovery
+from tracker.tracking.chamfer.limb_recovery import Judge, RecoverSettings, for_several, search_limbs
 
 
 def limb_of(model, name):
@@ -117,8 +117,8 @@ def test_for_several_places_are_looked_for_once(gavrila, monkeypatch):
     """However many poses the first limb leaves; from each of them where there is one person."""
     truth, looked = posed(gavrila, 1), []
     staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["60 degrees off"]))
-    candidates = recover._candidates
-    monkeypatch.setattr(recover, "_candidates", lambda *a: looked.append(a) or candidates(*a))
+    candidates = limb_recovery._candidates
+    monkeypatch.setattr(limb_recovery, "_candidates", lambda *a: looked.append(a) or candidates(*a))
     suspects, n_looked = [limb_of(gavrila, n) for n in ("left_forearm", "left_calf")], []
     for settings in (RecoverSettings(), for_several(RecoverSettings())):
         looked.clear()
@@ -158,9 +158,9 @@ def test_the_best_places_are_improved_to_the_end(gavrila, monkeypatch):
     """As many as are scored; before, all."""
     truth, rows = posed(gavrila, 1), []
     staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["60 degrees off"]))
-    improved = recover._improved
-    monkeypatch.setattr(recover, "_in_parts", lambda work, *arrays: [work(*arrays)])
-    monkeypatch.setattr(recover, "_improved", lambda *a: rows.append([len(x) for x in a[3:]]) or improved(*a))
+    improved = limb_recovery._improved
+    monkeypatch.setattr(limb_recovery, "_in_parts", lambda work, *arrays: [work(*arrays)])
+    monkeypatch.setattr(limb_recovery, "_improved", lambda *a: rows.append([len(x) for x in a[3:]]) or improved(*a))
     staged.judge = replace(staged.judge, settings=RecoverSettings(improved=24, scored=6, shakes_rad=(0.2, 0.1, 0.1)))
     assert staged.off_m(staged.search(limb_of(gavrila, "left_forearm")), limb_of(gavrila, "left_forearm").parts) < 0.03
     assert rows == [[24, 24], [6, 6, 6]]
@@ -173,12 +173,12 @@ def test_best_places_apart(gavrila):
     rng = np.random.default_rng(0)
     near = [turned(gavrila, base, left_elbow__extension=a) for a in rng.uniform(0, 3, 20)]
     poses, scores = np.array([*near, there]), np.array([*rng.uniform(1, 2, 20), 0.5])
-    found = recover._best_apart(gavrila, arm, poses, scores, 5, 0.05)
+    found = limb_recovery._best_apart(gavrila, arm, poses, scores, 5, 0.05)
     np.testing.assert_array_equal(found, [poses[np.argmax(scores)], there])
-    np.testing.assert_array_equal(recover._best_apart(gavrila, arm, poses, scores, 1, 0.05), found[:1])
+    np.testing.assert_array_equal(limb_recovery._best_apart(gavrila, arm, poses, scores, 1, 0.05), found[:1])
     # Where another limb is does not count.
     legs = np.array([base, turned(gavrila, base, left_knee__extension=90)])
-    assert len(recover._best_apart(gavrila, arm, legs, np.zeros(2), 5, 0.05)) == 1
+    assert len(limb_recovery._best_apart(gavrila, arm, legs, np.zeros(2), 5, 0.05)) == 1
 
 
 def test_where_nothing_is_better_the_pose_is_kept(gavrila):
@@ -216,7 +216,7 @@ def test_two_places_that_are_about_as_good_are_both_told(gavrila):
     ends = np.array([gavrila.points_world(f.values)[wrist] for f in (found.best, *found.others)])
     wanted = np.array([gavrila.points_world(v)[wrist] for v in (here, there)])
     assert np.linalg.norm(ends[:, None] - wanted, axis=-1).min(axis=0).max() < 0.05  # both are there
-    assert all(judge.cost(f) < judge.cost(found.best) + recover.LEAST_GAIN for f in found.others)
+    assert all(judge.cost(f) < judge.cost(found.best) + limb_recovery.LEAST_GAIN for f in found.others)
     # Where the edges show it once there is nothing to choose from.
     once = Staged(gavrila, here, turned(gavrila, here, **LOST["inside the trunk"]))
     assert once.searched(arm).others == ()
@@ -227,7 +227,7 @@ def test_the_same_every_time(gavrila):
     wrong = turned(gavrila, truth, **LOST["60 degrees off"])
     twice = []
     for _ in range(2):
-        recover._even.cache_clear()  # as in another run of the program
+        limb_recovery._even.cache_clear()  # as in another run of the program
         twice.append(Staged(gavrila, truth, wrong).search(limb_of(gavrila, "left_forearm")))
     np.testing.assert_array_equal(twice[0].values, twice[1].values)
     assert twice[0].cost == twice[1].cost
@@ -241,8 +241,8 @@ def test_the_same_however_many_threads_look(gavrila, monkeypatch, threads):
     limb, judge = limb_of(gavrila, "left_forearm"), Staged(gavrila, truth, wrong).judge
 
     def candidates(n):
-        monkeypatch.setattr(recover, "N_HELPERS", n)
-        return recover._candidates(gavrila, limb, [], wrong, [], replace(judge).of_limb(limb))
+        monkeypatch.setattr(limb_recovery, "N_HELPERS", n)
+        return limb_recovery._candidates(gavrila, limb, [], wrong, [], replace(judge).of_limb(limb))
 
     np.testing.assert_array_equal(candidates(threads), candidates(1))
 

@@ -13,8 +13,8 @@ from tracker.formats.pose_csv import read_pose_table
 from tracker.motion.prediction import predict
 from tracker.session.session import Session
 from tracker.simulate.record import simulate
-from tracker.track import track_chamfer
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.chamfer.tracker import track_chamfer
 from tracker.tracking.confidence import Status
 
 N = 6

@@ -5,9 +5,9 @@ import pytest
 from staging import SUIT, Shown, cameras_around, dressed, posed
 
 from tracker.body.model import Body
-from tracker.second_pass import Followed, Tracked, follow_back, stretches
-from tracker.track_settings import TrackSettings
-from tracker.ways import ROUNDS
+from tracker.tracking.chamfer.backward_pass import Followed, Tracked, follow_back, stretches
+from tracker.tracking.chamfer.pose_paths import ROUNDS
+from tracker.tracking.chamfer.settings import TrackSettings
 
 N = 9
 LOST = range(2, 5)

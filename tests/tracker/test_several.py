@@ -9,10 +9,10 @@ from staging import at, cameras_around, filmed, own_evidence, posed, solid
 from tracker.body.model import Body
 from tracker.fitting.gauss_newton import solve
 from tracker.motion.prediction import PredictSettings
-from tracker.recover import search_limbs
-from tracker.scene import Scene
-from tracker.track import track_chamfer
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.frame_estimator import Scene
+from tracker.tracking.chamfer.limb_recovery import search_limbs
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.chamfer.tracker import track_chamfer
 from tracker.tracking.person_memory import Memory
 
 N_FRAMES = 3
@@ -57,7 +57,9 @@ def test_people_are_refined_again_only_where_others_moved(monkeypatch, off_m, so
     views = own_evidence([at(ball, *v[:3]) for v in values], cameras)
     expected = values.copy()
     expected[1, 0] += off_m
-    monkeypatch.setattr("tracker.scene.solve", lambda *a, **k: done.append(a) or solve(*a, **k))
+    monkeypatch.setattr(
+        "tracker.tracking.chamfer.frame_estimator.solve", lambda *a, **k: done.append(a) or solve(*a, **k)
+    )
     scene = Scene(
         views, [Memory(ball, v, alone=False) for v in expected], expected, TrackSettings(recover=None, rounds=5)
     )
@@ -83,9 +85,11 @@ def test_nothing_depends_on_who_is_done_first(gavrila, monkeypatch):
             memory.update(scene.poses[person], scene.colors(person), found[person].status, given=False)
         return np.array([*scene.poses, *(found[p].covariance.sum(axis=1) for p in (0, 1))])
 
-    monkeypatch.setattr("tracker.scene.search_limbs", lambda *a: searched.append(a) or search_limbs(*a))
+    monkeypatch.setattr(
+        "tracker.tracking.chamfer.frame_estimator.search_limbs", lambda *a: searched.append(a) or search_limbs(*a)
+    )
     usual = poses()
     assert len(searched) == 2
     one_by_one = lambda work, items: [work(x) for x in items[::-1]][::-1]  # noqa: E731
-    monkeypatch.setattr("tracker.scene.side_by_side", one_by_one)
+    monkeypatch.setattr("tracker.tracking.chamfer.frame_estimator.side_by_side", one_by_one)
     np.testing.assert_array_equal(poses(), usual)

@@ -12,13 +12,13 @@ from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.motion.prediction import PredictSettings
-from tracker.recover import Searched
 from tracker.references import read_joints
 from tracker.search.best_first import SearchSettings
 from tracker.session.assemble import assemble
 from tracker.session.session import load_session
-from tracker.track import track_chamfer
-from tracker.track_settings import TrackSettings, pose_cost, search_frame
+from tracker.tracking.chamfer.limb_recovery import Searched
+from tracker.tracking.chamfer.settings import TrackSettings, pose_cost, search_frame
+from tracker.tracking.chamfer.tracker import track_chamfer
 
 COARSE = TrackSettings(
     estimate="search", search=SearchSettings(passes=(1.0,)), predict=PredictSettings(order=0), recover=None
@@ -196,7 +196,10 @@ def test_what_is_locked_is_neither_refined_nor_searched(gavrila, monkeypatch):
     truth = dancing(gavrila, 4, jump_at=2)
     views = [dressed([Body(gavrila, v)], cameras_around(4), SUIT) for v in truth]
     searched = []
-    monkeypatch.setattr("tracker.scene.search_limbs", lambda m, due, fit, *_: searched.extend(due) or Searched(fit))
+    monkeypatch.setattr(
+        "tracker.tracking.chamfer.frame_estimator.search_limbs",
+        lambda m, due, fit, *_: searched.extend(due) or Searched(fit),
+    )
     free = ~np.array([name.startswith(("left_shoulder", "left_elbow")) for name in gavrila.dof_names])
     start = truth[0].copy()
     outside = gavrila.dof_names.index("left_elbow.extension")

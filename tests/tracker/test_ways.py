@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from staging import posed
 
-from tracker.recover import LEAST_GAIN
-from tracker.ways import _BENT_M, _MOST, _MOST_BENT, ROUNDS, Candidates, carry, cheapest_way
+from tracker.tracking.chamfer.limb_recovery import LEAST_GAIN
+from tracker.tracking.chamfer.pose_paths import _BENT_M, _MOST, _MOST_BENT, ROUNDS, Candidates, carry, cheapest_way
 
 
 def cost_of(points, costs, before, after, way):

@@ -13,8 +13,8 @@ from tracker.geometry.cameras import Region
 from tracker.geometry.rigid import Array
 from tracker.images.static_edges import Scenery
 from tracker.motion.prediction import PredictSettings
-from tracker.scene import Found, Scene
-from tracker.track_settings import TrackSettings, pose_cost
+from tracker.tracking.chamfer.frame_estimator import Found, Scene
+from tracker.tracking.chamfer.settings import TrackSettings, pose_cost
 from tracker.tracking.estimate import OtherPose, PoseEstimate
 from tracker.tracking.person_memory import Memory
 from tracker.tracking.view_regions import confirmed, regions, regions_ahead, visible_outline

@@ -22,14 +22,14 @@ from tracker.fitting.contour_residuals import ContourMatch
 from tracker.fitting.gauss_newton import held
 from tracker.fitting.interpenetration import KeepBodiesApart
 from tracker.geometry.rigid import Array
-from tracker.scene import Scene
-from tracker.track import summed_up, track_chamfer
-from tracker.track_settings import TrackSettings
+from tracker.tracking.chamfer.frame_estimator import Scene
+from tracker.tracking.chamfer.pose_paths import ROUNDS, Candidates, Sight, carry, cheapest_way
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.chamfer.tracker import summed_up, track_chamfer
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import PoseEstimate
 from tracker.tracking.person_memory import Memory
 from tracker.tracking.view_regions import regions, visible_outline
-from tracker.ways import ROUNDS, Candidates, Sight, carry, cheapest_way
 
 _TRUSTED = 3
 """So many good frames in a row end a stretch; fewer may be a lost limb that looks well by chance."""

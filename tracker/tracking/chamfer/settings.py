@@ -14,9 +14,9 @@ from tracker.fitting.gauss_newton import Block, StayNear
 from tracker.fitting.interpenetration import KeepApart
 from tracker.geometry.rigid import Array
 from tracker.motion.prediction import PredictSettings
-from tracker.recover import RecoverSettings
 from tracker.search.best_first import SearchSettings, SearchStep, search
 from tracker.search.chamfer_cost import ChamferCost, Outliers
+from tracker.tracking.chamfer.limb_recovery import RecoverSettings
 
 Estimation = Literal["refine", "search"]
 

@@ -24,10 +24,10 @@ from tracker.fitting.gauss_newton_compiled import solve
 from tracker.fitting.interpenetration import KeepBodiesApart
 from tracker.geometry.rigid import Array
 from tracker.images.static_edges import Scenery
-from tracker.recover import LEAST_GAIN, Judge, for_several, search_limbs
 from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings
-from tracker.track_settings import TrackSettings, prior_blocks, search_frame
 from tracker.tracking import confidence
+from tracker.tracking.chamfer.limb_recovery import LEAST_GAIN, Judge, for_several, search_limbs
+from tracker.tracking.chamfer.settings import TrackSettings, prior_blocks, search_frame
 from tracker.tracking.confidence import Quality, Status
 from tracker.tracking.evidence_assignment import Shares, Sharing
 from tracker.tracking.person_memory import Memory

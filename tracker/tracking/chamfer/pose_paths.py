@@ -20,8 +20,8 @@ from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch
 from tracker.fitting.gauss_newton import Block
 from tracker.fitting.gauss_newton_compiled import solve
 from tracker.geometry.rigid import Array
-from tracker.recover import APART_M, LEAST_GAIN
-from tracker.track_settings import TrackSettings, prior_blocks
+from tracker.tracking.chamfer.limb_recovery import APART_M, LEAST_GAIN
+from tracker.tracking.chamfer.settings import TrackSettings, prior_blocks
 
 ROUNDS = 2
 """How often poses are carried forwards through all frames and back again."""
