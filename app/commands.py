@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
+from tracker.acquisition.from_joints import fit_sizes
 from tracker.errors import SessionError, TrackerError
 from tracker.evaluate import Alignment, evaluate_joints, evaluate_poses
 from tracker.fitting.gauss_newton import fit_to_points
@@ -24,7 +25,6 @@ from tracker.geometry.rigid import Array
 from tracker.references import Reference, stored_motion
 from tracker.session.lock import SessionLock
 from tracker.session.session import Person, Session, load_session, save_session
-from tracker.sizes import fit_sizes
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import FrameRow, PoseChange, PoseRecord
 

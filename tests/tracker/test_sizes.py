@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tracker.acquisition.from_joints import fit_sizes
 from tracker.errors import TrackerError
 from tracker.evaluate import joints_of_poses
 from tracker.formats.model_toml import load_model
-from tracker.sizes import fit_sizes
 
 LONGER = {"elbow": 1.1, "wrist": 0.93, "knee": 1.07, "ankle": 0.95}
 

@@ -1,0 +1,1 @@
+"""Sizes of a body from data. Today from known joints; to come from contours, from voxels, over many frames."""
