@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tracker.body.limbs import spoken
 from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array
-from tracker.pose_edits import joint_of, limb_of
+from tracker.posing.edits import joint_of, limb_of
 
 
 def factors(model: BodyModel) -> Array:

@@ -12,7 +12,7 @@ from app.pace import Pace
 from app.state import State
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array
-from tracker.pose_edits import joint_of
+from tracker.posing.edits import joint_of
 
 _ROOT_SCALE, _JOINT_SCALE = 0.3, 0.2
 _REST_S = 0.1

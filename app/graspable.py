@@ -6,9 +6,9 @@ import numpy as np
 
 from app.layers import View
 from app.state import State
-from tracker import picking
 from tracker.body.model import Body
 from tracker.geometry.rigid import FloatArray
+from tracker.posing import picking
 from tracker.session.session import Session
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from app.jobs import Latest
 from app.screen import Screen, spoken
 from app.state import DragState, State
-from tracker import posing
+from tracker.posing import drag as posing
 
 _CHECKPOINT_S = 1.0
 """A long drag is on disk at least this often."""
@@ -87,7 +87,7 @@ class Hand:
             self._screen.set(person=person, point=selected, drag=drag)
 
     def move_drag(self, page: int, pointer_px: tuple[float, float], seq: int, mode: str = "move") -> None:
-        """Let the held point follow the pointer; or turn its part, or push it in depth (see `tracker.posing`).
+        """Let the held point follow the pointer; or turn its part, or push it in depth (see `tracker.posing.drag`).
 
         Whenever the mode changes the hand takes hold anew, where the pointer was: nothing jumps.
         """

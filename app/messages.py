@@ -15,7 +15,7 @@ from app.floor_picks import Picking
 from app.layers import View
 from app.state import JobState, ReplayState, State, TrackState
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.posing import minor_points
+from tracker.posing.drag import minor_points
 from tracker.session.session import Session
 from tracker.store.records import SOURCES, STATUSES, FrameNumbers, HistoryEntry
 

@@ -16,7 +16,7 @@ from tracker.geometry.cameras import Camera, epipolar_segment
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.images.background_subtraction import Mask
 from tracker.images.edge_segments import accept
-from tracker.rebody import rebodied
+from tracker.posing.retarget import rebodied
 from tracker.session.session import Person, Session
 
 CANDIDATE_COLOR = "#ffffff"

@@ -10,8 +10,8 @@ import numpy as np
 from app.screen import Screen, spoken
 from app.state import Shown
 from tracker.errors import TrackerError
-from tracker.frame_fit import fit_frame
 from tracker.geometry.triangulation import ViewPin
+from tracker.posing.pinned_fit import fit_frame
 
 _CHECKPOINT_S = 1.0
 """A long drag of a pin is on disk at least this often."""

@@ -7,13 +7,13 @@ from contextlib import AbstractContextManager, contextmanager
 import numpy as np
 
 from app.screen import Screen, spoken
-from tracker import posing
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry.rigid import Array
-from tracker.orienting import orient
-from tracker.pose_edits import bent_alike, limb_of, mirrored, taken_over
-from tracker.rebody import rebodied
+from tracker.posing import drag
+from tracker.posing.edits import bent_alike, limb_of, mirrored, taken_over
+from tracker.posing.orient import orient
+from tracker.posing.retarget import rebodied
 from tracker.tracking import confidence
 
 _SAME_GESTURE_S = 1.0
@@ -86,9 +86,9 @@ class PoseEdits:
             start, end = view.project(np.stack([place, place + step]))
             if not np.all(np.isfinite([start, end])):
                 raise TrackerError(f"expected {spoken(name)} before {view.name}, found it behind; choose another view")
-            hand = posing.grab(model, values, view, name, start, self._screen.free(person))
+            hand = drag.grab(model, values, view, name, start, self._screen.free(person))
             label = f"nudge {spoken(name)}"
-            self._take(person, posing.drag(hand, end, values), label, ("nudge", name, camera))
+            self._take(person, drag.drag(hand, end, values), label, ("nudge", name, camera))
 
     def place_part(self, person: int, part: int, R_world: Array, position_world: Array | None, gesture: object) -> None:
         """Turn a part as near to an orientation as its joint allows; the root also goes to a position.

@@ -16,7 +16,7 @@ from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, parse_model
 from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import ViewPin
-from tracker.rebody import rebodied
+from tracker.posing.retarget import rebodied
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import (

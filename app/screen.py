@@ -17,10 +17,10 @@ from tracker.fitting.gauss_newton import held
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import ViewPin
-from tracker.rebody import rebodied
+from tracker.posing.default_pose import standing_pose
+from tracker.posing.retarget import rebodied
 from tracker.session.locked_dofs import free_of
 from tracker.session.session import Session
-from tracker.standing import standing_pose
 from tracker.tracking.chamfer.settings import pose_cost
 
 _APART_M = 0.9

@@ -13,7 +13,7 @@ from app.state import SizeDraft
 from tracker.body.dimensions import BodySizes, PartSizes, scaled, sizes_of, twin, with_sizes
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.rebody import rebodied
+from tracker.posing.retarget import rebodied
 from tracker.session.session import save_model
 from tracker.store.records import Change, PoseChange
 

@@ -188,7 +188,7 @@ class DragState:
     by_surface: bool = False
     """Whether the part is held by its surface, not by a point."""
     mode: str = "move"
-    """`move`, `turn` or `push`, see `tracker.posing`."""
+    """`move`, `turn` or `push`, see `tracker.posing.drag`."""
 
 
 @dataclass(frozen=True, eq=False)

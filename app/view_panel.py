@@ -12,7 +12,7 @@ from app.jobs import Latest
 from app.state import State
 from app.view_choice import MOST_TRAIL_FRAMES
 from tracker.errors import TrackerError
-from tracker.posing import minor_points
+from tracker.posing.drag import minor_points
 
 _FREE = "free"
 _COLORS = {"parts": "parts", "people": "people"}

@@ -26,7 +26,7 @@ ROOMS = [
     "tracker.tracking",
     "tracker.tracking.chamfer",
     "tracker.acquisition",
-    "tracker.posing",
+    "tracker.posing.drag",
     "tracker.evaluation",
     "tracker.simulate.people",
     "tracker.simulate.motion",

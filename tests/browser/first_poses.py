@@ -1,6 +1,6 @@
 """Make the hand-made poses of frame 0 of a sample's people: `python tests/browser/first_poses.py SESSION`.
 
-A user by rule places each body with what the page's hand does (`tracker.posing`): upright in the middle at first, by
+A user by rule places each body with what the page's hand does (`tracker.posing.drag`): upright in the middle at first, by
 moving the trunk, turning it by its slider, lifting the arms by theirs, and dragging joints in the two views that show
 each best. The user sees where the joints are, 3 px off, another 3 px each time, and knows nothing of the third
 dimension.
@@ -16,9 +16,9 @@ from tracker.body.model import Body
 from tracker.contours.part_edges import points_hidden
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
-from tracker.posing import drag, grab
+from tracker.posing.default_pose import standing_pose
+from tracker.posing.drag import drag, grab
 from tracker.session.session import load_session
-from tracker.standing import standing_pose
 
 FRAME = 0
 SLIDER_STEP_DEG = 5.0

@@ -20,8 +20,8 @@ from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera, viewed_point
+from tracker.posing.default_pose import standing_pose
 from tracker.session.session import Person, create_session, load_session
-from tracker.standing import standing_pose
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
 

@@ -12,8 +12,8 @@ from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
-from tracker.frame_fit import fit_frame
 from tracker.geometry.triangulation import ViewPin
+from tracker.posing.pinned_fit import fit_frame
 from tracker.references import read_joints
 from tracker.session.session import load_session
 from tracker.tracking.chamfer.settings import TrackSettings

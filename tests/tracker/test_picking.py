@@ -5,7 +5,7 @@ from staging import camera_at, in_posture
 
 from tracker.body.model import Body
 from tracker.geometry import rigid
-from tracker.picking import part_outlines, place_on_part
+from tracker.posing.picking import part_outlines, place_on_part
 
 SIDE = camera_at("side", (3.0, 2.5, 1.0))
 

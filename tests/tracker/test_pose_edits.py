@@ -7,8 +7,8 @@ from staging import shaken
 from tracker.body.parts import Axis
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
-from tracker.orienting import orient
-from tracker.pose_edits import bent_alike, joint_of, limb_of, mirrored, taken_over
+from tracker.posing.edits import bent_alike, joint_of, limb_of, mirrored, taken_over
+from tracker.posing.orient import orient
 
 M = np.diag([1.0, -1.0, 1.0])
 

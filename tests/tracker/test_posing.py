@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from staging import camera_at, cameras_around, shaken
 
-from tracker import posing
 from tracker.body.model import Body
 from tracker.fitting.gauss_newton import solve
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
-from tracker.picking import part_outlines
-from tracker.posing import drag, grab, grab_part, hold_anew, minor_points, push, turn
+from tracker.posing import drag as posing
+from tracker.posing.drag import drag, grab, grab_part, hold_anew, minor_points, push, turn
+from tracker.posing.picking import part_outlines
 
 SIDE = camera_at("side", (3.0, 2.5, 1.0))
 

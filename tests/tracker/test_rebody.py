@@ -7,7 +7,7 @@ from staging import cameras_around, posed
 from tracker.body.dimensions import PartSizes, sizes_of, with_sizes
 from tracker.formats.model_toml import load_model
 from tracker.geometry.triangulation import ViewPin
-from tracker.rebody import rebodied
+from tracker.posing.retarget import rebodied
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from staging import camera_at, cameras_around
 
 from tracker.geometry import rigid
 from tracker.geometry.ground_plane import UP_ROTATIONS
-from tracker.standing import standing_pose
+from tracker.posing.default_pose import standing_pose
 
 
 def place(model, values, point):

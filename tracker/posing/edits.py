@@ -9,7 +9,7 @@ from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.body.parts import Joint
 from tracker.geometry.rigid import Array
-from tracker.orienting import orient
+from tracker.posing.orient import orient
 
 _MIRROR = np.diag([1.0, -1.0, 1.0])
 """What swaps the body's left and right: y points to the left in every part's frame."""

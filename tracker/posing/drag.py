@@ -14,8 +14,8 @@ from tracker.fitting.gauss_newton import Block, Normal, StayNear, normal_of, sol
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array
-from tracker.orienting import orient
-from tracker.picking import place_on_part
+from tracker.posing.orient import orient
+from tracker.posing.picking import place_on_part
 
 
 class _Solving(TypedDict):
