@@ -184,8 +184,8 @@ def init(
         axes: the file's axes in the session's order, such as x,-z,y.
         json: print one JSON object.
     """
+    from tracker.evaluation.references import read_joints
     from tracker.formats.pose_csv import read_pose_table
-    from tracker.references import read_joints
 
     at = commands.target(session, person, several=False)
     commands.frame_range(f"{frame}:{frame + 1}", at.session)
@@ -282,7 +282,7 @@ def evaluate(
         align: rigid-all moves the whole reference onto the estimate first.
         json: print one JSON object.
     """
-    from tracker.references import read_reference
+    from tracker.evaluation.references import read_reference
 
     at = commands.target(session, person, several=False)
     found = commands.evaluate(at, read_reference(reference, at.session, at.people[0], joint_map, axes), frames, align)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from tracker.body.model import Body, BodyModel
+from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import fit_to_points
@@ -13,7 +14,6 @@ from tracker.footage.recording import Recording
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
-from tracker.references import read_joints
 from tracker.search.chamfer_cost import ChamferCost
 from tracker.session.session import Session, load_session
 

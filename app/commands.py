@@ -15,14 +15,14 @@ from rich.text import Text
 
 from tracker.acquisition.from_joints import fit_sizes
 from tracker.errors import SessionError, TrackerError
-from tracker.evaluate import Alignment, evaluate_joints, evaluate_poses
+from tracker.evaluation.metrics import Alignment, evaluate_joints, evaluate_poses
+from tracker.evaluation.references import Reference, stored_motion
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import PoseTable
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
-from tracker.references import Reference, stored_motion
 from tracker.session.lock import SessionLock
 from tracker.session.session import Person, Session, load_session, save_session
 from tracker.store.annotation_store import AnnotationStore

@@ -17,14 +17,14 @@ from sections import measured, put_section, table
 from true_starts import read_simulated, start_of
 
 from tracker.body.model import BodyModel
-from tracker.evaluate import evaluate_joints, joints_of_poses
+from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
+from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.fitting.contour_residuals import MatchSettings
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.motion.prediction import PredictSettings
-from tracker.references import read_joints
 from tracker.search.best_first import SearchSettings
 from tracker.session.assemble import assemble
 from tracker.session.session import load_session

@@ -18,7 +18,7 @@ from sections import measured, put_section, table
 from true_starts import read_simulated
 
 from tracker.body.model import BodyModel
-from tracker.evaluate import evaluate_joints, joints_of_poses
+from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable

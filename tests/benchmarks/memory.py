@@ -18,9 +18,9 @@ import numpy as np
 from app.allocation import give_back_freed_memory
 from app.commands import Reporter, init_from_joints, target
 from app.headless import track
+from tracker.evaluation.references import read_joints
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
-from tracker.references import read_joints
 from tracker.session.session import Session, load_session, save_session
 from tracker.simulate.encode import VideoWriter
 from tracker.tracking.chamfer.settings import TrackSettings

@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import BodyModel
+from tracker.evaluation.references import read_joints
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.rigid import Array
-from tracker.references import read_joints
 from tracker.session.assemble import DEFAULT_MODEL
 from tracker.session.session import Session, load_session
 

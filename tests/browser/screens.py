@@ -20,10 +20,10 @@ from driving import handle_of, shows, to_client
 from playwright.async_api import Browser, Page, async_playwright
 from running import ROOT, Program
 
+from tracker.evaluation.references import read_joints
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
-from tracker.references import read_joints
 from tracker.session.session import Session, load_session, save_session
 from tracker.simulate.record import simulate
 from tracker.store.annotation_store import AnnotationStore

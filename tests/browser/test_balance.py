@@ -8,8 +8,8 @@ import pytest_asyncio
 from driving import drags_of, handle_of, shows, state_of, to_client, until
 from running import Program
 
+from tracker.evaluation.references import read_joints
 from tracker.fitting.gauss_newton import fit_to_points
-from tracker.references import read_joints
 from tracker.session.assemble import assemble
 from tracker.session.session import load_session
 

@@ -8,9 +8,9 @@ import pytest_asyncio
 from driving import handle_of, shows, state_of, to_client
 from running import ROOT, Program, visited
 
+from tracker.evaluation.references import read_joints
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
-from tracker.references import read_joints
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord

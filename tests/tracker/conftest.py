@@ -6,13 +6,13 @@ from typing import NamedTuple
 import pytest
 
 from tracker.body.model import BodyModel
+from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import load_model
 from tracker.geometry.rigid import Array
-from tracker.references import read_joints
 from tracker.session.session import load_session
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"

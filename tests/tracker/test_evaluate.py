@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tracker.errors import FormatError
-from tracker.evaluate import (
+from tracker.evaluation.metrics import (
     Motion,
     at_rate,
     best_rigid,

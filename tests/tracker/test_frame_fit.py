@@ -7,6 +7,7 @@ from test_fit import ARM
 from test_pins import seen
 
 from tracker.body.model import Body
+from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
@@ -14,7 +15,6 @@ from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.geometry.triangulation import ViewPin
 from tracker.posing.pinned_fit import fit_frame
-from tracker.references import read_joints
 from tracker.session.session import load_session
 from tracker.tracking.chamfer.settings import TrackSettings
 

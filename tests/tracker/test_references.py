@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from tracker.errors import FormatError, SessionError
+from tracker.evaluation.references import read_joints, read_reference, stored_motion
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.joint_maps import JOINTS
 from tracker.formats.model_toml import format_model, load_model
 from tracker.formats.pose_csv import write_pose_table
 from tracker.formats.trc import read_trc, write_trc
-from tracker.references import read_joints, read_reference, stored_motion
 from tracker.session.session import Person, create_session, load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord

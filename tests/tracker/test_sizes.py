@@ -7,7 +7,7 @@ import pytest
 
 from tracker.acquisition.from_joints import fit_sizes
 from tracker.errors import TrackerError
-from tracker.evaluate import joints_of_poses
+from tracker.evaluation.metrics import joints_of_poses
 from tracker.formats.model_toml import load_model
 
 LONGER = {"elbow": 1.1, "wrist": 0.93, "knee": 1.07, "ankle": 0.95}

@@ -5,14 +5,14 @@ import pytest
 from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_evidence, posed, shaken, solid
 
 from tracker.body.model import Body
-from tracker.evaluate import evaluate_joints, joints_of_poses
+from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
+from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import view_evidence
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.motion.prediction import PredictSettings
-from tracker.references import read_joints
 from tracker.search.best_first import SearchSettings
 from tracker.session.assemble import assemble
 from tracker.session.session import load_session

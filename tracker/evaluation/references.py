@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.errors import FormatError, SessionError
-from tracker.evaluate import Motion, at_rate, joints_of_poses, remap_axes
+from tracker.evaluation.metrics import Motion, at_rate, joints_of_poses, remap_axes
 from tracker.formats.joint_maps import joints_of, read_joint_map
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 from tracker.formats.pose_csv import PoseTable, read_pose_table
