@@ -10,9 +10,9 @@ from scipy.optimize import least_squares
 from tracker.body.model import BodyModel, IntArray
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array
-from tracker.simulate.anatomy import ANKLE_HEIGHT
-from tracker.simulate.builds import MAN, Build
-from tracker.simulate.outfit import Outfit
+from tracker.simulate.people.anatomy import ANKLE_HEIGHT
+from tracker.simulate.people.builds import MAN, Build
+from tracker.simulate.people.outfit import Outfit
 
 HEADING_RAD = np.radians(32.0)
 """Where the person faces: towards FRONT, but not straight at it, where a forward motion would hardly show."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array
-from tracker.simulate.textures import value_noise
+from tracker.simulate.people.textures import value_noise
 
 Vector = tuple[float, float, float]
 Pattern = Literal["plain", "planks", "tiles", "checks", "stripes", "books", "speckles", "poster"]

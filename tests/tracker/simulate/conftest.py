@@ -1,9 +1,9 @@
 import pytest
 
 from tracker.formats.model_toml import load_model
-from tracker.simulate.outfit import Outfit
-from tracker.simulate.skeleton import altered_model
-from tracker.simulate.skin import make_skin
+from tracker.simulate.people.outfit import Outfit
+from tracker.simulate.people.skeleton import altered_model
+from tracker.simulate.people.skin import make_skin
 
 
 @pytest.fixture(scope="session")

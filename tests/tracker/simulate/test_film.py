@@ -5,7 +5,7 @@ import pytest
 from tracker.formats.model_toml import load_model
 from tracker.simulate.acting import perform
 from tracker.simulate.film import exposed, film, freeze
-from tracker.simulate.parts import PartsFigure
+from tracker.simulate.people.model_figure import PartsFigure
 from tracker.simulate.render import cast, pixel_means
 from tracker.simulate.rig import make_cameras
 from tracker.simulate.room import see_room

@@ -6,11 +6,11 @@ from scipy.spatial import cKDTree
 
 from tracker.formats.model_toml import load_model
 from tracker.simulate.acting import perform
-from tracker.simulate.anatomy import bone_names
+from tracker.simulate.people.anatomy import bone_names
+from tracker.simulate.people.skeleton import altered_model
+from tracker.simulate.people.skin import make_skin
 from tracker.simulate.render import vertex_normals
 from tracker.simulate.scenes import cast_of
-from tracker.simulate.skeleton import altered_model
-from tracker.simulate.skin import make_skin
 
 MAN, WOMAN = 0, 1
 

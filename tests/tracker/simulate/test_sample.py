@@ -15,10 +15,10 @@ from tracker.formats.trc import read_trc
 from tracker.session.session import load_session
 from tracker.simulate.acting import perform
 from tracker.simulate.film import film, freeze
+from tracker.simulate.people.skin import make_skin
 from tracker.simulate.rig import make_cameras
 from tracker.simulate.room import see_room
 from tracker.simulate.scenes import cast_of
-from tracker.simulate.skin import make_skin
 
 SAMPLES = Path(__file__).parents[3] / "sample_sessions"
 FRAMES = {"elbow_rotation": 50, "tango": 60}

@@ -5,8 +5,8 @@ from tracker.errors import TrackerError
 from tracker.formats.model_toml import load_model
 from tracker.simulate.acting import HEADING_RAD, perform
 from tracker.simulate.pairs import COUPLE_APART_M, TANGO_APART_M
+from tracker.simulate.people.skeleton import altered_model
 from tracker.simulate.scenes import CROWD_APART_M, SCENES, cast_of
-from tracker.simulate.skeleton import altered_model
 
 FPS = 25.0
 

@@ -3,9 +3,9 @@ import trimesh
 
 from tracker.geometry import rigid
 from tracker.simulate.acting import perform
-from tracker.simulate.anatomy import ANKLE_HEIGHT, bone_names
+from tracker.simulate.people.anatomy import ANKLE_HEIGHT, bone_names
+from tracker.simulate.people.skin import rest_values
 from tracker.simulate.scenes import cast_of
-from tracker.simulate.skin import rest_values
 
 
 def winding_number(mesh, point):

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from tracker.body.model import BodyModel
-from tracker.simulate.anatomy import Lobe, lobes
-from tracker.simulate.skeleton import BONE_FACTORS, Factors
+from tracker.simulate.people.anatomy import Lobe, lobes
+from tracker.simulate.people.skeleton import BONE_FACTORS, Factors
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array
-from tracker.simulate.skeleton import Factors
+from tracker.simulate.people.skeleton import Factors
 
 Point = tuple[float, float, float]
 

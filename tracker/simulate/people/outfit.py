@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.geometry.rigid import Array
-from tracker.simulate.textures import value_noise
+from tracker.simulate.people.textures import value_noise
 
 Color = tuple[float, float, float]
 

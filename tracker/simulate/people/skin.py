@@ -10,10 +10,10 @@ from scipy import sparse
 from tracker.body.model import BodyModel, IntArray
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array
-from tracker.simulate.anatomy import Lobe, bone_names, bone_poses
-from tracker.simulate.builds import MAN, Build
-from tracker.simulate.outfit import Outfit
-from tracker.simulate.surface_nets import surface_nets
+from tracker.simulate.people.anatomy import Lobe, bone_names, bone_poses
+from tracker.simulate.people.builds import MAN, Build
+from tracker.simulate.people.outfit import Outfit
+from tracker.simulate.people.surface_nets import surface_nets
 
 SPACING_M = 0.010
 """Grid of the implicit surface: about a pixel at four metres."""

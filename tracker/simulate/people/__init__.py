@@ -1,0 +1,1 @@
+"""Simulated people: skeletons, builds, skin, clothes."""
