@@ -27,7 +27,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.rigid import Array
 from tracker.simulate import simulate
-from tracker.simulate.scenes import cast_of
+from tracker.simulate.motion.scenes import cast_of
 from tracker.tracking import confidence
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import track_chamfer

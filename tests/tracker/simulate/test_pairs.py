@@ -5,12 +5,12 @@ import pytest
 from scipy.spatial import cKDTree
 
 from tracker.formats.model_toml import load_model
-from tracker.simulate.acting import perform
+from tracker.simulate.motion.postures import perform
+from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.people.anatomy import bone_names
 from tracker.simulate.people.skeleton import altered_model
 from tracker.simulate.people.skin import make_skin
 from tracker.simulate.render import vertex_normals
-from tracker.simulate.scenes import cast_of
 
 MAN, WOMAN = 0, 1
 

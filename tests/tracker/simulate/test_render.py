@@ -5,10 +5,10 @@ import trimesh
 
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
-from tracker.simulate.acting import perform
+from tracker.simulate.motion.postures import perform
+from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.render import SAMPLES, cast, pixel_means, vertex_normals
 from tracker.simulate.rig import make_cameras
-from tracker.simulate.scenes import cast_of
 
 
 def coverage(camera, vertices, faces):

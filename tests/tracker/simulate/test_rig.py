@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from tracker.errors import TrackerError
-from tracker.simulate.acting import HEADING_RAD
 from tracker.simulate.furniture import HALF_WIDTH_M
+from tracker.simulate.motion.postures import HEADING_RAD
 from tracker.simulate.render import SAMPLES
 from tracker.simulate.rig import CORNER_NAMES, make_cameras
 from tracker.simulate.room import see_room

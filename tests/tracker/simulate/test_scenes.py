@@ -3,10 +3,10 @@ import pytest
 
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import load_model
-from tracker.simulate.acting import HEADING_RAD, perform
-from tracker.simulate.pairs import COUPLE_APART_M, TANGO_APART_M
+from tracker.simulate.motion.couples import COUPLE_APART_M, TANGO_APART_M
+from tracker.simulate.motion.postures import HEADING_RAD, perform
+from tracker.simulate.motion.scenes import CROWD_APART_M, SCENES, cast_of
 from tracker.simulate.people.skeleton import altered_model
-from tracker.simulate.scenes import CROWD_APART_M, SCENES, cast_of
 
 FPS = 25.0
 

@@ -2,10 +2,10 @@ import numpy as np
 import trimesh
 
 from tracker.geometry import rigid
-from tracker.simulate.acting import perform
+from tracker.simulate.motion.postures import perform
+from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.people.anatomy import ANKLE_HEIGHT, bone_names
 from tracker.simulate.people.skin import rest_values
-from tracker.simulate.scenes import cast_of
 
 
 def winding_number(mesh, point):

@@ -6,8 +6,8 @@ from types import MappingProxyType
 import numpy as np
 
 from tracker.geometry.rigid import Array
-from tracker.simulate.acting import ramp
-from tracker.simulate.choreography import SIDES, Choreography, Track, glide
+from tracker.simulate.motion.choreography import SIDES, Choreography, Track, glide
+from tracker.simulate.motion.postures import ramp
 
 ARM_KEYS: Mapping[str, tuple[float, float, float, float]] = MappingProxyType(
     {

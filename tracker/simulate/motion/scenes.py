@@ -9,9 +9,9 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry import rigid
-from tracker.simulate.acting import Posture, Role, ramp, stance, standing_height
-from tracker.simulate.moves import dance, exercise, leaving, mingling, reach_and_cross
-from tracker.simulate.pairs import COUPLE_APART_M, Partner, couple, tango
+from tracker.simulate.motion.couples import COUPLE_APART_M, Partner, couple, tango
+from tracker.simulate.motion.postures import Posture, Role, ramp, stance, standing_height
+from tracker.simulate.motion.solo_moves import dance, exercise, leaving, mingling, reach_and_cross
 from tracker.simulate.people.builds import MAN, WOMAN
 from tracker.simulate.people.outfit import BLACK_AND_WHITE, GREEN, RED, Outfit
 

@@ -9,7 +9,7 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array
-from tracker.simulate.acting import Posture, ramp, stance, standing_height
+from tracker.simulate.motion.postures import Posture, ramp, stance, standing_height
 
 ARM_DOFS = ("shoulder.abduction", "shoulder.elevation", "shoulder.twist", "elbow.extension")
 SIDES = ("left", "right")

@@ -8,8 +8,8 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.geometry import rigid
-from tracker.simulate.acting import Posture, Reach
-from tracker.simulate.choreography import SIDES, Choreography, Track
+from tracker.simulate.motion.choreography import SIDES, Choreography, Track
+from tracker.simulate.motion.postures import Posture, Reach
 
 TANGO_TURN_S = 2.4
 """Time of a whole turn: 60 frames at 25 frames a second."""
