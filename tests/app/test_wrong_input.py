@@ -16,7 +16,7 @@ from tracker.formats.anipose import write_calibration
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 from tracker.session.lock import SessionLock
-from tracker.simulate.encode import VideoWriter
+from tracker.simulate.stage.video_writer import VideoWriter
 
 SIZE = (64, 48)
 

@@ -22,7 +22,7 @@ from tracker.evaluation.references import read_joints
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
 from tracker.session.session import Session, load_session, save_session
-from tracker.simulate.encode import VideoWriter
+from tracker.simulate.stage.video_writer import VideoWriter
 from tracker.tracking.chamfer.settings import TrackSettings
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"

@@ -22,16 +22,16 @@ from tracker.formats.trc import write_trc
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array
 from tracker.session.session import PALETTE, Person, Session, load_session, save_session
-from tracker.simulate.encode import VideoWriter
-from tracker.simulate.film import Image, exposed, film, freeze
 from tracker.simulate.motion.postures import Role, perform
 from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.people.model_figure import PartsFigure
 from tracker.simulate.people.skeleton import altered_model
 from tracker.simulate.people.skin import make_skin
-from tracker.simulate.render import Figure
-from tracker.simulate.rig import make_cameras
-from tracker.simulate.room import Backdrop, see_room
+from tracker.simulate.stage.camera_rig import make_cameras
+from tracker.simulate.stage.film import Image, exposed, film, freeze
+from tracker.simulate.stage.rasterizer import Figure
+from tracker.simulate.stage.room import Backdrop, see_room
+from tracker.simulate.stage.video_writer import VideoWriter
 
 BodyKind = Literal["skinned", "model"]
 Progress = Callable[[int, int], None]

@@ -3,13 +3,13 @@ import numpy as np
 import pytest
 
 from tracker.formats.model_toml import load_model
-from tracker.simulate.film import exposed, film, freeze
 from tracker.simulate.motion.postures import perform
 from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.people.model_figure import PartsFigure
-from tracker.simulate.render import cast, pixel_means
-from tracker.simulate.rig import make_cameras
-from tracker.simulate.room import see_room
+from tracker.simulate.stage.camera_rig import make_cameras
+from tracker.simulate.stage.film import exposed, film, freeze
+from tracker.simulate.stage.rasterizer import cast, pixel_means
+from tracker.simulate.stage.room import see_room
 
 SIZE = (320, 240)
 

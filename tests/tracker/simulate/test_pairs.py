@@ -10,7 +10,7 @@ from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.people.anatomy import bone_names
 from tracker.simulate.people.skeleton import altered_model
 from tracker.simulate.people.skin import make_skin
-from tracker.simulate.render import vertex_normals
+from tracker.simulate.stage.rasterizer import vertex_normals
 
 MAN, WOMAN = 0, 1
 

@@ -7,8 +7,8 @@ from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 from tracker.simulate.motion.postures import perform
 from tracker.simulate.motion.scenes import cast_of
-from tracker.simulate.render import SAMPLES, cast, pixel_means, vertex_normals
-from tracker.simulate.rig import make_cameras
+from tracker.simulate.stage.camera_rig import make_cameras
+from tracker.simulate.stage.rasterizer import SAMPLES, cast, pixel_means, vertex_normals
 
 
 def coverage(camera, vertices, faces):

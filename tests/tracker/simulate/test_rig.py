@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from tracker.errors import TrackerError
-from tracker.simulate.furniture import HALF_WIDTH_M
 from tracker.simulate.motion.postures import HEADING_RAD
-from tracker.simulate.render import SAMPLES
-from tracker.simulate.rig import CORNER_NAMES, make_cameras
-from tracker.simulate.room import see_room
+from tracker.simulate.stage.camera_rig import CORNER_NAMES, make_cameras
+from tracker.simulate.stage.furniture import HALF_WIDTH_M
+from tracker.simulate.stage.rasterizer import SAMPLES
+from tracker.simulate.stage.room import see_room
 
 
 @pytest.mark.parametrize("n", [1, 2, 4, 6])

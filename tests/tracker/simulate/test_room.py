@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from tracker.simulate.furniture import HALF_WIDTH_M
-from tracker.simulate.rig import make_cameras
-from tracker.simulate.room import SHADOW_CELL_M, floor_shadow, see_room
+from tracker.simulate.stage.camera_rig import make_cameras
+from tracker.simulate.stage.furniture import HALF_WIDTH_M
+from tracker.simulate.stage.room import SHADOW_CELL_M, floor_shadow, see_room
 
 SIZE = (160, 120)
 

@@ -13,12 +13,12 @@ from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.formats.trc import read_trc
 from tracker.session.session import load_session
-from tracker.simulate.film import film, freeze
 from tracker.simulate.motion.postures import perform
 from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.people.skin import make_skin
-from tracker.simulate.rig import make_cameras
-from tracker.simulate.room import see_room
+from tracker.simulate.stage.camera_rig import make_cameras
+from tracker.simulate.stage.film import film, freeze
+from tracker.simulate.stage.room import see_room
 
 SAMPLES = Path(__file__).parents[3] / "sample_sessions"
 FRAMES = {"elbow_rotation": 50, "tango": 60}

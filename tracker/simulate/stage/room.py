@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from tracker.body.model import IntArray
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array
-from tracker.simulate.furniture import HALF_WIDTH_M, furnished
-from tracker.simulate.render import DIRECT, SAMPLES, covered, lit, pixel_means
+from tracker.simulate.stage.furniture import HALF_WIDTH_M, furnished
+from tracker.simulate.stage.rasterizer import DIRECT, SAMPLES, covered, lit, pixel_means
 
 LAMP_WORLD = np.array([0.7, -0.5, 2.75])
 """Centre of the ceiling lamp, metres."""

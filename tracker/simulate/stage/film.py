@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from tracker.body.model import IntArray
 from tracker.geometry.rigid import Array
-from tracker.simulate.render import Figure, cast, lit, pixel_means, vertex_normals
-from tracker.simulate.room import LAMP_WORLD, Backdrop, floor_shadow
+from tracker.simulate.stage.rasterizer import Figure, cast, lit, pixel_means, vertex_normals
+from tracker.simulate.stage.room import LAMP_WORLD, Backdrop, floor_shadow
 
 Image = NDArray[np.uint8]
 

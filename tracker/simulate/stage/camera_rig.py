@@ -5,7 +5,7 @@ import numpy as np
 from tracker.errors import TrackerError
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import Array
-from tracker.simulate.furniture import HALF_WIDTH_M
+from tracker.simulate.stage.furniture import HALF_WIDTH_M
 
 CORNER_NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
 """Four cameras in the corners, named for the side of the person that each sees."""

@@ -1,0 +1,1 @@
+"""Where simulated people are filmed: rooms, furniture, cameras, rendering."""
