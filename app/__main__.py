@@ -9,9 +9,10 @@ from typing import Annotated, Any, Literal
 import tyro
 from rich.console import Console
 
-from app import commands, ending
-from app.allocation import give_back_freed_memory
-from app.commands import Reporter
+from app import commands
+from app.runtime import process_exit
+from app.runtime.malloc_trim import give_back_freed_memory
+from app.runtime.progress import Reporter
 from app.words import common_or_pairs, pairs
 from tracker.errors import TrackerError
 
@@ -403,7 +404,7 @@ def main() -> None:
 def program() -> None:
     """`main` as a process of its own."""
     give_back_freed_memory()
-    ending.run(main)
+    process_exit.run(main)
 
 
 if __name__ == "__main__":

@@ -1,17 +1,13 @@
 """What each command of the command line does; `__main__` reads the words and calls these."""
 
 import json
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
-from rich.text import Text
 
 from tracker.acquisition.from_joints import fit_sizes
 from tracker.errors import SessionError, TrackerError
@@ -208,50 +204,6 @@ def evaluate(at: Target, reference: Reference, frames: str | None, align: Alignm
     if reference.motion is not None:
         result = evaluate_poses(result, motion, reference.motion, wanted)
     return {"person": person.name, **asdict(result)}
-
-
-class Reporter:
-    """Progress on a terminal as a bar, elsewhere as plain lines; nothing with `--json`."""
-
-    def __init__(self, silent: bool = False) -> None:
-        """Report on standard error unless silent."""
-        self._console, self._silent = Console(stderr=True), silent
-
-    def say(self, line: str) -> None:
-        """Show a line."""
-        if not self._silent:
-            self._console.print(line, soft_wrap=True, highlight=False)
-
-    @contextmanager
-    def over(self, total: int, what: str) -> Iterator[Callable[[], None]]:
-        """Give a function to call after each of `total` pieces of work."""
-        if self._silent:
-            yield lambda: None
-        elif self._console.is_terminal:
-            columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), _RateColumn(), TimeRemainingColumn())
-            with Progress(*columns, console=self._console) as bar:
-                task = bar.add_task(what, total=total)
-                yield lambda: bar.advance(task)
-        else:
-            done, began = 0, time.monotonic()
-
-            def tick() -> None:
-                nonlocal done
-                done += 1
-                if done % max(1, total // 10) == 0 or done == total:
-                    rate = done / max(1e-6, time.monotonic() - began)
-                    left = "" if done == total else f", {(total - done) / rate:.0f} s left"
-                    self._console.print(f"{what}: {done} of {total}, {rate:.1f}/s{left}", highlight=False)
-
-            yield tick
-
-
-class _RateColumn(ProgressColumn):
-    """Pieces of work a second."""
-
-    def render(self, task: Task) -> Text:
-        """Text of the column."""
-        return Text("" if task.speed is None else f"{task.speed:.1f}/s")
 
 
 def as_json(result: Any) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from app.jobs import Latest
+from app.runtime.jobs import Latest
 from app.screen import Screen
 from app.state import State
 from tracker.motion.consistency import disagreeing

@@ -11,7 +11,7 @@ from functools import lru_cache
 import cv2
 
 from app import pictures
-from app.recent import Recent
+from app.runtime.byte_bounded_cache import Recent
 from tracker.errors import RecordingError
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence

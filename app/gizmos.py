@@ -7,8 +7,8 @@ import numpy as np
 import viser
 
 from app.controller import Controller
-from app.jobs import Latest
 from app.pace import Pace
+from app.runtime.jobs import Latest
 from app.state import State
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array

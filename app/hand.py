@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.jobs import Latest
+from app.runtime.jobs import Latest
 from app.screen import Screen, spoken
 from app.state import DragState, State
 from tracker.posing import drag as posing

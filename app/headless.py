@@ -9,7 +9,8 @@ from typing import Any, get_args
 
 import numpy as np
 
-from app.commands import Reporter, Target
+from app.commands import Target
+from app.runtime.progress import Reporter
 from app.tracked import Keyframes, keyframes_of, told_of, tracked_changes
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.errors import SessionError

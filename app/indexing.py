@@ -3,7 +3,7 @@
 from contextlib import closing
 from typing import Any
 
-from app.commands import Reporter
+from app.runtime.progress import Reporter
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.proxy import FOLDER, Proxy
 from tracker.footage.video import ImageFolder, open_footage

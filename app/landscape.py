@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager
 
 import numpy as np
 
-from app.jobs import Latest
+from app.runtime.jobs import Latest
 from app.screen import Screen, spoken
 from app.state import Landscape, State
 from tracker.body.model import BodyModel

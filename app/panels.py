@@ -9,8 +9,8 @@ import viser
 
 from app.body_panel import BodyPanel
 from app.controller import Controller
-from app.jobs import Latest
 from app.pace import Pace
+from app.runtime.jobs import Latest
 from app.settings_panel import SettingsPanel
 from app.state import State
 from tracker.body.model import BodyModel

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from app.jobs import Job
+from app.runtime.jobs import Job
 from app.screen import Screen
 from app.state import RangeState
 from app.tracking import Tracking

@@ -10,8 +10,8 @@ from app.controller import Controller
 from app.expected import prediction
 from app.floor_picks import FloorState
 from app.frusta import Frusta
-from app.jobs import Latest
 from app.pace import Pace
+from app.runtime.jobs import Latest
 from app.snap import SnapView
 from app.state import State
 from app.trails import Trails

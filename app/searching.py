@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.jobs import Job
 from app.runs import Run, Runs
+from app.runtime.jobs import Job
 from app.screen import Screen
 from app.state import JobState, Shown, finite_or_none
 from tracker.errors import TrackerError

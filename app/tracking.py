@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.jobs import Job
+from app.runtime.jobs import Job
 from app.screen import Screen
 from app.state import Shown, TrackState, finite_or_none
 from tracker.body.model import BodyModel

@@ -8,7 +8,7 @@ import viser
 
 from app.controller import Controller
 from app.floor_picks import FloorState
-from app.jobs import Latest
+from app.runtime.jobs import Latest
 from app.state import State
 from app.view_choice import MOST_TRAIL_FRAMES
 from tracker.errors import TrackerError

@@ -4,8 +4,8 @@ import time
 import pytest
 from hands import wait_for
 
-from app import jobs
-from app.jobs import Job
+from app.runtime import jobs
+from app.runtime.jobs import Job
 from tracker.errors import TrackerError
 
 

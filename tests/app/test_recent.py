@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import pytest
 
-from app.recent import Recent, bytes_of
+from app.runtime.byte_bounded_cache import Recent, bytes_of
 
 
 def test_each_is_computed_once_whoever_asks():

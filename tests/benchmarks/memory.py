@@ -15,9 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.allocation import give_back_freed_memory
-from app.commands import Reporter, init_from_joints, target
+from app.commands import init_from_joints, target
 from app.headless import track
+from app.runtime.malloc_trim import give_back_freed_memory
+from app.runtime.progress import Reporter
 from tracker.evaluation.references import read_joints
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage

@@ -1,0 +1,1 @@
+"""Threads, caches, progress and the process; knows nothing of sessions."""
