@@ -31,7 +31,7 @@ from app.saving import Saver
 from app.screen import Screen
 from app.searching import Searching
 from app.sizing import Sizing
-from app.state import State
+from app.state.state import State
 from app.tracking import Tracking
 from app.viewing import Viewing
 from tracker.body.model import BodyModel

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.runtime.jobs import Latest
 from app.screen import Screen
-from app.state import State
+from app.state.state import State
 from tracker.motion.consistency import disagreeing
 
 _REST_S = 0.3

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from app.floor_picks import Picking
 from app.overlays import EPIPOLAR_COLOR, Path
-from app.state import State
+from app.state.floor_picking import Picking
+from app.state.state import State
 from tracker.geometry.cameras import Camera, epipolar_segment
 from tracker.geometry.ground_plane import Floor, up_rotation
 from tracker.geometry.rigid import Array

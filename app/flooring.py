@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from app.floor_picks import FloorState, Picking, with_mark, with_next, without_last
 from app.screen import Screen
+from app.state.floor_picking import FloorState, Picking, with_mark, with_next, without_last
 from tracker.errors import TrackerError
 from tracker.geometry.ground_plane import Floor, nearest_axis, up_rotation
 from tracker.session.session import UPS, save_floor

@@ -9,7 +9,7 @@ import viser
 from app.centred import aspect_around, centred, field_of_view
 from app.controller import Controller
 from app.runtime.jobs import Latest
-from app.state import State
+from app.state.state import State
 from tracker.geometry import rigid
 
 _SCALE_M = 0.25

@@ -9,7 +9,7 @@ import viser
 from app.controller import Controller
 from app.pace import Pace
 from app.runtime.jobs import Latest
-from app.state import State
+from app.state.state import State
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array
 from tracker.posing.edits import joint_of

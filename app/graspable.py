@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.layers import View
-from app.state import State
+from app.state.page_view import View
+from app.state.state import State
 from tracker.body.model import Body
 from tracker.geometry.rigid import FloatArray
 from tracker.posing import picking

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.runtime.jobs import Latest
 from app.screen import Screen, spoken
-from app.state import DragState, State
+from app.state.state import DragState, State
 from tracker.posing import drag as posing
 
 _CHECKPOINT_S = 1.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from app.runtime.jobs import Latest
 from app.screen import Screen, spoken
-from app.state import Landscape, State
+from app.state.state import Landscape, State
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence.view_evidence import ViewEvidence

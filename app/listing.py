@@ -3,7 +3,7 @@
 import threading
 
 from app.screen import Screen
-from app.state import FootageState
+from app.state.state import FootageState
 from tracker.errors import TrackerError
 
 _LOOK_S = 0.2

@@ -11,9 +11,9 @@ import numpy as np
 from app import dofs, graspable, overlays, pin_marks
 from app.curves import plots_of, samples
 from app.floor_lines import floor_lines
-from app.floor_picks import Picking
-from app.layers import View
-from app.state import JobState, ReplayState, State, TrackState
+from app.state.floor_picking import Picking
+from app.state.page_view import View
+from app.state.state import JobState, ReplayState, State, TrackState
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.posing.drag import minor_points
 from tracker.session.session import Session

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.layers import View
-from app.state import State
+from app.state.page_view import View
+from app.state.state import State
 from tracker.body.model import Body, BodyModel
 from tracker.contours import occluding_contours, part_edges
 from tracker.contours.occluding_contours import Contour

@@ -3,7 +3,7 @@
 import time
 
 from app.controller import Controller
-from app.state import State
+from app.state.state import State
 
 _SELDOM_S = 2.0
 """Least time between two drawings while something is at work, or frames go by."""

@@ -12,7 +12,7 @@ from app.controller import Controller
 from app.pace import Pace
 from app.runtime.jobs import Latest
 from app.settings_panel import SettingsPanel
-from app.state import State
+from app.state.state import State
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 

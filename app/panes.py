@@ -11,11 +11,12 @@ from typing import Any
 import aiohttp
 from aiohttp import web
 
-from app import curves, intentions, layers, messages, picture_sets
+from app import curves, intentions, messages, picture_sets
 from app.controller import Controller
-from app.layers import View
 from app.search_feed import SearchFeed
-from app.state import State
+from app.state import page_view
+from app.state.page_view import View
+from app.state.state import State
 from tracker.errors import TrackerError
 from tracker.evidence.view_evidence import ViewEvidence
 
@@ -137,7 +138,7 @@ class _Page:
             self._sent_history = None
             self._wake(self._controller.state)
         elif message["type"] == "view":
-            self._view = layers.view_of(message, len(self._controller.session.cameras))
+            self._view = page_view.view_of(message, len(self._controller.session.cameras))
             self._wake(self._controller.state)
         else:
             intentions.carry_out(self._controller, self._number, message)
@@ -229,7 +230,7 @@ class _Page:
 
     def _evidence(self, state: State, view: View) -> tuple[ViewEvidence, ...] | None:
         """The evidence of the shown frame, if the page shows any of it and it is at hand; it is asked for where not."""
-        if view.layers.isdisjoint(layers.EVIDENCE):
+        if view.layers.isdisjoint(page_view.EVIDENCE):
             return None
         frames, views = self._controller.frames, self._controller.frames.evidence_at_hand(state.frame)
         if views is None:

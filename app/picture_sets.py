@@ -5,8 +5,8 @@ import itertools
 
 from app import messages, overlays, pictures
 from app.controller import Controller
-from app.layers import EVIDENCE, Picture, View
-from app.state import State
+from app.state.page_view import EVIDENCE, Picture, View
+from app.state.state import State
 from tracker.body.model import Body
 
 Key = tuple[Picture, int]

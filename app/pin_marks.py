@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.layers import View
 from app.overlays import EPIPOLAR_COLOR, Path
-from app.state import State, finite_or_none
+from app.state.page_view import View
+from app.state.state import State, finite_or_none
 from tracker.geometry.cameras import epipolar_segment
 from tracker.geometry.triangulation import ViewPin, triangulate
 from tracker.session.session import Session

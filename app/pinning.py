@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.screen import Screen, spoken
-from app.state import Shown
+from app.state.state import Shown
 from tracker.errors import TrackerError
 from tracker.geometry.triangulation import ViewPin
 from tracker.posing.pinned_fit import fit_frame

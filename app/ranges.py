@@ -10,7 +10,7 @@ import numpy as np
 
 from app.runtime.jobs import Job
 from app.screen import Screen
-from app.state import RangeState
+from app.state.state import RangeState
 from app.tracking import Tracking
 from tracker.errors import TrackerError
 from tracker.motion.interpolation import between

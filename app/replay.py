@@ -8,7 +8,7 @@ import numpy as np
 
 from app.runs import Run, Runs
 from app.screen import Screen
-from app.state import ReplayState, Shown, finite_or_none
+from app.state.state import ReplayState, Shown, finite_or_none
 from tracker.errors import TrackerError
 from tracker.geometry.rigid import Array
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from app.cells import Cells
-from app.state import Shown, State
+from app.state.state import Shown, State
 from app.tracked import keyframes_of, tracked_changes
 from app.writing import Writing
 from tracker.body.model import BodyModel

@@ -8,14 +8,14 @@ import viser
 
 from app.controller import Controller
 from app.expected import prediction
-from app.floor_picks import FloorState
 from app.frusta import Frusta
 from app.pace import Pace
 from app.runtime.jobs import Latest
 from app.snap import SnapView
-from app.state import State
+from app.state.floor_picking import FloorState
+from app.state.state import State
+from app.state.view_3d import View3d
 from app.trails import Trails
-from app.view_choice import View3d
 from app.view_panel import ViewPanel
 from tracker.body.model import Body, BodyModel
 from tracker.contours.occluding_contours import part_poses

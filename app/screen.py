@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from app.frames import Frames
 from app.saving import Saver
-from app.state import Shown, State, finite_or_none
+from app.state.state import Shown, State, finite_or_none
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import held
 from tracker.geometry.ground_plane import up_rotation

@@ -9,7 +9,7 @@ from app import search_settings
 from app.controller import Controller
 from app.messages import binary
 from app.runs import Run
-from app.state import Landscape, ReplayState, State, finite_or_none
+from app.state.state import Landscape, ReplayState, State, finite_or_none
 from tracker.session.session import Session
 
 _COLUMNS = 4

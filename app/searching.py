@@ -9,7 +9,7 @@ import numpy as np
 from app.runs import Run, Runs
 from app.runtime.jobs import Job
 from app.screen import Screen
-from app.state import JobState, Shown, finite_or_none
+from app.state.state import JobState, Shown, finite_or_none
 from tracker.errors import TrackerError
 from tracker.geometry.rigid import Array
 from tracker.search.best_first import SearchStep, stages

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.runs import Runs
 from app.screen import Screen
-from app.state import SizeDraft
+from app.state.state import SizeDraft
 from tracker.body.dimensions import BodySizes, PartSizes, scaled, sizes_of, twin, with_sizes
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError

@@ -11,7 +11,7 @@ import viser
 from app.centred import centred, field_of_view
 from app.controller import Controller
 from app.runtime.jobs import Latest
-from app.state import State
+from app.state.state import State
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera, viewed_point
 from tracker.geometry.rigid import Array

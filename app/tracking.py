@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from app.runtime.jobs import Job
 from app.screen import Screen
-from app.state import Shown, TrackState, finite_or_none
+from app.state.state import Shown, TrackState, finite_or_none
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer

@@ -7,10 +7,10 @@ import numpy as np
 import viser
 
 from app.controller import Controller
-from app.floor_picks import FloorState
 from app.runtime.jobs import Latest
-from app.state import State
-from app.view_choice import MOST_TRAIL_FRAMES
+from app.state.floor_picking import FloorState
+from app.state.state import State
+from app.state.view_3d import MOST_TRAIL_FRAMES
 from tracker.errors import TrackerError
 from tracker.posing.drag import minor_points
 

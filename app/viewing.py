@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from app.screen import Screen
-from app.view_choice import View3d, kept, restored
+from app.state.view_3d import View3d, kept, restored
 
 _KEY = "view_3d"
 """Setting of the session."""

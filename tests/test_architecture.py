@@ -34,7 +34,7 @@ ROOMS = [
     "tracker.simulate",
     "app",
     "app.runtime",
-    "app.state",
+    "app.state.state",
     "app.storage",
     "app.drawing",
     "app.session",

@@ -5,7 +5,7 @@ import pytest
 from hands import FRONT, PAGE, drag, pixel_of, wait_for
 
 from app import graspable, overlays, pin_marks
-from app.layers import View
+from app.state.page_view import View
 from tracker.errors import TrackerError
 from tracker.search.best_first import SearchSettings
 from tracker.tracking.chamfer.tracker import TrackSettings

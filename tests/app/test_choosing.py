@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app import overlays
-from app.layers import View
+from app.state.page_view import View
 from tracker.errors import TrackerError
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import Alternative, PoseChange, PoseRecord

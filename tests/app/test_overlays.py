@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from app import overlays
-from app.layers import View
 from app.overlays import Path
-from app.state import Shown
+from app.state.page_view import View
+from app.state.state import Shown
 from tracker.body.model import Body
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hands import PAGE, drag, pixel_of, wait_for
 
-from app import layers, messages
+from app import messages
+from app.state import page_view
 from tracker.body.dimensions import PartSizes, sizes_of
 from tracker.errors import TrackerError
 from tracker.session.session import load_session
@@ -44,7 +45,7 @@ def test_a_draft_is_drawn_and_changes_nothing(posed, session):
     lengthen(posed)
     assert length(posed.sizing.model(0)) == pytest.approx(length(before) + 0.01)
     assert length(posed.sizing.model(0), "right_forearm") == pytest.approx(length(before) + 0.01)  # both sides alike
-    view = layers.view_of({"layers": ["contours"], "reductions": [1] * 4, "by_part": False}, 4)
+    view = page_view.view_of({"layers": ["contours"], "reductions": [1] * 4, "by_part": False}, 4)
     drawn = messages.overlay(posed.session_of(posed.state), posed.state, PAGE, view, None)
     assert b'"ghost"' in drawn
     assert posed.models == (before,)

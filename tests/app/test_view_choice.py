@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 
 import pytest
 
-from app.view_choice import View3d, kept, restored
+from app.state.view_3d import View3d, kept, restored
 
 OTHER = View3d(
     bodies=False,

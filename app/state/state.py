@@ -4,8 +4,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from app.floor_picks import FloorState
-from app.view_choice import View3d
+from app.state.floor_picking import FloorState
+from app.state.view_3d import View3d
 from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import ViewPin
