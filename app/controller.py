@@ -27,11 +27,11 @@ from app.pose_edits import PoseEdits
 from app.ranges import Ranges
 from app.replay import Replay
 from app.runs import Runs
-from app.saving import Saver
 from app.screen import Screen
 from app.searching import Searching
 from app.sizing import Sizing
 from app.state.state import State
+from app.storage.saver import Saver
 from app.tracking import Tracking
 from app.viewing import Viewing
 from tracker.body.model import BodyModel

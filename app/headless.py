@@ -11,7 +11,7 @@ import numpy as np
 
 from app.commands import Target
 from app.runtime.progress import Reporter
-from app.tracked import Keyframes, keyframes_of, told_of, tracked_changes
+from app.storage.tracked_changes import Keyframes, keyframes_of, told_of, tracked_changes
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.errors import SessionError
 from tracker.evidence.observer import Observer

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.frames import Frames
-from app.saving import Saver
 from app.state.state import Shown, State, finite_or_none
+from app.storage.saver import Saver
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import held
 from tracker.geometry.ground_plane import up_rotation

@@ -20,9 +20,9 @@ from app.gizmos import Gizmos
 from app.panels import Panels
 from app.panes import Panes
 from app.private_viser import PrivateViser
-from app.saving import Saver
 from app.scene import Scene
 from app.server import create_app, serve_forever, static_folder
+from app.storage.saver import Saver
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.session.lock import SessionLock

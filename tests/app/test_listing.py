@@ -7,8 +7,8 @@ from hands import wait_for
 
 from app.controller import Controller
 from app.frames import Frames
-from app.saving import Saver
 from app.state.state import FootageState
+from app.storage.saver import Saver
 from tracker.errors import RecordingError, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.footage import packet_scan

@@ -1,7 +1,7 @@
 import numpy as np
 from fake_tracker import Estimate
 
-from app.tracked import tracked_changes
+from app.storage.tracked_changes import tracked_changes
 from tracker.store.annotation_store import AnnotationStore
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimate import OtherPose

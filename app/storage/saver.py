@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from app.cells import Cells
 from app.state.state import Shown, State
-from app.tracked import keyframes_of, tracked_changes
-from app.writing import Writing
+from app.storage.retry_queue import Writing
+from app.storage.timeline_cells import Cells
+from app.storage.tracked_changes import keyframes_of, tracked_changes
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, parse_model

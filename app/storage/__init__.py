@@ -1,0 +1,1 @@
+"""State to the annotation store and back; what cannot be written waits."""
