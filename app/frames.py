@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import cv2
 
-from app import pictures
+from app.drawing import pictures
 from app.runtime.byte_bounded_cache import Recent
 from tracker.errors import RecordingError
 from tracker.evidence.observer import Observer

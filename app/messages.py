@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from app import dofs, graspable, overlays, pin_marks
-from app.curves import plots_of, samples
-from app.floor_lines import floor_lines
+from app.drawing import dof_labels, overlays, part_outlines, pin_marks
+from app.drawing.curves import plots_of, samples
+from app.drawing.floor_lines import floor_lines
 from app.state.floor_picking import Picking
 from app.state.page_view import View
 from app.state.state import JobState, ReplayState, State, TrackState
@@ -53,7 +53,7 @@ def session(session: Session) -> dict[str, Any]:
                 "minor": list(minor_points(p.model)),
                 "bones": [list(b) for b in overlays.bones(p.model)],
                 "parts": [part.name for part in p.model.parts],
-                **dofs.described(p.model),
+                **dof_labels.described(p.model),
             }
             for p in session.people
         ],
@@ -79,7 +79,7 @@ def state(session: Session, state: State) -> dict[str, Any]:
         "status": shown.status,
         "remark": shown.remark,
         "parts_px": list(shown.parts_px),
-        "dofs": dofs.shown(session.people[state.person].model, shown.values),
+        "dofs": dof_labels.shown(session.people[state.person].model, shown.values),
         "locked": sorted(state.locked[state.person]),
         "other_sizes": state.revisions[state.person] != state.present[state.person],
         "job": _job(state.job),
@@ -128,7 +128,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         segments.append(path.segments_px)
         first += count
     parts = []
-    for outline in graspable.outlines(session, state, view):
+    for outline in part_outlines.outlines(session, state, view):
         count = len(outline.segments_px)
         what = {"camera": outline.camera, "person": outline.person, "part": outline.part, "depth": outline.depth}
         parts.append(what | {"first": first, "count": count})

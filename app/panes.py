@@ -11,8 +11,9 @@ from typing import Any
 import aiohttp
 from aiohttp import web
 
-from app import curves, intentions, messages, picture_sets
+from app import intentions, messages, picture_sets
 from app.controller import Controller
+from app.drawing import curves
 from app.search_feed import SearchFeed
 from app.state import page_view
 from app.state.page_view import View

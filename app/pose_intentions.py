@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from app import dofs
 from app.controller import Controller
+from app.drawing import dof_labels
 
 
 def pose(controller: Controller, _: int, message: Mapping[str, Any]) -> None:
@@ -28,7 +28,7 @@ def pose(controller: Controller, _: int, message: Mapping[str, Any]) -> None:
         dof = int(message["dof"])
         if not 0 <= dof < model.n_dofs:
             raise ValueError(f"there is no degree of freedom {dof}")
-        return dof, _finite(message[name]) / float(dofs.factors(model)[dof])
+        return dof, _finite(message[name]) / float(dof_labels.factors(model)[dof])
 
     def nudge() -> None:
         right_m, up_m = (_finite(message[name]) / 100 for name in ("right", "up"))

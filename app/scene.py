@@ -7,7 +7,8 @@ import numpy as np
 import viser
 
 from app.controller import Controller
-from app.expected import prediction
+from app.drawing.predicted_pose import prediction
+from app.drawing.trails import Trails
 from app.frusta import Frusta
 from app.pace import Pace
 from app.runtime.jobs import Latest
@@ -15,7 +16,6 @@ from app.snap import SnapView
 from app.state.floor_picking import FloorState
 from app.state.state import State
 from app.state.view_3d import View3d
-from app.trails import Trails
 from app.view_panel import ViewPanel
 from tracker.body.model import Body, BodyModel
 from tracker.contours.occluding_contours import part_poses

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from app.centred import centred, field_of_view
 from app.controller import Controller
+from app.drawing.centred_image import centred, field_of_view
 from app.runtime.jobs import Latest
 from app.state.state import State
 from tracker.geometry import rigid

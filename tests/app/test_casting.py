@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hands import FRONT, PAGE, drag, pixel_of, wait_for
 
-from app import graspable, overlays, pin_marks
+from app.drawing import overlays, part_outlines, pin_marks
 from app.state.page_view import View
 from tracker.errors import TrackerError
 from tracker.search.best_first import SearchSettings
@@ -21,7 +21,7 @@ def drawn_people(controller):
     drawn = (
         overlays.paths(session, state, ALL, None),
         overlays.handles(session, state, ALL.cameras),
-        graspable.outlines(session, state, ALL),
+        part_outlines.outlines(session, state, ALL),
         pin_marks.pin_marks(session, state),
     )
     return [{one.person for one in kind} for kind in drawn]

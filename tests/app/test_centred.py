@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.centred import aspect_around, centred, field_of_view
+from app.drawing.centred_image import aspect_around, centred, field_of_view
 from tracker.geometry.cameras import Camera
 
 K = np.array([[610.0, 3.0, 250.0], [0.0, 590.0, 291.0], [0.0, 0.0, 1.0]])

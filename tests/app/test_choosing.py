@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app import overlays
+from app.drawing import overlays
 from app.state.page_view import View
 from tracker.errors import TrackerError
 from tracker.store.annotation_store import AnnotationStore

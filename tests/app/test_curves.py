@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from app.curves import GROUPS, Plot, plots_of, samples
+from app.drawing.curves import GROUPS, Plot, plots_of, samples
 from tracker.formats.model_toml import load_model, parse_model
 from tracker.store.records import FrameNumbers
 

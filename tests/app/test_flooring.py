@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app import intentions
-from app.floor_lines import floor_lines
+from app.drawing.floor_lines import floor_lines
 from app.messages import state as state_message
 from tracker.errors import TrackerError
 from tracker.geometry import rigid

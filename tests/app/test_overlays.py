@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app import overlays
-from app.overlays import Path
+from app.drawing import overlays
+from app.drawing.overlays import Path
 from app.state.page_view import View
 from app.state.state import Shown
 from tracker.body.model import Body

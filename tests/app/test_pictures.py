@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app import pictures
+from app.drawing import pictures
 
 
 def decoded(picture):

@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 
-from app.expected import prediction
-from app.trails import Trails
+from app.drawing.predicted_pose import prediction
+from app.drawing.trails import Trails
 from tracker.formats.model_toml import load_model
 from tracker.motion.prediction import PredictSettings
 

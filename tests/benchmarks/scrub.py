@@ -29,7 +29,7 @@ from chromium import FLAGS, chromium_path  # noqa: E402
 from driving import shows  # noqa: E402
 from running import Program  # noqa: E402
 
-from app import pictures  # noqa: E402
+from app.drawing import pictures  # noqa: E402
 from app.indexing import index  # noqa: E402
 from app.runtime.progress import Reporter  # noqa: E402
 from tracker.footage.recording import Recording  # noqa: E402

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.overlays import EPIPOLAR_COLOR, Path
+from app.drawing.overlays import EPIPOLAR_COLOR, Path
 from app.state.page_view import View
 from app.state.state import State, finite_or_none
 from tracker.geometry.cameras import epipolar_segment

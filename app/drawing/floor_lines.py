@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from app.overlays import EPIPOLAR_COLOR, Path
+from app.drawing.overlays import EPIPOLAR_COLOR, Path
 from app.state.floor_picking import Picking
 from app.state.state import State
 from tracker.geometry.cameras import Camera, epipolar_segment

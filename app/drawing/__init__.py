@@ -1,0 +1,1 @@
+"""Pure functions: state to line segments, curves, labels, JPEG."""
