@@ -42,7 +42,7 @@ def open_(
         sample: which sample: tango, two people to be placed by hand (the default), or elbow_rotation, one person.
         start_again: throw away the working copy of the sample and make a new one.
     """
-    from app.samples import DEFAULT_SAMPLE, sample_copy
+    from app.session.samples import DEFAULT_SAMPLE, sample_copy
     from app.workbench import Serving, open_session  # the other commands need no web server
 
     if session is not None and (sample is not None or start_again):
@@ -143,7 +143,7 @@ def index(session: SessionArg, /, json: bool = False) -> None:
         session: session folder.
         json: print one JSON object.
     """
-    from app.indexing import index as make
+    from app.session.proxies import index as make
     from tracker.session.session import load_session
 
     found = make(load_session(session), Reporter(silent=json))

@@ -20,7 +20,7 @@ from rich.table import Table
 from app import bench_rows
 from app.bench_rows import Row, Yardstick
 from app.bench_scenes import FRAME, read_crowd, read_frame
-from app.samples import sample_copy
+from app.session.samples import sample_copy
 from tracker.errors import TrackerError
 from tracker.files import write_text_whole
 from tracker.simulate import simulate

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from app.bench_scenes import FRAME, read_crowd
-from app.samples import bundled
+from app.session.samples import bundled
 from tracker.body.model import BodyModel
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.errors import SessionError

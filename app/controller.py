@@ -16,7 +16,6 @@ from app.choosing import Choosing
 from app.compiling import Compiling
 from app.disagreements import Disagreements
 from app.flooring import Flooring
-from app.frames import Frames
 from app.hand import Hand
 from app.history import History
 from app.landscape import Landscapes
@@ -29,6 +28,7 @@ from app.replay import Replay
 from app.runs import Runs
 from app.screen import Screen
 from app.searching import Searching
+from app.session.frame_cache import Frames
 from app.sizing import Sizing
 from app.state.state import State
 from app.storage.saver import Saver

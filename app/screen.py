@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.frames import Frames
+from app.session.frame_cache import Frames
 from app.state.state import Shown, State, finite_or_none
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel

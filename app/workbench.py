@@ -12,16 +12,16 @@ from typing import Any
 
 from platformdirs import user_cache_path
 
-from app import indexing
 from app.access import access_for
 from app.controller import Controller
-from app.frames import Frames
 from app.gizmos import Gizmos
 from app.panels import Panels
 from app.panes import Panes
 from app.private_viser import PrivateViser
 from app.scene import Scene
 from app.server import create_app, serve_forever, static_folder
+from app.session import proxies
+from app.session.frame_cache import Frames
 from app.storage.saver import Saver
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
@@ -57,7 +57,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
     static = static_folder()
     with SessionLock(session.folder), Recording(session.cameras, indices=_indices(), in_background=True) as recording:
         store = AnnotationStore(session.annotations_path)
-        frames = Frames(Observer(session.cameras, recording), indexing.proxies(session))
+        frames = Frames(Observer(session.cameras, recording), proxies.proxies(session))
         controller = Controller(session, Saver(session, store, _author()), frames)
         viser = PrivateViser()
         try:
@@ -67,7 +67,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
             app = create_app(Panes(controller), viser.socket_path, access, static)
 
             def ready(address: str) -> None:
-                for name in indexing.stale(session):
+                for name in proxies.stale(session):
                     say(f"the proxy of camera {name} is of other footage: run quadrille index {session.folder} again")
                 say(f"{session.name}: {address}")
                 controller.compile_kernels()

@@ -11,7 +11,7 @@ from hands import drag, wait_for
 
 from app import __main__
 from app.controller import Controller
-from app.frames import Frames
+from app.session.frame_cache import Frames
 from app.storage.saver import Saver
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording

@@ -3,8 +3,8 @@
 import numpy as np
 from hands import wait_for
 
-from app import indexing
-from app.frames import Frames
+from app.session import proxies
+from app.session.frame_cache import Frames
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.session.session import load_session
@@ -14,7 +14,7 @@ def test_index_makes_a_proxy_of_every_camera(run, session):
     status, out, _ = run("index", session)
     assert status == 0
     loaded = load_session(session)
-    assert all(p is not None and p.n_frames == loaded.n_frames for p in indexing.proxies(loaded))
+    assert all(p is not None and p.n_frames == loaded.n_frames for p in proxies.proxies(loaded))
     assert f"FRONT {loaded.n_frames}" in out
     status, out, _ = run("index", session, "--json")
     assert status == 0
@@ -22,7 +22,7 @@ def test_index_makes_a_proxy_of_every_camera(run, session):
 
 
 def test_stopped_it_goes_on(run, session, monkeypatch):
-    real, count = indexing.Proxy.make, []
+    real, count = proxies.Proxy.make, []
 
     def make(self, path, footage):
         for done in real(self, path, footage):
@@ -31,14 +31,14 @@ def test_stopped_it_goes_on(run, session, monkeypatch):
                 raise KeyboardInterrupt
             yield done
 
-    monkeypatch.setattr(indexing.Proxy, "make", make)
+    monkeypatch.setattr(proxies.Proxy, "make", make)
     status, _, err = run("index", session)
     assert status == 1
     assert "goes on from here" in err
     loaded = load_session(session)
-    assert sum(p.n_frames for p in indexing.proxies(loaded) if p) == 69 - 1
+    assert sum(p.n_frames for p in proxies.proxies(loaded) if p) == 69 - 1
     assert run("index", session)[0] == 0
-    assert [p.n_frames for p in indexing.proxies(loaded)] == [loaded.n_frames] * len(loaded.cameras)
+    assert [p.n_frames for p in proxies.proxies(loaded)] == [loaded.n_frames] * len(loaded.cameras)
 
 
 def test_the_page_looks_at_the_proxy_and_matches_the_footage(run, session, monkeypatch):
@@ -49,7 +49,7 @@ def test_the_page_looks_at_the_proxy_and_matches_the_footage(run, session, monke
     real = recording._read_one
     monkeypatch.setattr(recording, "_read_one", lambda camera, k: decoded.append(k) or real(camera, k))
     observer = Observer(loaded.cameras, recording)
-    frames, plain = Frames(observer, indexing.proxies(loaded)), Frames(observer)
+    frames, plain = Frames(observer, proxies.proxies(loaded)), Frames(observer)
     try:
         seen = frames.images(31)
         assert decoded == []
@@ -67,8 +67,8 @@ def test_the_page_looks_at_the_proxy_and_matches_the_footage(run, session, monke
 def test_a_proxy_of_other_footage_is_not_looked_at(run, session):
     assert run("index", session)[0] == 0
     loaded = load_session(session)
-    assert indexing.stale(loaded) == []
+    assert proxies.stale(loaded) == []
     front = next(c.footage for c in loaded.cameras if c.camera.name == "FRONT")
     front.touch()
-    assert indexing.stale(loaded) == ["FRONT"]
-    assert [p is None for p in indexing.proxies(loaded)].count(True) == 1
+    assert proxies.stale(loaded) == ["FRONT"]
+    assert [p is None for p in proxies.proxies(loaded)].count(True) == 1

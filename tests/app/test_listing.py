@@ -6,7 +6,7 @@ import pytest
 from hands import wait_for
 
 from app.controller import Controller
-from app.frames import Frames
+from app.session.frame_cache import Frames
 from app.state.state import FootageState
 from app.storage.saver import Saver
 from tracker.errors import RecordingError, TrackerError

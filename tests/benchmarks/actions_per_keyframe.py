@@ -20,7 +20,7 @@ sys.path[:0] = [str(ROOT / "tests" / "browser")]
 from scripted_user import LIMBS, ScriptedUser  # noqa: E402
 
 from app.controller import Controller  # noqa: E402
-from app.frames import Frames  # noqa: E402
+from app.session.frame_cache import Frames  # noqa: E402
 from app.storage.saver import Saver  # noqa: E402
 from tracker.evidence.observer import Observer  # noqa: E402
 from tracker.footage.recording import Recording  # noqa: E402

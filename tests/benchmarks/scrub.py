@@ -30,8 +30,8 @@ from driving import shows  # noqa: E402
 from running import Program  # noqa: E402
 
 from app.drawing import pictures  # noqa: E402
-from app.indexing import index  # noqa: E402
 from app.runtime.progress import Reporter  # noqa: E402
+from app.session.proxies import index  # noqa: E402
 from tracker.footage.recording import Recording  # noqa: E402
 from tracker.images.matching_view import MatchedView  # noqa: E402
 from tracker.session.session import load_session, save_session  # noqa: E402

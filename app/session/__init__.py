@@ -1,0 +1,1 @@
+"""What the program keeps of an open session's footage."""
