@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from app.screen import Screen
+from app.control.session.session_state import Screen
 
 
 class Casting:

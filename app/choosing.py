@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 
-from app.screen import Screen
+from app.control.session.session_state import Screen
 from tracker.errors import TrackerError
 from tracker.store.records import Alternative, PoseChange, PoseRecord
 

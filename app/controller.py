@@ -13,20 +13,20 @@ from numpy.typing import NDArray
 
 from app.casting import Casting
 from app.choosing import Choosing
-from app.compiling import Compiling
+from app.control.session.footage_scan import Listing
+from app.control.session.history import History
+from app.control.session.kernel_warmup import Compiling
+from app.control.session.session_state import Screen
 from app.disagreements import Disagreements
 from app.flooring import Flooring
 from app.hand import Hand
-from app.history import History
 from app.landscape import Landscapes
-from app.listing import Listing
 from app.locks import Locks
 from app.pinning import Pinning
 from app.pose_edits import PoseEdits
 from app.ranges import Ranges
 from app.replay import Replay
 from app.runs import Runs
-from app.screen import Screen
 from app.searching import Searching
 from app.session.frame_cache import Frames
 from app.sizing import Sizing

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from app.control.session.session_state import Screen
 from app.runtime.jobs import Latest
-from app.screen import Screen
 from app.state.state import State
 from tracker.motion.consistency import disagreeing
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from app.screen import Screen
+from app.control.session.session_state import Screen
 from app.state.floor_picking import FloorState, Picking, with_mark, with_next, without_last
 from tracker.errors import TrackerError
 from tracker.geometry.ground_plane import Floor, nearest_axis, up_rotation

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.control.session.session_state import Screen, spoken
 from app.runtime.jobs import Latest
-from app.screen import Screen, spoken
 from app.state.state import DragState, State
 from tracker.posing import drag as posing
 

@@ -6,8 +6,8 @@ from contextlib import AbstractContextManager
 
 import numpy as np
 
+from app.control.session.session_state import Screen, spoken
 from app.runtime.jobs import Latest
-from app.screen import Screen, spoken
 from app.state.state import Landscape, State
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError

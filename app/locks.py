@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection
 from contextlib import AbstractContextManager
 
-from app.screen import Screen
+from app.control.session.session_state import Screen
 from tracker.body.model import BodyModel
 from tracker.session.locked_dofs import SETTING, kept_locks, to_keep
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.screen import Screen, spoken
+from app.control.session.session_state import Screen, spoken
 from app.state.state import Shown
 from tracker.errors import TrackerError
 from tracker.geometry.triangulation import ViewPin

@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager, contextmanager
 
 import numpy as np
 
-from app.screen import Screen, spoken
+from app.control.session.session_state import Screen, spoken
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry.rigid import Array

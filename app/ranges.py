@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from app.control.session.session_state import Screen
 from app.runtime.jobs import Job
-from app.screen import Screen
 from app.state.state import RangeState
 from app.tracking import Tracking
 from tracker.errors import TrackerError

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.screen import spoken
+from app.control.session.session_state import spoken
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.search.best_first import SearchSettings, stages

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.control.session.session_state import Screen
 from app.runs import Run, Runs
 from app.runtime.jobs import Job
-from app.screen import Screen
 from app.state.state import JobState, Shown, finite_or_none
 from tracker.errors import TrackerError
 from tracker.geometry.rigid import Array

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from app.control.session.session_state import Screen
 from app.runtime.jobs import Job
-from app.screen import Screen
 from app.state.state import Shown, TrackState, finite_or_none
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from app.screen import Screen
+from app.control.session.session_state import Screen
 from app.state.view_3d import View3d, kept, restored
 
 _KEY = "view_3d"

@@ -10,8 +10,8 @@ import pytest
 from hands import wait_for
 
 from app import compile_kernels
-from app.compiling import Compiling
-from app.screen import Screen
+from app.control.session.kernel_warmup import Compiling
+from app.control.session.session_state import Screen
 from tracker.compute.kernel_cache import compiled_mark
 
 WAITS = (sys.executable, "-c", "import time; time.sleep(100)")

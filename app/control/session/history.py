@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 
-from app.screen import Screen
+from app.control.session.session_state import Screen
 from tracker.store.records import HistoryEntry
 
 

@@ -2,7 +2,7 @@
 
 import threading
 
-from app.screen import Screen
+from app.control.session.session_state import Screen
 from app.state.state import FootageState
 from tracker.errors import TrackerError
 

@@ -6,7 +6,7 @@ import sys
 import threading
 from collections.abc import Sequence
 
-from app.screen import Screen
+from app.control.session.session_state import Screen
 from tracker.compute.kernel_cache import compiled_mark
 
 _LOG = logging.getLogger(__name__)
