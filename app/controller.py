@@ -11,14 +11,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.casting import Casting
 from app.choosing import Choosing
 from app.control.session.footage_scan import Listing
 from app.control.session.history import History
 from app.control.session.kernel_warmup import Compiling
 from app.control.session.session_state import Screen
+from app.control.view.floor import Flooring
+from app.control.view.view_3d import Viewing
+from app.control.view.visibility import Casting
 from app.disagreements import Disagreements
-from app.flooring import Flooring
 from app.hand import Hand
 from app.landscape import Landscapes
 from app.locks import Locks
@@ -33,7 +34,6 @@ from app.sizing import Sizing
 from app.state.state import State
 from app.storage.saver import Saver
 from app.tracking import Tracking
-from app.viewing import Viewing
 from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array
 from tracker.session.session import Session

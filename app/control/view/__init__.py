@@ -1,0 +1,1 @@
+"""What the views show: people, the floor, the 3-D view."""
