@@ -11,7 +11,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.choosing import Choosing
+from app.control.posing.alternatives import Choosing
+from app.control.posing.body_sizes import Sizing
+from app.control.posing.dof_locks import Locks
+from app.control.posing.dragging import Hand
+from app.control.posing.pinning import Pinning
+from app.control.posing.pose_edits import PoseEdits
 from app.control.session.footage_scan import Listing
 from app.control.session.history import History
 from app.control.session.kernel_warmup import Compiling
@@ -20,17 +25,12 @@ from app.control.view.floor import Flooring
 from app.control.view.view_3d import Viewing
 from app.control.view.visibility import Casting
 from app.disagreements import Disagreements
-from app.hand import Hand
 from app.landscape import Landscapes
-from app.locks import Locks
-from app.pinning import Pinning
-from app.pose_edits import PoseEdits
 from app.ranges import Ranges
 from app.replay import Replay
 from app.runs import Runs
 from app.searching import Searching
 from app.session.frame_cache import Frames
-from app.sizing import Sizing
 from app.state.state import State
 from app.storage.saver import Saver
 from app.tracking import Tracking

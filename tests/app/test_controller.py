@@ -77,7 +77,7 @@ def test_a_cancelled_drag_leaves_nothing(opened):
 
 
 def test_a_long_drag_is_on_disk_before_it_ends(opened, session, monkeypatch):
-    monkeypatch.setattr("app.hand._CHECKPOINT_S", 0.0)
+    monkeypatch.setattr("app.control.posing.dragging._CHECKPOINT_S", 0.0)
     controller = opened()
     start = pixel_of(controller, "torso")
     controller.hand.begin_drag(PAGE, FRONT, 0, "torso", tuple(start))

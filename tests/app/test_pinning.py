@@ -139,7 +139,7 @@ def test_where_a_live_pin_ends_decides_not_its_way(opened):
 
 @pytest.mark.parametrize("checkpoint_s", [1.0, 0.0])
 def test_a_cancelled_pin_leaves_nothing(opened, session, monkeypatch, checkpoint_s):
-    monkeypatch.setattr("app.pinning._CHECKPOINT_S", checkpoint_s)
+    monkeypatch.setattr("app.control.posing.pinning._CHECKPOINT_S", checkpoint_s)
     controller = opened()
     drag(controller, "torso", (4.0, 0.0))
     values, start = controller.state.poses[0], pixel_of(controller, "left_wrist")

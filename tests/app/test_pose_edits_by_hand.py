@@ -42,7 +42,7 @@ def test_nudges_in_quick_succession_are_one_entry(opened, monkeypatch):
     assert controller.state.undo is None
     for _ in range(2):
         controller.pose_edits.nudge(0, LEFT_WRIST, FRONT, 0.01, 0.0)
-        monkeypatch.setattr("app.pose_edits._SAME_GESTURE_S", 0.0)
+        monkeypatch.setattr("app.control.posing.pose_edits._SAME_GESTURE_S", 0.0)
     controller.undo()
     assert controller.state.undo == "nudge left wrist, frame 0"  # another second, another entry
 

@@ -1,0 +1,1 @@
+"""Poses changed by a person: drags, steps, pins, locks, sizes, alternatives."""
