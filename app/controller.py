@@ -17,6 +17,10 @@ from app.control.posing.dof_locks import Locks
 from app.control.posing.dragging import Hand
 from app.control.posing.pinning import Pinning
 from app.control.posing.pose_edits import PoseEdits
+from app.control.search.cost_landscape import Landscapes
+from app.control.search.replay import Replay
+from app.control.search.search_runs import Runs
+from app.control.search.searching import Searching
 from app.control.session.footage_scan import Listing
 from app.control.session.history import History
 from app.control.session.kernel_warmup import Compiling
@@ -25,11 +29,7 @@ from app.control.view.floor import Flooring
 from app.control.view.view_3d import Viewing
 from app.control.view.visibility import Casting
 from app.disagreements import Disagreements
-from app.landscape import Landscapes
 from app.ranges import Ranges
-from app.replay import Replay
-from app.runs import Runs
-from app.searching import Searching
 from app.session.frame_cache import Frames
 from app.state.state import State
 from app.storage.saver import Saver

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from app import search_settings
+from app.control.search import search_settings
+from app.control.search.search_runs import Run
 from app.controller import Controller
 from app.messages import binary
-from app.runs import Run
 from app.state.state import Landscape, ReplayState, State, finite_or_none
 from tracker.session.session import Session
 

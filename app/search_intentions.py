@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from app import search_settings
+from app.control.search import search_settings
 from app.controller import Controller
 
 Message = Mapping[str, Any]

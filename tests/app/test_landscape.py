@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hands import drag, wait_for
 
-from app.landscape import SAMPLES, landscape
+from app.control.search.cost_landscape import SAMPLES, landscape
 from tracker.errors import TrackerError
 from tracker.tracking.chamfer.settings import pose_cost
 

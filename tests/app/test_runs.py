@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from app import runs
-from app.runs import Run, Runs
+from app.control.search import search_runs
+from app.control.search.search_runs import Run, Runs
 from tracker.formats.model_toml import load_model
 from tracker.search.best_first import SearchStep
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -24,7 +24,7 @@ def begun():
 
 
 def test_long_searches_are_thinned_and_keep_what_matters(monkeypatch):
-    monkeypatch.setattr(runs, "KEPT_STEPS", 100)
+    monkeypatch.setattr(search_runs, "KEPT_STEPS", 100)
     run, best = begun(), 9.0
     for i in range(1000):
         best -= 0.01 if i % 50 == 0 else 0.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.search_settings import changed, differences, leaves
+from app.control.search.search_settings import changed, differences, leaves
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import load_model
 from tracker.tracking.chamfer.settings import TrackSettings

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from app.control.search.search_runs import Runs
 from app.control.session.session_state import Screen
-from app.runs import Runs
 from app.state.state import SizeDraft
 from tracker.body.dimensions import BodySizes, PartSizes, scaled, sizes_of, twin, with_sizes
 from tracker.body.model import BodyModel

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.control.search.search_runs import Run, Runs
 from app.control.session.session_state import Screen
-from app.runs import Run, Runs
 from app.runtime.jobs import Job
 from app.state.state import JobState, Shown, finite_or_none
 from tracker.errors import TrackerError

@@ -1,0 +1,1 @@
+"""The search on the shown frame: settings, runs, replay, the cost landscape."""
