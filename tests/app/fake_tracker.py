@@ -27,8 +27,8 @@ class FakeTracker:
     """Frame 4 is doubtful, frames divisible by 7 are lost, and the second view sees no edge."""
 
     def __init__(self, monkeypatch):
-        monkeypatch.setattr("app.tracking.track_chamfer", self.track)
-        monkeypatch.setattr("app.tracking.follow_back", self.follow_back)
+        monkeypatch.setattr("app.control.tracking.tracking.track_chamfer", self.track)
+        monkeypatch.setattr("app.control.tracking.tracking.follow_back", self.follow_back)
         self.steps = threading.Semaphore(0)
         self.told = None
         """Arguments of the last run."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hands import drag, wait_for
 
-from app import ranges
+from app.control.tracking import ranges
 from tracker.errors import TrackerError
 from tracker.motion.interpolation import between
 from tracker.store.annotation_store import AnnotationStore

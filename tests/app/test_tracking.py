@@ -157,7 +157,7 @@ def test_stop_ends_a_run_and_keeps_what_it_found(placed, tracker):
 
 
 def test_looking_around_does_not_stop_a_run(placed, tracker, monkeypatch):
-    monkeypatch.setattr("app.tracking._SAVE_S", 1e9)
+    monkeypatch.setattr("app.control.tracking.tracking._SAVE_S", 1e9)
     placed.track(backward=False, until=None)
     tracker.let_go(3)
     wait_for(at(placed, 5))
@@ -268,7 +268,7 @@ def test_what_a_full_disk_refused_is_written_later(placed, tracker, monkeypatch)
         raise SessionError("the disk is full; make room")
 
     monkeypatch.setattr(AnnotationStore, "commit", full)
-    monkeypatch.setattr("app.tracking._SAVE_S", 0.0)
+    monkeypatch.setattr("app.control.tracking.tracking._SAVE_S", 0.0)
     placed.track(backward=False, until=6)
     tracker.let_go(2)
     wait_for(at(placed, 4))

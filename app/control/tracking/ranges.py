@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 
 from app.control.session.session_state import Screen
+from app.control.tracking.tracking import Tracking
 from app.runtime.jobs import Job
 from app.state.state import RangeState
-from app.tracking import Tracking
 from tracker.errors import TrackerError
 from tracker.motion.interpolation import between
 from tracker.store.records import Change, FrameRow, MarkChange, PoseChange, PoseRecord

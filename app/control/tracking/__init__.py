@@ -1,0 +1,1 @@
+"""Tracking runs and work on ranges of frames."""
