@@ -8,7 +8,7 @@ from typing import Any
 
 import viser
 
-from app.controller import Controller
+from app.control.controller import Controller
 from app.state.state import State
 from tracker.body.dimensions import PartSizes, sizes_of, spoken, twin
 from tracker.errors import TrackerError

@@ -6,7 +6,7 @@ from typing import Any, Literal
 import numpy as np
 import viser
 
-from app.controller import Controller
+from app.control.controller import Controller
 from app.pace import Pace
 from app.runtime.jobs import Latest
 from app.state.state import State

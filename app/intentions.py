@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from app.controller import Controller
+from app.control.controller import Controller
 from app.pose_intentions import pose
 from app.search_intentions import SEARCHING
 

@@ -2,7 +2,7 @@
 
 import time
 
-from app.controller import Controller
+from app.control.controller import Controller
 from app.state.state import State
 
 _SELDOM_S = 2.0

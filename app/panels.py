@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from app.body_panel import BodyPanel
-from app.controller import Controller
+from app.control.controller import Controller
 from app.pace import Pace
 from app.runtime.jobs import Latest
 from app.settings_panel import SettingsPanel

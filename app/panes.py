@@ -12,7 +12,7 @@ import aiohttp
 from aiohttp import web
 
 from app import intentions, messages, picture_sets
-from app.controller import Controller
+from app.control.controller import Controller
 from app.drawing import curves
 from app.search_feed import SearchFeed
 from app.state import page_view

@@ -4,7 +4,7 @@ import asyncio
 import itertools
 
 from app import messages
-from app.controller import Controller
+from app.control.controller import Controller
 from app.drawing import overlays, pictures
 from app.state.page_view import EVIDENCE, Picture, View
 from app.state.state import State

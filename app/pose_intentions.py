@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from app.controller import Controller
+from app.control.controller import Controller
 from app.drawing import dof_labels
 
 

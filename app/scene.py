@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import viser
 
-from app.controller import Controller
+from app.control.controller import Controller
 from app.drawing.predicted_pose import prediction
 from app.drawing.trails import Trails
 from app.frusta import Frusta

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from app.control.controller import Controller
 from app.control.search import search_settings
 from app.control.search.search_runs import Run
-from app.controller import Controller
 from app.messages import binary
 from app.state.state import Landscape, ReplayState, State, finite_or_none
 from tracker.session.session import Session

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from app.control.controller import Controller
 from app.control.search import search_settings
-from app.controller import Controller
 
 Message = Mapping[str, Any]
 

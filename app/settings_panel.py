@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.controller import Controller
+from app.control.controller import Controller
 from tracker.errors import TrackerError
 from tracker.motion.prediction import MOST_ORDER, PredictSettings
 from tracker.search.best_first import SearchSettings

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from app.controller import Controller
+from app.control.controller import Controller
 from app.drawing.centred_image import centred, field_of_view
 from app.runtime.jobs import Latest
 from app.state.state import State

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.controller import Controller
+from app.control.controller import Controller
 from app.runtime.jobs import Latest
 from app.state.floor_picking import FloorState
 from app.state.state import State

@@ -13,7 +13,7 @@ from typing import Any
 from platformdirs import user_cache_path
 
 from app.access import access_for
-from app.controller import Controller
+from app.control.controller import Controller
 from app.gizmos import Gizmos
 from app.panels import Panels
 from app.panes import Panes

@@ -10,7 +10,7 @@ from fake_tracker import FakeTracker
 from hands import drag, wait_for
 
 from app import __main__
-from app.controller import Controller
+from app.control.controller import Controller
 from app.session.frame_cache import Frames
 from app.storage.saver import Saver
 from tracker.evidence.observer import Observer

@@ -5,7 +5,7 @@ import threading
 import pytest
 from hands import wait_for
 
-from app.controller import Controller
+from app.control.controller import Controller
 from app.session.frame_cache import Frames
 from app.state.state import FootageState
 from app.storage.saver import Saver

@@ -19,7 +19,7 @@ sys.path[:0] = [str(ROOT / "tests" / "browser")]
 
 from scripted_user import LIMBS, ScriptedUser  # noqa: E402
 
-from app.controller import Controller  # noqa: E402
+from app.control.controller import Controller  # noqa: E402
 from app.session.frame_cache import Frames  # noqa: E402
 from app.storage.saver import Saver  # noqa: E402
 from tracker.evidence.observer import Observer  # noqa: E402
