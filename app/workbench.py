@@ -15,8 +15,8 @@ from platformdirs import user_cache_path
 from app.access import access_for
 from app.control.controller import Controller
 from app.gizmos import Gizmos
+from app.page.socket import Panes
 from app.panels import Panels
-from app.panes import Panes
 from app.private_viser import PrivateViser
 from app.scene import Scene
 from app.server import create_app, serve_forever, static_folder

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from app import intentions
 from app.drawing.floor_lines import floor_lines
-from app.messages import state as state_message
+from app.page import intentions
+from app.page.messages import state as state_message
 from tracker.errors import TrackerError
 from tracker.geometry import rigid
 from tracker.geometry.ground_plane import UP_ROTATIONS, Floor, nearest_axis, up_rotation

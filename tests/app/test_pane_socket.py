@@ -8,7 +8,7 @@ import pytest
 from hands import drag
 from visits import visiting
 
-from app import messages
+from app.page import messages
 
 
 @pytest.fixture

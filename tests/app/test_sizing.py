@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hands import PAGE, drag, pixel_of, wait_for
 
-from app import messages
+from app.page import messages
 from app.state import page_view
 from tracker.body.dimensions import PartSizes, sizes_of
 from tracker.errors import TrackerError

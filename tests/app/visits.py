@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager
 import aiohttp
 from aiohttp import web
 
-from app.panes import Panes
+from app.page.socket import Panes
 
 
 class Page:

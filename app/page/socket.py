@@ -11,10 +11,10 @@ from typing import Any
 import aiohttp
 from aiohttp import web
 
-from app import intentions, messages, picture_sets
 from app.control.controller import Controller
 from app.drawing import curves
-from app.search_feed import SearchFeed
+from app.page import intentions, messages, picture_sets
+from app.page.search_feed import SearchFeed
 from app.state import page_view
 from app.state.page_view import View
 from app.state.state import State

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from app.control.controller import Controller
-from app.pose_intentions import pose
-from app.search_intentions import SEARCHING
+from app.page.pose_intentions import pose
+from app.page.search_intentions import SEARCHING
 
 Message = Mapping[str, Any]
 

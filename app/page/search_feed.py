@@ -8,7 +8,7 @@ import numpy as np
 from app.control.controller import Controller
 from app.control.search import search_settings
 from app.control.search.search_runs import Run
-from app.messages import binary
+from app.page.messages import binary
 from app.state.state import Landscape, ReplayState, State, finite_or_none
 from tracker.session.session import Session
 

@@ -3,9 +3,9 @@
 import asyncio
 import itertools
 
-from app import messages
 from app.control.controller import Controller
 from app.drawing import overlays, pictures
+from app.page import messages
 from app.state.page_view import EVIDENCE, Picture, View
 from app.state.state import State
 from tracker.body.model import Body

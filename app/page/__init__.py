@@ -1,0 +1,1 @@
+"""The pane socket: state to messages, messages to the controller."""
