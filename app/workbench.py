@@ -14,11 +14,11 @@ from platformdirs import user_cache_path
 
 from app.access import access_for
 from app.control.controller import Controller
-from app.gizmos import Gizmos
 from app.page.socket import Panes
-from app.panels import Panels
 from app.private_viser import PrivateViser
-from app.scene import Scene
+from app.scene3d.gizmos import Gizmos
+from app.scene3d.panels import Panels
+from app.scene3d.scene import Scene
 from app.server import create_app, serve_forever, static_folder
 from app.session import proxies
 from app.session.frame_cache import Frames

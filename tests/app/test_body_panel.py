@@ -7,8 +7,8 @@ import pytest
 import viser
 from viser._gui_handles import GuiEvent
 
-from app import body_panel
-from app.body_panel import BodyPanel
+from app.scene3d import body_panel
+from app.scene3d.body_panel import BodyPanel
 from tracker.body.dimensions import sizes_of
 
 

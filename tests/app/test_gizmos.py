@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hands import drag, wait_for
 
-from app.gizmos import Gizmos
+from app.scene3d.gizmos import Gizmos
 from tracker.geometry import rigid
 
 

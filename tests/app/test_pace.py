@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from app import pace
-from app.pace import Pace
+from app.scene3d import pace
+from app.scene3d.pace import Pace
 
 SOFTWARE = frozenset({1})
 

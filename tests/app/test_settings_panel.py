@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import viser
 
-from app.settings_panel import SettingsPanel, settings_of
+from app.scene3d.settings_panel import SettingsPanel, settings_of
 from tracker.errors import TrackerError
 from tracker.motion.prediction import PredictSettings
 from tracker.tracking.chamfer.settings import TrackSettings

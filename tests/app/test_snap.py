@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hands import wait_for
 
-from app.snap import SnapView
+from app.scene3d.camera_view import SnapView
 from tracker.geometry import rigid
 
 START = (np.array([3.0, 3.0, 2.0]), np.array([1.0, 0.0, 0.0, 0.0]))

@@ -7,8 +7,8 @@ import numpy as np
 import viser
 
 from app.control.controller import Controller
-from app.pace import Pace
 from app.runtime.jobs import Latest
+from app.scene3d.pace import Pace
 from app.state.state import State
 from tracker.geometry import rigid
 from tracker.geometry.rigid import Array

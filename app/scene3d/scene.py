@@ -9,14 +9,14 @@ import viser
 from app.control.controller import Controller
 from app.drawing.predicted_pose import prediction
 from app.drawing.trails import Trails
-from app.frusta import Frusta
-from app.pace import Pace
 from app.runtime.jobs import Latest
-from app.snap import SnapView
+from app.scene3d.camera_view import SnapView
+from app.scene3d.frusta import Frusta
+from app.scene3d.pace import Pace
+from app.scene3d.view_panel import ViewPanel
 from app.state.floor_picking import FloorState
 from app.state.state import State
 from app.state.view_3d import View3d
-from app.view_panel import ViewPanel
 from tracker.body.model import Body, BodyModel
 from tracker.contours.occluding_contours import part_poses
 from tracker.geometry import rigid

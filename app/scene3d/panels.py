@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.body_panel import BodyPanel
 from app.control.controller import Controller
-from app.pace import Pace
 from app.runtime.jobs import Latest
-from app.settings_panel import SettingsPanel
+from app.scene3d.body_panel import BodyPanel
+from app.scene3d.pace import Pace
+from app.scene3d.settings_panel import SettingsPanel
 from app.state.state import State
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError

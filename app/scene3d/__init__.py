@@ -1,0 +1,1 @@
+"""viser: handles, gizmos, panels."""
