@@ -42,8 +42,8 @@ def open_(
         sample: which sample: tango, two people to be placed by hand (the default), or elbow_rotation, one person.
         start_again: throw away the working copy of the sample and make a new one.
     """
+    from app.server.workbench import Serving, open_session
     from app.session.samples import DEFAULT_SAMPLE, sample_copy
-    from app.workbench import Serving, open_session  # the other commands need no web server
 
     if session is not None and (sample is not None or start_again):
         raise TrackerError(

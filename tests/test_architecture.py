@@ -46,7 +46,7 @@ ROOMS = [
     "app.control",
     "app.page",
     "app.scene3d",
-    "app.server",
+    "app.server.server",
     "app.bench",
     "app.cli",
     "app.__main__",

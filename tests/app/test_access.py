@@ -1,6 +1,6 @@
 import pytest
 
-from app.access import Access, access_for
+from app.server.access import Access, access_for
 from tracker.errors import TrackerError
 
 LOCAL = Access()

@@ -257,7 +257,9 @@ def test_simulate(run, tmp_path):
 
 def test_without_a_command_the_page_is_opened(run, monkeypatch):
     asked = []
-    monkeypatch.setattr("app.workbench.open_session", lambda folder, serving, say: asked.append((folder, serving)))
+    monkeypatch.setattr(
+        "app.server.workbench.open_session", lambda folder, serving, say: asked.append((folder, serving))
+    )
     monkeypatch.setattr("app.session.samples.sample_copy", lambda name, afresh: Path(f"{name}, {afresh}"))
     assert run()[0] == 0
     assert run("some/session", "--port", "0", "--no-browser")[0] == 0
@@ -289,7 +291,7 @@ def test_init_takes_a_pose_from_a_table(run, session, tmp_path):
 
 def test_samples_are_opened_as_working_copies_by_name(run, monkeypatch, tmp_path):
     asked = []
-    monkeypatch.setattr("app.workbench.open_session", lambda folder, serving, say: asked.append(folder))
+    monkeypatch.setattr("app.server.workbench.open_session", lambda folder, serving, say: asked.append(folder))
     monkeypatch.setattr("app.session.samples.user_data_path", lambda *_, **__: tmp_path)
     assert run("--sample", "elbow_rotation")[0] == 0
     assert asked == [tmp_path / "samples" / "elbow_rotation"]

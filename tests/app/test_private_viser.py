@@ -11,8 +11,8 @@ import pytest
 import viser
 import websockets.asyncio.server
 
-from app import private_viser
-from app.private_viser import PrivateViser
+from app.server import private_viser
+from app.server.private_viser import PrivateViser
 from tracker.errors import TrackerError
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -8,8 +8,8 @@ import pytest
 from aiohttp import web
 from yarl import URL
 
-from app import server
-from app.access import Access
+from app.server import server
+from app.server.access import Access
 from tracker.errors import TrackerError
 
 NOBODY = Path("/nowhere/viser")

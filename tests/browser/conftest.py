@@ -8,8 +8,8 @@ from driving import OPENED, listening, shows
 from fake_endpoint import FakeEndpoint
 from playwright.async_api import Error, async_playwright
 
-from app.access import Access
-from app.server import create_app, static_folder
+from app.server.access import Access
+from app.server.server import create_app, static_folder
 
 
 def pytest_collection_modifyitems(items):

@@ -467,9 +467,9 @@ def room(camera, frame):
 
 
 async def main(port):
-    from app.access import access_for
-    from app.private_viser import PrivateViser
-    from app.server import create_app, serve_forever, static_folder
+    from app.server.access import access_for
+    from app.server.private_viser import PrivateViser
+    from app.server.server import create_app, serve_forever, static_folder
 
     scene = PrivateViser()
     access = access_for("127.0.0.1")

@@ -6,9 +6,9 @@ import pytest
 from aiohttp import ClientSession, WSServerHandshakeError
 from driving import dragging, listening, shows, until
 
-from app.access import Access
-from app.private_viser import PrivateViser
-from app.server import create_app, static_folder
+from app.server.access import Access
+from app.server.private_viser import PrivateViser
+from app.server.server import create_app, static_folder
 
 
 async def test_a_lost_connection_is_said_and_mended_with_the_true_state(browser, endpoint, blank_viser):

@@ -16,8 +16,8 @@ import aiohttp
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
-from app import viser_proxy
-from app.access import Access, is_loopback
+from app.server import viser_proxy
+from app.server.access import Access, is_loopback
 from tracker.errors import TrackerError
 
 _LOG = logging.getLogger(__name__)

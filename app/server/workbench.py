@@ -12,14 +12,14 @@ from typing import Any
 
 from platformdirs import user_cache_path
 
-from app.access import access_for
 from app.control.controller import Controller
 from app.page.socket import Panes
-from app.private_viser import PrivateViser
 from app.scene3d.gizmos import Gizmos
 from app.scene3d.panels import Panels
 from app.scene3d.scene import Scene
-from app.server import create_app, serve_forever, static_folder
+from app.server.access import access_for
+from app.server.private_viser import PrivateViser
+from app.server.server import create_app, serve_forever, static_folder
 from app.session import proxies
 from app.session.frame_cache import Frames
 from app.storage.saver import Saver

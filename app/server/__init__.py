@@ -1,0 +1,1 @@
+"""One port: page, socket, viser; who may talk to it."""
