@@ -28,7 +28,7 @@ test-page: $(VENV)/.tested
 
 # Once, not in each process of the tests at the same time. Modules are found here while pip puts what is installed anew.
 kernels: $(VENV)/.installed
-	$(BIN)/python -m app.compile_kernels
+	$(BIN)/python -m app.bench.compile_kernels
 
 # How fast it is here, beside what must hold and the ratios that are kept.
 bench: $(VENV)/.tested

@@ -347,7 +347,7 @@ def bench(json: bool = False, baseline: Path | None = None, save: Path | None = 
         save: keep the ratios in this file instead of comparing them.
         tolerance: with --save, the share by which a ratio may later be worse.
     """
-    from app import bench as measuring
+    from app.bench import report as measuring
 
     kept = {"tolerance": tolerance, "ratios": {}} if save else measuring.read_baseline(baseline or measuring.BASELINE)
     rows = []

@@ -47,7 +47,7 @@ ROOMS = [
     "app.page",
     "app.scene3d",
     "app.server.server",
-    "app.bench",
+    "app.bench.report",
     "app.cli",
     "app.__main__",
 ]

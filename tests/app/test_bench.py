@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 from command_line import SAMPLE
 
-from app import bench, bench_rows
 from app.__main__ import main
-from app.bench_rows import Row, Yardstick
-from app.bench_scenes import read_crowd, read_frame
-from app.painting import PaintedCost
+from app.bench import report
+from app.bench import rows as bench_rows
+from app.bench.opencv_oracle import PaintedCost
+from app.bench.rows import Row, Yardstick
+from app.bench.sample_frames import read_crowd, read_frame
 from tracker.errors import TrackerError
 
 
@@ -77,7 +78,7 @@ def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
         *bench_rows.crowds(read_crowd(SAMPLE.with_name("tango"), 25), Yardstick()),
     ]
     names = [r.name for r in rows]
-    assert len(set(names)) == len(names) == bench.N_ROWS - 2  # all but the pipelines
+    assert len(set(names)) == len(names) == report.N_ROWS - 2  # all but the pipelines
     assert {r.ratio for r in rows} == {2.0}
     assert all((r.must is None) == (r.aim is None) for r in rows)
     assert all(r.aim < r.must for r in rows if r.must is not None)
@@ -85,8 +86,10 @@ def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
 
 def test_a_ratio_beyond_the_tolerance_is_slower(tmp_path):
     kept = tmp_path / "kept.json"
-    bench.save_baseline([row("a", 100), row("b", 100), row("c", 100)], kept, 0.3)
-    found = bench.report([row("a", 125, must=0.11), row("b", 135, must=0.2), row("d", 9999)], bench.read_baseline(kept))
+    report.save_baseline([row("a", 100), row("b", 100), row("c", 100)], kept, 0.3)
+    found = report.report(
+        [row("a", 125, must=0.11), row("b", 135, must=0.2), row("d", 9999)], report.read_baseline(kept)
+    )
     assert found["slower"] == ["b"]
     assert [r["holds"] for r in found["rows"]] == [False, True, None]
     assert [r["baseline"] for r in found["rows"]] == [0.1, 0.1, None]  # what is new is compared with nothing
@@ -96,8 +99,8 @@ def test_a_ratio_beyond_the_tolerance_is_slower(tmp_path):
 
 
 def test_the_baseline_knows_every_row():
-    kept = bench.read_baseline()
-    assert len(kept["ratios"]) == bench.N_ROWS
+    kept = report.read_baseline()
+    assert len(kept["ratios"]) == report.N_ROWS
     assert 0 < kept["tolerance"] < 1
 
 
@@ -106,13 +109,13 @@ def test_a_malformed_baseline(tmp_path, text):
     path = tmp_path / "kept.json"
     path.write_text(text)
     with pytest.raises(TrackerError, match=r"expected a baseline with tolerance and ratios in .*kept\.json"):
-        bench.read_baseline(path)
+        report.read_baseline(path)
 
 
 def test_the_command_says_by_its_status_what_became_slower(tmp_path, monkeypatch, capsys):
     kept = tmp_path / "kept.json"
     for time_us, status in ((100, None), (135, None), (145, 1)):
-        monkeypatch.setattr(bench, "measure", lambda t=time_us: iter([row("a", t, must=0.2)]))
+        monkeypatch.setattr(report, "measure", lambda t=time_us: iter([row("a", t, must=0.2)]))
         words = ["--baseline", str(kept)] if kept.exists() else ["--save", str(kept)]
         monkeypatch.setattr(sys, "argv", ["quadrille", "bench", "--json", *words])
         if status is None:

@@ -9,7 +9,7 @@ import numba
 import pytest
 from hands import wait_for
 
-from app import compile_kernels
+from app.bench import compile_kernels
 from app.control.session.kernel_warmup import Compiling
 from app.control.session.session_state import Screen
 from tracker.compute.kernel_cache import compiled_mark

@@ -1,4 +1,4 @@
-"""Compiles the kernels that are not in the cache: `python -m app.compile_kernels`.
+"""Compiles the kernels that are not in the cache: `python -m app.bench.compile_kernels`.
 
 Numba compiles a kernel when it is first called, and keeps the interpreter to itself meanwhile: after an installation a
 first Track would wait for a minute, and the page with it. This program calls them all at the lowest priority and leaves
@@ -10,7 +10,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
-from app.bench_scenes import FRAME, read_crowd
+from app.bench.sample_frames import FRAME, read_crowd
 from app.session.samples import bundled
 from tracker.body.model import BodyModel
 from tracker.compute.kernel_cache import compiled_mark

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
-from app.bench_scenes import BenchCrowd, BenchFrame, pose_at
-from app.painting import PaintedCost
+from app.bench.opencv_oracle import PaintedCost
+from app.bench.sample_frames import BenchCrowd, BenchFrame, pose_at
 from tracker.body.model import Body, BodyModel
 from tracker.contours import occluding_contours
 from tracker.evidence.observer import Observer

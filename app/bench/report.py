@@ -17,9 +17,9 @@ import cv2
 from rich.console import Console
 from rich.table import Table
 
-from app import bench_rows
-from app.bench_rows import Row, Yardstick
-from app.bench_scenes import FRAME, read_crowd, read_frame
+from app.bench import rows as bench_rows
+from app.bench.rows import Row, Yardstick
+from app.bench.sample_frames import FRAME, read_crowd, read_frame
 from app.session.samples import sample_copy
 from tracker.errors import TrackerError
 from tracker.files import write_text_whole

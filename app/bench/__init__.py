@@ -1,0 +1,1 @@
+"""`quadrille bench` and the frames it works on."""
