@@ -9,11 +9,11 @@ from typing import Annotated, Any, Literal
 import tyro
 from rich.console import Console
 
-from app import commands
+from app.cli import actions
+from app.cli.arguments import common_or_pairs, pairs
 from app.runtime import process_exit
 from app.runtime.malloc_trim import give_back_freed_memory
 from app.runtime.progress import Reporter
-from app.words import common_or_pairs, pairs
 from tracker.errors import TrackerError
 
 SessionArg = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION", help="session folder")]
@@ -118,9 +118,9 @@ def info(session: SessionArg, /, json: bool = False) -> None:
     """
     from tracker.session.session import load_session
 
-    found = commands.info(load_session(session))
+    found = actions.info(load_session(session))
     if json:
-        print(commands.as_json(found))
+        print(actions.as_json(found))
         return
     print(f"{found['name']}: {found['frames']} frames at {found['fps']:g} per second, up is {found['up']}")
     for c in found["cameras"]:
@@ -148,7 +148,7 @@ def index(session: SessionArg, /, json: bool = False) -> None:
 
     found = make(load_session(session), Reporter(silent=json))
     if json:
-        print(commands.as_json(found))
+        print(actions.as_json(found))
     else:
         frames = ", ".join(f"{name} {n}" for name, n in found["frames"].items())
         print(f"{found['folder']}: {frames} frames, {found['bytes'] / 1e6:.0f} MB" if frames else "no videos to index")
@@ -188,19 +188,19 @@ def init(
     from tracker.evaluation.references import read_joints
     from tracker.formats.pose_csv import read_pose_table
 
-    at = commands.target(session, person, several=False)
-    commands.frame_range(f"{frame}:{frame + 1}", at.session)
+    at = actions.target(session, person, several=False)
+    actions.frame_range(f"{frame}:{frame + 1}", at.session)
     given = {"joints": joints, "poses": poses}[method]
     if given is None:
         raise TrackerError(f"expected --{method} FILE, found none; say where the {method} are")
 
     if method == "poses":
-        found = commands.init_from_poses(at, frame, read_pose_table(given))
-        print(commands.as_json(found) if json else f"{found['person']}, frame {frame}: set from {given}")
+        found = actions.init_from_poses(at, frame, read_pose_table(given))
+        print(actions.as_json(found) if json else f"{found['person']}, frame {frame}: set from {given}")
         return
-    found = commands.init_from_joints(at, frame, read_joints(given, at.session.fps, joint_map, axes), fit_sizes)
+    found = actions.init_from_joints(at, frame, read_joints(given, at.session.fps, joint_map, axes), fit_sizes)
     residual = f"{found['mean_mm']:.1f} mm from {len(found['residual_mm'])} joints on average"
-    print(commands.as_json(found) if json else f"{found['person']}, frame {frame}: {residual}")
+    print(actions.as_json(found) if json else f"{found['person']}, frame {frame}: {residual}")
 
 
 @_app.command
@@ -235,13 +235,13 @@ def track(
         second_pass: at the end, follow whoever was lost back from the first trusted poses after it.
         json: print one JSON object.
     """
-    from app import headless
+    from app.cli import track as headless
     from tracker.motion.prediction import PredictSettings
     from tracker.search.best_first import SearchSettings
     from tracker.tracking.chamfer.settings import TrackSettings
 
-    at = commands.target(session, person, several=True)
-    wanted: Sequence[int] = commands.frame_range(frames, at.session)
+    at = actions.target(session, person, several=True)
+    wanted: Sequence[int] = actions.frame_range(frames, at.session)
     passes = (1.0,) if paper else SearchSettings().passes
     settings = TrackSettings(
         estimate="search" if paper else "refine",
@@ -252,7 +252,7 @@ def track(
         second_pass=second_pass and not paper,
     )
     found = headless.track(at, wanted[::-1] if backward else wanted, settings, Reporter(silent=json))
-    print(commands.as_json(found) if json else _track_summary(found))
+    print(actions.as_json(found) if json else _track_summary(found))
     if found["stopped_at"] is not None:
         sys.exit(130)
 
@@ -285,10 +285,10 @@ def evaluate(
     """
     from tracker.evaluation.references import read_reference
 
-    at = commands.target(session, person, several=False)
-    found = commands.evaluate(at, read_reference(reference, at.session, at.people[0], joint_map, axes), frames, align)
+    at = actions.target(session, person, several=False)
+    found = actions.evaluate(at, read_reference(reference, at.session, at.people[0], joint_map, axes), frames, align)
     if json:
-        print(commands.as_json(found))
+        print(actions.as_json(found))
         return
     print(
         f"{found['person']}: {found['frames']} frames, {found['missing_frames']} missing, {found['lost_frames']} lost"
@@ -359,7 +359,7 @@ def bench(json: bool = False, baseline: Path | None = None, save: Path | None = 
         measuring.save_baseline(rows, save, tolerance)
     found = measuring.report(rows, kept)
     if json:
-        print(commands.as_json(found))
+        print(actions.as_json(found))
     else:
         measuring.show(found, Console())
     if found["slower"]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from command_line import SAMPLE, assert_refused, stored
 
-from app import headless
+from app.cli import track
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
@@ -115,7 +115,7 @@ def test_tracking_leaves_what_is_locked(run, session):
 
 def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
-    original = headless.track_chamfer
+    original = track.track_chamfer
 
     def interrupted(*arguments):
         for k, estimate in enumerate(original(*arguments)):
@@ -123,7 +123,7 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
                 raise KeyboardInterrupt
             yield estimate
 
-    monkeypatch.setattr(headless, "track_chamfer", interrupted)
+    monkeypatch.setattr(track, "track_chamfer", interrupted)
     status, out, _ = run("track", session, "--frames", "0:6", "--json")
     assert status == 130
     assert (json.loads(out)["frames"], json.loads(out)["stopped_at"]) == (3, 3)
@@ -147,7 +147,7 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
     """What the second pass finds better is in the store at once, in the one entry of the history."""
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
     estimates, offered = {}, []
-    original = headless.track_chamfer
+    original = track.track_chamfer
 
     def tracked(*arguments):
         for estimate in original(*arguments):
@@ -166,8 +166,8 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
             raise KeyboardInterrupt
         yield Followed(3, 0, 2, 2, (elsewhere(3),))
 
-    monkeypatch.setattr(headless, "track_chamfer", tracked)
-    monkeypatch.setattr(headless, "follow_back", ways_back)
+    monkeypatch.setattr(track, "track_chamfer", tracked)
+    monkeypatch.setattr(track, "follow_back", ways_back)
     words = ("track", session, "--frames", "0:5", "--json")
     status, out, _ = run(*words)
     told = json.loads(out)
@@ -183,7 +183,7 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
     def never(*_):
         raise AssertionError("the first pass is done")
 
-    monkeypatch.setattr(headless, "track_chamfer", never)
+    monkeypatch.setattr(track, "track_chamfer", never)
     told = json.loads(run(*words)[1])  # the same call goes on with the second pass alone
     assert (told["frames"], told["stopped_at"], told["followed_back"]) == (0, None, 2)
     assert [f.frame for f in offered[1]] == [0, 1, 2, 3, 4]
@@ -191,7 +191,7 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
     for k, f in enumerate(offered[1]):
         np.testing.assert_array_equal(f.poses[0], found[k].values)
     np.testing.assert_array_equal(stored(session)[3].values, estimates[3].poses[0] + 0.01)
-    monkeypatch.setattr(headless, "track_chamfer", tracked)
+    monkeypatch.setattr(track, "track_chamfer", tracked)
     told = json.loads(run(*words)[1])  # once done it begins anew, all of it one entry
     assert (told["frames"], told["resumed_at"]) == (5, None)
     with closing(AnnotationStore(session / "annotations.sqlite")) as store:

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.commands import init_from_joints, target
-from app.headless import track
+from app.cli.actions import init_from_joints, target
+from app.cli.track import track
 from app.runtime.malloc_trim import give_back_freed_memory
 from app.runtime.progress import Reporter
 from tracker.evaluation.references import read_joints

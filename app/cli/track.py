@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from app.commands import Target
+from app.cli.actions import Target
 from app.runtime.progress import Reporter
 from app.storage.tracked_changes import Keyframes, keyframes_of, told_of, tracked_changes
 from tracker.compute.kernel_cache import compiled_mark
