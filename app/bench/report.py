@@ -25,7 +25,7 @@ from tracker.errors import TrackerError
 from tracker.files import write_text_whole
 from tracker.simulate import simulate
 
-BASELINE = Path(__file__).with_name("bench_baseline.json")
+BASELINE = Path(__file__).with_name("baseline.json")
 N_ROWS = 19
 """Number of rows that `measure` gives where `cma` is installed."""
 _PACKAGES = ("numpy", "opencv-python-headless", "numba", "scipy", "av", "cma")

@@ -127,7 +127,7 @@ def page_address(access: Access, host: str, port: int) -> str:
 
 def static_folder() -> Path:
     """Return the folder of the page: inside the installed package, or beside it in a checkout."""
-    here = Path(__file__).resolve().parent
+    here = Path(__file__).resolve().parents[1]
     for folder in (here / "static", here.parent / "static"):
         if (folder / "index.html").is_file():
             return folder

@@ -57,6 +57,6 @@ def samples() -> Iterable[str]:
 
 
 def _folder() -> Path:
-    here = Path(__file__).resolve().parent
+    here = Path(__file__).resolve().parents[1]
     installed = here / "sample_sessions"
     return installed if installed.is_dir() else here.parent / "sample_sessions"

@@ -10,7 +10,7 @@ FREED = """
 import sys, time
 from pathlib import Path
 import numpy as np
-from app.allocation import give_back_freed_memory
+from app.runtime.malloc_trim import give_back_freed_memory
 
 def resident_pages():
     return int(Path("/proc/self/statm").read_text().split()[1])

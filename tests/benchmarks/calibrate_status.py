@@ -1,4 +1,4 @@
-"""How sure the tracker may be of itself: the weights and thresholds of `tracker/tracking/confidence.py`, fitted and checked.
+"""Fit and check the weights and thresholds of `tracker/tracking/confidence.py`.
 
 `python tests/benchmarks/calibrate_status.py` makes simulated scenes (people whose shape is not the model's, clutter,
 noise), tracks them with and without the search for lost limbs, fits the logistic function of the evidence to the

@@ -1,6 +1,6 @@
 """Make the hand-made poses of frame 0 of a sample's people: `python tests/browser/first_poses.py SESSION`.
 
-A user by rule places each body with what the page's hand does (`tracker.posing.drag`): upright in the middle at first, by
+A scripted user places each body as the page does (`tracker.posing.drag`): upright in the middle at first, by
 moving the trunk, turning it by its slider, lifting the arms by theirs, and dragging joints in the two views that show
 each best. The user sees where the joints are, 3 px off, another 3 px each time, and knows nothing of the third
 dimension.

@@ -1,4 +1,4 @@
-"""The matching of contours and edges the slow, obvious way, with numpy: the judge of `tracker.fitting.contour_residuals`.
+"""The matching of contours and edges with plain numpy: the oracle of `tracker.fitting.contour_residuals`.
 
 Matches are made once, at one pose. At another pose the matched surface points have moved with their parts, and nothing
 else has changed: a cost that can be differentiated numerically. Only the contours' pieces are taken from the tracker.

@@ -1,7 +1,7 @@
 """The chamfer cost the slow, obvious way, with numpy, OpenCV and SciPy: the judge of the fast one.
 
-Nothing is shared with `tracker.contours.occluding_contours` and `tracker.search.best_first.chamfer_cost` but the shapes' surface and implicit function. A part is
-convex, so its outline is the convex hull of a dense mesh; whether another part hides a point of it is found by walking
+Nothing is shared with `tracker.contours.occluding_contours` and `tracker.search.chamfer_cost` but the shapes' surface
+and implicit function. A part is convex, so its outline is the convex hull of a dense mesh; whether another part hides a point of it is found by walking
 along the line of sight.
 """
 

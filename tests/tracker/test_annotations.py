@@ -342,8 +342,8 @@ def test_settings(store, path):
 CHILD = textwrap.dedent("""
     import sys
     import numpy as np
-    from tracker.annotations import AnnotationStore
-    from tracker.records import PoseChange, PoseRecord
+    from tracker.store.annotation_store import AnnotationStore
+    from tracker.store.records import PoseChange, PoseRecord
     store = AnnotationStore(sys.argv[1])
     store.add_model_revision("ann", "a = 1")
     edit = None

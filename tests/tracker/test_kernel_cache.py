@@ -9,18 +9,18 @@ import tracker
 
 PROGRAM = """
 import numpy as np
-from tracker import occlusion
-from tracker.body import Body
-from tracker.cameras import Camera
+from tracker.contours import part_edges
+from tracker.body.model import Body
+from tracker.geometry.cameras import Camera
 from tracker.formats.model_toml import load_model
-from tracker.rigid import transform
+from tracker.geometry.rigid import transform
 model = load_model("gavrila22")
 R = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 camera = Camera("a", (640, 480), np.array([[520.0, 0, 320], [0, 520, 240], [0, 0, 1]]), np.zeros(0),
                 transform(R, np.array([4.0, 0.0, 0.0])))
 body = Body(model, model.neutral())
 behind = body.points_world - (0.5, 0.0, 0.0)
-print(int(occlusion.points_hidden([body], [camera], behind).sum()))
+print(int(part_edges.points_hidden([body], [camera], behind).sum()))
 """
 
 
@@ -31,12 +31,14 @@ def run(folder):
 
 
 def test_an_edit_of_one_kernel_reaches_the_kernels_that_call_it(tmp_path):
-    """`_mark_blocked` in occlusion.py compiles `hide` of hiding.py into itself."""
+    """`_mark_blocked` in part_edges.py compiles `hide` of visibility.py into itself."""
     copy = tmp_path / "tracker"
     shutil.copytree(Path(tracker.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__", "simulate"))
     before = run(tmp_path)
     assert before > 0
-    text = (copy / "hiding.py").read_text()
+    text = (copy / "contours" / "visibility.py").read_text()
     assert text.count("        far, near = shared[0, i], shared[1, i]\n") == 1
-    (copy / "hiding.py").write_text(text.replace("far, near = shared[0, i], shared[1, i]", "far, near = 1.0, 0.0"))
+    (copy / "contours" / "visibility.py").write_text(
+        text.replace("far, near = shared[0, i], shared[1, i]", "far, near = 1.0, 0.0")
+    )
     assert run(tmp_path) == 0  # no line of sight is inside anything, so nothing hides

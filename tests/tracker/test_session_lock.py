@@ -12,7 +12,7 @@ from tracker.session.lock import LOCK_FILE, SessionLock
 
 HOLDER = textwrap.dedent("""
     import sys, time
-    from tracker.session_lock import SessionLock
+    from tracker.session.lock import SessionLock
     SessionLock(sys.argv[1]).acquire()
     print("held", flush=True)
     time.sleep(60)

@@ -213,7 +213,8 @@ class ChamferCost:
         if scratch is None:
             room = self._room
             scratch = self._own.scratch = _Scratch(
-                occluding_contours.piece_buffer(self._surfaces, room), segment_buffer(room), np.empty((3, room), np.float32),
+                occluding_contours.piece_buffer(self._surfaces, room),
+                segment_buffer(room), np.empty((3, room), np.float32),
                 np.empty(room, np.float32), np.empty(room, np.float32), np.ones(room, np.float32),
             )  # fmt: skip
         return scratch
@@ -358,8 +359,8 @@ def _score(
 
 @njit(nogil=True, cache=True)
 def _score_candidates(
-    candidates: Array, first: int, n_dofs: int, tree: Tree, Ts: Array, surfaces: occluding_contours.Surfaces, scene: _Scene,
-    paper: bool, scratch: _Scratch, directed: Array,
+    candidates: Array, first: int, n_dofs: int, tree: Tree, Ts: Array,
+    surfaces: occluding_contours.Surfaces, scene: _Scene, paper: bool, scratch: _Scratch, directed: Array,
 ) -> None:  # fmt: skip
     """`_score` for many poses of the person whose parts begin at `first`; directed is (C, V, 2)."""
     last = first + tree.parents.shape[0]
