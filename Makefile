@@ -59,9 +59,9 @@ $(VENV)/.installed: pyproject.toml constraints.txt | $(BIN)/python
 	touch $@
 
 # .tested: the tools of development, and a browser for the tests.
-$(VENV)/.tested: $(VENV)/.installed tests/browser/chromium.py
+$(VENV)/.tested: $(VENV)/.installed tests/support/chromium.py
 	$(PIP) install --constraint constraints.txt --editable '.[dev]'
-	$(BIN)/python tests/browser/chromium.py
+	$(BIN)/python tests/support/chromium.py
 	touch $@
 
 # The path is for npm's own scripts, which look for node there.

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from command_line import SAMPLE
 from fake_tracker import FakeTracker
-from hands import drag, wait_for
+from gestures import drag, wait_for
 
 from app import __main__
 from app.control.controller import Controller

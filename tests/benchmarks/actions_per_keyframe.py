@@ -1,6 +1,6 @@
 """How many actions a keyframe costs where the tracker does the rest: `python tests/benchmarks/actions_per_keyframe.py`.
 
-A user by rule (tests/browser/scripted_user.py) annotates `walk`: places the body on frame 0 from 40 cm and 30 degrees
+A user by rule (tests/support/scripted_user.py) annotates `walk`: places the body on frame 0 from 40 cm and 30 degrees
 away, fits, tracks to the next keyframe, looks at it in two views, drags what is off by more than the eye forgives,
 fits, verifies it, tracks on. An action is one press to release, or one key. `--data DIR` says where `walk` is.
 """
@@ -15,17 +15,17 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "tests" / "browser")]
+sys.path[:0] = [str(ROOT / "tests" / "support")]
 
-from scripted_user import LIMBS, ScriptedUser  # noqa: E402
+from scripted_user import LIMBS, ScriptedUser
 
-from app.control.controller import Controller  # noqa: E402
-from app.session.frame_cache import Frames  # noqa: E402
-from app.storage.saver import Saver  # noqa: E402
-from tracker.evidence.observer import Observer  # noqa: E402
-from tracker.footage.recording import Recording  # noqa: E402
-from tracker.session.assemble import assemble  # noqa: E402
-from tracker.store.annotation_store import AnnotationStore  # noqa: E402
+from app.control.controller import Controller
+from app.session.frame_cache import Frames
+from app.storage.saver import Saver
+from tracker.evidence.observer import Observer
+from tracker.footage.recording import Recording
+from tracker.session.assemble import assemble
+from tracker.store.annotation_store import AnnotationStore
 
 VIEWS = (0, 1)
 EVERY = 10

@@ -9,7 +9,7 @@ import asyncio
 import numpy as np
 from sample_page import sample_page
 
-from driving import handle_of, to_client  # isort: skip  (found by sample_page)
+from page_driver import handle_of, to_client  # isort: skip  (found by sample_page)
 
 MOVES, INTERVAL_S = 300, 1 / 30
 

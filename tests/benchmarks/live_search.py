@@ -12,7 +12,7 @@ import asyncio
 import numpy as np
 from sample_page import sample_page
 
-from driving import shows  # isort: skip  (found by sample_page)
+from page_driver import shows  # isort: skip  (found by sample_page)
 
 WATCH = """() => {
   const seen = { spans: [], waits: [] };

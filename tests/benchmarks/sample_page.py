@@ -11,11 +11,11 @@ from pathlib import Path
 from playwright.async_api import Page, async_playwright
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "tests" / "browser")]
+sys.path[:0] = [str(ROOT / "tests" / "support")]
 
-from chromium import FLAGS, chromium_path  # noqa: E402
-from driving import shows  # noqa: E402
-from running import Program  # noqa: E402
+from chromium import FLAGS, chromium_path
+from page_driver import shows
+from program import Program
 
 
 @contextlib.asynccontextmanager

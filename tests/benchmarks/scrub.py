@@ -23,18 +23,18 @@ import numpy as np
 from playwright.async_api import async_playwright
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "tests" / "browser"), str(ROOT)]
+sys.path[:0] = [str(ROOT / "tests" / "support"), str(ROOT)]
 
-from chromium import FLAGS, chromium_path  # noqa: E402
-from driving import shows  # noqa: E402
-from running import Program  # noqa: E402
+from chromium import FLAGS, chromium_path
+from page_driver import shows
+from program import Program
 
-from app.drawing import pictures  # noqa: E402
-from app.runtime.progress import Reporter  # noqa: E402
-from app.session.proxies import index  # noqa: E402
-from tracker.footage.recording import Recording  # noqa: E402
-from tracker.images.matching_view import MatchedView  # noqa: E402
-from tracker.session.session import load_session, save_session  # noqa: E402
+from app.drawing import pictures
+from app.runtime.progress import Reporter
+from app.session.proxies import index
+from tracker.footage.recording import Recording
+from tracker.images.matching_view import MatchedView
+from tracker.session.session import load_session, save_session
 
 REDUCTION = 1.7
 """Pixels of the footage, along either side, for one of a pane, with four of them in a window of 1280x720."""

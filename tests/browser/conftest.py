@@ -1,11 +1,12 @@
 import os
+from pathlib import Path
 
 import pytest
 import pytest_asyncio
 from aiohttp import web
 from chromium import FLAGS, chromium_path
-from driving import OPENED, listening, shows
 from fake_endpoint import FakeEndpoint
+from page_driver import OPENED, listening, shows
 from playwright.async_api import Error, async_playwright
 
 from app.server.access import Access
@@ -14,7 +15,7 @@ from app.server.server import create_app, static_folder
 
 def pytest_collection_modifyitems(items):
     for item in items:
-        if item.path.parent.name == "browser":
+        if Path(__file__).parent in item.path.parents:
             item.add_marker(pytest.mark.browser)
             # One event loop for all: the browser is started once, and the server under test runs beside the test.
             item.add_marker(pytest.mark.asyncio(loop_scope="session"), append=False)

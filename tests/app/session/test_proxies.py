@@ -1,0 +1,74 @@
+"""`quadrille index`: what it makes, how it goes on, and that the page looks at it."""
+
+import numpy as np
+from gestures import wait_for
+
+from app.session import proxies
+from app.session.frame_cache import Frames
+from tracker.evidence.observer import Observer
+from tracker.footage.recording import Recording
+from tracker.session.session import load_session
+
+
+def test_index_makes_a_proxy_of_every_camera(run, session):
+    status, out, _ = run("index", session)
+    assert status == 0
+    loaded = load_session(session)
+    assert all(p is not None and p.n_frames == loaded.n_frames for p in proxies.proxies(loaded))
+    assert f"FRONT {loaded.n_frames}" in out
+    status, out, _ = run("index", session, "--json")
+    assert status == 0
+    assert '"stopped": false' in out
+
+
+def test_stopped_it_goes_on(run, session, monkeypatch):
+    real, count = proxies.Proxy.make, []
+
+    def make(self, path, footage):
+        for done in real(self, path, footage):
+            count.append(done)
+            if len(count) == 70:
+                raise KeyboardInterrupt
+            yield done
+
+    monkeypatch.setattr(proxies.Proxy, "make", make)
+    status, _, err = run("index", session)
+    assert status == 1
+    assert "goes on from here" in err
+    loaded = load_session(session)
+    assert sum(p.n_frames for p in proxies.proxies(loaded) if p) == 69 - 1
+    assert run("index", session)[0] == 0
+    assert [p.n_frames for p in proxies.proxies(loaded)] == [loaded.n_frames] * len(loaded.cameras)
+
+
+def test_the_page_looks_at_the_proxy_and_matches_the_footage(run, session, monkeypatch):
+    assert run("index", session)[0] == 0
+    loaded = load_session(session)
+    recording = Recording(loaded.cameras)
+    decoded = []
+    real = recording._read_one
+    monkeypatch.setattr(recording, "_read_one", lambda camera, k: decoded.append(k) or real(camera, k))
+    observer = Observer(loaded.cameras, recording)
+    frames, plain = Frames(observer, proxies.proxies(loaded)), Frames(observer)
+    try:
+        seen = frames.images(31)
+        assert decoded == []
+        for image, truth in zip(seen, plain.images(31), strict=True):
+            assert np.abs(image.astype(int) - truth).mean() < 4
+        frames.request(31, lambda _: None)
+        wait_for(lambda: frames.evidence_at_hand(31) is not None)
+        assert 31 in decoded
+    finally:
+        frames.close()
+        plain.close()
+        recording.close()
+
+
+def test_a_proxy_of_other_footage_is_not_looked_at(run, session):
+    assert run("index", session)[0] == 0
+    loaded = load_session(session)
+    assert proxies.stale(loaded) == []
+    front = next(c.footage for c in loaded.cameras if c.camera.name == "FRONT")
+    front.touch()
+    assert proxies.stale(loaded) == ["FRONT"]
+    assert [p is None for p in proxies.proxies(loaded)].count(True) == 1

@@ -1,0 +1,118 @@
+"""A real run on the bundled sample: track forward and back while the panes follow, pause, look around, undo."""
+
+import asyncio
+import shutil
+
+import numpy as np
+import pytest_asyncio
+from page_driver import handle_of, shows, state_of
+from program import ROOT, Program, visited
+
+from tracker.formats.model_toml import format_model
+from tracker.formats.pose_csv import read_pose_table
+from tracker.session.session import load_session
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange, PoseRecord
+
+SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
+START = 8
+"""The arms are on their way up."""
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def program(tmp_path):
+    """The program on a copy of the sample whose body a person has put in place on one frame."""
+    folder = shutil.copytree(SAMPLE, tmp_path / "session")
+    session = load_session(folder)
+    model = session.people[0].model
+    truth = read_pose_table(folder / "truth.csv")
+    store = AnnotationStore(session.annotations_path)
+    revision = store.add_model_revision("person", format_model(model))
+    pose = PoseRecord(truth.values[START], ("manual",) * len(model.value_names), revision, keyframe=True)
+    store.commit("place", [PoseChange("person", START, pose)])
+    store.close()
+    running = Program(folder)
+    await running.start()
+    yield running
+    await running.kill()
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def live(browser, program):
+    async with visited(browser, program.address, (1440, 900), viser=True) as page:
+        await go_to(page, START)
+        yield page
+
+
+PAUSED_AFTER = """async (done) => {
+  while (!(quadrille.state.state.track.done > done)) await new Promise((resolve) => setTimeout(resolve, 2));
+  document.body.dispatchEvent(new KeyboardEvent("keydown", { key: "p", code: "KeyP", altKey: true, bubbles: true }));
+}"""
+"""Pauses from within the page: a quick tracker is through before a driver outside has heard of it."""
+FOLLOWED = "quadrille.state.shown.frame === {0} && quadrille.state.overlay.frame === {0}"
+
+
+async def said(page, expression, timeout_s=60.0):
+    """Wait until the program has said something, drawn or not: a quick tracker does not wait for a slow browser."""
+    async with asyncio.timeout(timeout_s):
+        while not await page.evaluate(expression):
+            await asyncio.sleep(0.005)
+
+
+async def go_to(page, frame):
+    await page.locator("#frame").fill(str(frame))
+    await page.keyboard.press("Enter")
+    await shows(page, FOLLOWED.format(frame), 60)
+
+
+async def test_a_run_is_watched_paused_looked_at_and_taken_back(live):
+    await live.keyboard.press("c")
+    before = await handle_of(live, 0, "left_wrist")
+    await live.keyboard.press("t")
+    await live.evaluate(PAUSED_AFTER, 2)
+    await said(live, "!quadrille.state.state.track.running")
+    at = (await state_of(live))["state"]["track"]["at"]
+    assert START + 3 <= at < 49
+    await shows(live, FOLLOWED.format(at), 60)
+    after = await handle_of(live, 0, "left_wrist")
+    assert 0 < np.hypot(*np.subtract(after, before)) < 12 * (at - START)  # it follows the arm
+    state = (await state_of(live))["state"]
+    assert state["status"] in ("good", "doubtful", "lost")
+    assert len(state["parts_px"]) == 10
+
+    # All of it is in the timeline and in the curves, and a click on a curve leads there.
+    await shows(live, f"Number.isFinite(quadrille.state.curves.series[0].values[{at}])", 20)
+    timeline = (await state_of(live))["timeline"]
+    assert {timeline[str(f)]["source"] for f in range(START + 1, at + 1)} == {"tracked"}
+    assert timeline[str(START)]["keyframe"]
+    box = await live.locator("#curves").bounding_box()
+    await live.mouse.click(box["x"] + 52 + (START + 2.5) * (box["width"] - 60) / 50, box["y"] + 60)
+    await shows(live, FOLLOWED.format(START + 2), 60)
+
+    await live.keyboard.press("Alt+p")
+    await said(live, f"quadrille.state.state.track.at > {at}", 120)
+    await live.keyboard.press("Escape")
+    await shows(live, "quadrille.state.state.track.first === null", 60)
+    await shows(live, f"quadrille.state.timeline[{at + 1}]?.source === 'tracked'", 20)
+    assert (await state_of(live))["state"]["undo"] == f"track forward from frame {START + 1}"  # one entry for all of it
+    await live.keyboard.press("Control+z")
+    await shows(live, f"Object.keys(quadrille.state.timeline).join() === '{START}'", 20)
+
+
+async def test_backward_to_the_first_frame_is_seen_frame_by_frame(live):
+    await go_to(live, START)
+    await live.locator("#track-backward").click()
+    seen, message = [], ""
+    async with asyncio.timeout(120):
+        while not message:
+            image, vectors, message = await live.evaluate(
+                "(({ shown, overlay, state }) => [shown.frame, overlay.frame, state.track.message])(quadrille.state)"
+            )
+            if image == vectors and image not in seen:
+                seen.append(image)
+    await shows(live, FOLLOWED.format(0), 60)
+    assert len(seen) >= 3
+    assert seen == sorted(seen, reverse=True)
+    assert {int(f) for f in (await state_of(live))["timeline"]} == set(range(START + 1))
+    await live.keyboard.press("Control+z")
+    await shows(live, f"Object.keys(quadrille.state.timeline).join() === '{START}'", 20)

@@ -1,0 +1,61 @@
+"""Range actions against the real program on the sample: what is on the page, in the store, and after undo."""
+
+import shutil
+
+import pytest_asyncio
+from page_driver import dragging, shows, state_of
+from program import ROOT, Program
+
+from tracker.store.annotation_store import AnnotationStore
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def live(browser, tmp_path):
+    folder = shutil.copytree(ROOT / "sample_sessions" / "elbow_rotation", tmp_path / "session")
+    program = Program(folder)
+    await program.start()
+    page = await browser.new_page(viewport={"width": 1280, "height": 720})
+    await page.goto(program.address)
+    await shows(page, "window.quadrille?.state.overlay && quadrille.state.state.cost_px !== null", 120)
+    yield page, folder
+    await page.close()
+    await program.stop()
+
+
+async def go_to(page, frame):
+    await page.locator("#frame").fill(str(frame))
+    await page.keyboard.press("Enter")
+    await shows(page, f"quadrille.state.shown.frame === {frame} && quadrille.state.overlay.frame === {frame}", 30)
+
+
+async def test_a_range_is_interpolated_reviewed_cleared_and_given_back(live):
+    page, folder = live
+    await page.keyboard.press("k")  # the draft as it stands
+    await shows(page, "quadrille.state.timeline[0]?.keyframe", 30)
+    await go_to(page, 10)
+    async with dragging(page, 0, "left_wrist", (10, -20), (30, -60)):
+        pass
+    await shows(page, "quadrille.state.timeline[10]?.keyframe", 30)
+    await page.mouse.dblclick(*await place_of(page, 5))
+    await shows(page, "quadrille.state.range?.first === 0 && quadrille.state.range.last === 10")
+    await page.keyboard.press("Shift+I")
+    await shows(page, "document.querySelector('#range-work').textContent === 'interpolated 9 frames'", 30)
+    sources = "[0, 1, 9, 10].map((k) => quadrille.state.timeline[k]?.source).join()"
+    await shows(page, f"{sources} === 'manual,interpolated,interpolated,manual'")
+    await page.locator("#range-reviewed").click()
+    await shows(page, "quadrille.state.timeline[4]?.reviewed", 30)
+    await page.locator("#range-clear").click()
+    await shows(page, "Object.keys(quadrille.state.timeline).length === 2", 30)
+    store = AnnotationStore(folder / "annotations.sqlite", read_only=True)
+    assert [row.frame for row in store.frames("person")] == [0, 10]
+    for expected in ("quadrille.state.timeline[4]?.reviewed", "!quadrille.state.timeline[4].reviewed",
+                     "!quadrille.state.timeline[4] && quadrille.state.timeline[10]"):  # fmt: skip
+        await page.keyboard.press("Control+z")
+        await shows(page, expected, 30)
+    assert [row.frame for row in store.frames("person")] == [0, 10]
+    store.close()
+
+
+async def place_of(page, frame):
+    box, state = await page.locator("#timeline").bounding_box(), await state_of(page)
+    return box["x"] + 52 + (frame + 0.5) * (box["width"] - 60) / state["session"]["n_frames"], box["y"] + 40

@@ -1,0 +1,269 @@
+"""Panes against `fake_endpoint`: what is drawn where, and what a hand in a pane sends."""
+
+import asyncio
+
+import pytest
+from fake_endpoint import FakeEndpoint, project
+from page_driver import dragging, handle_of, shows, state_of, to_client, until
+
+PIXEL = """([x, y]) => {
+  const canvas = document.querySelector(".pane-overlay");
+  const box = canvas.getBoundingClientRect();
+  const at = [Math.round((x - box.left) * devicePixelRatio), Math.round((y - box.top) * devicePixelRatio)];
+  return [...canvas.getContext("2d").getImageData(...at, 1, 1).data];
+}"""
+"""JavaScript: the colour of the first pane at a place of the window."""
+
+
+async def test_all_cameras_are_shown_with_names_and_costs(page):
+    assert await page.locator(".pane").count() == 4
+    assert await page.locator(".pane-name").all_inner_texts() == ["FRONT", "RIGHT", "BACK", "LEFT"]
+    assert await page.locator(".pane-cost").all_inner_texts() == ["0.84 px", "1.10 px", "2.31 px", "–"]
+    assert await page.locator("#cost").inner_text() == "1.47"
+    assert await page.locator("#session-name").inner_text() == "elbow_rotation"
+    assert await page.locator("#people-group").is_hidden()
+
+
+async def test_image_and_vectors_are_drawn_where_the_maths_says(page, endpoint):
+    # A model contour's colour lies where the view puts its first segment.
+    segment = endpoint.outline(0, 0, 0.0)[8]
+    x, y = await to_client(page, 0, *segment[:2])
+    found = await page.evaluate(PIXEL, [x, y])
+    assert found[3] > 200
+    assert found[0] > found[2] + 60  # orange
+
+
+@pytest.mark.parametrize("zoomed", [False, True])
+async def test_a_drag_sends_undistorted_pixels_within_half_a_pixel(page, endpoint, zoomed):
+    if zoomed:
+        at = await to_client(page, 0, *await handle_of(page, 0, "l_wrist"))
+        await page.mouse.move(at[0] - 40, at[1] + 25)
+        await page.mouse.wheel(0, -700)
+        await page.mouse.down(button="middle")
+        await page.mouse.move(at[0] - 90, at[1] + 60, steps=4)
+        await page.mouse.up(button="middle")
+        view = (await state_of(page))["views"][0]
+        assert view["zoom"] == pytest.approx(2.857, rel=0.01)
+    async with dragging(page, 0, "l_wrist", (2, -3), (10.25, -20.5), (17.5, -31.25)) as (u, v):
+        await until(lambda: any(m["u"] == pytest.approx(u + 17.5, abs=0.5) for m in endpoint.heard("drag")))
+    await until(lambda: endpoint.heard("drag")[-1]["phase"] == "end")
+    first, *moves, last = endpoint.heard("drag")
+    assert (first["phase"], first["camera"], first["point"]) == ("start", 0, "l_wrist")
+    assert (first["u"], first["v"]) == (pytest.approx(u), pytest.approx(v))
+    assert {m["phase"] for m in moves} == {"move"}
+    assert last["u"] == pytest.approx(u + 17.5, abs=0.5)
+    assert last["v"] == pytest.approx(v - 31.25, abs=0.5)
+    numbers = [m["seq"] for m in endpoint.heard("drag")]
+    assert numbers == sorted(set(numbers))
+    # The figure follows in every view: what was dragged is drawn where it was dropped.
+    await shows(page, f"quadrille.state.overlay.seq === {numbers[-1]}")
+    assert await handle_of(page, 0, "l_wrist") == pytest.approx((u + 17.5, v - 31.25), abs=0.5)
+    ((u2, v2),) = project(endpoint.pose[0, "l_wrist"][None], 2)
+    assert await handle_of(page, 2, "l_wrist") == pytest.approx((u2, v2), abs=0.01)
+
+
+async def test_a_move_is_told_before_the_browser_gets_to_the_next_frame(page, endpoint):
+    """The browser tells each move at once by an event of its own; the one that all know waits for a frame."""
+    told = """([x, y]) => {
+      const at = { pointerId: 1, clientX: x, clientY: y };
+      document.querySelectorAll(".pane-overlay")[1].dispatchEvent(new PointerEvent("pointerrawupdate", at));
+    }"""
+    async with dragging(page, 1, "l_wrist", (5, 5), (10, 10)) as (u, v):
+        await asyncio.sleep(0.1)
+        await page.evaluate(told, list(await to_client(page, 1, u + 33, v - 21)))
+        await until(lambda: endpoint.heard("drag")[-1]["u"] == pytest.approx(u + 33, abs=0.01))
+        assert endpoint.heard("drag")[-1]["v"] == pytest.approx(v - 21, abs=0.01)
+
+
+async def test_a_grab_beside_the_joint_keeps_the_distance(page, endpoint):
+    u, v = await handle_of(page, 1, "head")
+    x, y = await to_client(page, 1, u, v)
+    await page.mouse.move(x + 7, y - 5)
+    await page.mouse.down()
+    await page.mouse.move(x + 7, y + 30, steps=3)
+    await page.mouse.up()
+    await until(lambda: endpoint.heard("drag") and endpoint.heard("drag")[-1]["phase"] == "end")
+    scale = (await state_of(page))["views"][1]["scale"]
+    last = endpoint.heard("drag")[-1]
+    assert (last["u"], last["v"]) == (pytest.approx(u, abs=0.5), pytest.approx(v + 35 / scale, abs=0.5))
+
+
+async def test_beyond_twelve_pixels_nothing_is_grabbed_and_the_view_moves(page, endpoint):
+    u, v = await handle_of(page, 0, "head")
+    x, y = await to_client(page, 0, u, v)
+    await page.mouse.move(x, y - 14)
+    await page.mouse.down()
+    await page.mouse.move(x + 40, y - 14, steps=3)
+    await page.mouse.up()
+    assert await to_client(page, 0, u, v) == pytest.approx((x + 40, y), abs=0.01)
+    assert not endpoint.heard("drag")
+    assert not endpoint.heard("select")
+
+
+async def test_a_click_selects_without_editing(page, endpoint):
+    x, y = await to_client(page, 0, *await handle_of(page, 0, "l_elbow"))
+    await page.mouse.move(x, y)
+    await page.mouse.down()
+    await page.mouse.move(x + 1, y + 2)  # a hand is never quite still
+    await page.mouse.up()
+    await until(lambda: endpoint.heard("select"))
+    assert endpoint.heard("select") == [{"type": "select", "person": 0, "point": "l_elbow"}]
+    assert not endpoint.heard("drag")
+
+
+async def test_escape_takes_a_drag_back(page, endpoint):
+    async with dragging(page, 0, "l_wrist", (5, 5), (30, 30)) as (u, v):
+        await until(lambda: len(endpoint.heard("drag")) >= 2)
+        await page.keyboard.press("Escape")
+        await until(lambda: endpoint.heard("drag")[-1]["phase"] == "cancel")
+        await page.mouse.move(*await to_client(page, 0, u + 60, v + 60))
+    await shows(page, f"quadrille.state.overlay.seq === {endpoint.heard('drag')[-1]['seq']}")
+    assert [m["phase"] for m in endpoint.heard("drag")][-1] == "cancel"
+    assert await handle_of(page, 0, "l_wrist") == pytest.approx((u, v), abs=0.01)
+
+
+async def test_dragging_shows_epipolar_lines_elsewhere_and_measures_itself(page):
+    async with dragging(page, 0, "torso", *[(2 * k, -k) for k in range(1, 12)]):
+        await shows(page, "quadrille.state.overlay.paths.some((path) => path.kind === 'epipolar')")
+        paths = (await state_of(page))["overlay"]["paths"]
+        assert {path["camera"] for path in paths if path["kind"] == "epipolar"} == {1, 2, 3}
+    await shows(page, "!quadrille.state.overlay.paths.some((path) => path.kind === 'epipolar')")
+    latencies = await page.evaluate("quadrille.latencies")
+    assert 5 <= len(latencies) <= 12
+    assert all(0 < ms < 1000 for ms in latencies)
+
+
+async def test_hover_names_the_joint_in_all_panes(page):
+    await page.mouse.move(*await to_client(page, 3, *await handle_of(page, 3, "head")))
+    await shows(page, "quadrille.state.hover?.point === 'head'")
+    await page.mouse.move(5, 5)
+    await shows(page, "quadrille.state.hover === null")
+
+
+async def test_a_pane_fills_the_grid_by_key_and_double_click(page):
+    await page.keyboard.press("3")
+    await shows(page, "quadrille.state.filled === 2")
+    assert [await p.is_visible() for p in await page.locator(".pane").all()] == [False, False, True, False]
+    box = await page.locator(".pane:visible").bounding_box()
+    await page.mouse.dblclick(box["x"] + 60, box["y"] + 200)
+    await shows(page, "quadrille.state.filled === null")
+    assert await page.locator(".pane:visible").count() == 4
+
+
+async def test_zoom_stays_at_the_pointer_and_zero_resets_it(page):
+    # The wheel reports whole pixels: what must stay is what lies under one.
+    x, y = map(round, await to_client(page, 1, 100, 100))
+    pane = await page.locator(".pane").nth(1).bounding_box()
+    view = (await state_of(page))["views"][1]
+    u = (x - pane["x"] - view["origin"]["x"]) / view["scale"]
+    v = (y - pane["y"] - view["origin"]["y"]) / view["scale"]
+    await page.mouse.move(x, y)
+    await page.mouse.wheel(0, -500)
+    await shows(page, "quadrille.state.views[1].zoom > 2")
+    assert await to_client(page, 1, u, v) == pytest.approx((x, y), abs=0.01)
+    views = (await state_of(page))["views"]
+    assert views[1]["zoom"] > 2
+    assert views[0]["zoom"] == 1
+    await page.keyboard.press("0")
+    assert await to_client(page, 1, u, v) == pytest.approx((x, y), abs=0.01)
+    assert (await state_of(page))["views"][1]["zoom"] == 1
+
+
+async def test_layers_are_asked_for_and_shown_at_once(page, endpoint):
+    (first,) = endpoint.views
+    assert first["layers"] == ["image", "contours", "joints", "epipolar"]
+    assert first["reductions"] == pytest.approx([1 / view["scale"] for view in (await state_of(page))["views"]])
+    await page.locator("#quick-layers").get_by_text("Distance").click()
+    await shows(page, "'distance 3' in quadrille.state.shown.pictures")
+    await page.locator("#quick-layers").get_by_text("Contours").click()
+    await page.locator("#quick-layers").get_by_text("Joints").click()
+    await shows(page, f"({DRAWN}) === 0")
+    await until(lambda: set(endpoint.views[-1]["layers"]) == {"image", "distance", "epipolar"})
+
+
+DRAWN = """[...document.querySelectorAll(".pane-overlay")].reduce((sum, canvas) => {
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  const people = quadrille.state.session.people.map(({ color }) => parseInt(color.slice(1), 16));
+  for (let i = 0; i < data.length; i += 4)
+    if (people.includes((data[i] << 16) | (data[i + 1] << 8) | data[i + 2])) sum++;
+  return sum;
+}, 0)"""
+"""JavaScript: how many pixels of all panes have exactly a person's colour; the images have none."""
+
+
+async def test_contours_and_joints_are_drawn_in_the_persons_colour(page):
+    await shows(page, f"({DRAWN}) > 200")
+
+
+async def test_layers_change_before_the_program_answers(page, endpoint):
+    async def silence(_message):
+        pass
+
+    endpoint.answer = silence
+    await page.locator("#quick-layers").get_by_text("Contours").click()
+    await page.locator("#quick-layers").get_by_text("Joints").click()
+    await shows(page, f"({DRAWN}) === 0")
+
+
+async def test_hidden_joints_cannot_be_grabbed(page, endpoint):
+    await page.locator("#quick-layers").get_by_text("Joints").click()
+    async with dragging(page, 0, "head", (10, 10), (20, 20)):
+        pass
+    assert not endpoint.heard("drag")
+
+
+async def test_a_minor_joint_gives_way_to_a_neighbour_until_one_zooms_in(page, endpoint):
+    waist = await handle_of(page, 0, "waist")
+    x, y = await to_client(page, 0, *waist)
+    await page.mouse.move(x, y)
+    await shows(page, "quadrille.state.hover?.point === 'torso'")
+    await page.mouse.wheel(0, -1400)
+    await shows(page, "quadrille.state.views[0].zoom > 5")
+    async with dragging(page, 0, "waist", (1, 1), (4, 6)):
+        await until(lambda: any(m["phase"] == "move" for m in endpoint.heard("drag")))
+    assert {m["point"] for m in endpoint.heard("drag")} == {"waist"}
+
+
+async def test_a_minor_joint_in_the_hand_stays_there_as_it_meets_another(page, endpoint):
+    await page.mouse.move(*await to_client(page, 0, *await handle_of(page, 0, "waist")))
+    await page.mouse.wheel(0, -1400)
+    await shows(page, "quadrille.state.views[0].zoom > 5")
+    u, v = await handle_of(page, 0, "torso")
+    x, y = await to_client(page, 0, u, v)
+    beside = [x + 15, y - 7]  # where the name of a joint that lies at x, y is written
+    before = await page.evaluate(PIXEL, beside)
+    async with dragging(page, 0, "waist", (1, 1)):
+        await page.mouse.move(x, y)
+        await until(lambda: endpoint.heard("drag")[-1]["v"] == pytest.approx(v, abs=0.5))
+        await shows(page, f"quadrille.state.overlay.seq === {endpoint.heard('drag')[-1]['seq']}")
+        assert max((await page.evaluate(PIXEL, beside))[:3]) < 60 < max(before[:3])
+    await until(lambda: endpoint.heard("drag")[-1]["phase"] == "end")
+
+
+async def test_the_splitter_moves_by_drag_and_key_within_bounds(page):
+    panes = page.locator("#panes")
+    before = (await panes.bounding_box())["width"]
+    box = await page.locator("#split").bounding_box()
+    await page.mouse.move(box["x"] + 2, 300)
+    await page.mouse.down()
+    await page.mouse.move(700, 300, steps=4)
+    await page.mouse.up()
+    assert (await panes.bounding_box())["width"] == pytest.approx(700, abs=1) != before
+    await page.locator("#split").focus()
+    await page.keyboard.press("ArrowRight")
+    assert (await panes.bounding_box())["width"] == pytest.approx(724, abs=1)
+    for _ in range(40):
+        await page.keyboard.press("ArrowRight")
+    assert (await page.locator("#scene").bounding_box())["width"] >= 290
+
+
+class TestPeople:
+    @pytest.fixture
+    def endpoint(self):
+        return FakeEndpoint(n_people=2, n_cameras=6)
+
+    async def test_six_cameras_and_two_people(self, page, endpoint):
+        assert await page.locator(".pane:visible").count() == 6
+        await page.locator("#people input").nth(1).check(force=True)
+        await until(lambda: endpoint.heard("select"))
+        assert endpoint.heard("select") == [{"type": "select", "person": 1, "point": None}]

@@ -1,0 +1,184 @@
+"""For whoever cannot see well, or has no mouse: names, contrast, focus, motion, and a page that does not jump."""
+
+import pytest
+from page_driver import dragging, shows, state_of, until
+
+from tracker.store.records import SOURCES
+
+LUMINANCE = """(color) => {
+  const context = new OffscreenCanvas(1, 1).getContext('2d');
+  context.fillStyle = color;
+  context.fillRect(0, 0, 1, 1);
+  const [r, g, b] = [...context.getImageData(0, 0, 1, 1).data].map((c) => {
+    const share = c / 255;
+    return share <= 0.04045 ? share / 12.92 : ((share + 0.055) / 1.055) ** 2.4;
+  });
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+}"""
+TEXT = [
+    *((text, ground) for text in ("text", "muted") for ground in ("chrome", "raised", "pressed", "stage", "plot")),
+    *((text, ground) for text in ("bad", "accent") for ground in ("chrome", "raised")),
+    ("on-accent", "accent"),
+]
+MARKS = [
+    *((mark, "chrome") for mark in ("accent", "good", "bad", "status-good", "status-doubtful", "status-lost")),
+    *((f"series-{i}", "plot") for i in range(8)),
+    *((f"source-{source}", "track") for source in SOURCES),
+]
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+async def test_colours_are_told_apart(page, scheme):
+    """WCAG AA: 4.5 to 1 for text, 3 to 1 for what is not text."""
+    await page.emulate_media(color_scheme=scheme)
+    poor = await page.evaluate(
+        f"""([text, marks]) => {{
+          const luminance = {LUMINANCE};
+          const style = getComputedStyle(document.documentElement);
+          const of = (name) => luminance(style.getPropertyValue(`--${{name}}`));
+          const ratio = ([a, b]) => {{
+            const [low, high] = [of(a), of(b)].sort((x, y) => x - y);
+            return (high + 0.05) / (low + 0.05);
+          }};
+          const below = (pairs, least) => pairs.filter((p) => !(ratio(p) >= least)).map((p) => [...p, ratio(p)]);
+          return [...below(text, 4.5), ...below(marks, 3)];
+        }}""",
+        [TEXT, MARKS],
+    )
+    assert poor == []
+
+
+async def test_every_control_has_a_name_and_a_title_in_every_panel(page):
+    session = await page.context.new_cdp_session(page)
+    roles = {
+        "button", "checkbox", "combobox", "radio", "searchbox", "slider", "spinbutton", "switch", "textbox", "tab",
+        "splitter", "Iframe", "listbox", "option",
+    }  # fmt: skip
+    for key in ("", "a", "h", "Shift+H", "i", "c", "b", "Control+k", "?"):
+        if key:
+            await page.keyboard.press(key)
+        tree = (await session.send("Accessibility.getFullAXTree"))["nodes"]
+        unnamed = [
+            node["role"]["value"]
+            for node in tree
+            if not node.get("ignored")
+            and node.get("role", {}).get("value") in roles
+            and not node.get("name", {}).get("value", "").strip()
+        ]
+        assert unnamed == [], key
+        untitled = await page.evaluate(
+            """() => [...document.querySelectorAll('button, input, select, summary, [role=slider], [role=separator]')]
+              .filter((one) => one.checkVisibility() && !one.closest('[title]') && !one.labels?.[0]?.title)
+              .map((one) => one.outerHTML.slice(0, 120))"""
+        )
+        assert untitled == [], key
+        await page.keyboard.press("Escape")
+
+
+async def test_all_is_reached_by_tab_and_the_focus_is_seen(page):
+    await page.set_viewport_size({"width": 1280, "height": 720})
+    reached, unseen = set(), []
+    for _ in range(90):
+        await page.keyboard.press("Tab")
+        found = await page.evaluate(
+            """() => {
+              const one = document.activeElement;
+              const mark = one.matches('.segmented input') ? one.nextElementSibling : one;
+              const box = mark.getBoundingClientRect();
+              const isWithin = box.width > 0 && box.right <= innerWidth + 1 && box.bottom <= innerHeight + 1
+                && box.left >= -1 && box.top >= -1;
+              const seen = one.matches('iframe, body') || (isWithin && getComputedStyle(mark).outlineStyle !== 'none');
+              return [one.id || one.getAttribute('aria-label') || one.tagName, seen];
+            }"""
+        )
+        reached.add(found[0])
+        if not found[1]:
+            unseen.append(found[0])
+    assert unseen == []
+    assert {"show-layers", "search-frame", "undo", "show-history", "joint-name", "play", "frame", "timeline"} <= reached
+
+
+async def test_a_keyboard_alone_does_a_round_of_work(page, endpoint):
+    await page.keyboard.press("Tab")
+    await page.keyboard.press("Control+k")
+    await page.keyboard.type("12")
+    await page.keyboard.press("Escape")
+    await page.keyboard.press("h")
+    await until(lambda: endpoint.heard("history") == [{"type": "history", "limit": 100}])
+    entries = [
+        {"edit": k, "label": f"drag torso, frame {k}", "author": "ada", "time": "2026-01-01T10:00:00Z", "undone": k > 2}
+        for k in (3, 2, 1)
+    ]
+    await endpoint.broadcast({"type": "history", "entries": entries, "later": False, "earlier": False})
+    await shows(page, "document.activeElement.getAttribute('aria-current') === 'step'")
+    assert "frame 2" in await page.evaluate("document.activeElement.textContent")
+    await page.keyboard.press("ArrowDown")
+    await page.keyboard.press("Enter")
+    await until(lambda: endpoint.heard("go_to") == [{"type": "go_to", "edit": 1}])
+    await page.keyboard.press("Escape")
+    await until(lambda: endpoint.heard("history")[-1]["limit"] == 0)
+    await page.keyboard.press("Period")
+    await shows(page, "quadrille.state.shown.frame === 13")
+
+
+async def test_the_live_region_says_what_changed(page, endpoint):
+    await page.keyboard.press("Period")
+    await shows(page, "document.querySelector('#announcer').textContent.startsWith('frame 13')")
+    endpoint.state |= {"undo": "drag r_knee, frame 13"}
+    await endpoint.broadcast(endpoint.state)
+    await shows(page, "document.querySelector('#announcer').textContent === 'drag r_knee, frame 13.'")
+
+
+async def test_nothing_jumps_while_work_is_under_way(page, endpoint):
+    await page.set_viewport_size({"width": 1280, "height": 720})
+    await shows(page, "quadrille.state.views[0].scale > 0.5")
+    await page.evaluate(
+        """() => {
+          window.shifts = [];
+          new PerformanceObserver((list) => {
+            for (const entry of list.getEntries()) {
+              for (const { node, previousRect: a, currentRect: b } of entry.sources) {
+                if (!node) continue;
+                window.shifts.push(`${node.id || node.className || node.nodeName}: ${a.x},${a.y} -> ${b.x},${b.y}`);
+              }
+            }
+          }).observe({ type: 'layout-shift', buffered: false });
+        }"""
+    )
+    await page.keyboard.press("f")
+    await shows(page, "!quadrille.state.state.job.running && quadrille.state.state.job.message", timeout_s=20.0)
+    await page.keyboard.press("t")
+    await shows(page, "quadrille.state.state.track.done > 12", timeout_s=20.0)
+    await page.keyboard.press("Escape")
+    await shows(
+        page, "!quadrille.state.state.track.running && quadrille.state.overlay.frame === quadrille.state.shown.frame"
+    )
+    async with dragging(page, 0, "l_wrist", *[(4 * k, -3 * k) for k in range(12)]):
+        pass
+    await endpoint.broadcast({"type": "notice", "level": "error", "text": "the frame 9 is out of range"})
+    await page.get_by_role("alert").wait_for()
+    assert await page.evaluate("shifts") == []
+
+
+async def test_reduced_motion_is_respected(page):
+    await page.emulate_media(reduced_motion="reduce")
+    moving = await page.evaluate(
+        """() => [...document.querySelectorAll('*')].filter((one) => {
+          const style = getComputedStyle(one);
+          const lasts = (times) => times.split(', ').some((time) => parseFloat(time) > 0);
+          return (style.animationName !== 'none' && lasts(style.animationDuration)) ||
+            (style.transitionProperty !== 'none' && lasts(style.transitionDuration));
+        }).map((one) => one.outerHTML.slice(0, 80))"""
+    )
+    assert moving == []
+
+
+async def test_a_change_of_the_systems_scheme_reaches_the_3d_view(page):
+    frame = page.frame_locator("#scene").locator("body")
+    assert await frame.evaluate("() => location.search") == "?darkMode"
+    await page.emulate_media(color_scheme="light")
+    await shows(page, "document.querySelector('#scene').contentWindow.location.search === ''")
+    assert (await state_of(page))["connected"]
+    await page.frame_locator("#scene").locator("body").focus()
+    await page.keyboard.press("Period")
+    await shows(page, "quadrille.state.shown.frame === 13")

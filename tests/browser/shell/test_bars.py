@@ -1,0 +1,181 @@
+"""Keys, top bar and timeline against `fake_endpoint`: what they send and what they say."""
+
+import pytest
+from page_driver import shows, state_of, until
+from playwright.async_api import expect
+
+
+@pytest.mark.parametrize(
+    ("key", "frame"),
+    [
+        ("Period", 13), ("Comma", 11), ("Shift+Period", 22), ("Shift+Comma", 2), ("Home", 0), ("End", 119),
+    ],
+)  # fmt: skip
+async def test_frame_keys(page, endpoint, key, frame):
+    await page.keyboard.press(key)
+    await shows(page, f"quadrille.state.shown.frame === {frame}")
+    assert endpoint.heard("seek") == [{"type": "seek", "frame": frame}]
+    assert await page.locator("#frame").input_value() == str(frame)
+
+
+async def test_frames_end_at_the_ends(page, endpoint):
+    for key in ("Home", "Comma", "Shift+Comma"):
+        await page.keyboard.press(key)
+    await shows(page, "quadrille.state.shown.frame === 0")
+    assert {m["frame"] for m in endpoint.heard("seek")} == {0}
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("Control+z", {"type": "undo"}), ("Control+Shift+z", {"type": "redo"}), ("Control+y", {"type": "redo"}),
+        ("s", {"type": "search", "action": "step", "person": None}),
+        ("f", {"type": "search", "action": "frame", "person": None}),
+    ],
+)  # fmt: skip
+async def test_keys_send_one_message(page, endpoint, key, message):
+    await page.keyboard.press(key)
+    await until(lambda: endpoint.received)
+    assert endpoint.received == [message]
+
+
+async def test_keys_written_into_the_frame_number_go_there(page, endpoint):
+    await page.locator("#frame").click()
+    await page.keyboard.type("33")
+    await page.keyboard.press("s")
+    await page.keyboard.press("Enter")
+    await shows(page, "quadrille.state.shown.frame === 33")
+    assert endpoint.received == [{"type": "seek", "frame": 33}]
+
+
+async def test_a_search_is_watched_and_stopped(page, endpoint):
+    stop = page.locator("#search-stop")
+    assert await stop.is_disabled()
+    await page.locator("#search-frame").click()
+    await shows(page, "quadrille.state.overlay.paths.some((path) => path.kind === 'candidate')")
+    assert await page.locator("#search-frame").is_disabled()
+    assert "/s" in await page.locator("#search-figures").inner_text()
+    await stop.click()
+    await shows(page, "!quadrille.state.state.job.running")
+    assert await page.locator("#search-stage").inner_text() == "Stopped at 1.21 px after 512 poses"
+    assert await stop.is_disabled()
+    assert [m["action"] for m in endpoint.heard("search")] == ["frame", "stop"]
+    await page.keyboard.press("s")
+    await shows(page, "quadrille.state.state.job.kind === 'step'")
+    await page.keyboard.press("Escape")
+    await until(lambda: [m["action"] for m in endpoint.heard("search")] == ["frame", "stop", "step", "stop"])
+
+
+async def test_history_and_saving_say_what_they_would_do(page, endpoint):
+    assert await page.locator("#undo").get_attribute("title") == "Undo drag l_wrist (Ctrl+Z)"
+    assert await page.locator("#redo").is_disabled()
+    assert await page.locator("#saved").inner_text() == "All saved"
+    endpoint.state |= {"saved": False, "save_error": "the disk is full", "undo": None, "redo": "search"}
+    await endpoint.broadcast(endpoint.state)
+    await shows(page, "document.querySelector('#saved').textContent === 'Not saved'")
+    assert "Not saved: the disk is full" in await page.locator("#saved").get_attribute("title")
+    assert await page.locator("#saved").get_attribute("class") == "is-failed"
+    assert await page.locator("#undo").is_disabled()
+
+
+async def test_notices_are_shown_and_dismissed(page, endpoint):
+    notice = {"type": "notice", "level": "error", "text": "the frame 9 is out of range"}
+    await endpoint.broadcast(notice)
+    await endpoint.broadcast(notice)
+    alert = page.get_by_role("alert")
+    await alert.wait_for()
+    assert await alert.count() == 1
+    await alert.get_by_label("Dismiss").click()
+    assert await alert.count() == 0
+
+
+async def test_the_list_of_keys_opens_and_closes(page, endpoint):
+    await page.keyboard.press("?")
+    dialog = page.get_by_role("dialog")
+    await dialog.wait_for()
+    assert await dialog.locator("dt").count() >= 24
+    await page.keyboard.press("s")
+    await page.keyboard.press("Escape")
+    await dialog.wait_for(state="hidden")
+    assert not endpoint.received
+
+
+async def test_scrubbing_asks_for_one_frame_at_a_time_and_ends_at_the_last(page, endpoint):
+    endpoint.image_delay_s = 0.05  # 200 ms a frame
+    box = await page.locator("#timeline").bounding_box()
+    y = box["y"] + box["height"] - 14
+    await page.mouse.move(box["x"] + 20, y)
+    await page.mouse.down()
+    for x in range(30, 1200, 20):
+        await page.mouse.move(box["x"] + x, y)
+    await page.mouse.up()
+    wanted = (await state_of(page))["target"]
+    await shows(page, f"quadrille.state.shown.frame === {wanted}")
+    assert wanted > 95
+    assert 2 <= len(endpoint.heard("seek")) < 40
+    assert endpoint.heard("seek")[-1]["frame"] == wanted
+
+
+async def test_playback_keeps_no_backlog_and_stops_at_the_end(page, endpoint):
+    endpoint.image_delay_s = 0.03  # 120 ms a frame, far slower than 30 fps
+    await page.keyboard.press("Shift+Period")
+    for _ in range(7):
+        await page.keyboard.press("Shift+Period")
+    await shows(page, "quadrille.state.shown.frame === 92")
+    endpoint.received.clear()
+    await page.keyboard.press("Space")
+    await shows(page, "!quadrille.state.playing && quadrille.state.shown.frame === 119", timeout_s=10.0)
+    frames = [m["frame"] for m in endpoint.heard("seek")]
+    assert frames == sorted(set(frames))
+    assert len(frames) < 20
+
+
+@pytest.mark.parametrize(("width", "height", "scale"), [(1280, 720, 0.5), (1100, 680, 0.5)])
+async def test_nothing_is_cut_off_in_small_windows(page, width, height, scale):
+    await page.set_viewport_size({"width": width, "height": height})
+    help_box = await page.locator("#show-help").bounding_box()
+    assert help_box["x"] + help_box["width"] <= width
+    curves = await page.locator("#show-curves").bounding_box()
+    assert curves["x"] + curves["width"] <= width
+    timeline = await page.locator("#timeline").bounding_box()
+    assert timeline["y"] + timeline["height"] <= height
+    assert await page.evaluate("document.documentElement.scrollWidth") == width
+    await shows(page, f"quadrille.state.views[0].scale > {scale}")
+
+
+async def test_every_control_has_a_name_and_a_tooltip(page):
+    unnamed = await page.evaluate(
+        """() => [...document.querySelectorAll("button")].filter((button) =>
+          !(button.title && (button.textContent.trim() || button.ariaLabel))).map((b) => b.outerHTML)"""
+    )
+    assert unnamed == []
+
+
+async def test_that_kernels_are_compiled_is_said_while_they_are(page, endpoint):
+    mark = page.locator("#compiling")
+    assert not await mark.is_visible()
+    endpoint.state["compiling"] = True
+    await endpoint.broadcast(endpoint.state)
+    await mark.wait_for(state="visible")
+    assert await mark.inner_text() == "Compiling"
+    endpoint.state["compiling"] = False
+    await endpoint.broadcast(endpoint.state)
+    await mark.wait_for(state="hidden")
+
+
+async def test_work_that_waits_for_kernels_says_so(page, endpoint):
+    figures = page.locator("#search-figures")
+    track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "total": 18}
+    for compiling, done, text in ((True, 0, "waits for the compiler"), (False, 0, "0.0/s"), (True, 3, "0.0/s")):
+        endpoint.state |= {"compiling": compiling, "track": track | {"done": done}}
+        await endpoint.broadcast(endpoint.state)
+        await expect(figures).to_have_text(text)
+
+
+async def test_the_second_pass_is_told_from_the_first(page, endpoint):
+    track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "at": 30, "lost": 2}
+    for back, text in ((False, "Tracked 4 of 9"), (True, "Followed 4 of 9")):
+        endpoint.state["track"] = track | {"back": back, "done": 4, "total": 9}
+        await endpoint.broadcast(endpoint.state)
+        await expect(page.locator("#search-stage")).to_have_text(text, use_inner_text=True)
+    assert await page.locator("#search-stage").get_attribute("title") == "Following back who was lost"

@@ -1,0 +1,185 @@
+"""The palette, the list of keys, and keys that hold everywhere, against `fake_endpoint`."""
+
+import pytest
+from page_driver import OPENED, shows, to_client, until
+
+
+async def open_palette(page, query=""):
+    await page.keyboard.press("Control+k")
+    await shows(page, "document.querySelector('#palette').open")
+    await page.keyboard.type(query)
+
+
+async def found(page):
+    return await page.locator("#palette-list li > span:first-child").all_inner_texts()
+
+
+@pytest.mark.parametrize(
+    ("query", "kind", "message"),
+    [
+        ("track back", "track", {"type": "track", "action": "backward", "until": None}),
+        ("57", "seek", {"type": "seek", "frame": 57}),
+        ("go to frame 8", "seek", {"type": "seek", "frame": 8}),
+        ("l elb", "select", {"type": "select", "person": 0, "point": "l_elbow"}),
+        ("undo", "undo", {"type": "undo"}),
+        ("srch one", "search", {"type": "search", "action": "step", "person": None}),
+    ],
+)
+async def test_a_few_letters_and_enter_do_it(page, endpoint, query, kind, message):
+    await open_palette(page, query)
+    await page.keyboard.press("Enter")
+    await until(lambda: endpoint.heard(kind) == [message])
+    assert not await page.locator("#palette").is_visible()
+
+
+async def test_layers_and_cameras_are_found_by_name(page, endpoint):
+    await open_palette(page, "hidden cont")
+    await page.keyboard.press("Enter")
+    await shows(page, "quadrille.state.layers.shown.hidden")
+    await open_palette(page, "fill back")
+    await page.keyboard.press("Enter")
+    await shows(page, "quadrille.state.filled === 2")
+
+
+async def test_it_says_why_not(page, endpoint):
+    await open_palette(page, "redo")
+    assert "nothing to redo" in await page.locator("#palette-why").inner_text()
+    await page.keyboard.press("Enter")
+    assert await page.locator("#palette").is_visible()
+    await page.locator("#palette-query").fill("clear range")
+    assert await found(page) == ["Clear"]
+    assert "No range is marked" in await page.locator("#palette-why").inner_text()
+    await page.locator("#palette-query").fill("500")
+    assert await page.locator("#palette-why").inner_text() == "The last frame is 119."
+    await page.locator("#palette-query").fill("qwrtz")
+    assert "qwrtz" in await page.locator("#palette-why").inner_text()
+    await page.keyboard.press("Enter")
+    await page.keyboard.press("Escape")
+    assert not endpoint.received
+
+
+async def test_what_was_used_lately_comes_first(page):
+    await open_palette(page)
+    first = await found(page)
+    await page.keyboard.type("curves")
+    await page.keyboard.press("Enter")
+    await shows(page, "quadrille.state.drawer !== null")
+    await open_palette(page)
+    again = await found(page)
+    assert again[0] == "Curves"
+    assert first[0] != "Curves"
+    assert again[1:5] == first[:4]
+
+
+async def test_every_key_and_button_is_in_it(page):
+    await open_palette(page)
+    await page.evaluate("document.querySelector('#palette').close()")
+    missing = await page.evaluate(
+        """async () => {
+          const rows = [...document.querySelectorAll('#help-keys dd')].map((d) => d.textContent);
+          document.querySelector('#show-palette').click();
+          const query = document.querySelector('#palette-query');
+          const missing = [];
+          for (const label of rows) {
+            query.value = label.replace(/[^a-zA-Z0-9 ]/g, ' ');
+            query.dispatchEvent(new Event('input'));
+            const found = [...document.querySelectorAll('#palette-list li > span:first-child')];
+            if (!found.some((span) => span.textContent === label)) missing.push(label);
+          }
+          return missing;
+        }"""
+    )
+    # These stand for many keys, and the palette has the places that they lead to one by one.
+    assert [m for m in missing if m != "Commands"] == [
+        "Show or hide a layer, by its number in the menu",
+        "Fill the grid with a camera, and back; two digits for 10 to 16",
+    ]
+
+
+async def test_the_list_of_keys_is_searched_and_fits(page):
+    await page.set_viewport_size({"width": 1280, "height": 720})
+    await page.keyboard.press("?")
+    box = await page.locator("#help").bounding_box()
+    assert box["x"] >= 0
+    assert box["y"] >= 0
+    assert box["x"] + box["width"] <= 1280
+    assert box["y"] + box["height"] <= 720
+    assert await page.evaluate(
+        "document.querySelector('#help .scroller').scrollWidth <= document.querySelector('#help .scroller').clientWidth"
+    )
+    assert "More" not in await page.locator("#help h3").all_inner_texts()  # every key is about something
+    await page.keyboard.type("former doubt")
+    assert await page.locator("#help dd:visible").all_inner_texts() == ["Former doubtful or lost frame"]
+
+
+async def test_undo_holds_in_every_part_of_the_page(page, endpoint):
+    """In a field only what is being typed is undone by the field itself."""
+    await page.locator("#frame").click()
+    await page.keyboard.press("Control+z")
+    await until(lambda: len(endpoint.heard("undo")) == 1)
+    await page.keyboard.type("4")
+    await page.keyboard.press("Control+z")
+    await page.keyboard.press("Escape")
+    await page.locator("#frame").blur()
+    await page.keyboard.press("a")  # the menu of layers
+    await page.locator("#layers-menu input[type=range]").first.focus()
+    await page.keyboard.press("Control+Shift+z")
+    await until(lambda: len(endpoint.heard("redo")) == 1)
+    await (
+        page.frame_locator("#scene")
+        .locator("body")
+        .evaluate("(body) => { const input = document.createElement('input'); body.append(input); input.focus(); }")
+    )
+    await page.keyboard.press("Control+z")
+    await until(lambda: len(endpoint.heard("undo")) == 2)
+    await page.keyboard.press("Control+k")
+    assert await page.locator("#palette").is_visible()
+
+
+async def test_a_key_that_does_nothing_says_why(page, endpoint):
+    await page.keyboard.press("Alt+p")
+    await shows(page, "document.querySelector('.notice:not([hidden]) span')?.textContent.startsWith('No tracking run')")
+    assert not endpoint.received
+
+
+async def test_people_are_changed_by_key_by_name_and_by_a_click(browser, endpoint, address):
+    endpoint.n_people = 2
+    endpoint.__post_init__()
+    page = await (await browser.new_context(viewport={"width": 1280, "height": 720})).new_page()
+    await page.goto(address)
+    await shows(page, OPENED)
+    chosen = page.locator("#people input:checked")
+    for key, person in (("p", 1), ("p", 0), ("Shift+P", 1), ("Shift+P", 0)):
+        await page.keyboard.press(key)
+        await shows(page, f"quadrille.state.state.person === {person}")
+        assert await chosen.input_value() == str(person)
+    await page.get_by_text("person 1", exact=True).first.click()
+    await shows(page, "quadrille.state.state.person === 1")
+    await page.keyboard.press("p")
+    await shows(page, "quadrille.state.state.person === 0")
+    await open_palette(page, "work on person 1")
+    await page.keyboard.press("Enter")
+    await shows(page, "quadrille.state.state.person === 1")
+    handles = await page.evaluate("quadrille.state.overlay.handles")
+    u, v = next((h["u"], h["v"]) for h in handles if h["camera"] == 0 and h["person"] == 0 and h["point"] == "r_wrist")
+    await page.mouse.click(*await to_client(page, 0, u, v))
+    await shows(page, "quadrille.state.state.person === 0 && quadrille.state.state.point === 'r_wrist'")
+    await page.context.close()
+
+
+async def test_one_frame_without_a_pose_is_a_page_too(browser, endpoint, address):
+    endpoint.n_frames = 1
+    endpoint.state |= {
+        "frame": 0, "source": None, "undo": None, "cost_px": None, "view_costs_px": [None] * 4,
+    }  # fmt: skip
+    page = await (await browser.new_context(viewport={"width": 1280, "height": 720})).new_page()
+    errors = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    await page.goto(address)
+    await shows(page, "window.quadrille?.state.shown?.frame === 0 && quadrille.state.overlay")
+    assert await page.locator("#source").inner_text() == "No pose yet"
+    for key in ("Period", "Comma", "End", "Space", "n", "k", "Control+z", "h", "Escape"):
+        await page.keyboard.press(key)
+    assert await page.locator("#frame").input_value() == "0"
+    assert errors == []
+    await page.context.close()

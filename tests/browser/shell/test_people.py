@@ -1,0 +1,86 @@
+"""Two people in the page: chosen, dimmed, hidden; whom searches move, and who is in the hand's reach."""
+
+import pytest_asyncio
+from page_driver import OPENED, handle_of, shows, state_of, to_client, until
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def couple(browser, endpoint, address):
+    """The page on two people, of whom person 0 is worked on."""
+    endpoint.n_people = 2
+    endpoint.__post_init__()
+    context = await browser.new_context(viewport={"width": 1280, "height": 720})
+    page = await context.new_page()
+    errors = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    await page.goto(address)
+    await shows(page, OPENED)
+    yield page
+    await context.close()
+    assert errors == []
+
+
+async def drag_wrist(page, person):
+    x, y = await to_client(page, 0, *await handle_of(page, 0, "r_wrist", person))
+    await page.mouse.move(x, y)
+    await page.mouse.down()
+    await page.mouse.move(x + 12, y, steps=3)
+    await page.mouse.up()
+
+
+async def test_solo_keeps_the_others_out_of_reach(couple, endpoint):
+    await couple.keyboard.press("Shift+A")
+    await shows(couple, "quadrille.state.state.solo")
+    assert await couple.locator("#solo").get_attribute("aria-pressed") == "true"
+    await drag_wrist(couple, 1)
+    assert not endpoint.heard("drag")  # the view has moved
+    await couple.keyboard.press("p")
+    await shows(couple, "quadrille.state.state.person === 1")
+    await drag_wrist(couple, 1)
+    await until(lambda: endpoint.heard("drag"))
+    assert {m["person"] for m in endpoint.heard("drag")} == {1}
+    await couple.click("#solo")
+    await shows(couple, "!quadrille.state.state.solo")
+
+
+async def test_searches_and_fits_are_of_everybody_or_of_one(couple, endpoint):
+    for key in ("s", "g", "Shift+E", "s", "g"):
+        await couple.keyboard.press(key)
+    await until(lambda: len(endpoint.heard("fit")) == 2)
+    assert [m["person"] for m in endpoint.heard("search")] == [None, 0]
+    assert [m["person"] for m in endpoint.heard("fit")] == [None, 0]
+    await shows(couple, "document.querySelector('#search-whose').selectedOptions[0].textContent === 'Only person 0'")
+    await couple.select_option("#search-whose", "all")
+    await couple.keyboard.press("s")
+    await until(lambda: len(endpoint.heard("search")) == 3)
+    assert endpoint.heard("search")[-1]["person"] is None
+
+
+async def test_the_list_chooses_hides_and_copies(couple, endpoint):
+    await couple.keyboard.press("Shift+U")
+    await couple.get_by_label("Show person 1", exact=True).click()
+    await shows(couple, "!quadrille.state.state.people[1].shown")
+    assert await couple.get_by_label("Copy the pose of person 0", exact=True).is_disabled()
+    await couple.get_by_label("Copy the pose of person 1", exact=True).click()
+    await couple.locator("#people-list").get_by_text("person 1").click()
+    await shows(couple, "quadrille.state.state.person === 1")
+    await couple.keyboard.press("Escape")
+    await couple.keyboard.press("Shift+C")
+    await couple.keyboard.press("Shift+V")
+    await shows(couple, "quadrille.state.state.people[1].shown")
+    copies = [(m["person"], m["from"]) for m in endpoint.heard("pose") if m["action"] == "copy_person"]
+    assert copies == [(0, 1), (1, 0)]
+
+
+async def test_each_has_a_lane_and_two_poses_as_good_are_gone_to(couple, endpoint):
+    assert (await state_of(couple))["timeline"]["71"]["ambiguous"]
+    height = (await couple.locator("#timeline").bounding_box())["height"]
+    assert height > 72
+    await couple.keyboard.press("Alt+a")
+    await shows(couple, "quadrille.state.state.frame === 71")
+    assert not await couple.locator("#take-other").is_visible()
+    endpoint.state["people"][1]["others"] = 1
+    await endpoint.broadcast(endpoint.state)
+    await couple.locator("#take-other").click()
+    await couple.keyboard.press("Shift+X")
+    await until(lambda: [m["action"] for m in endpoint.heard("pose")] == ["other", "other"])

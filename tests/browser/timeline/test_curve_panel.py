@@ -1,0 +1,158 @@
+"""The curves against `fake_endpoint`: what is asked for, where it is drawn, and that a click goes to the frame."""
+
+import numpy as np
+import pytest
+import pytest_asyncio
+from fake_endpoint import FakeEndpoint, curve
+from page_driver import shows, state_of, until
+
+GUTTER, PADDING = 52, 8
+
+DRAWN = """([first, last, index]) => {
+  const canvas = document.querySelector("#curves canvas");
+  const count = quadrille.state.session.n_frames;
+  const x = (frame) => Math.round((52 + frame * (canvas.clientWidth - 60) / count) * devicePixelRatio);
+  const context = document.createElement("canvas").getContext("2d");
+  context.fillStyle = getComputedStyle(canvas).getPropertyValue(`--series-${index}`);
+  context.fillRect(0, 0, 1, 1);
+  const [r, g, b] = context.getImageData(0, 0, 1, 1).data;
+  const { data } = canvas.getContext("2d").getImageData(x(first), 0, Math.max(1, x(last) - x(first)), canvas.height);
+  let sum = 0;
+  for (let i = 0; i < data.length; i += 4) if (data[i] === r && data[i + 1] === g && data[i + 2] === b) sum += 1;
+  return sum;
+}"""
+"""JavaScript: how many pixels between two frames have exactly the colour of a curve."""
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def curves(page):
+    """The page with its curves open."""
+    await page.locator("#show-curves").click()
+    await shows(page, "quadrille.state.curves !== null")
+    return page
+
+
+async def place_of(page, frame, height=0.5):
+    box = await page.locator("#curves").bounding_box()
+    n_frames = (await state_of(page))["session"]["n_frames"]
+    x = box["x"] + GUTTER + (frame + 0.5) * (box["width"] - GUTTER - PADDING) / n_frames
+    return x, box["y"] + height * box["height"]
+
+
+async def test_curves_are_sent_only_while_they_are_open(page, endpoint):
+    assert await page.locator("#curves").is_hidden()
+    assert not endpoint.heard("curves")
+    await page.keyboard.press("c")
+    await shows(page, "quadrille.state.curves?.group === 'arms'")
+    await page.get_by_text("Legs", exact=True).click()
+    await shows(page, "quadrille.state.curves.group === 'legs'")
+    await page.keyboard.press("c")
+    await page.locator("#drawer").wait_for(state="hidden")
+    await until(lambda: len(endpoint.heard("curves")) == 3)
+    assert [m["group"] for m in endpoint.heard("curves")] == ["arms", "legs", None]
+
+
+async def test_what_is_open_is_remembered(curves, endpoint):
+    await curves.get_by_text("Torso", exact=True).click()
+    await shows(curves, "quadrille.state.curves.group === 'torso'")
+    await curves.reload()
+    await shows(curves, "quadrille.state.curves?.group === 'torso'")
+    assert await curves.locator("#curves").is_visible()
+
+
+@pytest.mark.parametrize("height", [0.2, 0.7])
+async def test_a_click_goes_to_the_frame_whichever_curve_is_there(curves, endpoint, height):
+    await curves.mouse.click(*await place_of(curves, 77, height))
+    await shows(curves, "quadrille.state.shown.frame === 77")
+    assert endpoint.heard("seek") == [{"type": "seek", "frame": 77}]
+
+
+async def test_curves_and_timeline_share_their_axis(curves, endpoint):
+    x, _ = await place_of(curves, 93)
+    box = await curves.locator("#timeline").bounding_box()
+    await curves.mouse.click(x, box["y"] + 20)
+    await shows(curves, "quadrille.state.shown.frame === 93")
+
+
+async def test_gaps_stay_open(curves):
+    for index in range(4):
+        assert await curves.evaluate(DRAWN, [20, 24, index]) > 0
+        assert await curves.evaluate(DRAWN, [61, 64, index]) == 0
+        assert await curves.evaluate(DRAWN, [102, 118, index]) == 0
+
+
+async def test_the_legend_reads_values_and_switches_curves(curves, endpoint):
+    switches = curves.locator(".legend-switch")
+    assert [t.split("\n")[0] for t in await switches.all_inner_texts()] == [
+        "abduction", "elevation", "twist", "extension",
+    ]  # fmt: skip
+    left, right = float(curve(0, 12)), float(curve(4, 12))
+    values = await switches.nth(0).locator("output").text_content()
+    assert values == f"L {left:.1f}°  R {right:.1f}°"
+    await curves.mouse.move(*await place_of(curves, 40))
+    await shows(curves, f"document.querySelector('.legend-switch output').textContent.startsWith("
+                        f"'L {float(curve(0, 40)):.1f}°')")  # fmt: skip
+    await switches.nth(1).click()
+    await shows(curves, "true")
+    assert await switches.nth(1).get_attribute("aria-pressed") == "false"
+    assert await curves.evaluate(DRAWN, [0, 100, 1]) == 0
+    assert await curves.evaluate(DRAWN, [0, 100, 0]) > 0
+    await switches.nth(1).click()
+    await shows(curves, "true")
+    assert await curves.evaluate(DRAWN, [0, 100, 1]) > 0
+
+
+async def test_angles_are_drawn_without_jumps_of_a_turn(curves):
+    values = await curves.evaluate("[...quadrille.state.curves.series[2].values]")
+    known = np.array([v for v in values if v is not None and np.isfinite(v)])
+    assert np.abs(np.diff(known)).max() < 60  # 7 degrees a frame; the gap of 5 frames between
+    assert known[-1] - known[0] == pytest.approx(7 * 99)
+
+
+async def test_changes_are_taken_over_frame_by_frame(curves, endpoint):
+    before = await curves.evaluate("[...quadrille.state.curves.series[0].values]")
+    await endpoint.send_curves(np.array([3, 110]), replace=False, shift=100.0)
+    await shows(curves, "Number.isFinite(quadrille.state.curves.series[0].values[110])")
+    after = await curves.evaluate("[...quadrille.state.curves.series[0].values]")
+    changed = [i for i in range(120) if before[i] != after[i] and not (before[i] != before[i] and after[i] != after[i])]
+    assert changed == [3, 110]
+    assert after[3] == pytest.approx(before[3] + 100.0, abs=1e-3)
+
+
+async def test_costs_have_a_curve_for_each_view(curves):
+    await curves.locator("#drawer").get_by_text("Cost", exact=True).click()
+    await shows(curves, "quadrille.state.curves.group === 'cost'")
+    names = await curves.locator(".legend-switch").all_inner_texts()
+    assert [n.split("\n")[0] for n in names] == ["mean", "FRONT", "RIGHT", "BACK", "LEFT"]
+    assert " px" in names[0]
+
+
+async def test_they_fit_a_small_screen(curves):
+    await curves.set_viewport_size({"width": 1280, "height": 720})
+    timeline = await curves.locator("#timeline").bounding_box()
+    assert timeline["y"] + timeline["height"] <= 720
+    assert await curves.evaluate("document.documentElement.scrollWidth") == 1280
+    # The bar of the selected joint has its 34 px too.
+    await shows(curves, "quadrille.state.views[0].scale > 0.34")
+
+
+class TestLong:
+    @pytest.fixture
+    def endpoint(self):
+        return FakeEndpoint(n_frames=100_000)
+
+    async def test_a_hundred_thousand_frames_are_drawn_at_once(self, curves):
+        """Redrawn in the time of a few screen refreshes, on a machine without a graphics card."""
+        milliseconds = await curves.evaluate(
+            """async () => {
+              const radio = document.querySelector("input[name=curves][value=arms]");
+              const times = [];
+              for (let i = 0; i < 5; i += 1) {
+                const began = performance.now();
+                document.querySelectorAll(".legend-switch")[0].click();
+                times.push(performance.now() - began);
+              }
+              return times.sort((a, b) => a - b)[2];
+            }"""
+        )
+        assert milliseconds < 150

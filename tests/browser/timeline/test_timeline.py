@@ -1,0 +1,256 @@
+"""The timeline against `fake_endpoint`: playing, jumping, zooming, and what is done with a range."""
+
+from itertools import pairwise
+
+import pytest
+from page_driver import shows, state_of, until
+
+GUTTER, PADDING = 52, 8
+
+
+async def box_of(page):
+    return await page.locator("#timeline").bounding_box()
+
+
+async def place_of(page, frame, overview=False):
+    """Where a frame lies on the timeline, or on the strip of the whole recording; window pixels."""
+    box, state = await box_of(page), await state_of(page)
+    n = state["session"]["n_frames"]
+    span = (not overview and state["visible"]) or {"start": 0, "end": n}
+    share = (frame + 0.5 - span["start"]) / (span["end"] - span["start"])
+    return box["x"] + GUTTER + share * (box["width"] - GUTTER - PADDING), box["y"] + (67 if overview else 40)
+
+
+async def mark(page, first, last):
+    await page.keyboard.down("Shift")
+    await page.mouse.move(*await place_of(page, first))
+    await page.mouse.down()
+    await page.mouse.move(*await place_of(page, last), steps=4)
+    await page.mouse.up()
+    await page.keyboard.up("Shift")
+    assert (await state_of(page))["range"] == {"first": first, "last": last}
+
+
+async def go_to(page, frame):
+    await page.locator("#frame").fill(str(frame))
+    await page.keyboard.press("Enter")
+    await shows(page, f"quadrille.state.shown.frame === {frame}")
+
+
+async def played(page, endpoint, enough):
+    """When frames were asked for while a clip played, s, and which, until there are enough of them."""
+    before = len(endpoint.heard("seek"))
+    await page.keyboard.press("Space")
+    await until(lambda: enough([m["frame"] for m in endpoint.heard("seek")[before:]]), 20)
+    if (await state_of(page))["playing"]:  # a quick clip may have come to its end
+        await page.keyboard.press("Space")
+    await shows(page, "!quadrille.state.playing")
+    seeks = endpoint.heard("seek")[before:]
+    return endpoint.seek_times[before:], [m["frame"] for m in seeks]
+
+
+@pytest.mark.parametrize("rate", ["0.25", "1", "2"])
+async def test_a_clip_plays_at_its_rate(page, endpoint, rate):
+    await page.locator("#rate").select_option(rate)
+    times, frames = await played(page, endpoint, lambda f: len(f) > 1 and f[-1] - f[0] > 8)
+    assert frames == sorted(set(frames))
+    # A seek leaves when its frame is due, a frame or a moment late.
+    found = (frames[-1] - frames[0]) / (times[-1] - times[0]) / 30
+    assert 0.4 * float(rate) < found < 1.4 * float(rate)  # a busy machine draws seldom, and is late for it
+
+
+async def test_keys_change_the_rate(page):
+    for key, rate in (("Quote", 2), ("Quote", 4), ("Quote", 4), ("Semicolon", 2), ("Semicolon", 1), ("Semicolon", 0.5)):
+        await page.keyboard.press(key)
+        await shows(page, f"quadrille.state.rate === {rate} && document.querySelector('#rate').value === '{rate}'")
+
+
+async def test_frames_that_would_come_late_are_skipped_or_waited_for(page, endpoint):
+    endpoint.image_delay_s = 0.03  # 8 frames a second of 4 cameras
+    _, skipping = await played(page, endpoint, lambda f: len(f) > 4)
+    assert max(b - a for a, b in pairwise(skipping)) > 1
+    await page.locator("#every-frame").click()
+    await go_to(page, 12)
+    _, every = await played(page, endpoint, lambda f: len(f) > 4)
+    assert every == list(range(every[0], every[0] + len(every)))
+
+
+async def test_playing_ends_at_the_last_frame_and_begins_anew(page, endpoint):
+    await go_to(page, 115)
+    await page.keyboard.press("Space")
+    await shows(page, "quadrille.state.shown.frame === 119 && !quadrille.state.playing")
+    await page.keyboard.press("Space")
+    await shows(page, "quadrille.state.shown.frame < 60 && quadrille.state.playing")
+    await page.keyboard.press("Space")
+
+
+async def test_a_loop_goes_round_the_marked_range(page, endpoint):
+    await mark(page, 40, 46)
+    await page.keyboard.press("Shift+Space")
+    await shows(page, "document.querySelector('#loop').getAttribute('aria-pressed') === 'true'")
+    await page.locator("#every-frame").click()
+    _, frames = await played(page, endpoint, lambda f: f.count(40) > 2)
+    assert frames[:15] == [*range(40, 47), *range(40, 47), 40]
+    await page.keyboard.press("Shift+Space")
+    await shows(page, "!quadrille.state.loops")
+
+
+async def test_a_hand_that_goes_elsewhere_while_it_plays_is_followed(page, endpoint):
+    await page.keyboard.press("Space")
+    await shows(page, "quadrille.state.shown.frame > 20")
+    await page.keyboard.press("Home")
+    frames = [m["frame"] for m in endpoint.heard("seek")]
+    await until(lambda: [m["frame"] for m in endpoint.heard("seek")].count(0), 10)
+    await until(lambda: len(endpoint.heard("seek")) > len(frames) + 4, 10)
+    await page.keyboard.press("Space")
+    frames = [m["frame"] for m in endpoint.heard("seek")]
+    home = frames.index(0)
+    for frame, at in zip(frames[home + 1 :], endpoint.seek_times[home + 1 :], strict=False):
+        assert 0 < frame <= 30 * (at - endpoint.seek_times[home]) + 3
+
+
+async def test_the_wheel_zooms_where_the_pointer_is(page):
+    x, y = await place_of(page, 70)
+    await page.mouse.move(x, y)
+    await page.keyboard.down("Control")
+    await page.mouse.wheel(0, -500)
+    await page.keyboard.up("Control")
+    await shows(page, "quadrille.state.visible?.end - quadrille.state.visible?.start < 60")
+    assert (await place_of(page, 70))[0] == pytest.approx(x, abs=3.0)
+    before = (await state_of(page))["visible"]
+    await page.mouse.wheel(0, 60)
+    await shows(page, f"quadrille.state.visible.start > {before['start']} + 1")
+    after = (await state_of(page))["visible"]
+    assert after["end"] - after["start"] == pytest.approx(before["end"] - before["start"])
+    await page.mouse.click(*await place_of(page, 75))
+    await shows(page, "quadrille.state.shown.frame === 75")
+    await page.keyboard.down("Control")
+    await page.mouse.wheel(0, 3000)
+    await page.keyboard.up("Control")
+    await shows(page, "quadrille.state.visible === null")
+
+
+async def test_what_is_zoomed_is_moved_by_the_middle_button_and_by_the_overview(page):
+    for _ in range(4):
+        await page.keyboard.press("z")
+    await shows(page, "quadrille.state.visible?.end - quadrille.state.visible?.start < 20")
+    x, y = await place_of(page, 14)
+    await page.mouse.move(x, y)
+    await page.mouse.down(button="middle")
+    await page.mouse.move(x - 300, y, steps=3)
+    await page.mouse.up(button="middle")
+    assert (await place_of(page, 14))[0] == pytest.approx(x - 300, abs=1.0)
+    await page.mouse.click(*await place_of(page, 90, overview=True))
+    await shows(page, "quadrille.state.visible.start < 90 && quadrille.state.visible.end > 90")
+    assert (await state_of(page))["shown"]["frame"] == 12  # to look around is not to go there
+    await page.keyboard.press("Period")
+    await shows(
+        page, "quadrille.state.shown.frame === 13 && quadrille.state.visible.start <= 13"
+    )  # it comes back to view
+    await page.keyboard.press("Alt+z")
+    await shows(page, "quadrille.state.visible === null")
+
+
+async def test_timeline_and_curves_share_the_zoom(page):
+    await page.keyboard.press("c")
+    await shows(page, "quadrille.state.curves")
+    stage = await page.locator("#curves").bounding_box()
+    x, _ = await place_of(page, 30)
+    await page.mouse.move(x, stage["y"] + 40)
+    await page.keyboard.down("Control")
+    await page.mouse.wheel(0, -400)
+    await page.keyboard.up("Control")
+    await shows(page, "quadrille.state.visible !== null")
+    assert (await place_of(page, 30))[0] == pytest.approx(x, abs=3.0)
+    await page.mouse.click((await place_of(page, 33))[0], stage["y"] + 40)
+    await shows(page, "quadrille.state.shown.frame === 33")
+    await page.keyboard.press("c")
+
+
+async def test_the_menu_counts_what_there_is_to_go_to(page):
+    await page.locator("#show-jumps").click()
+    await page.keyboard.press("Escape")
+    assert await page.locator("#jump-menu").is_hidden()
+    await page.locator("#show-jumps").click()
+    rows = page.locator("#jump-menu .jump-row")
+    counts = {await r.locator("span").inner_text(): await r.locator("output").inner_text() for r in await rows.all()}
+    assert counts == {
+        "Doubtful or lost": "3", "Two poses as good": "2", "Not reviewed": "80", "Disagreeing": "2", "Keyframes": "5",
+        "Without a pose": "20",
+    }  # fmt: skip
+    await rows.nth(3).locator("button").nth(1).click()
+    await shows(page, "quadrille.state.shown.frame === 44")
+    await page.locator(".jump-gap").click()
+    await shows(page, "quadrille.state.shown.frame === 100")
+    await page.keyboard.press("Escape")
+    assert await page.locator("#jump-menu").is_hidden()
+
+
+async def test_jumps_by_keys(page):
+    for key, frame in (
+        ("d", 44), ("d", 45), ("d", 45), ("Shift+D", 44), ("w", 60), ("w", 80), ("Shift+W", 60), ("Alt+n", 61),
+        ("Alt+Shift+N", 59), ("q", 100), ("n", 100), ("Shift+N", 50),
+    ):  # fmt: skip
+        await page.keyboard.press(key)
+        await shows(page, f"quadrille.state.shown.frame === {frame}")
+
+
+async def test_a_double_click_marks_the_stretch_between_keyframes(page):
+    await page.mouse.dblclick(*await place_of(page, 33))
+    await shows(page, "quadrille.state.range?.first === 20 && quadrille.state.range.last === 40")
+    await page.mouse.dblclick(*await place_of(page, 110))
+    await shows(page, "quadrille.state.range?.first === 80 && quadrille.state.range.last === 119")
+
+
+async def test_a_range_is_worked_on_from_its_bar(page, endpoint):
+    assert await page.locator("#range-bar").is_hidden()
+    await mark(page, 24, 36)
+    assert await page.locator("#range-text").inner_text() == "Frames 24 – 36"
+    assert await page.locator("#range-work").inner_text() == "13 frames"
+    names = ["backward", "forward", "interpolate", "clear", "keyframe", "reviewed", "unreviewed"]
+    for name in names:
+        await page.locator(f"#range-{name}").click()
+    await page.keyboard.press("Shift+I")
+    await until(lambda: len(endpoint.heard("range")) == 8)
+    assert [m["action"] for m in endpoint.heard("range")] == [
+        "track_backward", "track_forward", "interpolate", "clear", "keyframe", "reviewed", "unreviewed", "interpolate",
+    ]  # fmt: skip
+    assert {(m["first"], m["last"], m["person"]) for m in endpoint.heard("range")} == {(24, 36, None)}
+    endpoint.state["range"] |= {"running": True, "what": "interpolating", "done": 500, "total": 12000}
+    await endpoint.broadcast(endpoint.state)
+    await shows(page, "document.querySelector('#range-work').textContent === 'interpolating 500 of 12,000'")
+    assert await page.locator("#range-clear").is_disabled()
+    await page.locator("#range-stop").click()
+    await until(lambda: endpoint.heard("stop_range"))
+    endpoint.state["range"] |= {"running": False, "message": "stopped: interpolated 500 frames of 12000"}
+    await endpoint.broadcast(endpoint.state)
+    await shows(page, "document.querySelector('#range-work').textContent.startsWith('stopped: ')")
+    await page.keyboard.press("Escape")
+    await shows(page, "quadrille.state.range === null")
+    assert await page.locator("#range-bar").is_hidden()
+
+
+async def test_the_bar_stays_within_the_window(page):
+    await page.set_viewport_size({"width": 1280, "height": 720})
+    for first, last in ((0, 3), (60, 61), (116, 119)):
+        await mark(page, first, last)
+        await shows(page, "!document.querySelector('#range-bar').hidden")
+        bar = await page.locator("#range-bar").bounding_box()
+        assert bar["x"] >= 0
+        assert bar["x"] + bar["width"] <= 1280
+        assert bar["y"] + bar["height"] <= (await box_of(page))["y"]
+
+
+async def test_marks_of_the_shown_frame(page, endpoint):
+    assert await page.locator("#toggle-reviewed").get_attribute("aria-pressed") == "true"  # frame 12 of the fake
+    assert await page.locator("#toggle-keyframe").get_attribute("aria-pressed") == "false"
+    await page.keyboard.press("k")
+    await page.keyboard.press("e")
+    await page.keyboard.press("Shift+K")
+    await page.locator("#toggle-keyframe").click()
+    await until(lambda: len(endpoint.heard("mark")) == 3)
+    assert [m["toggle"] for m in endpoint.heard("mark")] == ["keyframe", "reviewed", "keyframe"]
+    assert endpoint.heard("range") == [{"type": "range", "action": "none", "first": 12, "last": 12, "person": 0}]
+    await go_to(page, 20)
+    assert await page.locator("#toggle-keyframe").get_attribute("aria-pressed") == "true"
+    assert await page.locator("#toggle-reviewed").is_disabled()  # a keyframe is reviewed

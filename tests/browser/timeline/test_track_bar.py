@@ -1,0 +1,177 @@
+"""Tracking and the timeline against `fake_endpoint`: what buttons and keys send, and what is drawn of a run."""
+
+import asyncio
+
+import pytest
+from fake_endpoint import REMARK
+from page_driver import dragging, shows, state_of, until
+
+STRIP = """(frame) => {
+  const canvas = document.querySelector("#timeline canvas");
+  const count = quadrille.state.session.n_frames;
+  const x = Math.round((52 + (frame + 0.5) * (canvas.clientWidth - 60) / count) * devicePixelRatio);
+  const style = getComputedStyle(canvas);
+  const context = document.createElement("canvas").getContext("2d");
+  const column = canvas.getContext("2d").getImageData(x, 28 * devicePixelRatio, 1, 12 * devicePixelRatio).data;
+  for (const status of ["good", "doubtful", "lost"]) {
+    context.fillStyle = style.getPropertyValue(`--status-${status}`);
+    context.fillRect(0, 0, 1, 1);
+    const [r, g, b] = context.getImageData(0, 0, 1, 1).data;
+    let height = 0;
+    for (let i = 0; i < column.length; i += 4)
+      if (column[i] === r && column[i + 1] === g && column[i + 2] === b) height += 1;
+    if (height) return [status, height / devicePixelRatio];
+  }
+  return [null, 0];
+}"""
+"""JavaScript: which status the strip shows at a frame, and how high its bar stands."""
+
+
+async def place_of(page, frame):
+    """Where a frame lies on the timeline, window pixels."""
+    box = await page.locator("#timeline").bounding_box()
+    n_frames = (await state_of(page))["session"]["n_frames"]
+    return box["x"] + 52 + (frame + 0.5) * (box["width"] - 60) / n_frames, box["y"] + box["height"] - 14
+
+
+async def test_a_run_is_watched_paused_and_stopped(page, endpoint):
+    assert await page.locator("#track-pause").is_disabled()
+    await page.locator("#track-forward").click()
+    await shows(
+        page, "quadrille.state.shown.frame > 14 && quadrille.state.overlay.frame === quadrille.state.shown.frame"
+    )
+    assert await page.locator("#track-forward").is_disabled()
+    assert (await page.locator("#search-stage").inner_text()).startswith("Tracked ")
+    assert "20.0/s" in await page.locator("#search-figures").inner_text()
+    await page.locator("#track-pause").click()
+    await shows(page, "!quadrille.state.state.track.running")
+    assert (await page.locator("#search-stage").inner_text()).startswith("Paused ")
+    at = (await state_of(page))["state"]["track"]["at"]
+    await page.locator("#track-pause").click()
+    await shows(page, f"quadrille.state.shown.frame > {at}")
+    await page.locator("#track-stop").click()
+    await shows(page, "quadrille.state.state.track.first === null")
+    assert (await page.locator("#search-stage").inner_text()).startswith("Stopped: ")
+    assert [m["action"] for m in endpoint.heard("track")] == ["forward", "pause", "go_on", "stop"]
+    assert endpoint.heard("track")[0]["until"] is None
+    assert not endpoint.heard("seek")  # following asks for nothing
+    seen = (await state_of(page))["timeline"]
+    assert seen[str(at)]["source"] == "tracked"
+
+
+async def test_backward_by_key_and_escape(page, endpoint):
+    await page.keyboard.press("Shift+T")
+    await shows(page, "quadrille.state.shown.frame < 11")
+    await page.keyboard.press("Escape")
+    await until(lambda: endpoint.heard("track")[-1]["action"] == "stop")
+    assert endpoint.heard("track")[0] == {"type": "track", "action": "backward", "until": None}
+
+
+async def test_looking_elsewhere_unticks_follow_and_the_tick_leads_back(page, endpoint):
+    endpoint.frame_s = 0.3  # the run must outlast what a busy machine takes for a click
+    await page.keyboard.press("t")
+    await shows(page, "quadrille.state.shown.frame > 13")
+    await page.mouse.click(*await place_of(page, 5))
+    await shows(page, "quadrille.state.shown.frame === 5 && !quadrille.state.state.follow")
+    assert not await page.locator("#follow").is_checked()
+    at = (await state_of(page))["state"]["track"]["at"]
+    await shows(page, f"quadrille.state.state.track.at > {at + 3}")
+    assert (await state_of(page))["shown"]["frame"] == 5
+    await page.keyboard.press("l")
+    await shows(page, "quadrille.state.shown.frame > 15")
+    assert await page.locator("#follow").is_checked()
+
+
+async def test_a_marked_range_ends_a_run(page, endpoint):
+    (x0, y), (x1, _) = await place_of(page, 8), await place_of(page, 40)
+    await page.keyboard.down("Shift")
+    await page.mouse.move(x0, y)
+    await page.mouse.down()
+    await page.mouse.move(x1, y, steps=5)
+    await page.mouse.up()
+    await page.keyboard.up("Shift")
+    assert (await state_of(page))["range"] == {"first": 8, "last": 40}
+    assert not endpoint.heard("seek")
+    await page.locator("#track-forward").click()
+    await until(lambda: endpoint.heard("track"))
+    await page.locator("#track-stop").click()
+    await shows(page, "quadrille.state.state.track.first === null")
+    await page.locator("#track-backward").click()
+    await until(lambda: len(endpoint.heard("track")) == 3)
+    assert [m.get("until") for m in endpoint.heard("track")] == [40, None, 8]
+    await page.keyboard.press("Escape")
+    await page.keyboard.down("Shift")
+    await page.mouse.click(x0, y)
+    await page.keyboard.up("Shift")
+    await shows(page, "quadrille.state.range === null")
+
+
+async def test_a_range_is_marked_by_keys(page):
+    await page.keyboard.press("[")
+    await page.keyboard.press("Shift+Period")
+    await shows(page, "quadrille.state.shown.frame === 22")
+    await page.keyboard.press("]")
+    await shows(page, "quadrille.state.range?.first === 12 && quadrille.state.range.last === 22")
+
+
+@pytest.mark.parametrize("dark", [True, False])
+async def test_statuses_differ_by_colour_and_by_height(page, dark):
+    await page.emulate_media(color_scheme="dark" if dark else "light")
+    async with asyncio.timeout(20):
+        while (await page.evaluate(STRIP, 15))[0] is None:  # drawn anew in the colours of the theme
+            await asyncio.sleep(0.05)
+    found = {frame: await page.evaluate(STRIP, frame) for frame in (3, 15, 31, 50, 110)}
+    assert found[3] == [None, 0]  # nobody has judged it
+    assert found[110] == [None, 0]  # no pose
+    assert [found[f][0] for f in (15, 31, 50)] == ["good", "doubtful", "lost"]
+    assert found[15][1] + 2 < found[31][1] < found[50][1] - 2
+
+
+async def test_a_tooltip_says_what_the_tracker_thinks(page):
+    await page.mouse.move(*await place_of(page, 31))
+    await shows(page, "document.querySelector('#timeline').title.startsWith('Frame 31: tracked, doubtful, ')")
+    assert (await page.locator("#timeline").get_attribute("title")).endswith(f" px\n{REMARK}")
+    await page.mouse.move(*await place_of(page, 110))
+    await shows(page, "document.querySelector('#timeline').title === 'Frame 110: no pose'")
+
+
+async def test_doubtful_and_lost_frames_are_visited_one_after_the_other(page, endpoint):
+    for frame in (31, 32, 50, 50):
+        await page.keyboard.press("n")
+        await shows(page, f"quadrille.state.shown.frame === {frame}")
+    await page.locator("#former-doubt").click()
+    await shows(page, "quadrille.state.shown.frame === 32")
+    await page.locator("#next-doubt").click()
+    await shows(page, "quadrille.state.shown.frame === 50")
+    assert [m["frame"] for m in endpoint.heard("seek")] == [31, 32, 50, 32, 50]
+
+
+async def test_the_card_says_what_the_tracker_thinks_of_the_frame(page):
+    card = page.locator("#frame-card")
+    assert await card.is_hidden()  # of the first frame nobody has said anything
+    await page.keyboard.press("n")
+    await shows(page, "document.querySelector('#frame-status').textContent === 'doubtful'")
+    assert await page.locator("#frame-remark").inner_text() == REMARK
+    assert not await page.locator("#frame-parts").is_visible()
+    await card.locator("summary").click()
+    await shows(page, "document.querySelector('#frame-parts').childElementCount > 0")
+    texts = await page.locator("#frame-parts").locator("span, output").all_inner_texts()
+    # Left beside right, whatever the order of the model; three parts of the trunk leave a gap.
+    assert texts == [
+        "torso", "0.80 px", "head", "1.20 px", "pelvis", "0.90 px", "",
+        "left arm", "4.50 px", "right arm", "unseen", "left leg", "1.50 px", "right leg", "2.50 px",
+    ]  # fmt: skip
+    label = page.locator("#frame-parts span")
+    boxes = {await one.inner_text(): await one.bounding_box() for one in await label.all()}
+    for left, right in (("left arm", "right arm"), ("left leg", "right leg")):
+        assert boxes[left]["y"] == boxes[right]["y"]
+        assert boxes[left]["x"] < boxes[right]["x"]
+    await page.keyboard.press("Period")
+    await shows(page, "quadrille.state.state.frame === 32")
+    assert await page.locator("#frame-parts").is_visible()
+
+
+async def test_a_drag_names_the_frame_under_the_hand(page, endpoint):
+    async with dragging(page, 0, "head", (5, 5), (9, 9)):
+        await until(lambda: endpoint.heard("drag"))
+    assert {m["frame"] for m in endpoint.heard("drag")} == {12}

@@ -1,0 +1,277 @@
+"""Pictures of every state of the page: `python tests/recipes/screenshots.py OUT`, to be looked at one by one.
+
+Runs the real program on the bundled samples and on sessions made for the purpose (one camera, eight), in dark and
+light, for a laptop and for a large screen. `--only NAME` takes those whose name begins so, `--tutorial` those that
+docs/tutorial.md shows, as JPEG.
+"""
+
+import argparse
+import asyncio
+import shutil
+import sys
+import tempfile
+from collections.abc import Awaitable, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
+
+from chromium import FLAGS, chromium_path
+from page_driver import handle_of, shows, to_client
+from playwright.async_api import Browser, Page, async_playwright
+from program import ROOT, Program
+
+from tracker.evaluation.references import read_joints
+from tracker.fitting.gauss_newton import fit_to_points
+from tracker.formats.model_toml import format_model
+from tracker.formats.pose_csv import read_pose_table
+from tracker.session.session import Session, load_session, save_session
+from tracker.simulate.record import simulate
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange, PoseRecord
+
+SAMPLES = ROOT / "sample_sessions"
+LAPTOP, LARGE = (1280, 720), (1920, 1080)
+SETTLE_S = 3.0
+"""The 3-D view draws slowly without a graphics card."""
+
+Act = Callable[[Page], Awaitable[None]]
+
+
+@dataclass(frozen=True)
+class Screen:
+    """A picture to take."""
+
+    name: str
+    session: str
+    """Which of the sessions that `make_sessions` makes."""
+    act: Act
+    """What a user does to get there."""
+    size: tuple[int, int] = LAPTOP
+    scheme: str = "dark"
+
+
+async def nothing(_: Page) -> None:
+    """The page as it opens."""
+
+
+async def posing(page: Page) -> None:
+    """In the middle of a drag of the wrist, which goes on until the picture is taken."""
+    x, y = await to_client(page, 0, *await handle_of(page, 0, "left_wrist"))
+    await page.mouse.move(x, y)
+    await page.mouse.down()
+    for k in range(1, 6):
+        await page.mouse.move(x + 5 * k, y - 7 * k)
+    await shows(page, "quadrille.state.overlay.paths.some((path) => path.kind === 'epipolar')", 20)
+
+
+async def pins(page: Page) -> None:
+    """Two views pinned: they meet in space."""
+    await page.mouse.click(*await to_client(page, 0, *await handle_of(page, 0, "left_wrist")))
+    await shows(page, "quadrille.state.state.point === 'left_wrist'", 20)
+    for camera in (0, 1):
+        u, v = await handle_of(page, camera, "left_wrist")
+        await page.keyboard.down("Control")
+        await page.mouse.click(*await to_client(page, camera, u + 12, v - 8))
+        await page.keyboard.up("Control")
+        await shows(page, f"quadrille.state.overlay.pins.length === {camera + 1}", 20)
+
+
+async def layers(page: Page) -> None:
+    """Every layer in its menu, some of them on."""
+    for key in ("Shift+Digit7", "Shift+Digit8"):
+        await page.keyboard.press(key)
+    await page.keyboard.press("a")
+
+
+async def searching(page: Page) -> None:
+    """A search at a speed for watching."""
+    await page.keyboard.press("b")
+    await page.select_option("select[aria-label='Expansions a second']", index=1)
+    await page.keyboard.press("f")
+    await shows(page, "quadrille.state.state.job.evaluations > 50", 60)
+
+
+async def searched(page: Page) -> None:
+    await page.keyboard.press("b")
+    await page.keyboard.press("f")
+    await shows(page, "quadrille.state.state.job.message.startsWith('done')", 120)
+
+
+async def replaying(page: Page) -> None:
+    """A finished search, looked at half way."""
+    await searched(page)
+    box = await page.locator("#drawer input[type=range]").bounding_box()
+    await page.mouse.click(box["x"] + box["width"] / 3, box["y"] + box["height"] / 2)
+
+
+async def landscape(page: Page) -> None:
+    await page.mouse.click(*await to_client(page, 0, *await handle_of(page, 0, "left_elbow")))
+    await page.keyboard.press("v")
+
+
+async def tracking(page: Page) -> None:
+    """A tracker that has been paused on its way."""
+    await page.keyboard.press("t")
+    await shows(page, "quadrille.state.state.track.done > 3", 120)
+    await page.keyboard.press("Alt+p")
+
+
+async def tracked(page: Page) -> None:
+    """Tracked, with the curves of the arms."""
+    await page.keyboard.press("t")
+    await shows(page, "quadrille.state.state.track.message.startsWith('done')", 180)
+    await page.keyboard.press("c")
+
+
+async def refused(page: Page) -> None:
+    """An error, said to the user: nobody has been placed."""
+    await page.keyboard.press("t")
+    await shows(page, "document.querySelector('#notices').childElementCount > 0", 20)
+
+
+async def helping(page: Page) -> None:
+    await page.keyboard.press("?")
+
+
+async def palette(page: Page) -> None:
+    """What can be done, found by typing."""
+    await page.keyboard.press("Control+k")
+    await page.keyboard.type("track")
+
+
+async def history(page: Page) -> None:
+    """A few edits, and the list of them."""
+    for key in ("ArrowRight", "m", "ArrowUp"):
+        await page.keyboard.press(key)
+        await asyncio.sleep(1.2)
+    await page.keyboard.press("h")
+
+
+async def fitted(page: Page) -> None:
+    """Two people placed by hand, then fitted."""
+    await page.keyboard.press("g")
+    await shows(page, "/fit/i.test(quadrille.state.state.undo ?? '')", 60)
+    # What the 3-D view says of machines without a graphics card is no part of the picture.
+    await page.frame_locator("#scene").locator(".mantine-Notification-closeButton").first.click(timeout=60_000)
+
+
+async def filled(page: Page) -> None:
+    await page.keyboard.press("1")
+
+
+SCREENS = [
+    Screen("empty", "fresh", nothing),
+    Screen("empty-light", "fresh", nothing, scheme="light"),
+    Screen("posing", "placed", posing),
+    Screen("posing-large", "placed", posing, LARGE),
+    Screen("filled", "placed", filled),
+    Screen("pins", "placed", pins),
+    Screen("pins-light", "placed", pins, scheme="light"),
+    Screen("layers", "placed", layers),
+    Screen("search-running", "near", searching),
+    Screen("search-replay", "near", replaying),
+    Screen("search-replay-large", "near", replaying, LARGE, "light"),
+    Screen("landscape", "placed", landscape),
+    Screen("tracking", "placed", tracking),
+    Screen("curves", "placed", tracked),
+    Screen("curves-light-large", "placed", tracked, LARGE, "light"),
+    Screen("notice", "fresh", refused),
+    Screen("keys", "placed", helping),
+    Screen("palette", "placed", palette),
+    Screen("history", "placed", history),
+    Screen("one-camera", "one", nothing),
+    Screen("eight-cameras", "eight", nothing),
+    Screen("eight-cameras-large-light", "eight", nothing, LARGE, "light"),
+    Screen("two-people", "tango", nothing),
+    Screen("page", "tango", fitted, (1600, 900)),
+]
+
+TUTORIAL = ("empty", "posing", "pins", "search-replay", "landscape", "curves", "palette")
+
+
+def make_sessions(folder: Path, wanted: set[str]) -> dict[str, Path]:
+    """The sessions that pictures are taken of, each anew."""
+    made = {name: folder / name for name in wanted}
+    for name, at in made.items():
+        if name == "eight":
+            simulate(at, "exercise", n_cameras=8, n_frames=4, size=(320, 240))
+        else:
+            shutil.copytree(SAMPLES / ("tango" if name == "tango" else "elbow_rotation"), at)
+        session = load_session(at)
+        if name == "one":
+            save_session(replace(session, cameras=session.cameras[:1]))
+        if name != "fresh":
+            place(load_session(at), near=name == "near")
+    return made
+
+
+def place(session: Session, near: bool) -> None:
+    """Put everybody on frame 0, where the true joints are or a hand has put the dancers; near: arms a little off."""
+    joints = None if len(session.people) > 1 else read_joints(session.folder / "truth.trc", session.fps)
+    store = AnnotationStore(session.annotations_path)
+    for person in session.people:
+        model = person.model
+        if joints is None:
+            values = read_pose_table(session.folder / f"first_pose_{person.name}.csv").values_for(model)[0]
+        else:
+            places = dict(zip(joints.names, joints.points[0], strict=True))
+            values = fit_to_points(model, {n: p for n, p in places.items() if n in model.point_names}).values
+        if near:
+            values = model.retract(values, np.where(np.arange(model.n_dofs) >= 6, 0.12, 0.02))
+            values = model.clip(values)
+        revision = store.add_model_revision(person.name, format_model(model))
+        pose = PoseRecord(values, ("manual",) * len(values), revision, keyframe=True)
+        store.commit("place", [PoseChange(person.name, 0, pose)])
+    store.close()
+
+
+@asynccontextmanager
+async def opened(browser: Browser, folder: Path, screen: Screen):
+    """The page of a session, with its first frame and its cost on the screen."""
+    with tempfile.TemporaryDirectory() as name:
+        program = Program(shutil.copytree(folder, Path(name) / folder.name))
+        await program.start()
+        context = await browser.new_context(
+            viewport={"width": screen.size[0], "height": screen.size[1]}, color_scheme=screen.scheme
+        )
+        try:
+            page = await context.new_page()
+            await page.goto(program.address, timeout=120_000)
+            await shows(page, "window.quadrille?.state.overlay && quadrille.state.state.cost_px !== null", 180)
+            yield page
+        finally:
+            await context.close()
+            await program.kill()
+
+
+async def take(out: Path, only: str, tutorial: bool) -> None:
+    """Take the pictures, one after the other."""
+    out.mkdir(parents=True, exist_ok=True)
+    screens = [s for s in SCREENS if s.name.startswith(only) and (s.name in TUTORIAL or not tutorial)]
+    with tempfile.TemporaryDirectory() as name:
+        sessions = make_sessions(Path(name), {s.session for s in screens})
+        async with async_playwright() as playwright:
+            browser = await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
+            for screen in screens:
+                path = out / f"{screen.name}.{'jpg' if tutorial else 'png'}"
+                async with opened(browser, sessions[screen.session], screen) as page:
+                    if screen.session != "fresh":
+                        await page.click("#close-first-steps")
+                    await screen.act(page)
+                    await asyncio.sleep(SETTLE_S)
+                    await page.screenshot(path=path, timeout=120_000, **({"quality": 80} if tutorial else {}))
+                print(path, flush=True)
+            await browser.close()
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path, help="folder for the pictures")
+    parser.add_argument("--only", default="", help="those whose name begins so")
+    parser.add_argument("--tutorial", action="store_true", help="those of docs/tutorial.md, as JPEG")
+    words = parser.parse_args()
+    asyncio.run(take(words.out, words.only, words.tutorial))

@@ -1,0 +1,44 @@
+"""Bodies of every kind of joint, for tests that must not hold for people alone."""
+
+from tracker.formats.model_toml import PRESETS, load_model, parse_model
+
+BALLS = """
+version = 1
+name = "balls"
+height_m = 2.0
+joints = [
+    { name = "root", child = "trunk", free = true, kind = "ball" },
+    { name = "shoulder", parent = "trunk", child = "arm", position = [0, 0.1, 0.2], kind = "ball", cone_deg = 100, twist_deg = 60 },
+    { name = "elbow", parent = "arm", child = "forearm", position = [0, 0, -0.2], axes = [
+        { name = "bend", axis = [0, -1, 0], limits_deg = [0, 150] },
+        { name = "roll", axis = [0, 0, 1], limits_deg = [-90, 90] },
+    ] },
+    { name = "grip", parent = "forearm", child = "hand", position = [0, 0, -0.15] },
+]
+parts = [
+    { name = "trunk", half_axes = [0.1, 0.1, 0.2] },
+    { name = "arm", half_axes = [0.03, 0.03, 0.1] },
+    { name = "forearm", half_axes = [0.02, 0.02, 0.08] },
+    { name = "hand", half_axes = [0.02, 0.02, 0.02] },
+]
+landmarks = [{ name = "finger", part = "hand", position = [0.01, 0.02, -0.05] }]
+"""  # noqa: E501
+
+MODELS = {name: load_model(name) for name in PRESETS} | {"balls": parse_model(BALLS, "balls")}
+
+ARM = parse_model(
+    """
+    version = 1
+    name = "arm"
+    height_m = 1.0
+    parts = [{ name = "upper", half_axes = [0.1, 0.1, 0.3] }, { name = "lower", half_axes = [0.1, 0.1, 0.3] }]
+    landmarks = [{ name = "hand", part = "lower", position = [0, 0, -0.4] }]
+    joints = [
+        { name = "shoulder", child = "upper", kind = "ball", free = true, cone_deg = 100, twist_deg = 60 },
+        { name = "elbow", parent = "upper", child = "lower", position = [0, 0, -0.3], axes = [
+            { name = "bend", axis = [0, -1, 0], limits_deg = [0, 150] },
+        ] },
+    ]
+    """,
+    "arm",
+)

@@ -1,0 +1,481 @@
+"""The smallest program that speaks the pane socket (docs/protocol.md): a stick figure, and an ear for the page.
+
+It stands in for the controller in tests of the page alone; `python tests/support/fake_endpoint.py` serves it on a port.
+"""
+
+import asyncio
+import contextlib
+import itertools
+import json
+import struct
+import sys
+import time
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from aiohttp import WSMsgType, web
+
+WIDTH, HEIGHT, N_FRAMES = 640, 480, 120
+CAMERA_NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
+COLORS = ("#ffb454", "#6ccbff")
+REST = {
+    "torso": (0.0, 0.25, 0.0),
+    "waist": (0.0, 0.18, 0.0),
+    "head": (0.0, 1.0, 0.0),
+    "l_shoulder": (0.3, 0.7, 0.0),
+    "l_elbow": (0.62, 0.55, 0.1),
+    "l_wrist": (0.9, 0.7, 0.2),
+    "r_shoulder": (-0.3, 0.7, 0.0),
+    "r_elbow": (-0.62, 0.55, 0.1),
+    "r_wrist": (-0.9, 0.7, 0.2),
+    "l_hip": (0.17, -0.1, 0.0),
+    "l_knee": (0.2, -0.7, 0.08),
+    "r_hip": (-0.17, -0.1, 0.0),
+    "r_knee": (-0.2, -0.7, 0.08),
+}
+BONES = [
+    ("l_shoulder", "l_elbow"), ("l_elbow", "l_wrist"), ("r_shoulder", "r_elbow"), ("r_elbow", "r_wrist"),
+    ("l_hip", "l_knee"), ("r_hip", "r_knee"), ("torso", "head"), ("l_shoulder", "r_shoulder"), ("l_hip", "r_hip"),
+]  # fmt: skip
+SCALE = 150.0
+HIDDEN_LINE = np.column_stack([np.arange(100, 300), np.full(200, 60), np.arange(101, 301), np.full(200, 60)])
+"""What the layer of hidden contours shows: a line of short pieces, px."""
+NO_TRACK = {
+    "running": False, "first": None, "last": None, "at": None, "done": 0, "total": 0, "per_second": 0.0, "doubtful": 0,
+    "lost": 0, "back": False, "message": "",
+}  # fmt: skip
+DISAGREEING = [44, 45]
+AMBIGUOUS = (71, 72)
+NO_RANGE = {"running": False, "what": "", "done": 0, "total": 0, "message": ""}
+STAGES = ["torso_head", "arms", "legs"]
+PARTS = ["torso", "left_arm", "left_leg", "head", "right_leg", "right_arm", "pelvis"]
+DOFS = [{"joint": "torso", "name": name, "unit": "cm", "low": None, "high": None} for name in ("x", "y", "z")] + [
+    {"joint": "l_elbow", "name": "extension", "unit": "deg", "low": 0.0, "high": 155.0}
+]
+ANGLES = ("abduction", "elevation", "twist", "extension")
+PLOTS = {
+    "arms": [("Left arm", "deg", ANGLES), ("Right arm", "deg", ANGLES)],
+    "legs": [("Left leg", "deg", ANGLES), ("Right leg", "deg", ANGLES)],
+    "torso": [("Angles", "deg", ANGLES[:3]), ("Position", "cm", ("x", "y", "z"))],
+    "cost": [("Cost", "px", ("mean", *CAMERA_NAMES))],
+}
+REMARK = "left arm searched anew"
+
+
+def status_of(frame):
+    """Frames 31 and 32 are doubtful, 50 is lost; there is no pose from 100 on."""
+    return "doubtful" if frame in (31, 32) else "lost" if frame == 50 else "good"
+
+
+def curve(index, frame):
+    """Value of a curve: twists wrap at half a turn, the gap from frame 60 to 64 has none."""
+    value = 90.0 + 60 * np.sin(frame / 9 + index) if index % 4 != 2 else (7.0 * frame + 180) % 360 - 180
+    return np.where((frame >= 100) | ((frame >= 60) & (frame < 65)), np.nan, value)
+
+
+def project(points, camera):
+    """Orthographic views from four sides, (N, 3) to (N, 2) undistorted pixels."""
+    angle = camera * np.pi / 2
+    x = points[:, 0] * np.cos(angle) + points[:, 2] * np.sin(angle)
+    return np.stack([WIDTH / 2 + SCALE * x, HEIGHT / 2 + 20 - SCALE * points[:, 1]], axis=-1)
+
+
+@dataclass
+class FakeEndpoint:
+    """Answers pane sockets; one state for all of them."""
+
+    n_people: int = 1
+    n_cameras: int = 4
+    overlay_delay_s: float = 0.0
+    """How long each overlay takes, to try what a slow program does."""
+    image_delay_s: float = 0.0
+    held: asyncio.Event | None = None
+    """Images are kept back until it is set; None: none are."""
+    n_frames: int = N_FRAMES
+    received: list = field(default_factory=list)
+    """Every message of every page, but for what each says when it connects."""
+    frame_s: float = 0.05
+    """How long a run takes for a frame."""
+    seek_times: list = field(default_factory=list)
+    """When each seek came, s."""
+    greetings: list = field(default_factory=list)
+    """What the pages said when they connected."""
+    views: list = field(default_factory=list)
+    """What the pages said that they show."""
+    sizes: tuple = ((WIDTH, HEIGHT),)
+    """Of the cameras' images, px; in turn, where there are more cameras."""
+    sockets: set = field(default_factory=set)
+
+    def __post_init__(self):
+        self.pose = {(p, name): np.add(at, (0.9 * p, 0, 0)) for p in range(self.n_people) for name, at in REST.items()}
+        self.before_drag = None
+        self.seq = 0
+        self.epipolar_of = None
+        self.jpegs = {}
+        self.set_numbers = itertools.count(1)
+        self.search_task = None
+        self.track_task = None
+        self.curves_group = None
+        self.state = {
+            "type": "state", "frame": 12, "person": 0, "point": None,
+            "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
+            "source": "manual", "status": "", "remark": "", "parts_px": [], "job": self.idle_job(""), "replay": None,
+            "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
+            "dofs": [1.0, 2.0, 90.0, 30.0], "locked": [], "other_sizes": False, "solo": False,
+            "people": [{"source": "manual", "status": "", "shown": True, "others": 0} for _ in range(self.n_people)],
+            "snapped": None, "floor": None, "footage": {"listed": None, "error": None}, "compiling": False,
+            "saved": True, "save_error": None,
+        }  # fmt: skip
+
+    def idle_job(self, message):
+        return {
+            "running": False, "kind": None, "stage": None, "stages": STAGES, "evaluations": 0, "per_second": 0.0,
+            "best_px": None, "message": message,
+        }  # fmt: skip
+
+    def heard(self, kind):
+        """All messages of a type, in order."""
+        return [m for m in self.received if m["type"] == kind]
+
+    async def serve(self, socket):
+        self.sockets.add(socket)
+        self.seq = 0
+        try:
+            await self.send_all(socket)
+            async for message in socket:
+                if message.type is WSMsgType.TEXT:
+                    told = json.loads(message.data)
+                    kept = {"hold_3d": self.greetings, "view": self.views}.get(told["type"], self.received)
+                    kept.append(told)
+                    if told["type"] == "seek":
+                        self.seek_times.append(time.monotonic())
+                    await self.answer(told)
+        finally:
+            self.sockets.discard(socket)
+
+    async def answer(self, message):
+        match message["type"]:
+            case "seek":
+                self.state |= self.judged(message["frame"])
+                if self.state["track"]["running"]:
+                    self.state["follow"] = False
+                await self.broadcast(self.state)
+                await self.send_frame()
+            case "select":
+                self.state |= {"person": message["person"], "point": message["point"]}
+                await self.broadcast(self.state)
+            case "people":
+                await self.cast(message)
+            case "view":
+                await self.send_frame()
+            case "drag":
+                await self.drag(message)
+            case "search":
+                await self.search(message["action"])
+            case "track":
+                await self.track(message["action"], message.get("until"))
+            case "follow":
+                self.state["follow"] = message["follow"]
+                await self.broadcast(self.state)
+            case "curves":
+                self.curves_group = message["group"]
+                if self.curves_group:
+                    await self.send_curves(np.arange(self.n_frames), replace=True)
+            case "snap":
+                self.state["snapped"] = message["camera"]
+                await self.broadcast(self.state)
+            case "undo" | "redo":
+                await self.broadcast(self.state)
+
+    async def cast(self, message):
+        if message["action"] == "solo":
+            self.state["solo"] = message["on"]
+        else:
+            self.state["people"][message["person"]]["shown"] = message["shown"]
+        await self.broadcast(self.state)
+
+    async def drag(self, message):
+        key = (message["person"], message["point"])
+        self.seq = message["seq"]
+        if message["phase"] == "start":
+            self.before_drag = {k: v.copy() for k, v in self.pose.items()}
+        elif message["phase"] == "cancel":
+            self.pose = self.before_drag
+        angle = message["camera"] * np.pi / 2
+        right = np.array([np.cos(angle), 0, np.sin(angle)])
+        x = (message["u"] - WIDTH / 2) / SCALE
+        y = (HEIGHT / 2 + 20 - message["v"]) / SCALE
+        if message["phase"] in ("move", "end"):
+            point = self.pose[key]
+            moved = right * (x - point @ right) + np.array([0, y - point[1], 0])
+            for other in self.pose:
+                if other == key or (key[1] == "torso" and other[0] == key[0]):
+                    self.pose[other] = self.pose[other] + moved
+        self.epipolar_of = (message["camera"], y) if message["phase"] in ("start", "move") else None
+        await asyncio.sleep(self.overlay_delay_s)
+        await self.send_overlay()
+        if message["phase"] == "end":
+            self.state |= {"undo": f"drag {message['point']}", "source": "manual"}
+            await self.broadcast(self.state)
+
+    async def search(self, action):
+        if self.search_task:
+            self.search_task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self.search_task
+            self.search_task = None
+        if action == "frame":
+            self.search_task = asyncio.create_task(self.run_search())
+            return
+        job = self.idle_job("Stopped at 1.21 px after 512 poses")
+        if action == "step":
+            job |= {"kind": "step", "stage": "torso_head", "evaluations": 11, "best_px": 1.4, "per_second": 0.0}
+        self.state["job"] = job
+        await self.broadcast(self.state)
+
+    def judged(self, frame):
+        """What the state says of a frame."""
+        status = status_of(frame)
+        remark = REMARK if status == "doubtful" else ""
+        return {"frame": frame, "status": status, "remark": remark, "parts_px": [0.8, 4.5, 1.5, 1.2, 2.5, None, 0.9]}
+
+    async def track(self, action, until):
+        if self.track_task:
+            self.track_task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self.track_task
+            self.track_task = None
+        track = self.state["track"]
+        if action in ("forward", "backward"):
+            step = 1 if action == "forward" else -1
+            first = self.state["frame"] + step
+            end = (self.n_frames - 1 if step > 0 else 0) if until is None else until
+            self.state |= {"follow": True}
+            track |= NO_TRACK | {"first": first, "last": end, "total": abs(end - first) + 1, "running": True}
+        elif action == "stop":
+            track |= NO_TRACK | {"message": f"stopped: {track['done']} frames"}
+        else:
+            track["running"] = action == "go_on"
+        if track["running"]:
+            self.track_task = asyncio.create_task(self.run_track())
+        await self.broadcast(self.state)
+
+    async def run_track(self):
+        """A frame after the other, at an even pace."""
+        track = self.state["track"]
+        step = 1 if track["last"] >= track["first"] else -1
+        at = track["first"] if track["at"] is None else track["at"] + step
+        for frame in range(at, track["last"] + step, step):
+            track |= {"at": frame, "done": track["done"] + 1, "per_second": 1 / self.frame_s}
+            cell = {
+                "source": "tracked",
+                "cost_px": 1.0,
+                "keyframe": False,
+                "status": status_of(frame),
+                "remark": "",
+                "reviewed": False,
+                "ambiguous": False,
+            }
+            await self.broadcast({"type": "timeline", "person": None, "cells": {frame: cell}, "replace": False})
+            if self.state["follow"]:
+                self.state |= self.judged(frame)
+                await self.send_frame()
+            await self.broadcast(self.state)
+            await asyncio.sleep(self.frame_s)
+        track |= NO_TRACK | {"message": f"done: {track['done']} frames"}
+        await self.broadcast(self.state)
+
+    async def send_curves(self, frames, replace, shift=0.0):
+        plots = PLOTS[self.curves_group]
+        values = shift + np.stack(
+            [curve(i, frames % 101 if shift else frames) for i in range(sum(len(p[2]) for p in plots))]
+        )
+        header = {
+            "type": "curves", "group": self.curves_group, "person": 0, "replace": replace, "count": len(frames),
+            "plots": [{"title": title, "unit": unit, "labels": labels} for title, unit, labels in plots],
+        }  # fmt: skip
+        await self.send_binary(header, frames.astype("<u4").tobytes() + values.astype("<f4").tobytes())
+
+    async def run_search(self, n_steps=40):
+        for step in range(n_steps):
+            self.state["job"] = self.idle_job("") | {
+                "running": True, "kind": "frame", "stage": STAGES[step * 3 // n_steps], "evaluations": 97 * step,
+                "per_second": 3120.0, "best_px": 1.47 - 0.015 * step,
+            }  # fmt: skip
+            self.state["cost_px"] = 1.47 - 0.015 * step
+            await self.broadcast(self.state)
+            await self.send_overlay(candidate=0.05 * np.sin(step))
+            await asyncio.sleep(0.04)
+        self.state["job"] = self.idle_job("0.88 px after 3,880 poses in 1.6 s")
+        await self.broadcast(self.state)
+
+    async def send_all(self, socket):
+        cameras = [
+            {"name": CAMERA_NAMES[c % 4] + ("" if c < 4 else str(c // 4 + 1)), "width": width, "height": height}
+            for c, (width, height) in enumerate(self.sizes[c % len(self.sizes)] for c in range(self.n_cameras))
+        ]
+        people = [
+            {
+                "name": f"person {p}",
+                "color": COLORS[p],
+                "model": "stick",
+                "height_m": 1.7,
+                "points": list(REST),
+                "minor": ["waist"],
+                "bones": BONES,
+                "parts": PARTS,
+                "dofs": DOFS,
+                "point_dofs": {name: [0, 1, 2] if name == "torso" else [3] for name in REST},
+                "point_limbs": {
+                    name: {"name": "body" if name == "torso" else "left arm", "dofs": [3]} for name in REST
+                },
+            }
+            for p in range(self.n_people)
+        ]
+        await socket.send_str(json.dumps({
+            "type": "session", "name": "elbow_rotation", "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
+            "people": people,
+        }))  # fmt: skip
+        await socket.send_str(json.dumps(self.state))
+        sources = ["manual", "searched", "searched", "tracked", "tracked", "tracked", "interpolated", "smoothed"]
+        cells = {
+            k: {
+                "source": sources[k // 10 % 8],
+                "cost_px": 1 + 0.5 * np.sin(k / 7) + (k == 50) * 9,
+                "keyframe": k % 20 == 0,
+                "status": "" if k < 10 else status_of(k),
+                "remark": REMARK if k in (31, 32) else "",
+                "reviewed": k % 20 == 0 or k < 16,
+                "ambiguous": k in AMBIGUOUS,
+            }
+            for k in range(self.n_frames * 100 // N_FRAMES)
+        }
+        for person in (None, *(range(self.n_people) if self.n_people > 1 else ())):
+            told = {"type": "timeline", "person": person, "cells": cells, "replace": True}
+            await socket.send_str(json.dumps(told))
+        await socket.send_str(json.dumps({"type": "disagreeing", "frames": DISAGREEING}))
+        if self.views:
+            await self.send_frame([socket])
+
+    async def broadcast(self, message):
+        for socket in list(self.sockets):
+            with contextlib.suppress(ConnectionError):
+                await socket.send_str(json.dumps(message))
+
+    async def send_binary(self, header, payload, sockets=None):
+        text = json.dumps(header).encode()
+        for socket in list(self.sockets) if sockets is None else sockets:
+            with contextlib.suppress(ConnectionError):
+                await socket.send_bytes(struct.pack("<I", len(text)) + text + payload)
+
+    async def send_frame(self, sockets=None):
+        frame, view = self.state["frame"], self.views[-1]
+        layers = [layer for layer in ("image", "silhouette", "distance", "parts") if layer in view["layers"]]
+        seen = [camera for camera, reduction in enumerate(view["reductions"]) if reduction]
+        wanted = [(layer, camera) for layer in layers for camera in seen]
+        together = {"set": next(self.set_numbers), "of": len(wanted)}
+        for layer, camera in wanted:
+            await asyncio.sleep(self.image_delay_s)
+            if self.held:
+                await self.held.wait()
+            header = self.header(camera, frame, layer) | together
+            await self.send_binary(header, self.picture(camera, frame, layer), sockets)
+        await self.send_overlay(sockets)
+
+    def header(self, camera, frame, layer="image"):
+        """Of a picture that is a set by itself."""
+        limit_px = 38.4 if layer == "distance" else None
+        return {
+            "type": "image", "layer": layer, "camera": camera, "frame": frame,
+            "set": next(self.set_numbers), "of": 1,
+            "limit_px": limit_px,
+        }  # fmt: skip
+
+    async def send_overlay(self, sockets=None, candidate=None):
+        paths, segments, handles = [], [], []
+
+        def add(camera, person, kind, color, lines):
+            paths.append({
+                "camera": camera, "person": person, "kind": kind, "color": color, "first": sum(map(len, segments)),
+                "count": len(lines),
+            })  # fmt: skip
+            segments.append(lines)
+
+        for camera in range(self.n_cameras):
+            for person in range(self.n_people):
+                add(camera, person, "model", COLORS[person], self.outline(camera, person, 0.0))
+                if "hidden" in self.views[-1]["layers"]:
+                    add(camera, person, "hidden", COLORS[person], HIDDEN_LINE)
+                if candidate is not None:
+                    add(camera, person, "candidate", "#ffffff", self.outline(camera, person, candidate))
+                for (p, name), at in self.pose.items():
+                    if p != person:
+                        continue
+                    ((u, v),) = project(at[None], camera)
+                    visible = (name.startswith("l_"), name.startswith("r_"))[camera % 2] or name in ("torso", "head")
+                    handles.append({"camera": camera, "person": p, "point": name, "u": u, "v": v, "visible": visible})
+            if self.epipolar_of and self.epipolar_of[0] != camera:
+                v = HEIGHT / 2 + 20 - SCALE * self.epipolar_of[1]
+                add(camera, 0, "epipolar", "#ff5d8f", np.array([[0, v, WIDTH - 1, v]]))
+        header = {
+            "type": "overlay", "frame": self.state["frame"], "seq": self.seq, "job": candidate is not None,
+            "paths": paths, "outlines": [], "handles": handles, "pins": [], "meeting": None,
+        }  # fmt: skip
+        await self.send_binary(header, np.concatenate(segments).astype("<f4").tobytes(), sockets)
+
+    def outline(self, camera, person, shift):
+        """A capsule round each bone as line segments, (N, 4) px."""
+        around = np.linspace(0, 2 * np.pi, 33)
+        lines = []
+        for names in BONES:
+            ends = project(np.stack([self.pose[person, n] for n in names]) + shift, camera)
+            axis = ends[1] - ends[0]
+            length = np.hypot(*axis) + 1e-9
+            along, across = axis / length, np.array([-axis[1], axis[0]]) / length
+            ring = (
+                ends.mean(axis=0)
+                + np.outer(np.cos(around), along * (length / 2 + 8))
+                + np.outer(np.sin(around), across * 14)
+            )
+            lines.append(np.concatenate([ring[:-1], ring[1:]], axis=1))
+        return np.concatenate(lines)
+
+    def picture(self, camera, frame, layer):
+        """The image of a room with a bright figure that shows its number; masks and a distance image of even colour."""
+        size = self.sizes[camera % len(self.sizes)]
+        key = (camera, frame if layer == "image" else 0, layer)
+        if key not in self.jpegs:
+            color = {"silhouette": (140, 224, 74), "distance": (164, 255, 252), "parts": (30, 30, 250)}.get(layer)
+            image = room(camera, frame) if color is None else np.full((HEIGHT, WIDTH, 3), color, np.uint8)
+            self.jpegs[key] = cv2.imencode(".jpg", cv2.resize(image, size))[1].tobytes()
+        return self.jpegs[key]
+
+
+def room(camera, frame):
+    """A room with a bright figure, (HEIGHT, WIDTH, 3)."""
+    rows = np.linspace(90, 50, HEIGHT)[:, None, None] * np.array([1.0, 0.95, 0.9])
+    image = np.broadcast_to(rows, (HEIGHT, WIDTH, 3)).astype(np.uint8).copy()
+    cv2.rectangle(image, (0, 380), (WIDTH, HEIGHT), (70, 78, 84), -1)
+    for x in range(-40, WIDTH, 90):
+        cv2.rectangle(image, (x + 9 * camera, 60), (x + 50 + 9 * camera, 250), (96, 88, 82), 3)
+    for names in BONES:
+        ends = project(np.array([REST[n] for n in names]), camera).round().astype(int)
+        cv2.line(image, ends[0], ends[1], (150, 160, 190), 24, cv2.LINE_AA)
+    cv2.putText(image, str(frame), (280, 460), cv2.FONT_HERSHEY_SIMPLEX, 1.0, (200, 200, 200), 2, cv2.LINE_AA)
+    return image
+
+
+async def main(port):
+    from app.server.access import access_for
+    from app.server.private_viser import PrivateViser
+    from app.server.server import create_app, serve_forever, static_folder
+
+    scene = PrivateViser()
+    access = access_for("127.0.0.1")
+    app: web.Application = create_app(FakeEndpoint(n_people=1), scene.socket_path, access, static_folder())
+    await serve_forever(app, access, "127.0.0.1", port, print)
+
+
+if __name__ == "__main__":
+    asyncio.run(main(int(sys.argv[1]) if len(sys.argv) > 1 else 8080))

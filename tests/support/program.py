@@ -1,0 +1,86 @@
+"""A real program on a real session, as a user starts it."""
+
+import asyncio
+import contextlib
+import os
+import sys
+from pathlib import Path
+
+from page_driver import shows
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Program:
+    """`quadrille open SESSION` in a process of its own."""
+
+    def __init__(self, session: Path, *options: str) -> None:
+        self._words = [sys.executable, "-m", "app", "open", str(session), "--no-browser", *options]
+        self._process: asyncio.subprocess.Process | None = None
+        self.address = ""
+
+    @property
+    def pid(self) -> int:
+        """Number of its process."""
+        return self._process.pid
+
+    async def start(self, port: int = 0) -> None:
+        """Start it at a port; 0 takes a free one."""
+        self._process = await asyncio.create_subprocess_exec(
+            *self._words,
+            "--port",
+            str(port),
+            cwd=ROOT,
+            stdout=asyncio.subprocess.PIPE,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        )
+        async with asyncio.timeout(120):
+            while not self.address:
+                line = (await self._process.stdout.readline()).decode()
+                assert line, "the program ended before it served the page"
+                if ": http://127.0.0.1" in line and "viser" not in line.lower():
+                    self.address = line.partition(": ")[2].strip()
+
+    async def kill(self) -> None:
+        """End it at once, as a crash would."""
+        with contextlib.suppress(ProcessLookupError):
+            self._process.kill()
+        await self._process.wait()
+        self.address = ""
+
+    async def stop(self) -> None:
+        """End it as Ctrl+C does."""
+        with contextlib.suppress(ProcessLookupError):
+            self._process.terminate()
+        await asyncio.wait_for(self._process.wait(), 30)
+        self.address = ""
+
+
+AT_REST = """async () => {
+  const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+  while (!document.querySelector("#scene")?.contentDocument?.querySelector("canvas")) await pause(50);
+  await pause(9000);
+}"""
+"""Until the 3-D view has faded in and rests beside other work (static/scene_rest.js): before, where no graphics card
+draws, it may keep the page from doing anything else for seconds."""
+
+
+@contextlib.asynccontextmanager
+async def visited(browser, address, size=(1280, 720), viser=False):
+    """The page of a program with its first cost on the screen; fails where the page reports an error.
+
+    Without viser the 3-D view is an empty page: it takes much of a machine without a graphics card.
+    """
+    context = await browser.new_context(viewport={"width": size[0], "height": size[1]}, color_scheme="dark")
+    page = await context.new_page()
+    errors = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    if not viser:
+        await page.route("**/viser/**", lambda route: route.fulfill(body="<!doctype html>", content_type="text/html"))
+    await page.goto(address, timeout=120_000)
+    await shows(page, "window.quadrille?.state.overlay && quadrille.state.state?.cost_px !== null", 180)
+    if viser:
+        await page.evaluate(AT_REST)
+    yield page
+    await context.close()
+    assert errors == []

@@ -1,0 +1,22 @@
+"""The kinematics of a chain against that of the whole body; test_body.py holds the latter against its definition."""
+
+import numpy as np
+import pytest
+from bodies import MODELS
+
+from tracker.body.kinematics import chain_poses
+from tracker.body.limbs import limbs
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_chain_in_many_poses_is_where_the_whole_body_puts_it(name):
+    """To the last digit, from any pose with the same rest; and what is at hand stays as it is."""
+    model, rng = MODELS[name], np.random.default_rng(3)
+    base = model.retract(model.neutral(), rng.normal(size=model.n_dofs))
+    for limb in limbs(model):
+        start, *poses = model.retract(base, rng.normal(size=(30, model.n_dofs)) * limb.dofs)
+        rest = model.kinematics(start)
+        before = rest.Ts_world_part.copy()
+        found = chain_poses(model.tree, rest, limb.parts, np.array(poses))
+        np.testing.assert_array_equal(found, [model.kinematics(v).Ts_world_part[limb.parts] for v in poses])
+        np.testing.assert_array_equal(rest.Ts_world_part, before)

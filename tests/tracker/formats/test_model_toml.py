@@ -1,0 +1,205 @@
+import numpy as np
+import pytest
+from bodies import BALLS
+
+from tracker.errors import ModelError
+from tracker.formats.model_toml import DEFAULT_HEIGHT_M, PRESETS, format_model, load_model, parse_model
+from tracker.geometry.shapes import Ellipsoid, EllipticalCone
+
+SMALL = """
+version = 1
+name = "small"
+[[search]]
+name = "all"
+dofs = ["root.*", "hinge.bend"]
+[[joints]]
+name = "hinge"
+parent = "trunk"
+child = "arm"
+axes = [{ name = "bend", axis = [0, 2, 0], limits_deg = [0, 90] }]
+[[joints]]
+name = "root"
+child = "trunk"
+free = true
+axes = [{ name = "turn", axis = [0, 0, 1] }]
+[[landmarks]]
+name = "tip"
+part = "arm"
+position = [0, 0, -0.1]
+[[parts]]
+name = "arm"
+half_axes = [0.1, 0.1, 0.1]
+[[parts]]
+name = "trunk"
+half_axes = [0.2, 0.2, 0.2]
+"""
+
+
+def test_joints_come_parent_first_and_parts_in_their_order():
+    model = parse_model(SMALL, "x")
+    assert [j.name for j in model.joints] == ["root", "hinge"]
+    assert [p.name for p in model.parts] == ["trunk", "arm"]
+    assert model.parents == (-1, 0)
+    assert model.joints[1].axes[0].direction == (0.0, 1.0, 0.0)  # made a unit vector
+    np.testing.assert_allclose(model.limits[-1], [0, np.pi / 2])
+    assert model.limits[3].tolist() == [-np.inf, np.inf]
+    assert model.search_groups[0].dofs == ("root.x", "root.y", "root.z", "root.turn", "hinge.bend")
+
+
+def test_spread():
+    model = parse_model(SMALL.replace("limits_deg = [0, 90]", "limits_deg = [0, 90], spread_deg = 30"), "x")
+    np.testing.assert_allclose(model.spreads, [*[np.inf] * 4, np.pi / 6])
+    assert np.isinf(parse_model(SMALL, "x").spreads).all()
+    assert "spread_deg" not in format_model(parse_model(SMALL, "x"))
+
+
+def test_without_groups_one_holds_everything():
+    model = parse_model(BALLS, "x")
+    assert [g.dofs for g in model.search_groups] == [model.dof_names]
+
+
+def test_height():
+    assert parse_model(SMALL, "x").height_m == DEFAULT_HEIGHT_M
+    assert parse_model(BALLS, "x").height_m == 2.0
+    assert parse_model(BALLS, "x", 1.5).height_m == 1.5
+    assert load_model("gavrila22", 1.62).height_m == 1.62
+
+
+def models():
+    return [load_model(n, 1.63) for n in PRESETS] + [parse_model(SMALL, "x"), parse_model(BALLS, "x")]
+
+
+@pytest.mark.parametrize("model", models(), ids=lambda m: m.name)
+def test_round_trip(model):
+    again = parse_model(format_model(model), "again")
+    assert (again.name, again.height_m) == (model.name, model.height_m)
+    assert (again.parts, again.landmarks, again.search_groups) == (model.parts, model.landmarks, model.search_groups)
+    assert again.value_names == model.value_names
+    np.testing.assert_allclose(again.limits, model.limits, atol=1e-15)
+    np.testing.assert_allclose(again.spreads, model.spreads, atol=1e-15)
+    for a, b in zip(again.joints, model.joints, strict=True):
+        assert (a.name, a.parent, a.child, a.position, a.kind, a.free) == (
+            b.name,
+            b.parent,
+            b.child,
+            b.position,
+            b.kind,
+            b.free,
+        )
+        np.testing.assert_allclose([a.cone, a.twist], [b.cone, b.twist], atol=1e-15)
+    values = model.retract(model.neutral(), np.linspace(-1, 1, model.n_dofs))
+    np.testing.assert_allclose(again.points_world(values), model.points_world(values), atol=1e-12)
+
+
+def test_from_a_file(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL)
+    assert load_model(path).name == load_model(str(path)).name == "small"
+
+
+@pytest.mark.parametrize("name", ["gavrila23", "small.txt", "none.toml"])
+def test_unknown_model(name):
+    with pytest.raises(ModelError, match=f"'{name}' not found: expected one of .*gavrila22"):
+        load_model(name)
+
+
+LOOP = """
+[[joints]]
+name = "a"
+parent = "hand"
+child = "finger"
+[[joints]]
+name = "b"
+parent = "finger"
+child = "hand"
+[[parts]]
+name = "finger"
+half_axes = [1, 1, 1]
+[[parts]]
+name = "hand"
+half_axes = [1, 1, 1]
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (SMALL + LOOP, "the joints a, b form a loop"),
+        (
+            SMALL.replace('parent = "trunk"', 'parent = "tail"'),
+            "'hinge' hangs on a missing parent part 'tail'.*arm, trunk",
+        ),
+        (SMALL.replace('parent = "trunk"', ""), r"one joint without a parent, found \['hinge', 'root'\]"),
+        (SMALL.replace("version = 1", "version = 2"), "version 2, this program reads up to 1; upgrade"),
+        (SMALL.replace('name = "hinge"', "name = "), "line 8"),
+        (SMALL.replace('name = "small"', ""), "'name' is missing"),
+        (SMALL.replace('child = "arm"', ""), "'child' is missing"),
+        (SMALL.replace('part = "arm"', 'part = "leg"'), "landmark 'tip' is on a missing part 'leg'"),
+        (SMALL.replace("[0, 2, 0]", "[0, 0, 0]"), "axis 'hinge.bend' expected a direction"),
+        (SMALL.replace("[0, 90]", "[10, 90]"), "limits around 0"),
+        (SMALL.replace("[0, 90]", "[0, 90], spread_deg = 0"), "'hinge.bend' expected a spread_deg above 0, found 0"),
+        (SMALL.replace("[0, 90]", "[0, 90], spread_deg = nan"), "expected a spread_deg above 0, found nan"),
+        (SMALL.replace("[0, 0, -0.1]", "[0, 0]"), "'tip' expected 3 finite numbers"),
+        (SMALL.replace("[0, 0, -0.1]", "[0, 0, nan]"), "'tip' expected 3 finite numbers"),
+        (SMALL.replace("[0.1, 0.1, 0.1]", "[0.1, 0.1, -0.1]"), "part 'arm' expected half-axes above 0"),
+        (SMALL.replace("free = true", 'kind = "slide"'), "joint 'root' expected kind revolute or ball, found 'slide'"),
+        (SMALL.replace('"hinge.bend"', '"hinge.bent"'), "search group 'all' names an unknown dof 'hinge.bent'"),
+        (SMALL + '[[parts]]\nname = "tail"\nhalf_axes = [1, 1, 1]\n', "one joint for each part, but see: tail"),
+        ("joints = 3\nparts = 4\n", "malformed"),
+        ("", "'joints' is missing"),
+    ],
+)
+def test_malformed(text, expected):
+    with pytest.raises(ModelError, match=expected) as caught:
+        parse_model(text, "mine.toml")
+    assert "mine.toml" in str(caught.value)
+
+
+def test_two_joints_for_one_part():
+    text = SMALL.replace('dofs = ["root.*", "hinge.bend"]', 'dofs = ["root.*"]')
+    with pytest.raises(ModelError, match="one joint for each part, but see: arm"):
+        parse_model(text + '[[joints]]\nname = "c"\nparent = "trunk"\nchild = "arm"\n', "x")
+
+
+@pytest.mark.parametrize("height", [0.0, -1.0, 17.5, float("nan")])
+def test_impossible_heights(height):
+    with pytest.raises(ModelError, match=r"height of 0\.3 to 3 metres"):
+        parse_model(SMALL, "x", height)
+
+
+KINDS = SMALL.replace('name = "arm"\nhalf_axes', 'name = "arm"\nshape = "cone"\ntaper = 0.3\nhalf_axes').replace(
+    'name = "trunk"\nhalf_axes', 'name = "trunk"\nshape = "ellipsoid"\nhalf_axes'
+)
+
+
+def test_shapes_of_parts():
+    model = parse_model(KINDS, "x", 2.0)
+    assert model.shapes == (Ellipsoid((0.4, 0.4, 0.4)), EllipticalCone((0.2, 0.2, 0.2), 0.3))
+    again = parse_model(format_model(model), "again")
+    assert again.parts == model.parts
+    assert again.shapes == model.shapes
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (KINDS.replace('"cone"', '"cube"'), "part 'arm' expected shape superquadric, cone or ellipsoid, found 'cube'"),
+        (KINDS.replace("taper", "exponents = [1, 1]\ntaper"), "of shape cone, which has no exponents; leave it out"),
+        (KINDS.replace('"cone"', '"ellipsoid"'), "of shape ellipsoid, which has no taper; leave it out"),
+        (KINDS.replace("taper = 0.3", "taper = 0.95"), "tapers within 0.9"),
+        (KINDS.replace("taper = 0.3", "taper = [0.3, 0.3]"), "malformed"),
+    ],
+)
+def test_malformed_shapes(text, expected):
+    with pytest.raises(ModelError, match=expected):
+        parse_model(text, "mine.toml")
+
+
+def test_the_cones_stand_where_gavrilas_parts_do():
+    model, cones = load_model("gavrila22"), load_model("gavrila22_cones")
+    assert cones.joints == model.joints
+    assert cones.landmarks == model.landmarks
+    assert cones.search_groups == model.search_groups
+    for part, other in zip(cones.parts, model.parts, strict=True):
+        assert (part.name, part.half_axes, part.center) == (other.name, other.half_axes, other.center)
+        assert part.kind == ("ellipsoid" if part.name == "head" else "cone")

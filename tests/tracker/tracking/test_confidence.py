@@ -1,0 +1,170 @@
+import itertools
+
+import numpy as np
+import pytest
+from bodies import BALLS
+from hypothesis import given
+from hypothesis import strategies as st
+from staging import SUIT, cameras_around, dressed, own_evidence, posed
+
+from tracker.appearance.part_colors import Colors
+from tracker.body.limbs import limbs
+from tracker.body.model import Body
+from tracker.fitting.contour_residuals import ContourMatch
+from tracker.fitting.gauss_newton import StayNear, solve
+from tracker.formats.model_toml import PRESETS, load_model, parse_model
+from tracker.tracking.confidence import LimbFigures, Quality, judge, quality, reason, worst
+
+
+def names_of(model, parts):
+    return [model.parts[p].name for p in parts]
+
+
+def test_limbs_of_the_papers_body(gavrila):
+    found = {x.name: x for x in limbs(gavrila)}
+    assert set(found) == {f"{s}_{n}" for s in ("left", "right") for n in ("forearm", "calf")}
+    assert names_of(gavrila, found["left_forearm"].parts) == ["left_upper_arm", "left_forearm"]
+    assert names_of(gavrila, found["right_calf"].parts) == ["right_thigh", "right_calf"]
+    dofs = np.array(gavrila.dof_names)[found["left_forearm"].dofs]
+    assert sorted(d.split(".")[0] for d in dofs) == ["left_elbow"] + ["left_shoulder"] * 3
+
+
+def test_limbs_of_a_trunk_that_bends():
+    model = load_model("gavrila34")
+    found = {x.name: x for x in limbs(model)}
+    assert names_of(model, found["left_forearm"].parts) == ["left_collar", "left_upper_arm", "left_forearm"]
+    assert names_of(model, found["left_calf"].parts) == ["left_thigh", "left_calf"]  # two legs hang on the pelvis
+    assert names_of(model, found["head"].parts) == ["head"]
+    assert found["head"].dofs.sum() == 2
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_limbs_share_nothing_and_leave_the_trunk_alone(name):
+    model = load_model(name)
+    found = limbs(model)
+    for a, b in itertools.combinations(found, 2):
+        assert not set(a.parts) & set(b.parts)
+        assert not np.any(a.dofs & b.dofs)
+    root = model.dof_joint == 0
+    for limb in found:
+        assert 0 not in limb.parts
+        assert not np.any(limb.dofs & root)
+        # Whatever its degrees of freedom move is of the limb.
+        assert set(np.flatnonzero(model.moves[limb.dofs].any(axis=0))) <= set(limb.parts)
+        assert list(limb.parts) == sorted(limb.parts)  # from the trunk outwards
+
+
+def test_limbs_of_a_body_with_balls():
+    balls = parse_model(BALLS, "balls")
+    (arm,) = limbs(balls)
+    assert names_of(balls, arm.parts) == ["arm", "forearm", "hand"]
+    assert arm.dofs.sum() == 5  # a ball and two axes; the hand is stuck on
+
+
+def test_worst():
+    for several in itertools.product(("good", "doubtful", "lost"), repeat=3):
+        expected = "lost" if "lost" in several else "doubtful" if "doubtful" in several else "good"
+        assert worst(several) == expected
+    assert worst([]) == "good"
+
+
+figures = st.builds(
+    LimbFigures,
+    name=st.just("arm"),
+    color=st.floats(-3, 3),
+    worst_drop=st.floats(-3, 6),
+    spread_px=st.floats(0.1, 80),
+    forward=st.floats(0, 1),
+    shown=st.floats(0, 1.2),
+    explained=st.floats(0, 1.5),
+)
+CLEAR = LimbFigures("leg", 1.0, 0.0, 1.2, 0.05, 0.6, 0.5)
+ASTRAY = (0.3, 0.2, 0.1)
+"""Contours far from edges, hardly seen, that explain little."""
+
+
+@given(before=figures, worse=st.tuples(*[st.floats(0, 3)] * 6), body=st.tuples(*[st.floats(0, 0.1)] * 2))
+def test_worse_figures_never_clear_a_limb(before, worse, body):
+    signs = (-1, 1, 1, 1, -1, -1)
+    after = LimbFigures("arm", *(b + s * w for b, s, w in zip(before[1:], signs, worse, strict=True)))
+    better = Quality(0.05, 3, 0.0, (before, CLEAR))
+    worst_of = Quality(0.05 + body[0], 3, body[1], (after, CLEAR))
+    assert (worst_of.log_odds >= better.log_odds).all()
+    for alone in (True, False):
+        assert set(better.suspects(alone)) <= set(worst_of.suspects(alone))
+    order = ("good", "doubtful", "lost")
+    assert order.index(judge(worst_of)) >= order.index(judge(better))
+
+
+def test_what_is_plain():
+    undressed, vague = LimbFigures("x", -2.0, 3.0, 4.0, *ASTRAY), LimbFigures("y", 0.2, 1.0, 40.0, *ASTRAY)
+    assert judge(Quality(0.05, 3, 0.0, (CLEAR, CLEAR))) == "good"
+    for limb in (undressed, vague):
+        found = Quality(0.15, 3, 0.03, (CLEAR, CLEAR, limb))
+        assert found.suspects(True) == found.suspects(False) == (limb.name,)
+        assert judge(found) == "lost"
+        assert not found.body_lost
+    assert Quality(0.15, 3, 0.03, (CLEAR, undressed, vague)).body_lost  # most of it
+    assert judge(Quality(1.0, 3, 0.0, (CLEAR, CLEAR))) == "lost"  # no edge anywhere near
+    assert judge(Quality(0.0, 0, 0.0, ())) == "lost"  # nothing sees the body
+    # What no part explains speaks against every limb.
+    assert (Quality(0.05, 3, 0.12, (CLEAR, vague)).log_odds > Quality(0.05, 3, 0.0, (CLEAR, vague)).log_odds).all()
+
+
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        (Quality(0.05, 3, 0.0, (CLEAR, CLEAR)), ""),
+        (Quality(0.15, 3, 0.03, (CLEAR, LimbFigures("left_forearm", -2.0, 3.0, 4.0, *ASTRAY))), "left arm uncertain"),
+        (Quality(0.15, 3, 0.03, (LimbFigures("right_calf", -2.0, 3.0, 4.0, *ASTRAY), CLEAR)), "right leg uncertain"),
+        (Quality(0.02, 3, 0.2, (CLEAR, CLEAR)), "part of the silhouette unexplained"),
+        (Quality(1.0, 3, 0.0, (CLEAR, CLEAR)), "no edges near the body"),
+        (Quality(0.0, 0, 0.0, ()), "no view shows the body"),
+    ],
+)
+def test_what_is_said_against_a_pose(found, words):
+    assert reason(found) == words
+
+
+def judged(model, truth, values, colors=False):
+    """Quality of a pose before the evidence of another one."""
+    bodies = [Body(model, truth)]
+    views = dressed(bodies, cameras_around(), SUIT) if colors else own_evidence(bodies, cameras_around())
+    match = ContourMatch(views, [Body(model, values)])
+    fit = solve(model, values, [match, StayNear(values, np.full(model.n_dofs, 5.0))], max_iterations=0)
+    thetas = np.array([v.theta_px for v in views])
+    score = None
+    if colors:
+        known = Colors(views, bodies).learn()
+        score = Colors(views, [Body(model, values)]).score(values, known), known
+    return quality(Body(model, values), fit, match.part_costs(values), thetas, np.zeros(len(views)), 100.0, score)
+
+
+@pytest.mark.parametrize("colors", [False, True])
+def test_quality_of_a_pose_and_of_a_lost_arm(gavrila, colors):
+    truth = posed(gavrila, 1)
+    off = np.array(truth)
+    off[gavrila.dof_names.index("left_shoulder.abduction")] += 1.0
+    right, wrong = judged(gavrila, truth, truth, colors), judged(gavrila, truth, off, colors)
+    assert right.views == wrong.views == 3
+    assert right.forward < 0.05 < wrong.forward
+    arm = [x.name for x in wrong.limbs].index("left_forearm")
+    assert wrong.log_odds[arm] > right.log_odds[arm]
+    assert wrong.limbs[arm].forward > right.limbs[arm].forward + 0.1
+    assert wrong.limbs[arm].explained < right.limbs[arm].explained
+    assert all(0.1 < x.shown < 1.2 for x in right.limbs)
+    assert (right.unexplained, wrong.unexplained) == (0, 0)
+    assert all(0 < x.spread_px < 10 for x in right.limbs)
+    if colors:
+        assert wrong.log_odds.argmax() == arm
+        assert wrong.limbs[arm].color < right.limbs[arm].color - 0.5
+        assert wrong.limbs[arm].worst_drop > right.limbs[arm].worst_drop + 0.5
+    else:  # they say nothing
+        assert all((x.color, x.worst_drop) == (np.inf, -np.inf) or x.worst_drop == 0 for x in right.limbs)
+
+
+def test_quality_where_nothing_is_seen(gavrila):
+    truth = posed(gavrila, 1)
+    found = judged(gavrila, truth, gavrila.retract(truth, np.pad([0.0, 0.0, 30.0], (0, gavrila.n_dofs - 3))))
+    assert found.views == 0
+    assert judge(found) == "lost"
