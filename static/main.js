@@ -1,57 +1,57 @@
 /** Puts the page together: messages go into the store, the views read it, gestures and keys send. */
 
-import { Actions } from "./actions.js";
-import { Announcer } from "./announcer.js";
-import { Connection } from "./connection.js";
-import { Curves } from "./curves.js";
-import { Drawer } from "./drawer.js";
-import { button, byId } from "./elements.js";
-import { Floor } from "./floor.js";
-import { FirstSteps } from "./first_steps.js";
-import { FrameCard } from "./frame_card.js";
-import { FrameWindow } from "./frame_window.js";
-import { Gestures } from "./gestures.js";
-import { HistoryList } from "./history_list.js";
-import { Inspector } from "./inspector.js";
-import { JumpMenu } from "./jump_menu.js";
-import { Jumps } from "./jumps.js";
-import { KeyMap } from "./key_map.js";
-import * as keys from "./keys.js";
-import { LandscapePanel } from "./landscape.js";
-import { Latency } from "./latency.js";
-import { Layers } from "./layers.js";
-import { LayersMenu } from "./layers_menu.js";
-import { LookMenu } from "./look_menu.js";
-import { showProgress } from "./progress_marks.js";
-import { Looks } from "./looks.js";
-import { Navigation } from "./navigation.js";
-import { Notices, watchConnection } from "./notices.js";
-import { Palette } from "./palette.js";
-import { People } from "./people.js";
-import { PaneGrid } from "./pane_grid.js";
-import { PinBar } from "./pin_bar.js";
-import { Pinning } from "./pinning.js";
-import { Posing } from "./posing.js";
-import { Playback } from "./playback.js";
-import { RangeBar } from "./range_bar.js";
-import { reasonsOf } from "./reasons.js";
-import { RecentImages } from "./recent_images.js";
-import { Receiver } from "./receiver.js";
-import { SavedMark } from "./saved_mark.js";
-import { SceneRest } from "./scene_rest.js";
-import { followScheme } from "./scene_scheme.js";
-import { SearchPanel } from "./search_panel.js";
-import { Snap } from "./snap.js";
-import { makeSplitter } from "./splitter.js";
-import { StandIns } from "./stand_ins.js";
-import { Store } from "./store.js";
-import { Timeline } from "./timeline.js";
-import { TopBar } from "./top_bar.js";
-import { TrackBar } from "./track_bar.js";
-import { Transport } from "./transport.js";
-import { watchTyping } from "./typing.js";
-import { ViewRequest } from "./view_request.js";
-import { drawsInSoftware } from "./webgl.js";
+import { Actions } from "./model/actions.js";
+import { Announcer } from "./shell/announcer.js";
+import { Connection } from "./model/connection.js";
+import { Curves } from "./timeline/curves.js";
+import { Drawer } from "./timeline/drawer.js";
+import { button, byId } from "./widgets/elements.js";
+import { Floor } from "./scene/floor.js";
+import { FirstSteps } from "./shell/first_steps.js";
+import { FrameCard } from "./posing/frame_card.js";
+import { FrameWindow } from "./timeline/frame_window.js";
+import { Gestures } from "./panes/gestures.js";
+import { HistoryList } from "./shell/history_list.js";
+import { Inspector } from "./posing/inspector.js";
+import { JumpMenu } from "./timeline/jump_menu.js";
+import { Jumps } from "./timeline/jumps.js";
+import { KeyMap } from "./shell/key_list.js";
+import * as keys from "./shell/keys.js";
+import { LandscapePanel } from "./search/cost_landscape.js";
+import { Latency } from "./model/latency.js";
+import { Layers } from "./model/layers.js";
+import { LayersMenu } from "./panes/layers_menu.js";
+import { LookMenu } from "./panes/image_tone_menu.js";
+import { showProgress } from "./shell/progress_marks.js";
+import { Looks } from "./model/image_tone.js";
+import { Navigation } from "./model/navigation.js";
+import { Notices, watchConnection } from "./shell/notices.js";
+import { Palette } from "./shell/palette.js";
+import { People } from "./shell/people.js";
+import { PaneGrid } from "./panes/pane_grid.js";
+import { PinBar } from "./posing/pin_bar.js";
+import { Pinning } from "./posing/pinning.js";
+import { Posing } from "./posing/posing.js";
+import { Playback } from "./timeline/playback.js";
+import { RangeBar } from "./timeline/range_bar.js";
+import { reasonsOf } from "./model/unavailable_reasons.js";
+import { RecentImages } from "./model/recent_images.js";
+import { Receiver } from "./model/receiver.js";
+import { SavedMark } from "./shell/saved_mark.js";
+import { SceneRest } from "./scene/pause.js";
+import { followScheme } from "./scene/color_scheme.js";
+import { SearchPanel } from "./search/search_panel.js";
+import { Snap } from "./scene/camera_view.js";
+import { makeSplitter } from "./widgets/splitter.js";
+import { StandIns } from "./panes/placeholder_frames.js";
+import { Store } from "./model/store.js";
+import { Timeline } from "./timeline/timeline.js";
+import { TopBar } from "./shell/top_bar.js";
+import { TrackBar } from "./timeline/track_bar.js";
+import { Transport } from "./timeline/transport.js";
+import { watchTyping } from "./widgets/typing.js";
+import { ViewRequest } from "./model/view_request.js";
+import { drawsInSoftware } from "./widgets/webgl.js";
 
 // A token has become a cookie by now, and does not belong into the history or a screenshot.
 if (location.search) window.history.replaceState(null, "", location.pathname);
@@ -62,7 +62,7 @@ const notices = new Notices();
 const notify = notices.show.bind(notices);
 const recentImages = new RecentImages();
 const receiver = new Receiver(store, notify, recentImages);
-/** @type {(message: import("./protocol.js").ClientMessage) => void} */
+/** @type {(message: import("./model/protocol.js").ClientMessage) => void} */
 const send = (message) => connection.send(message);
 
 const actions = new Actions(store, send);
@@ -75,7 +75,7 @@ const openLook = lookMenu.toggle.bind(lookMenu);
 const pinning = new Pinning(store, send, notify);
 // Who watches first has the pointer first: a pin's head may lie over a joint.
 const pointers = {
-  watch: (/** @type {import("./pane.js").Pane} */ pane, /** @type {number} */ camera) => {
+  watch: (/** @type {import("./panes/pane.js").Pane} */ pane, /** @type {number} */ camera) => {
     pinning.watch(pane, camera);
     gestures.watch(pane, camera);
   },

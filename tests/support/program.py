@@ -61,7 +61,7 @@ AT_REST = """async () => {
   while (!document.querySelector("#scene")?.contentDocument?.querySelector("canvas")) await pause(50);
   await pause(9000);
 }"""
-"""Until the 3-D view has faded in and rests beside other work (static/scene_rest.js): before, where no graphics card
+"""Until the 3-D view has faded in and rests beside other work (static/scene/pause.js): before, where no graphics card
 draws, it may keep the page from doing anything else for seconds."""
 
 

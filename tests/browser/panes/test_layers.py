@@ -152,7 +152,7 @@ async def test_brightness_belongs_to_one_camera_and_is_remembered(page):
 async def test_gamma_lifts_the_shadows_and_leaves_black_and_white(page):
     curve = await page.evaluate(
         """async () => {
-          const { toneCurve } = await import("/static/looks.js");
+          const { toneCurve } = await import("/static/model/image_tone.js");
           const curve = toneCurve({ brightness: 0, contrast: 0, gamma: 2 });
           return [curve[0], curve[64], curve[255]];
         }"""

@@ -1,0 +1,188 @@
+/** Puts the program's messages into the store. */
+
+import { Cells } from "./cells.js";
+import { PICTURE_LAYERS } from "./layers.js";
+import { PictureAssembler, keyOf } from "./pictures.js";
+import { mergeCandidates, mergeSteps, takeLandscape, takeRuns } from "./search_runs.js";
+import { mergeCurves } from "./series.js";
+
+const MOST_EARLY = 8;
+
+export class Receiver {
+  #store;
+  #notify;
+  #recent;
+  /** @type {PictureAssembler | null} */
+  #pictures = null;
+  /** @type {Map<number, import("./protocol.js").Overlay>} vectors that came before the images of their frame */
+  #early = new Map();
+
+  /**
+   * @param {import("./store.js").Store} store
+   * @param {(notice: import("./protocol.js").NoticeMessage) => void} notify
+   * @param {import("./recent_images.js").RecentImages} recent keeps the images of the frames that came last
+   */
+  constructor(store, notify, recent) {
+    this.#store = store;
+    this.#recent = recent;
+    this.#notify = notify;
+    store.subscribe((changed) => {
+      if (changed.has("layers")) this.#forgetHidden();
+    });
+  }
+
+  /** @param {boolean} open */
+  onOpen(open) {
+    if (open !== this.#store.facts.connected) this.#store.set({ connected: open });
+  }
+
+  /** @param {import("./protocol.js").TextMessage} message */
+  onText(message) {
+    switch (message.type) {
+      case "session":
+        this.#begin(message);
+        break;
+      case "state":
+        this.#store.set({ state: message });
+        break;
+      case "timeline":
+        this.#mergeTimeline(message);
+        break;
+      case "search_setup":
+        this.#store.set({ searchSetup: message });
+        break;
+      case "search_runs":
+        this.#store.set(takeRuns(this.#store.facts, message));
+        break;
+      case "disagreeing":
+        this.#store.set({ disagreeing: message.frames });
+        break;
+      case "history":
+        this.#store.set({ history: message });
+        break;
+      case "notice":
+        this.#notify(message);
+        break;
+    }
+  }
+
+  /**
+   * @param {import("./protocol.js").BinaryHeader} header
+   * @param {ArrayBuffer} payload
+   */
+  onBinary(header, payload) {
+    switch (header.type) {
+      case "image":
+        this.#pictures?.receive(header, payload);
+        break;
+      case "overlay":
+        this.#takeOverlay({ ...header, segments: new Float32Array(payload) });
+        break;
+      case "cells":
+        this.#cells(header).take(header, payload);
+        break;
+      case "curves":
+        this.#store.set({ curves: mergeCurves(this.#store.facts.curves, header, payload, this.#frameCount) });
+        break;
+      case "search_steps":
+        this.#store.set({ searchSteps: mergeSteps(this.#store.facts.searchSteps, header, payload) });
+        break;
+      case "search_candidates":
+        this.#store.set({ searchCandidates: mergeCandidates(this.#store.facts.searchCandidates, header, payload) });
+        break;
+      case "landscape":
+        this.#store.set({ landscape: takeLandscape(header, payload) });
+        break;
+    }
+  }
+
+  get #frameCount() {
+    return this.#store.facts.session?.n_frames ?? 0;
+  }
+
+  /**
+   * Vectors never lie over the image of another frame: they wait for theirs, where any layer has one.
+   *
+   * @param {import("./protocol.js").Overlay} overlay
+   */
+  #takeOverlay(overlay) {
+    const { layers, shown } = this.#store.facts;
+    const isBare = !PICTURE_LAYERS.some((layer) => layers.shown[layer]);
+    if (isBare && shown?.frame !== overlay.frame) this.#show(overlay.frame, new Map());
+    if (this.#store.facts.shown?.frame === overlay.frame) {
+      this.#store.set({ overlay });
+      return;
+    }
+    this.#early.delete(overlay.frame);
+    this.#early.set(overlay.frame, overlay);
+    // A tracker may be some frames ahead of the decoder. What is older belongs to frames that were skipped.
+    for (const frame of this.#early.keys()) if (this.#early.size > MOST_EARLY) this.#early.delete(frame);
+  }
+
+  /** @param {import("./protocol.js").SessionMessage} session */
+  #begin(session) {
+    this.#pictures?.close();
+    this.#pictures = new PictureAssembler((frame, pictures) => this.#show(frame, pictures));
+    this.#early.clear();
+    this.#recent.clear(); // the footage may have changed while the program was away
+    const former = this.#store.facts.session?.cameras;
+    this.#store.set({ session, lanes: [] });
+    if (JSON.stringify(former) !== JSON.stringify(session.cameras)) this.#store.set({ shown: null, overlay: null });
+  }
+
+  /**
+   * Pictures of another frame take the place of all; those of the same frame that of their like.
+   *
+   * @param {number} frame
+   * @param {import("./pictures.js").Pictures} pictures
+   */
+  #show(frame, pictures) {
+    const { shown } = this.#store.facts;
+    const kept = new Map(shown?.frame === frame ? shown.pictures : []);
+    for (const [key, { bitmap }] of shown?.pictures ?? []) {
+      if (kept.has(key) && !pictures.has(key)) continue;
+      bitmap.close();
+    }
+    for (const [key, picture] of pictures) kept.set(key, picture);
+    this.#store.set({ shown: { frame, pictures: kept } });
+    this.#recent.keep(frame, pictures);
+    const overlay = this.#early.get(frame);
+    if (overlay) {
+      this.#store.set({ overlay });
+      this.#early.delete(frame);
+    }
+  }
+
+  /** The program sends a layer anew when it is shown again: until then what is kept may have become wrong. */
+  #forgetHidden() {
+    const { shown, layers, session } = this.#store.facts;
+    for (const layer of PICTURE_LAYERS) {
+      if (layers.shown[layer]) continue;
+      for (const camera of session?.cameras.keys() ?? []) {
+        shown?.pictures.get(keyOf(layer, camera))?.bitmap.close();
+        shown?.pictures.delete(keyOf(layer, camera));
+      }
+    }
+  }
+
+  /** @param {import("./protocol.js").TimelineMessage} message */
+  #mergeTimeline(message) {
+    const cells = this.#cells(message);
+    for (const [frame, cell] of Object.entries(message.cells)) cells.set(Number(frame), cell);
+  }
+
+  /**
+   * The cells to change in place: a long recording has a hundred thousand, and a tracker changes some twice a second.
+   *
+   * @param {{replace: boolean, person: number | null}} message whether to begin with none; of whom among several, null
+   *   for all together
+   */
+  #cells({ replace, person }) {
+    const { facts } = this.#store;
+    const known = person === null ? facts.timeline : facts.lanes[person];
+    const cells = replace || !known ? new Cells(this.#frameCount) : known;
+    if (person === null) this.#store.set({ timeline: cells });
+    else this.#store.set({ lanes: Object.assign([...facts.lanes], { [person]: cells }) });
+    return cells;
+  }
+}

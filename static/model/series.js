@@ -1,0 +1,123 @@
+/** Curves as data: one number per frame, NaN where there is none. */
+
+/** @typedef {import("./protocol.js").CurveGroup | "search" | "landscape"} Tab */
+
+/**
+ * @typedef {import("./protocol.js").CurvesHeader} CurvesHeader
+ * @typedef {{plot: number, label: string, values: Float32Array}} Series
+ * @typedef {{group: import("./protocol.js").CurveGroup, person: number, plots: import("./protocol.js").Plot[],
+ *   series: Series[], raw: Float32Array[]}} Curves `values` are what is drawn, `raw` what came: angles within a turn
+ */
+
+/**
+ * Take over a message: a new group of curves, or some frames of the known one.
+ *
+ * @param {Curves | null} former
+ * @param {CurvesHeader} header
+ * @param {ArrayBuffer} payload frames as uint32, then one curve after the other as float32
+ * @param {number} frameCount of the recording
+ * @returns {Curves}
+ */
+export function mergeCurves(former, { group, person, replace, count, plots }, payload, frameCount) {
+  const labels = plots.flatMap(({ labels, unit }, plot) => labels.map((label) => ({ plot, label, unit })));
+  const frames = new Uint32Array(payload, 0, count);
+  const goesOn = !replace && former?.group === group && former.person === person && former.raw.length === labels.length;
+  const raw = goesOn ? former.raw : labels.map(() => new Float32Array(frameCount).fill(NaN));
+  raw.forEach((values, index) => {
+    const news = new Float32Array(payload, 4 * count * (index + 1), count);
+    for (let i = 0; i < count; i += 1) values[frames[i]] = news[i];
+  });
+  const series = labels.map(({ plot, label, unit }, index) => ({
+    plot,
+    label,
+    values: unit === "deg" ? unwrapped(raw[index]) : raw[index],
+  }));
+  return { group, person, plots, series, raw };
+}
+
+/**
+ * Angles without jumps of whole turns.
+ *
+ * @param {Float32Array} degrees
+ */
+export function unwrapped(degrees) {
+  const out = new Float32Array(degrees.length).fill(NaN);
+  let turns = 0;
+  let former = NaN;
+  for (let i = 0; i < degrees.length; i += 1) {
+    const value = degrees[i];
+    if (value !== value) continue;
+    if (former === former) turns -= Math.round((value - former) / 360);
+    former = value;
+    out[i] = value + 360 * turns;
+  }
+  return out;
+}
+
+/**
+ * Least and greatest of some curves; null where they hold no number.
+ *
+ * @param {Float32Array[]} curves
+ */
+export function extent(curves) {
+  let least = Infinity;
+  let most = -Infinity;
+  for (const values of curves) {
+    for (let i = 0; i < values.length; i += 1) {
+      if (values[i] < least) least = values[i];
+      if (values[i] > most) most = values[i];
+    }
+  }
+  return least <= most ? { least, most } : null;
+}
+
+/**
+ * Trace a curve: frame by frame, or where several frames share a pixel from its first to its least, greatest and last value
+ * there, so that no spike is lost and a long recording is drawn as soon as a short one. Gaps stay open; a frame that stands
+ * alone shows as a dot.
+ *
+ * @param {Path2D} path
+ * @param {Float32Array} values
+ * @param {import("../widgets/frame_axis.js").FrameAxis} axis
+ * @param {(value: number) => number} toY
+ */
+export function trace(path, values, axis, toY) {
+  const stride = Math.max(1, Math.floor(1 / axis.pitch));
+  let isOpen = false;
+  // One more on either side, so that the line runs out of the picture.
+  const begin = Math.max(0, Math.floor(axis.first / stride) - 1) * stride;
+  const end = Math.min(values.length, axis.last + 2 * stride + 1);
+  for (let first = begin; first < end; first += stride) {
+    const points = summary(values, first, Math.min(first + stride, values.length));
+    if (points.length === 0) {
+      isOpen = false;
+      continue;
+    }
+    const x = axis.middle(first + (stride - 1) / 2);
+    if (!isOpen) path.moveTo(x - 0.5, toY(points[0]));
+    for (const value of points) path.lineTo(x, toY(value));
+    if (!isOpen) path.lineTo(x + 0.5, toY(points[points.length - 1]));
+    isOpen = true;
+  }
+}
+
+/**
+ * First, least, greatest and last number of a stretch; nothing where it has none.
+ *
+ * @param {Float32Array} values
+ * @param {number} from
+ * @param {number} to
+ */
+function summary(values, from, to) {
+  if (to - from === 1) return values[from] === values[from] ? [values[from]] : [];
+  let [first, last, least, most] = [NaN, NaN, Infinity, -Infinity];
+  for (let i = from; i < to; i += 1) {
+    const value = values[i];
+    if (value !== value) continue;
+    if (first !== first) first = value;
+    last = value;
+    if (value < least) least = value;
+    if (value > most) most = value;
+  }
+  return first === first ? [first, least, most, last] : [];
+}

@@ -1,0 +1,57 @@
+/**
+ * What a drag is doing, and what else it could, said at the foot of its pane.
+ *
+ * It stays there: what follows the pointer lies over what is being placed, and costs a picture of the page of its own
+ * with each move.
+ */
+
+/** @type {Record<import("../model/protocol.js").DragMode, string>} */
+const HINTS = {
+  move: "Shift or Alt: turn · Ctrl: depth",
+  turn: "Turning about the line of sight",
+  push: "Depth: up is away",
+};
+
+export class DragHint {
+  #element = document.createElement("div");
+  /** @type {import("../model/protocol.js").DragMode | null} what it says now */
+  #mode = null;
+
+  constructor() {
+    this.#element.className = "drag-hint";
+    this.#element.hidden = true;
+    this.#element.setAttribute("aria-hidden", "true");
+    document.body.append(this.#element);
+  }
+
+  /**
+   * @param {import("../model/protocol.js").DragMode} mode
+   * @param {HTMLElement} pane
+   */
+  show(mode, pane) {
+    if (mode === this.#mode) return;
+    this.#mode = mode;
+    this.#element.textContent = HINTS[mode];
+    this.#element.classList.toggle("is-quiet", mode === "move");
+    this.#element.hidden = false;
+    const { left, bottom, width } = pane.getBoundingClientRect();
+    this.#element.style.left = `${left + width / 2}px`;
+    this.#element.style.top = `${bottom - 8}px`;
+  }
+
+  hide() {
+    this.#element.hidden = true;
+    this.#mode = null;
+  }
+}
+
+/**
+ * What the keys held down make of a drag.
+ *
+ * @param {MouseEvent | KeyboardEvent} event
+ * @returns {import("../model/protocol.js").DragMode}
+ */
+export function modeOf(event) {
+  if (event.ctrlKey || event.metaKey) return "push";
+  return event.altKey || event.shiftKey ? "turn" : "move";
+}

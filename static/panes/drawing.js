@@ -1,0 +1,243 @@
+/** Draws one pane: the image layer, and the vectors over it. All sizes on the screen are CSS pixels. */
+
+/**
+ * @typedef {import("../model/protocol.js").Overlay} Overlay
+ * @typedef {import("../model/protocol.js").Handle} Handle
+ * @typedef {import("./pane_view.js").PaneView} PaneView
+ * @typedef {{handle: Handle, x: number, y: number}} PlacedHandle
+ */
+
+const HALO = "rgba(0, 0, 0, 0.45)";
+// Joints have their person's colour, as its contours have: bones between them must not look like contours.
+const BONE = "#fff";
+const PIXELS_VISIBLE_FROM = 4;
+const BEHIND_IMAGES = "#000";
+const JOINT_RADIUS = 3.5;
+const TORSO_HALF_SIDE = 5.5;
+export const TORSO = "torso";
+/** How strongly people are drawn who are dimmed. */
+export const DIMMED = 0.3;
+
+/**
+ * How each kind of line is drawn, and the layer that it belongs to; null: always.
+ *
+ * @typedef {{width: number, dash: number[], layer: import("../model/protocol.js").Layer | null, hasHalo: boolean,
+ *   ofPerson?: boolean}} LineStyle ofPerson: whether they go faint with their person
+ * @type {Record<import("../model/protocol.js").Path["kind"], LineStyle>}
+ */
+const LINE_STYLES = {
+  model: { width: 1.75, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
+  hidden: { width: 1.25, dash: [4, 4], layer: "hidden", hasHalo: false, ofPerson: true },
+  candidate: { width: 1.25, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
+  ghost: { width: 1.5, dash: [5, 4], layer: null, hasHalo: true, ofPerson: true },
+  part_edge: { width: 1, dash: [], layer: "part_edges", hasHalo: true },
+  epipolar: { width: 1.25, dash: [6, 4], layer: "epipolar", hasHalo: true },
+  // Thousands of short lines, which their halos would merge into one.
+  accepted: { width: 1.5, dash: [], layer: "accepted", hasHalo: false },
+  floor: { width: 1.25, dash: [], layer: null, hasHalo: true },
+  rejected: { width: 1, dash: [], layer: "rejected", hasHalo: false },
+};
+
+/**
+ * Give a canvas the size of its pane in device pixels, and return its context scaled to CSS pixels and cleared.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param {number} width
+ * @param {number} height
+ * @param {boolean} onProcessor keep the canvas off the graphics card: many short lines, all new each time, are drawn sooner
+ *   by the processor, and much sooner where there is no graphics card
+ */
+export function prepare(canvas, width, height, onProcessor) {
+  const ratio = devicePixelRatio;
+  const [deviceWidth, deviceHeight] = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (canvas.width !== deviceWidth || canvas.height !== deviceHeight) {
+    canvas.width = deviceWidth;
+    canvas.height = deviceHeight;
+  }
+  const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: onProcessor }));
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, width, height);
+  return context;
+}
+
+/**
+ * Darken the place of the image: layers that let something through must look the same in the dark and the light theme.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {PaneView} view
+ */
+export function drawBackground(context, view) {
+  const { x, y, width, height } = view.place;
+  context.fillStyle = BEHIND_IMAGES;
+  context.fillRect(x, y, width, height);
+}
+
+/**
+ * Draw a picture, of whatever size, in the place of the whole image.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {PaneView} view
+ * @param {CanvasImageSource & {width: number, height: number}} picture
+ * @param {number} opacity
+ */
+export function drawPicture(context, view, picture, opacity) {
+  const { x, y, width, height } = view.place;
+  // Far in, pixels are what one wants to see.
+  context.imageSmoothingEnabled = width / picture.width < PIXELS_VISIBLE_FROM;
+  context.imageSmoothingQuality = "medium";
+  context.globalAlpha = opacity;
+  context.drawImage(picture, x, y, width, height);
+  context.globalAlpha = 1;
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {PaneView} view
+ * @param {Overlay} overlay
+ * @param {number} camera
+ * @param {import("../model/layers.js").LayerChoice} layers
+ * @param {(person: number) => boolean} isDimmed whether a person's lines are to be faint
+ */
+export function drawPaths(context, view, overlay, camera, layers, isDimmed) {
+  for (const path of overlay.paths) {
+    if (path.camera !== camera || path.count === 0) continue;
+    const style = LINE_STYLES[path.kind];
+    if (style.layer && !layers.shown[style.layer]) continue;
+    const line = tracePath(view, overlay.segments, path.first, path.count);
+    const isFaint = style.ofPerson && isDimmed(path.person);
+    context.globalAlpha = (style.layer ? layers.opacity[style.layer] : 1) * (isFaint ? DIMMED : 1);
+    context.setLineDash(style.dash);
+    stroke(context, line, path.color, style.width, style.hasHalo && !isFaint);
+  }
+  context.setLineDash([]);
+  context.globalAlpha = 1;
+}
+
+/**
+ * @param {PaneView} view
+ * @param {Float32Array} segments
+ * @param {number} first
+ * @param {number} count
+ */
+function tracePath(view, segments, first, count) {
+  const { x, y } = view.origin;
+  const scale = view.scale;
+  const line = new Path2D();
+  for (let i = 4 * first, end = 4 * (first + count); i < end; i += 4) {
+    // Segments that go on where the last one ended are one line: its corners join, and it is drawn in half the time.
+    const goesOn = i > 4 * first && segments[i] === segments[i - 2] && segments[i + 1] === segments[i - 1];
+    if (!goesOn) line.moveTo(x + scale * segments[i], y + scale * segments[i + 1]);
+    line.lineTo(x + scale * segments[i + 2], y + scale * segments[i + 3]);
+  }
+  return line;
+}
+
+/**
+ * Stroke with a dark halo, so that any colour shows on any image.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {Path2D} line
+ * @param {string} color
+ * @param {number} width
+ * @param {boolean} hasHalo
+ */
+function stroke(context, line, color, width, hasHalo = true) {
+  context.lineJoin = context.lineCap = "round";
+  if (hasHalo) {
+    context.strokeStyle = HALO;
+    context.lineWidth = width + 2;
+    context.stroke(line);
+  }
+  context.strokeStyle = color;
+  context.lineWidth = width;
+  context.stroke(line);
+}
+
+/**
+ * Mark the part that a press would take.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {PaneView} view
+ * @param {Overlay} overlay
+ * @param {import("../model/protocol.js").Outline} outline
+ * @param {string} color
+ */
+export function drawPart(context, view, overlay, outline, color) {
+  const shape = tracePath(view, overlay.segments, outline.first, outline.count);
+  context.globalAlpha = 0.28;
+  context.fillStyle = color;
+  context.fill(shape);
+  context.globalAlpha = 1;
+  stroke(context, shape, "#fff", 1.25);
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {PlacedHandle[]} placed
+ * @param {import("../model/protocol.js").PersonInfo[]} people
+ * @param {number} opacity
+ */
+export function drawSkeleton(context, placed, people, opacity) {
+  people.forEach((person, index) => {
+    const joints = new Map(placed.filter((p) => p.handle.person === index).map((p) => [p.handle.point, p]));
+    const line = new Path2D();
+    for (const [from, to] of person.bones) {
+      const [a, b] = [joints.get(from), joints.get(to)];
+      if (!a || !b) continue;
+      line.moveTo(a.x, a.y);
+      line.lineTo(b.x, b.y);
+    }
+    context.globalAlpha = opacity;
+    stroke(context, line, BONE, 1.25);
+    context.globalAlpha = 1;
+  });
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {PlacedHandle} placed
+ * @param {string} color
+ * @param {"plain" | "selected" | "hovered"} emphasis
+ */
+export function drawHandle(context, { handle, x, y }, color, emphasis) {
+  const grown = emphasis === "hovered" ? 1.5 : 0;
+  const outline = new Path2D();
+  if (handle.point === TORSO) {
+    const half = TORSO_HALF_SIDE + grown;
+    outline.roundRect(x - half, y - half, 2 * half, 2 * half, 2);
+  } else {
+    outline.arc(x, y, JOINT_RADIUS + grown, 0, 2 * Math.PI);
+  }
+  // Hidden joints are hollow: a ring of the colour. Visible ones are discs with a white ring.
+  context.strokeStyle = HALO;
+  context.lineWidth = 3.5;
+  context.stroke(outline);
+  if (handle.visible) {
+    context.fillStyle = color;
+    context.fill(outline);
+  }
+  context.strokeStyle = handle.visible || emphasis !== "plain" ? "#fff" : color;
+  context.lineWidth = emphasis === "plain" ? 1.25 : 2.25;
+  context.stroke(outline);
+}
+
+/**
+ * Write a joint's name beside it, on the side where the pane has room.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {PlacedHandle} placed
+ * @param {number} paneWidth
+ */
+export function drawName(context, { handle, x, y }, paneWidth) {
+  const text = handle.point.replaceAll("_", " ") + (handle.visible ? "" : " (hidden)");
+  context.font = "500 12px system-ui, sans-serif";
+  context.textBaseline = "middle";
+  const width = context.measureText(text).width + 12;
+  const left = x + 12 + width < paneWidth ? x + 12 : x - 12 - width;
+  context.fillStyle = "rgba(12, 13, 15, 0.85)";
+  context.beginPath();
+  context.roundRect(left, y - 10, width, 20, 4);
+  context.fill();
+  context.fillStyle = "#fff";
+  context.fillText(text, left + 6, y + 0.5);
+}

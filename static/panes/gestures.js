@@ -1,0 +1,276 @@
+/**
+ * The pointer in a pane. On a joint it drags the joint, anywhere else (or with the middle button) it moves the view.
+ *
+ * A drag keeps the distance between pointer and joint, begins after a few pixels (a click only selects), and sends about one
+ * message per animation frame: as soon as the pointer moves, not when the browser gets to the next frame.
+ */
+
+const DRAG_THRESHOLD = 3;
+/** A mouse may tell its moves a thousand times a second; no more often than this they are told on. */
+const LEAST_INTERVAL_MS = 12;
+/** By so much a joint of the person worked on is nearer than it looks: hands that touch are told apart by whose they are. */
+const YIELD_PX = 4;
+
+import { isDimmed } from "../model/selectors.js";
+import { GRAB_RADIUS } from "./crowding.js";
+import { DragHint, modeOf } from "./drag_hint.js";
+import { partAt } from "./part_hit.js";
+
+/**
+ * @typedef {import("./drawing.js").PlacedHandle} PlacedHandle
+ * @typedef {{pane: import("./pane.js").Pane, frame: number, camera: number, pointer: number, person: number, point: string,
+ *   part: number | null, mode: import("../model/protocol.js").DragMode, start: {x: number, y: number}, grabbed: {u: number, v: number}, at: {u: number, v: number},
+ *   offset: {u: number, v: number}, begun: boolean}} Drag
+ */
+
+export class Gestures {
+  #store;
+  #send;
+  #latency;
+  /** @type {Drag | null} */
+  #drag = null;
+  /**
+   * @type {{pane: import("./pane.js").Pane, pointer: number, x: number, y: number, start: {x: number, y: number},
+   *   person: number | null} | null} person: a dimmed one whom a mere click means
+   */
+  #pan = null;
+  #hint = new DragHint();
+  #seq = 0;
+  #movesSent = -Infinity;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+   * @param {import("../model/latency.js").Latency} latency
+   */
+  constructor(store, send, latency) {
+    this.#store = store;
+    this.#send = send;
+    this.#latency = latency;
+    store.subscribe((changed) => {
+      if (!changed.has("connected")) return;
+      this.#release();
+      this.#latency.forget();
+    });
+  }
+
+  /**
+   * Watch the pointer in a pane.
+   *
+   * @param {import("./pane.js").Pane} pane
+   * @param {number} camera
+   */
+  watch(pane, camera) {
+    const surface = pane.surface;
+    surface.addEventListener("pointerdown", (event) => this.#down(event, pane, camera));
+    surface.addEventListener("pointermove", (event) => this.#move(event, pane, camera));
+    // Where the browser tells them; elsewhere the moves of each frame come as one.
+    surface.addEventListener("pointerrawupdate", (event) => {
+      if (this.#drag?.pointer === /** @type {PointerEvent} */ (event).pointerId && this.#drag.begun) {
+        this.#dragTo(this.#drag, /** @type {PointerEvent} */ (event), LEAST_INTERVAL_MS);
+      }
+    });
+    for (const kind of ["pointerenter", "pointerdown"]) {
+      surface.addEventListener(kind, () => this.#store.facts.active !== camera && this.#store.set({ active: camera }));
+    }
+    surface.addEventListener("pointerup", (event) => this.#up(event));
+    surface.addEventListener("pointercancel", () => this.cancel());
+    surface.addEventListener("pointerleave", () => {
+      if (!this.#drag && (this.#store.facts.hover || this.#store.facts.hoverPart)) this.#store.set({ hover: null, hoverPart: null });
+    });
+    // The middle button would scroll, and paste on some systems.
+    surface.addEventListener("mousedown", (event) => event.button === 1 && event.preventDefault());
+  }
+
+  /** Let go of whatever is held and take a begun drag back; says whether there was anything. */
+  cancel() {
+    const held = this.#drag !== null || this.#pan !== null;
+    if (this.#drag?.begun) this.#message("cancel", this.#drag.grabbed);
+    this.#release();
+    return held;
+  }
+
+  /**
+   * The joint nearest to a pointer, within reach.
+   *
+   * @param {import("./pane.js").Pane} pane
+   * @param {{x: number, y: number}} at
+   * @returns {PlacedHandle | null}
+   */
+  #hit(pane, at) {
+    const { layers, state } = this.#store.facts;
+    if (!this.#store.isSettled || !layers.shown.joints || state?.floor) return null;
+    let nearest = null;
+    let reach = GRAB_RADIUS;
+    for (const placed of pane.graspableHandles()) {
+      const distance = Math.hypot(placed.x - at.x, placed.y - at.y) + (placed.handle.person === state?.person ? 0 : YIELD_PX);
+      if (distance <= reach) [nearest, reach] = [placed, distance];
+    }
+    return nearest;
+  }
+
+  /**
+   * The part under a pointer, with what a drag needs to know of it: the place that is taken is the pointer's own.
+   *
+   * @param {import("./pane.js").Pane} pane
+   * @param {number} camera
+   * @param {{x: number, y: number}} at
+   */
+  #hitPart(pane, camera, at) {
+    const { layers, overlay, state } = this.#store.facts;
+    if (!this.#store.isSettled || !overlay || !layers.shown.joints || state?.floor) return null;
+    const place = pane.view.toImage(at.x, at.y);
+    const found = partAt(overlay, camera, place, (person) => !isDimmed(state, person));
+    if (!found) return null;
+    // Joint i moves part i, and is what a part that is touched selects.
+    const point = this.#store.facts.session?.people[found.person]?.points[found.part] ?? "";
+    return { camera, person: found.person, part: found.part, point, ...place };
+  }
+
+  /**
+   * The person who is dimmed and lies under the pointer of the main button: no hand can take him, but a click can mean him.
+   *
+   * @param {import("./pane.js").Pane} pane
+   * @param {number} camera
+   * @param {{x: number, y: number}} at
+   * @param {number} mouseButton
+   */
+  #dimmedAt(pane, camera, at, mouseButton) {
+    const { overlay, state } = this.#store.facts;
+    if (!overlay || !state?.solo || state.floor || mouseButton !== 0) return null;
+    return partAt(overlay, camera, pane.view.toImage(at.x, at.y), (person) => isDimmed(state, person))?.person ?? null;
+  }
+
+  /**
+   * @param {PointerEvent} event
+   * @param {import("./pane.js").Pane} pane
+   * @param {number} camera
+   */
+  #down(event, pane, camera) {
+    if (this.#drag || this.#pan || event.button > 1) return;
+    const at = pane.locate(event);
+    const hit = event.button === 0 ? (this.#hit(pane, at) ?? this.#hitPart(pane, camera, at)) : null;
+    pane.surface.setPointerCapture(event.pointerId);
+    if (!hit) {
+      const start = { x: event.clientX, y: event.clientY };
+      this.#pan = { pane, pointer: event.pointerId, ...start, start, person: this.#dimmedAt(pane, camera, at, event.button) };
+      pane.surface.classList.add("is-panning");
+      return;
+    }
+    const { person, point, u, v, part } = "handle" in hit ? { ...hit.handle, part: null } : hit;
+    const pointer = pane.view.toImage(at.x, at.y);
+    this.#drag = {
+      pane,
+      frame: this.#store.facts.shown?.frame ?? 0,
+      camera,
+      pointer: event.pointerId,
+      person,
+      point,
+      part,
+      mode: modeOf(event),
+      start: at,
+      grabbed: { u, v },
+      at: { u, v },
+      offset: { u: u - pointer.u, v: v - pointer.v },
+      begun: false,
+    };
+    pane.surface.classList.add("is-dragging");
+    const held = part === null ? { hover: { camera, person, point } } : { hoverPart: { camera, person, part } };
+    this.#store.set({ dragging: true, hover: null, hoverPart: null, ...held });
+    this.#send({ type: "select", person, point });
+  }
+
+  /**
+   * @param {PointerEvent} event
+   * @param {import("./pane.js").Pane} pane
+   * @param {number} camera
+   */
+  #move(event, pane, camera) {
+    if (this.#pan?.pointer === event.pointerId) {
+      this.#pan.pane.panBy(event.clientX - this.#pan.x, event.clientY - this.#pan.y);
+      [this.#pan.x, this.#pan.y] = [event.clientX, event.clientY];
+    } else if (this.#drag?.pointer === event.pointerId) {
+      this.#drag.mode = modeOf(event);
+      this.#dragTo(this.#drag, event);
+      if (this.#drag.begun) this.#hint.show(this.#drag.mode, pane.element);
+    } else if (!this.#drag && !this.#pan) {
+      this.#hoverAt(pane, camera, pane.locate(event));
+    }
+  }
+
+  /**
+   * Take what is held to where a pointer is.
+   *
+   * @param {Drag} drag
+   * @param {PointerEvent} event
+   * @param {number} intervalMs since the last message, or else this one waits for the next move
+   */
+  #dragTo(drag, event, intervalMs = 0) {
+    const at = drag.pane.locate(event);
+    if (!drag.begun) {
+      if (Math.hypot(at.x - drag.start.x, at.y - drag.start.y) < DRAG_THRESHOLD) return;
+      drag.begun = true;
+      this.#message("start", drag.grabbed);
+    }
+    const pointer = drag.pane.view.toImage(at.x, at.y);
+    const { u, v } = { u: pointer.u + drag.offset.u, v: pointer.v + drag.offset.v };
+    if ((u === drag.at.u && v === drag.at.v) || performance.now() < this.#movesSent + intervalMs) return;
+    drag.at = { u, v };
+    this.#movesSent = performance.now();
+    this.#latency.sent(this.#message("move", drag.at), event.timeStamp);
+  }
+
+  /** @param {PointerEvent} event */
+  #up(event) {
+    const pointer = this.#drag?.pointer ?? this.#pan?.pointer;
+    if (event.pointerId !== pointer) return;
+    if (this.#drag?.begun) this.#message("end", this.#drag.at);
+    const pan = this.#pan;
+    if (pan?.person != null && Math.hypot(event.clientX - pan.start.x, event.clientY - pan.start.y) < DRAG_THRESHOLD) {
+      this.#send({ type: "select", person: pan.person, point: null });
+    }
+    this.#release();
+  }
+
+  /**
+   * @param {import("./pane.js").Pane} pane
+   * @param {number} camera
+   * @param {{x: number, y: number}} at
+   */
+  #hoverAt(pane, camera, at) {
+    const hit = this.#hit(pane, at);
+    const { hover, hoverPart } = this.#store.facts;
+    const part = hit ? null : this.#hitPart(pane, camera, at);
+    pane.surface.classList.toggle("is-over-joint", hit !== null);
+    pane.surface.classList.toggle("is-over-part", part !== null);
+    if (hoverPart?.camera !== part?.camera || hoverPart?.person !== part?.person || hoverPart?.part !== part?.part) {
+      this.#store.set({ hoverPart: part && { camera, person: part.person, part: part.part } });
+    }
+    if (!hit) {
+      if (hover) this.#store.set({ hover: null });
+    } else if (hover?.camera !== camera || hover.person !== hit.handle.person || hover.point !== hit.handle.point) {
+      this.#store.set({ hover: { camera, person: hit.handle.person, point: hit.handle.point } });
+    }
+  }
+
+  /**
+   * @param {"start" | "move" | "end" | "cancel"} phase
+   * @param {{u: number, v: number}} at
+   * @returns the message's number
+   */
+  #message(phase, { u, v }) {
+    const { frame, camera, person, point, part, mode } = /** @type {Drag} */ (this.#drag);
+    this.#seq += 1;
+    this.#send({ type: "drag", phase, frame, camera, person, point, part, mode, u, v, seq: this.#seq });
+    return this.#seq;
+  }
+
+  #release() {
+    const surface = (this.#drag ?? this.#pan)?.pane.surface;
+    surface?.classList.remove("is-dragging", "is-panning");
+    this.#hint.hide();
+    this.#drag = null;
+    this.#pan = null;
+    if (this.#store.facts.dragging) this.#store.set({ dragging: false });
+  }
+}

@@ -1,0 +1,113 @@
+/** The small panel at a pane for brightness, contrast and gamma of its image. */
+
+import { byId } from "../widgets/elements.js";
+import { PLAIN, isPlain } from "../model/image_tone.js";
+import { slider, togglePopover } from "../widgets/popovers.js";
+
+const signed = (/** @type {number} */ value) => (value > 0 ? `+${value}` : String(value));
+/** The slider of gamma runs evenly over its logarithm: as far down as up. */
+const GAMMA_STEPS = 100;
+const MOST_GAMMA = 5;
+
+export class LookMenu {
+  #store;
+  #looks;
+  #panel = byId("look-menu", HTMLElement);
+  #title = document.createElement("h3");
+  #camera = 0;
+  #closedAt = -Infinity;
+  #reset = document.createElement("button");
+  /** @type {(() => void)[]} */
+  #show = [];
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {import("../model/image_tone.js").Looks} looks
+   */
+  constructor(store, looks) {
+    this.#store = store;
+    this.#looks = looks;
+    this.#panel.append(this.#title);
+    this.#row("Brightness", "Added to every gray level", "brightness");
+    this.#row("Contrast", "Stretches the gray levels about the middle", "contrast");
+    this.#row("Gamma", "Above 1 lifts the shadows, below 1 deepens them", "gamma");
+    this.#buildFoot();
+    this.#panel.addEventListener("toggle", () => {
+      if (!this.#panel.matches(":popover-open")) this.#closedAt = performance.now();
+    });
+    store.subscribe((changed) => {
+      if (changed.has("looks")) this.#show.forEach((one) => one());
+    });
+  }
+
+  /**
+   * Open the panel for a camera at a button, or close it where it is open for that camera.
+   *
+   * @param {number} camera
+   * @param {HTMLElement} button
+   */
+  toggle(camera, button) {
+    // The press on the button of an open panel has closed it by now: the click must not open it again.
+    const isClosing = camera === this.#camera && performance.now() - this.#closedAt < 250;
+    if (isClosing) return;
+    if (this.#panel.matches(":popover-open") && camera !== this.#camera) this.#panel.hidePopover();
+    this.#camera = camera;
+    this.#title.textContent = this.#store.facts.session?.cameras[camera].name ?? "";
+    this.#show.forEach((one) => one());
+    togglePopover(this.#panel, button);
+  }
+
+  get #look() {
+    return this.#store.facts.looks[this.#camera] ?? PLAIN;
+  }
+
+  /**
+   * @param {string} label
+   * @param {string} title
+   * @param {keyof import("../model/image_tone.js").Look} field
+   */
+  #row(label, title, field) {
+    const isGamma = field === "gamma";
+    const caption = document.createElement("span");
+    caption.textContent = label;
+    caption.title = title;
+    const control = slider({
+      label,
+      title,
+      least: -100,
+      most: 100,
+      step: 2,
+      format: (value) => (isGamma ? gammaOf(value).toFixed(2) : signed(value)),
+      onInput: (value) =>
+        this.#looks.set(this.#camera, { ...this.#look, [field]: isGamma ? gammaOf(value) : value }),
+    });
+    control.input.dataset.look = field;
+    this.#show.push(() => {
+      const value = this.#look[field];
+      control.show(isGamma ? Math.round((GAMMA_STEPS * Math.log(value)) / Math.log(MOST_GAMMA)) : value);
+    });
+    this.#panel.append(caption, control.input, control.value);
+  }
+
+  #buildFoot() {
+    const foot = document.createElement("div");
+    foot.className = "popover-foot";
+    const all = document.createElement("button");
+    all.type = "button";
+    all.textContent = "All cameras";
+    all.title = "Give the images of all cameras this look";
+    all.addEventListener("click", () => this.#looks.setAll(this.#look));
+    this.#reset.type = "button";
+    this.#reset.textContent = "Reset";
+    this.#reset.title = "Show this image as it is";
+    this.#reset.addEventListener("click", () => this.#looks.set(this.#camera, PLAIN));
+    this.#show.push(() => (this.#reset.disabled = isPlain(this.#look)));
+    foot.append(all, this.#reset);
+    this.#panel.append(foot);
+  }
+}
+
+/** @param {number} step from -100 to 100 */
+function gammaOf(step) {
+  return MOST_GAMMA ** (step / GAMMA_STEPS);
+}

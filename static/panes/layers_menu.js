@@ -1,0 +1,153 @@
+/** The menu of the layers, and the few that are one click away. */
+
+import { button, byId } from "../widgets/elements.js";
+import { BY_KEY, LAYERS } from "../model/layers.js";
+import { opensPopover, slider, togglePopover } from "../widgets/popovers.js";
+
+/** @typedef {import("../model/protocol.js").Layer} Layer */
+
+/** @type {{label: string, title: string, ids: Layer[]}[]} */
+const QUICK = [
+  { label: "Contours", title: "The model's visible contours", ids: ["contours"] },
+  { label: "Joints", title: "The joints, to be dragged", ids: ["joints"] },
+  { label: "Edges", title: "Edges: those that this pose explains in turquoise, the others in pink", ids: ["accepted", "rejected"] },
+  { label: "Distance", title: "The distance to the nearest edge, as the search sees it", ids: ["distance"] },
+];
+const GROUPS = ["Model", "Evidence", "Picture"];
+
+export class LayersMenu {
+  #store;
+  #layers;
+  #panel = byId("layers-menu", HTMLElement);
+  #button = byId("show-layers", HTMLButtonElement);
+  /** @type {(() => void)[]} */
+  #show = [];
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {import("../model/layers.js").Layers} layers
+   */
+  constructor(store, layers) {
+    this.#store = store;
+    this.#layers = layers;
+    opensPopover(this.#panel, this.#button, () => this.toggle());
+    this.#buildQuick();
+    for (const group of GROUPS) this.#buildGroup(group);
+    this.#buildFoot();
+    const show = () => this.#show.forEach((one) => one());
+    store.subscribe((changed) => {
+      if (changed.has("layers")) show();
+    });
+    show();
+  }
+
+  toggle() {
+    togglePopover(this.#panel, this.#button);
+  }
+
+  #buildQuick() {
+    const bar = byId("quick-layers", HTMLElement);
+    for (const { label, title, ids } of QUICK) {
+      const { element, input } = checkbox(label, title);
+      input.addEventListener("change", () => {
+        input.blur();
+        this.#layers.toggle(ids, input.checked);
+      });
+      this.#show.push(() => {
+        const { shown } = this.#store.facts.layers;
+        input.checked = ids.some((id) => shown[id]);
+        input.indeterminate = input.checked && !ids.every((id) => shown[id]);
+      });
+      bar.append(element);
+    }
+  }
+
+  /** @param {string} group */
+  #buildGroup(group) {
+    const heading = document.createElement("h3");
+    heading.textContent = group;
+    this.#panel.append(heading);
+    // As they lie over one another: the uppermost comes first.
+    for (const info of LAYERS.filter((layer) => layer.group === group).reverse()) {
+      this.#panel.append(...this.#row(info));
+      if (info.id === "contours") this.#panel.append(this.#colors());
+    }
+  }
+
+  /** @param {import("../model/layers.js").LayerInfo} info */
+  #row({ id, label, title }) {
+    const { element, input } = checkbox(label, title);
+    element.className = "popover-check";
+    input.dataset.layer = id;
+    input.addEventListener("change", () => this.#layers.toggle([id], input.checked));
+    const key = document.createElement("kbd");
+    const number = BY_KEY.indexOf(id) + 1;
+    key.textContent = number ? `⇧${number}` : "";
+    key.title = number ? `Shift+${number}` : "";
+    const opacity = slider({
+      label: `Opacity of ${label.toLowerCase()}`,
+      title: `How strongly ${label.toLowerCase()} are drawn`.replace("image are", "image is"),
+      least: 5,
+      most: 100,
+      step: 5,
+      format: (value) => `${value}%`,
+      onInput: (value) => this.#layers.setOpacity(id, value / 100),
+    });
+    opacity.input.dataset.opacity = id;
+    this.#show.push(() => {
+      const { layers } = this.#store.facts;
+      input.checked = layers.shown[id];
+      opacity.show(Math.round(100 * layers.opacity[id]));
+      opacity.input.disabled = !layers.shown[id];
+      opacity.value.classList.toggle("is-off", !layers.shown[id]);
+    });
+    return [element, key, opacity.input, opacity.value];
+  }
+
+  #colors() {
+    const choice = document.createElement("fieldset");
+    choice.className = "segmented popover-choice";
+    choice.setAttribute("aria-label", "Colours of the contours");
+    for (const [value, label, title] of /** @type {const} */ ([
+      ["person", "by person", "Contours in the colour of their person"],
+      ["part", "by part", "Contours in the colour of their part"],
+    ])) {
+      const { element, input } = checkbox(label, title);
+      Object.assign(input, { type: "radio", name: "contour-colors", value });
+      input.addEventListener("change", () => this.#layers.setColors(value));
+      this.#show.push(() => (input.checked = this.#store.facts.layers.colors === value));
+      choice.append(element);
+    }
+    return choice;
+  }
+
+  #buildFoot() {
+    const foot = document.createElement("div");
+    foot.className = "popover-foot";
+    const hint = document.createElement("span");
+    hint.textContent = "Kept in this browser for this session";
+    const reset = document.createElement("button");
+    reset.type = "button";
+    reset.id = "reset-layers";
+    reset.textContent = "Reset layers";
+    reset.title = "Show the usual layers at their usual strength";
+    foot.append(hint, reset);
+    this.#panel.append(foot);
+    button("reset-layers", () => this.#layers.reset());
+  }
+}
+
+/**
+ * @param {string} label
+ * @param {string} title
+ */
+function checkbox(label, title) {
+  const element = document.createElement("label");
+  const input = document.createElement("input");
+  input.type = "checkbox";
+  const text = document.createElement("span");
+  text.textContent = label;
+  element.title = title;
+  element.append(input, text);
+  return { element, input };
+}

@@ -1,0 +1,257 @@
+/** One camera's pane: two canvases, what stands in its corners, zoom and pan. */
+
+import * as drawing from "./drawing.js";
+import { drawPins } from "./pin_drawing.js";
+import { uncrowded } from "./crowding.js";
+import { isDimmed } from "../model/selectors.js";
+import { PICTURE_LAYERS } from "../model/layers.js";
+import { isPlain } from "../model/image_tone.js";
+import { PaneCorner } from "./pane_corner.js";
+import { PaneView } from "./pane_view.js";
+import { keyOf } from "../model/pictures.js";
+import { TonedImage } from "./toned_image.js";
+import { drawsInSoftware } from "../widgets/webgl.js";
+
+// Without a graphics card one opaque canvas is laid on the screen sooner than a transparent one over another.
+const IN_SOFTWARE = drawsInSoftware();
+const WHEEL_ZOOM = 0.0015;
+const PINCH_ZOOM = 0.01;
+const LINE_PX = 16;
+/** Below this width words give way to signs. */
+const NARROW_PX = 250;
+/** A picture may have this share of the pixels that its pane shows along either side, up to that: a splitter that is drawn
+ * does not ask for new ones all the way. */
+const [ENOUGH, MORE_THAN_ENOUGH] = [0.95, 1.25];
+
+export class Pane {
+  element = document.createElement("section");
+  view;
+  #store;
+  #camera;
+  #info;
+  #image = document.createElement("canvas");
+  #overlay = document.createElement("canvas");
+  #corner;
+  #toned = new TonedImage();
+  #onView;
+  #size = { width: 0, height: 0 };
+  #reduction = 1;
+  #redrawScheduled = false;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {number} camera
+   * @param {import("../model/protocol.js").CameraInfo} info
+   * @param {{viewChanged: () => void, openLook: (camera: number, button: HTMLElement) => void}} run
+   */
+  constructor(store, camera, info, { viewChanged, openLook }) {
+    this.#store = store;
+    this.#camera = camera;
+    this.#info = info;
+    this.#onView = viewChanged;
+    this.view = new PaneView(info.width, info.height);
+    this.element.className = "pane";
+    this.element.setAttribute("aria-label", `Camera ${info.name}`);
+    this.#overlay.className = "pane-overlay";
+    this.#corner = new PaneCorner(camera, info.name, {
+      reset: () => this.reset(),
+      openLook: (button) => openLook(camera, button),
+    });
+    if (!IN_SOFTWARE) this.element.append(this.#image);
+    this.element.append(this.#overlay, ...this.#corner.elements);
+    this.element.addEventListener("wheel", (event) => this.#zoom(event), { passive: false });
+  }
+
+  /** The element that takes the pointer. */
+  get surface() {
+    return this.#overlay;
+  }
+
+  get lookButton() {
+    return this.#corner.lookButton;
+  }
+
+  /**
+   * How many pixels of the image, along either side, this pane can do with one for; 0 where it is not seen. A picture as large as
+   * its pane is made, sent, decoded and drawn in a fraction of the time that the whole image takes.
+   */
+  get reduction() {
+    if (this.#size.width === 0 || this.#size.height === 0) return 0;
+    const shown = this.view.scale * devicePixelRatio;
+    const share = 1 / (this.#reduction * shown);
+    const isKept = this.#reduction > 1 ? share >= ENOUGH && share <= MORE_THAN_ENOUGH : shown > ENOUGH;
+    if (!isKept) this.#reduction = Math.max(1, 1 / shown);
+    return this.#reduction;
+  }
+
+  /** Show the whole image. */
+  reset() {
+    this.view.reset();
+    this.#redraw();
+  }
+
+  /**
+   * @param {number} dx
+   * @param {number} dy
+   */
+  panBy(dx, dy) {
+    this.view.panBy(dx, dy);
+    this.#redraw();
+  }
+
+  /**
+   * Screen position, in CSS pixels of the pane, of a pointer event.
+   *
+   * @param {MouseEvent} event
+   */
+  locate(event) {
+    const box = this.#overlay.getBoundingClientRect();
+    return { x: event.clientX - box.left, y: event.clientY - box.top };
+  }
+
+  /** The joints that a hand can take in this view, and where they lie in the pane; of people who are dimmed none. */
+  graspableHandles() {
+    const { session, hover, dragging, state } = this.#store.facts;
+    const placed = this.#placedHandles().filter(({ handle }) => !isDimmed(state, handle.person));
+    return uncrowded(placed, session?.people ?? [], dragging ? hover : null);
+  }
+
+  /** All joints of this view, and where they lie in the pane. */
+  #placedHandles() {
+    const handles = this.#store.facts.overlay?.handles ?? [];
+    return handles
+      .filter((handle) => handle.camera === this.#camera)
+      .map((handle) => ({ handle, ...this.view.toScreen(handle.u, handle.v) }));
+  }
+
+  /**
+   * Take over the place that the layout gave; canvases that show nothing keep no memory.
+   *
+   * @param {import("./grid_layout.js").Box | null} box
+   */
+  place(box) {
+    const { x, y, width, height } = box ?? { x: 0, y: 0, width: 0, height: 0 };
+    this.element.hidden = box === null;
+    Object.assign(this.element.style, { left: `${x}px`, top: `${y}px`, width: `${width}px`, height: `${height}px` });
+    this.element.classList.toggle("is-narrow", width < NARROW_PX);
+    this.#size = { width, height };
+    this.view.resize(width, height);
+    if (box) this.draw(true);
+    else this.#image.width = this.#image.height = this.#overlay.width = this.#overlay.height = 0;
+  }
+
+  /** Draw once on the next animation frame, however often the view moves before it. */
+  #redraw() {
+    if (this.#redrawScheduled) return;
+    this.#redrawScheduled = true;
+    requestAnimationFrame(() => {
+      this.#redrawScheduled = false;
+      this.draw(true);
+      this.#onView();
+    });
+  }
+
+  /**
+   * Draw now; called within an animation frame.
+   *
+   * @param {boolean} withPictures whether the pictures under the vectors changed too
+   */
+  draw(withPictures) {
+    const { width, height } = this.#size;
+    const { state, session, overlay, layers, standIn } = this.#store.facts;
+    if (width === 0 || height === 0) return;
+    if (withPictures) this.#drawPictures();
+    const context = drawing.prepare(this.#overlay, width, height, true);
+    if (IN_SOFTWARE) context.drawImage(this.#image, 0, 0, width, height);
+    this.#corner.showStandIn(standIn);
+    if (!state || !session || !overlay || standIn?.pictures) return;
+    drawing.drawPaths(context, this.view, overlay, this.#camera, layers, (person) => isDimmed(state, person));
+    this.#drawJoints(context, state, session.people);
+    this.#showJoint(state);
+    drawPins(context, this.view, this.#store.facts, this.#camera, width);
+  }
+
+  showCost() {
+    this.#corner.showCost(this.#store.facts.state?.view_costs_px[this.#camera] ?? null);
+  }
+
+  #drawPictures() {
+    const { width, height } = this.#size;
+    const { shown, standIn, layers, looks } = this.#store.facts;
+    const pictures = standIn?.pictures ?? shown?.pictures;
+    const context = drawing.prepare(this.#image, width, height, IN_SOFTWARE);
+    drawing.drawBackground(context, this.view);
+    /** @type {number | null} */
+    let limitPx = null;
+    for (const layer of PICTURE_LAYERS) {
+      const picture = layers.shown[layer] ? pictures?.get(keyOf(layer, this.#camera)) : undefined;
+      if (!picture) continue;
+      const source = layer === "image" ? this.#toned.of(picture.bitmap, looks[this.#camera]) : picture.bitmap;
+      drawing.drawPicture(context, this.view, source, layers.opacity[layer]);
+      limitPx ??= picture.limitPx;
+    }
+    this.#corner.showScale(limitPx, width);
+    this.#corner.showZoom(this.view.isReset);
+    this.#corner.showLook(!isPlain(looks[this.#camera]));
+  }
+
+  /** @param {import("../model/protocol.js").StateMessage} state */
+  #showJoint({ person, point }) {
+    const { overlay } = this.#store.facts;
+    const handle = overlay?.handles.find((h) => h.camera === this.#camera && h.person === person && h.point === point);
+    const { width, height } = this.#info;
+    const isInside = handle && handle.u >= -0.5 && handle.v >= -0.5 && handle.u < width - 0.5 && handle.v < height - 0.5;
+    this.#corner.showJoint(point, !isInside ? "outside" : handle.visible ? "visible" : "hidden");
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {import("../model/protocol.js").StateMessage} state
+   * @param {import("../model/protocol.js").PersonInfo[]} people
+   */
+  #drawJoints(context, state, people) {
+    const { hover, layers } = this.#store.facts;
+    if (layers.shown.skeleton) {
+      const undimmed = this.#placedHandles().filter(({ handle }) => !isDimmed(state, handle.person));
+      drawing.drawSkeleton(context, undimmed, people, layers.opacity.skeleton);
+    }
+    if (!layers.shown.joints) return;
+    this.#drawHoveredPart(context, people);
+    /** @type {drawing.PlacedHandle | null} */
+    let named = null;
+    context.globalAlpha = layers.opacity.joints;
+    for (const one of this.graspableHandles()) {
+      const isHovered = hover?.person === one.handle.person && hover.point === one.handle.point;
+      const isSelected = state.person === one.handle.person && state.point === one.handle.point;
+      if (isHovered && hover.camera === this.#camera) named = one;
+      const color = people[one.handle.person]?.color ?? "#fff";
+      drawing.drawHandle(context, one, color, isHovered ? "hovered" : isSelected ? "selected" : "plain");
+    }
+    context.globalAlpha = 1;
+    if (named) drawing.drawName(context, named, this.#size.width);
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {import("../model/protocol.js").PersonInfo[]} people
+   */
+  #drawHoveredPart(context, people) {
+    const { hoverPart, overlay } = this.#store.facts;
+    if (!overlay || hoverPart?.camera !== this.#camera) return;
+    const outline = overlay.outlines.find(
+      ({ camera, person, part }) => camera === this.#camera && person === hoverPart.person && part === hoverPart.part,
+    );
+    if (outline) drawing.drawPart(context, this.view, overlay, outline, people[outline.person]?.color ?? "#fff");
+  }
+
+  /** @param {WheelEvent} event */
+  #zoom(event) {
+    event.preventDefault();
+    const { x, y } = this.locate(event);
+    const delta = event.deltaY * (event.deltaMode === WheelEvent.DOM_DELTA_LINE ? LINE_PX : 1);
+    // Browsers report a pinch as a wheel with the control key held.
+    this.view.zoomAt(x, y, Math.exp(-delta * (event.ctrlKey ? PINCH_ZOOM : WHEEL_ZOOM)));
+    this.#store.set({ hover: null });
+    this.#redraw();
+  }
+}

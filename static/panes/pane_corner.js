@@ -1,0 +1,147 @@
+/** What stands in the corners of a pane: the camera, the selected joint's visibility, the cost; scale, tools. */
+
+import { px } from "../widgets/text.js";
+
+const SCALE_FROM_PX = 230;
+
+/**
+ * @typedef {"visible" | "hidden" | "outside"} Visibility
+ */
+
+/** As the joints are drawn: full where one sees them, hollow where something hides them. */
+const MARKS = { visible: "●", hidden: "○", outside: "⊘" };
+const MEANINGS = {
+  visible: "is seen by this camera",
+  hidden: "is behind something in this camera",
+  outside: "is outside this camera's image",
+};
+
+export class PaneCorner {
+  #label = document.createElement("div");
+  #mark = document.createElement("span");
+  #word = document.createElement("span");
+  #joint = document.createElement("output");
+  #cost = document.createElement("output");
+  #tools = document.createElement("div");
+  #standIn = document.createElement("div");
+  #scale = document.createElement("div");
+  #limit = document.createElement("span");
+  #fit;
+  #look;
+
+  /**
+   * @param {number} camera
+   * @param {string} name
+   * @param {{reset: () => void, openLook: (button: HTMLElement) => void}} run
+   */
+  constructor(camera, name, { reset, openLook }) {
+    this.#label.className = "pane-label";
+    const number = document.createElement("kbd");
+    number.textContent = String(camera + 1);
+    const title = document.createElement("span");
+    title.className = "pane-name";
+    title.textContent = name;
+    this.#joint.className = "pane-joint";
+    this.#joint.append(this.#mark, this.#word);
+    this.#joint.hidden = true;
+    this.#label.append(number, title, this.#joint);
+    this.#label.title = `Camera ${camera + 1}, ${name}: ${keysOf(camera)} or a double click fills the grid with it`;
+
+    this.#cost.className = "pane-cost";
+    this.#cost.title = "Chamfer cost of this view, in pixels";
+
+    this.#standIn.className = "pane-stand-in";
+    this.#standIn.title = "The picture of the frame asked for is on its way; until it is here the nearest one at hand is shown";
+    this.#standIn.hidden = true;
+
+    this.#scale.className = "pane-scale";
+    const bar = document.createElement("i");
+    this.#scale.append("0", bar, this.#limit);
+    this.#scale.title = "Distance image: distance to the nearest edge, in pixels of the image";
+    this.#scale.hidden = true;
+    this.#fit = toolButton("Fit", "Show the whole image (0)", `Show the whole image of ${name}`);
+    this.#fit.classList.add("pane-reset");
+    this.#fit.addEventListener("click", () => {
+      this.#fit.blur();
+      reset();
+    });
+    this.#look = toolButton("◐", "Brightness and contrast (I)", `Brightness and contrast of ${name}`);
+    this.#look.classList.add("pane-look");
+    this.#look.addEventListener("click", () => openLook(this.#look));
+    this.#tools.className = "pane-tools";
+    this.#tools.append(this.#scale, this.#fit, this.#look);
+  }
+
+  get elements() {
+    return [this.#label, this.#cost, this.#standIn, this.#tools];
+  }
+
+  get lookButton() {
+    return this.#look;
+  }
+
+  /** @param {number | null} cost in pixels */
+  showCost(cost) {
+    this.#cost.textContent = px(cost);
+  }
+
+  /** @param {import("../model/store.js").StandIn | null} standIn which frame is shown in place of which */
+  showStandIn(standIn) {
+    this.#standIn.hidden = standIn === null || standIn.frame === standIn.target;
+    if (!standIn) return;
+    const word = document.createElement("span"); // there is no room for it in a narrow pane
+    word.textContent = "frame ";
+    this.#standIn.replaceChildren(word, `${standIn.frame}, while ${standIn.target} loads`);
+  }
+
+  /** @param {boolean} isReset whether the whole image is shown already */
+  showZoom(isReset) {
+    this.#fit.hidden = isReset;
+  }
+
+  /** @param {boolean} isChanged whether the image is shown otherwise than it is */
+  showLook(isChanged) {
+    this.#look.classList.toggle("is-changed", isChanged);
+  }
+
+  /**
+   * @param {string | null} joint name of the selected joint
+   * @param {Visibility} visibility
+   */
+  showJoint(joint, visibility) {
+    this.#joint.hidden = joint === null;
+    if (joint === null || this.#joint.dataset.is === `${joint} ${visibility}`) return;
+    this.#joint.dataset.is = `${joint} ${visibility}`;
+    this.#mark.textContent = MARKS[visibility];
+    this.#word.textContent = visibility;
+    this.#joint.title = `The ${joint.replaceAll("_", " ")} ${MEANINGS[visibility]}`;
+  }
+
+  /**
+   * @param {number | null} limitPx what the darkest colour of the distance image means; null: it is not shown
+   * @param {number} paneWidth
+   */
+  showScale(limitPx, paneWidth) {
+    this.#scale.hidden = limitPx === null || paneWidth < SCALE_FROM_PX;
+    if (limitPx !== null) this.#limit.textContent = `${Math.round(limitPx)} px`;
+  }
+}
+
+/** @param {number} camera */
+function keysOf(camera) {
+  return camera < 9 ? `key ${camera + 1}` : `keys ${[...String(camera + 1)].join(" ")}`;
+}
+
+/**
+ * @param {string} text
+ * @param {string} title
+ * @param {string} name for screen readers
+ */
+function toolButton(text, title, name) {
+  const button = document.createElement("button");
+  button.type = "button";
+  button.textContent = text;
+  button.title = title;
+  button.setAttribute("aria-label", name);
+  return button;
+}

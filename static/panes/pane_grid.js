@@ -1,0 +1,185 @@
+/** The panes of all cameras: laid out as large as they fit, or one of them filling the grid. */
+
+import { layOut } from "./grid_layout.js";
+import { Pane } from "./pane.js";
+
+/** Two digits within this time are one number. */
+const SECOND_DIGIT_MS = 700;
+/** What is drawn otherwise under the pointer. @type {(keyof import("../model/store.js").Facts)[]} */
+const HOVERED = ["hover", "hoverPart", "pinHover", "heldPin"];
+/** What changes the pictures under the vectors. @type {(keyof import("../model/store.js").Facts)[]} */
+const PICTURED = ["shown", "standIn", "layers", "looks"];
+
+export class PaneGrid {
+  /** @type {Pane[]} */
+  panes = [];
+  #store;
+  #gestures;
+  #latency;
+  #openLook;
+  #element;
+  #digit = { value: 0, at: -Infinity };
+  #cameras = "";
+  #choice = "";
+
+  /**
+   * @param {HTMLElement} element
+   * @param {import("../model/store.js").Store} store
+   * @param {{watch: (pane: Pane, camera: number) => void}} gestures whoever takes the pointer in a pane
+   * @param {import("../model/latency.js").Latency} latency
+   * @param {(camera: number, button: HTMLElement) => void} openLook opens brightness and contrast of a camera
+   */
+  constructor(element, store, gestures, latency, openLook) {
+    this.#openLook = openLook;
+    this.#element = element;
+    this.#store = store;
+    this.#gestures = gestures;
+    this.#latency = latency;
+    store.subscribe((changed) => this.#update(changed));
+    new ResizeObserver(() => this.#layOut()).observe(element);
+    // Moving the window to another screen changes the size of a device pixel, not that of the element.
+    addEventListener("resize", () => this.#layOut());
+  }
+
+  /**
+   * Let one pane fill the grid, or lead back where it does already.
+   *
+   * @param {number} camera
+   */
+  toggleFill(camera) {
+    if (camera >= this.panes.length) return;
+    this.#store.set({ filled: this.#store.facts.filled === camera ? null : camera, active: camera });
+  }
+
+  /**
+   * Fill the grid with the camera of a number, counted from 1. Where there are more than nine, a second digit soon after the
+   * first makes the number of both.
+   *
+   * @param {number} digit
+   * @returns whether there is such a camera, or one is meant that a second digit may yet make
+   */
+  typeCamera(digit) {
+    const now = performance.now();
+    const { value, at } = this.#digit;
+    const both = now - at < SECOND_DIGIT_MS ? 10 * value + digit : digit;
+    const number = both <= this.panes.length ? both : digit;
+    this.#digit = { value: digit, at: now };
+    if (number < 1 || number > this.panes.length) return false;
+    if (number > 9) this.#store.set({ filled: number - 1, active: number - 1 });
+    else this.toggleFill(number - 1);
+    return true;
+  }
+
+  /**
+   * Fill the grid with the next camera, or the one before.
+   *
+   * @param {1 | -1} step
+   */
+  stepFill(step) {
+    const { filled } = this.#store.facts;
+    const count = this.panes.length;
+    const next = filled === null ? (step > 0 ? 0 : count - 1) : (filled + step + count) % count;
+    if (count > 0) this.#store.set({ filled: next, active: next });
+  }
+
+  /** Open brightness and contrast of the pane under the pointer, else of the one worked in. */
+  openLook() {
+    const under = this.panes.findIndex((pane) => pane.element.matches(":hover"));
+    const camera = under >= 0 ? under : (this.#store.facts.filled ?? this.#store.facts.active ?? 0);
+    if (camera < this.panes.length) this.#openLook(camera, this.panes[camera].lookButton);
+  }
+
+  /** Show whole images: in the pane under the pointer, or else in all. */
+  resetViews() {
+    const under = this.panes.filter((pane) => pane.element.matches(":hover"));
+    for (const pane of under.length ? under : this.panes) pane.reset();
+  }
+
+  /**
+   * Where an undistorted pixel lies in the window.
+   *
+   * @param {number} camera
+   * @param {number} u
+   * @param {number} v
+   */
+  toClient(camera, u, v) {
+    const pane = this.panes[camera];
+    const box = pane.surface.getBoundingClientRect();
+    const { x, y } = pane.view.toScreen(u, v);
+    return { x: box.left + x, y: box.top + y };
+  }
+
+  /** @param {Set<keyof import("../model/store.js").Facts>} changed */
+  #update(changed) {
+    if (changed.has("session")) this.#build();
+    if (changed.has("filled")) this.#layOut();
+    if (changed.has("target")) this.#ask(this.panes.map((pane) => pane.reduction));
+    if (changed.has("active") || changed.has("session")) this.#markActive();
+    const withPictures = PICTURED.some((fact) => changed.has(fact));
+    // A new state comes with every move of a drag; only its choice of what to draw concerns the vectors.
+    const { person, point, solo } = this.#store.facts.state ?? {};
+    const choice = JSON.stringify([person, point, solo]);
+    const hovered = HOVERED.some((fact) => changed.has(fact));
+    if (withPictures || changed.has("overlay") || choice !== this.#choice || hovered) {
+      this.#choice = choice;
+      for (const pane of this.panes) pane.draw(withPictures);
+    }
+    if (changed.has("overlay")) this.#latency.painted(this.#store.facts.overlay?.seq ?? 0);
+    if (changed.has("target") || changed.has("shown")) {
+      this.#element.classList.toggle("is-loading", this.#store.facts.shown?.frame !== this.#store.facts.target);
+    }
+    if (changed.has("state")) for (const pane of this.panes) pane.showCost();
+  }
+
+  #markActive() {
+    const active = this.#store.facts.active ?? 0;
+    this.panes.forEach((pane, camera) => pane.element.classList.toggle("is-active", camera === active));
+  }
+
+  #build() {
+    const cameras = this.#store.facts.session?.cameras ?? [];
+    // The session comes again with each connection: zoom and filled pane outlast it where the cameras are the same.
+    const described = JSON.stringify(cameras);
+    if (described === this.#cameras) return;
+    this.#cameras = described;
+    this.panes = cameras.map((info, camera) => {
+      const pane = new Pane(this.#store, camera, info, {
+        viewChanged: () => this.#refine(),
+        openLook: this.#openLook,
+      });
+      this.#gestures.watch(pane, camera);
+      pane.element.addEventListener("dblclick", (event) => {
+        if (!(event.target instanceof Element && event.target.closest("button"))) this.toggleFill(camera);
+      });
+      return pane;
+    });
+    this.#element.replaceChildren(...this.panes.map((pane) => pane.element));
+    this.#store.set({ filled: null });
+    this.#layOut();
+  }
+
+  #layOut() {
+    const cameras = this.#store.facts.session?.cameras ?? [];
+    if (cameras.length === 0) return;
+    const { filled } = this.#store.facts;
+    const { clientWidth, clientHeight } = this.#element;
+    const shown = filled === null ? cameras : [cameras[filled]];
+    const boxes = layOut(shown.map(({ width, height }) => width / height), clientWidth, clientHeight); // prettier-ignore
+    this.panes.forEach((pane, camera) => {
+      if (filled === null) pane.place(boxes[camera]);
+      else pane.place(filled === camera ? boxes[0] : null);
+    });
+    this.#ask(this.panes.map((pane) => pane.reduction));
+  }
+
+  /** Ask for finer pictures where one has zoomed in; coarser ones would save nothing before the next frame. */
+  #refine() {
+    const { reductions } = this.#store.facts;
+    this.#ask(this.panes.map((pane, camera) => Math.min(pane.reduction, reductions[camera] ?? pane.reduction)));
+  }
+
+  /** @param {number[]} reductions */
+  #ask(reductions) {
+    if (reductions.join() !== this.#store.facts.reductions.join()) this.#store.set({ reductions });
+  }
+}

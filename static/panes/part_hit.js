@@ -1,0 +1,38 @@
+/** Which part of a body lies under the pointer. */
+
+/**
+ * The nearest of the parts whose outline holds an image position; null where none does.
+ *
+ * @param {import("../model/protocol.js").Overlay} overlay
+ * @param {number} camera
+ * @param {{u: number, v: number}} at
+ * @param {(person: number) => boolean} isMeant whose parts count
+ */
+export function partAt(overlay, camera, { u, v }, isMeant) {
+  /** @type {import("../model/protocol.js").Outline | null} */
+  let nearest = null;
+  for (const outline of overlay.outlines) {
+    if (outline.camera !== camera || !isMeant(outline.person) || (nearest && nearest.depth <= outline.depth)) continue;
+    if (holds(overlay.segments, outline, u, v)) nearest = outline;
+  }
+  return nearest;
+}
+
+/**
+ * A convex outline holds what lies on the same side of all its segments.
+ *
+ * @param {Float32Array} segments
+ * @param {import("../model/protocol.js").Outline} outline
+ * @param {number} u
+ * @param {number} v
+ */
+function holds(segments, { first, count }, u, v) {
+  let side = 0;
+  for (let i = 4 * first, end = 4 * (first + count); i < end; i += 4) {
+    const [x0, y0, x1, y1] = segments.subarray(i, i + 4);
+    const now = Math.sign((x1 - x0) * (v - y0) - (y1 - y0) * (u - x0));
+    if (now !== 0 && side !== 0 && now !== side) return false;
+    side = now || side;
+  }
+  return side !== 0;
+}

@@ -1,0 +1,193 @@
+/** Draws the pins of one view, how far the model is off them, and where they meet. All sizes are CSS pixels. */
+
+/**
+ * @typedef {import("../model/protocol.js").PinMark} PinMark
+ * @typedef {{pin: PinMark, x: number, y: number, headX: number, headY: number}} PlacedPin
+ */
+
+const HALO = "rgba(0, 0, 0, 0.55)";
+/** The joint worked on: its pins, their lines and the place where they meet. */
+const CHOSEN = "#ffd54a";
+const OFF = "#ff8a7a";
+/** How strongly the pins of people are drawn who are not worked on. */
+const OTHERS = 0.4;
+const STEM = 15;
+const HEAD_RADIUS = 5;
+/** How far from the middle of its head a pin can be taken. */
+export const HEAD_REACH = 9;
+/** How far from its point, where no joint lies that a hand could mean. */
+export const POINT_REACH = 6;
+const MEETING_RADIUS = 5;
+const LEAST_OFF = 2;
+
+/**
+ * The pins of a view and where they lie in its pane: as the program drew them last, but for the one in the hand. A pin
+ * stands on the place it means, so that its head can be taken where a joint lies under it; at the upper border it hangs.
+ *
+ * @param {import("../model/store.js").Facts} facts
+ * @param {import("./pane_view.js").PaneView} view
+ * @param {number} camera
+ * @returns {PlacedPin[]}
+ */
+export function placedPins({ overlay, heldPin }, view, camera) {
+  const pins = (overlay?.pins ?? []).filter((pin) => pin.camera === camera && !isSame(pin, heldPin));
+  if (heldPin?.camera === camera) pins.push(heldPin);
+  return pins.map((pin) => {
+    const { x, y } = view.toScreen(pin.u, pin.v);
+    return { pin, x, y, headX: x, headY: y < STEM + 2 * HEAD_RADIUS ? y + STEM : y - STEM };
+  });
+}
+
+/**
+ * @param {{camera: number, person: number, point: string}} a
+ * @param {{camera: number, person: number, point: string} | null} b
+ */
+export function isSame(a, b) {
+  return a.camera === b?.camera && a.person === b.person && a.point === b.point;
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {import("./pane_view.js").PaneView} view
+ * @param {import("../model/store.js").Facts} facts
+ * @param {number} camera
+ * @param {number} paneWidth
+ */
+export function drawPins(context, view, facts, camera, paneWidth) {
+  const { state, session, pinHover, overlay } = facts;
+  if (!state || !session) return;
+  const isChosen = (/** @type {PlacedPin} */ { pin }) => pin.person === state.person && pin.point === state.point;
+  // Those of the joint worked on are drawn last, over the others, and those of other people first.
+  const rank = (/** @type {PlacedPin} */ one) => Number(one.pin.person === state.person) + Number(isChosen(one));
+  const placed = placedPins(facts, view, camera).sort((a, b) => rank(a) - rank(b));
+  const strengthOf = (/** @type {PlacedPin} */ { pin }) => (pin.person === state.person ? 1 : OTHERS);
+  for (const one of placed) {
+    context.globalAlpha = strengthOf(one);
+    drawOff(context, view, one);
+  }
+  context.globalAlpha = 1;
+  drawMeeting(context, view, overlay, camera, paneWidth);
+  for (const one of placed) {
+    const color = isChosen(one) ? CHOSEN : (session.people[one.pin.person]?.color ?? "#fff");
+    context.globalAlpha = isSame(one.pin, pinHover) ? 1 : strengthOf(one);
+    drawPin(context, one, color, isSame(one.pin, pinHover) || isSame(one.pin, facts.heldPin));
+  }
+  context.globalAlpha = 1;
+  const named = placed.find(({ pin }) => isSame(pin, pinHover));
+  if (named && !facts.heldPin) {
+    const hint = "drag to move, right-click or Delete removes";
+    label(context, named.headX, named.headY, [describe(named.pin), hint], paneWidth);
+  }
+}
+
+/** @param {PinMark} pin */
+function describe({ point, u, v, model_u, model_v }) {
+  const off = model_u === null || model_v === null ? "" : `, model ${Math.hypot(model_u - u, model_v - v).toFixed(1)} px off`;
+  return `Pin ${point.replaceAll("_", " ")}${off}`;
+}
+
+/**
+ * The line from a pin to where the model has the joint.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {import("./pane_view.js").PaneView} view
+ * @param {PlacedPin} placed
+ */
+function drawOff(context, view, { pin, x, y }) {
+  if (pin.model_u === null || pin.model_v === null) return;
+  const model = view.toScreen(pin.model_u, pin.model_v);
+  if (Math.hypot(model.x - x, model.y - y) < LEAST_OFF) return;
+  const line = new Path2D();
+  line.moveTo(x, y);
+  line.lineTo(model.x, model.y);
+  twice(context, line, OFF, 1.5);
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {PlacedPin} placed
+ * @param {string} color
+ * @param {boolean} isGrown
+ */
+function drawPin(context, { x, y, headX, headY }, color, isGrown) {
+  const radius = HEAD_RADIUS + (isGrown ? 1.5 : 0);
+  const stem = new Path2D();
+  stem.moveTo(x, y);
+  stem.lineTo(headX, headY);
+  twice(context, stem, "#fff", 1.5);
+  const head = new Path2D();
+  head.arc(headX, headY, radius, 0, 2 * Math.PI);
+  context.strokeStyle = HALO;
+  context.lineWidth = 3.5;
+  context.stroke(head);
+  context.fillStyle = color;
+  context.fill(head);
+  context.strokeStyle = "#fff";
+  context.lineWidth = 1.5;
+  context.stroke(head);
+}
+
+/**
+ * Where in this view the point lies in which the pins of the joint worked on meet, and how far this view's pin is from it.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {import("./pane_view.js").PaneView} view
+ * @param {import("../model/protocol.js").Overlay | null} overlay
+ * @param {number} camera
+ * @param {number} paneWidth
+ */
+function drawMeeting(context, view, overlay, camera, paneWidth) {
+  const mark = overlay?.meeting?.marks.find((one) => one.camera === camera);
+  if (!mark) return;
+  const { x, y } = view.toScreen(mark.u, mark.v);
+  const diamond = new Path2D();
+  diamond.moveTo(x, y - MEETING_RADIUS);
+  diamond.lineTo(x + MEETING_RADIUS, y);
+  diamond.lineTo(x, y + MEETING_RADIUS);
+  diamond.lineTo(x - MEETING_RADIUS, y);
+  diamond.closePath();
+  twice(context, diamond, CHOSEN, 1.5);
+  if (mark.error_px !== null) label(context, x, y + 16, [`${mark.error_px.toFixed(1)} px`], paneWidth);
+}
+
+/**
+ * Stroke with a dark halo, so that any colour shows on any image.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {Path2D} line
+ * @param {string} color
+ * @param {number} width
+ */
+function twice(context, line, color, width) {
+  context.lineCap = context.lineJoin = "round";
+  context.strokeStyle = HALO;
+  context.lineWidth = width + 2;
+  context.stroke(line);
+  context.strokeStyle = color;
+  context.lineWidth = width;
+  context.stroke(line);
+}
+
+/**
+ * Lines of text beside a place, on the side where the pane has room; the first counts, the others explain.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {number} x
+ * @param {number} y of the first line's middle
+ * @param {string[]} lines
+ * @param {number} paneWidth
+ */
+function label(context, x, y, lines, paneWidth) {
+  context.font = "500 12px system-ui, sans-serif";
+  context.textBaseline = "middle";
+  const width = Math.max(...lines.map((text) => context.measureText(text).width)) + 12;
+  const left = x + 10 + width < paneWidth ? x + 10 : Math.max(0, x - 10 - width);
+  context.fillStyle = "rgba(12, 13, 15, 0.85)";
+  context.beginPath();
+  context.roundRect(left, y - 10, width, 4 + 16 * lines.length, 4);
+  context.fill();
+  lines.forEach((text, index) => {
+    context.fillStyle = index === 0 ? "#fff" : "#c3c8cf";
+    context.fillText(text, left + 6, y + 0.5 + 16 * index);
+  });
+}

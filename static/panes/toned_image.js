@@ -1,0 +1,48 @@
+/** An image with another tone curve: made once for each picture and look, and kept until either changes. */
+
+import { isPlain, toneCurve } from "../model/image_tone.js";
+
+export class TonedImage {
+  /** @type {ImageBitmap | OffscreenCanvas | null} */
+  #source = null;
+  /** @type {import("../model/image_tone.js").Look | null} */
+  #look = null;
+  /** @type {OffscreenCanvas | null} */
+  #canvas = null;
+
+  /**
+   * @param {ImageBitmap | OffscreenCanvas} bitmap
+   * @param {import("../model/image_tone.js").Look | undefined} look
+   * @returns {CanvasImageSource & {width: number, height: number}} the bitmap itself where the look is plain
+   */
+  of(bitmap, look) {
+    if (!look || isPlain(look)) {
+      this.#source = this.#look = this.#canvas = null;
+      return bitmap;
+    }
+    if (bitmap === this.#source && look === this.#look && this.#canvas) return this.#canvas;
+    [this.#source, this.#look] = [bitmap, look];
+    this.#canvas = toned(bitmap, toneCurve(look));
+    return this.#canvas;
+  }
+}
+
+/**
+ * @param {ImageBitmap | OffscreenCanvas} bitmap
+ * @param {Uint8ClampedArray} curve
+ */
+function toned(bitmap, curve) {
+  const { width, height } = bitmap;
+  const canvas = new OffscreenCanvas(width, height);
+  const context = /** @type {OffscreenCanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: true }));
+  context.drawImage(bitmap, 0, 0);
+  const pixels = context.getImageData(0, 0, width, height);
+  const { data } = pixels;
+  for (let i = 0; i < data.length; i += 4) {
+    data[i] = curve[data[i]];
+    data[i + 1] = curve[data[i + 1]];
+    data[i + 2] = curve[data[i + 2]];
+  }
+  context.putImageData(pixels, 0, 0);
+  return canvas;
+}

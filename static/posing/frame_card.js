@@ -1,0 +1,83 @@
+/** What the tracker says of the shown frame: a line in the corner of the panes that opens to the cost of each part. */
+
+import { button, byId } from "../widgets/elements.js";
+import { px } from "../widgets/text.js";
+
+const STORED_OPEN = "quadrille.parts-open";
+/** A bar as long as this cost fills its row: what costs more looks no worse. */
+const FULL_PX = 6;
+
+export class FrameCard {
+  #store;
+  #card = byId("frame-card", HTMLDetailsElement);
+  #badge = byId("frame-status", HTMLElement);
+  #remark = byId("frame-remark", HTMLElement);
+  #parts = byId("frame-parts", HTMLElement);
+  #other;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {import("./posing.js").Posing} posing
+   */
+  constructor(store, posing) {
+    this.#store = store;
+    this.#other = button("take-other", () => posing.takeOther());
+    this.#card.open = localStorage.getItem(STORED_OPEN) === "yes";
+    this.#card.addEventListener("toggle", () => {
+      localStorage.setItem(STORED_OPEN, this.#card.open ? "yes" : "no");
+      this.#show();
+    });
+    store.subscribe((changed) => {
+      if (changed.has("state")) this.#show();
+    });
+  }
+
+  #show() {
+    const { state, session } = this.#store.facts;
+    if (!state || !session) return;
+    const { status, remark, parts_px, person, people } = state;
+    this.#other.hidden = !people.some(({ others, shown }) => others > 0 && shown);
+    this.#card.hidden = status === "" && parts_px.length === 0;
+    this.#badge.className = `status-badge is-${status}`;
+    this.#badge.textContent = status || "not judged";
+    this.#remark.textContent = remark;
+    if (this.#card.hidden || !this.#card.open) return;
+    const names = session.people[person].parts;
+    const cells = leftBesideRight(names).flatMap((part) => (part === null ? gap() : row(names[part], parts_px[part] ?? null)));
+    this.#parts.replaceChildren(...(parts_px.length ? cells : []));
+  }
+}
+
+/**
+ * The order of parts in two columns: those of the trunk, then each part of the left beside that of the right. Null is a gap.
+ *
+ * @param {string[]} names
+ */
+function leftBesideRight(names) {
+  const pairs = names.flatMap((name, left) => {
+    const right = name.startsWith("left_") ? names.indexOf(name.replace("left_", "right_")) : -1;
+    return right < 0 ? [] : [[left, right]];
+  });
+  const paired = new Set(pairs.flat());
+  const trunk = [...names.keys()].filter((part) => !paired.has(part));
+  return [...trunk, ...(trunk.length % 2 ? [null] : []), ...pairs.flat()];
+}
+
+/** An empty place in a row; a value too, so that every second value ends a row. */
+function gap() {
+  return [document.createElement("output")];
+}
+
+/**
+ * @param {string} name
+ * @param {number | null} cost px; null for a part that no view sees
+ */
+function row(name, cost) {
+  const label = document.createElement("span");
+  label.textContent = name.replaceAll("_", " ");
+  const bar = document.createElement("i");
+  bar.style.setProperty("--filled", `${Math.min(100, (100 * (cost ?? 0)) / FULL_PX)}%`);
+  const value = document.createElement("output");
+  value.textContent = cost === null ? "unseen" : px(cost);
+  return [label, bar, value];
+}

@@ -1,0 +1,224 @@
+/** The bar under the views: the selected joint, its degrees of freedom as numbers, locks, steps, whole-pose edits. */
+
+import { CopyMenu } from "./copy_menu.js";
+import { button, byId } from "../widgets/elements.js";
+import { numberEntry } from "../widgets/number_field.js";
+import { makeScrubber } from "../widgets/scrubber.js";
+import { spoken } from "../widgets/text.js";
+
+const LOCK = '<path d="M4 7.5h8v5.5H4zM5.5 7.5V5.2a2.5 2.5 0 0 1 5 0v2.3" />';
+const UNLOCKED = '<path d="M4 7.5h8v5.5H4zM5.5 7.5V4.2a2.5 2.5 0 0 1 4.7-1.2" />';
+const UNITS = { deg: "°", cm: "cm" };
+/** How far a number goes for a CSS pixel that its name is drawn sideways. */
+const PER_PIXEL = { deg: 0.5, cm: 0.2 };
+/** More degrees of freedom than these are named in short. */
+const MOST_IN_FULL = 3;
+
+/** @typedef {{dof: number, row: HTMLElement, entry: import("../widgets/number_field.js").Entry, lock: HTMLButtonElement}} Field */
+
+export class Inspector {
+  #store;
+  #posing;
+  #notify;
+  #joint = byId("joint-name", HTMLSelectElement);
+  #list = byId("joint-dofs", HTMLElement);
+  #lock = byId("lock-joint", HTMLButtonElement);
+  #reset = byId("reset-limb", HTMLButtonElement);
+  /** @type {Field[]} */
+  #fields = [];
+  #built = "";
+
+  /**
+   * @param {HTMLElement} element
+   * @param {import("../model/store.js").Store} store
+   * @param {import("./posing.js").Posing} posing
+   * @param {(notice: import("../model/protocol.js").NoticeMessage) => void} notify
+   */
+  constructor(element, store, posing, notify) {
+    this.#store = store;
+    this.#posing = posing;
+    this.#notify = notify;
+    button("previous-joint", () => posing.toJoint(-1));
+    button("next-joint", () => posing.toJoint(1));
+    button("lock-joint", () => posing.toggleLock(posing.dofs));
+    button("mirror-pose", () => posing.mirror());
+    button("reset-limb", () => posing.resetLimb());
+    this.#joint.addEventListener("change", () => {
+      posing.selectPoint(this.#joint.value);
+      this.#joint.blur();
+    });
+    new CopyMenu(store, posing);
+    this.#addStep("step-cm", "cm", "Step of the arrow keys, in centimetres (Shift: ten times, Ctrl: a tenth)");
+    this.#addStep("step-deg", "deg", "Step of + and -, in degrees");
+    // A row of many fields goes sideways under the wheel.
+    this.#list.addEventListener("wheel", (event) => {
+      this.#list.scrollLeft += event.deltaY + event.deltaX;
+    });
+    store.subscribe((changed) => {
+      if (changed.has("connected")) this.#enable(element);
+      if (changed.has("state") || changed.has("session") || changed.has("dof")) this.#show();
+    });
+    this.#enable(element);
+  }
+
+  /** Put the cursor where the selected degree of freedom is typed in. */
+  type() {
+    const selected = this.#fields.find(({ dof }) => dof === this.#store.facts.dof);
+    selected?.row.scrollIntoView({ block: "nearest", inline: "nearest" });
+    selected?.entry.element.focus();
+  }
+
+  /** @param {HTMLElement} element */
+  #enable(element) {
+    element.inert = !this.#store.facts.connected;
+  }
+
+  /**
+   * @param {string} id of the place
+   * @param {"cm" | "deg"} unit
+   * @param {string} name
+   */
+  #addStep(id, unit, name) {
+    const entry = numberEntry({
+      name,
+      take: (text) => {
+        const step = Number(text);
+        if (text === "" || !(step > 0 && step <= 100)) return `Step: expected a number above 0 and up to 100, found “${text}”.`;
+        this.#posing.setSteps({ [unit]: step });
+        return null;
+      },
+      refuse: (text) => this.#notify({ type: "notice", level: "info", text }),
+      step: null,
+    });
+    entry.element.title = name;
+    entry.show(String(this.#posing.steps[unit]));
+    byId(id, HTMLElement).replaceWith(entry.element);
+    entry.element.id = id;
+  }
+
+  #show() {
+    const { person, point, dofs, limb } = this.#posing;
+    const { state, dof: selected } = this.#store.facts;
+    if (!person || !state || !point) return;
+    const built = JSON.stringify([state.person, person.points, dofs]);
+    if (built !== this.#built) {
+      this.#built = built;
+      this.#joint.replaceChildren(...person.points.map((name) => new Option(spoken(name), name)));
+      this.#fields = dofs.map((dof) => this.#field(person.dofs[dof], dof, dofs.length > MOST_IN_FULL, point));
+      this.#list.replaceChildren(...this.#fields.map(({ row }) => row));
+    }
+    this.#joint.value = point;
+    this.#joint.classList.toggle("is-nothing", state.point === null);
+    for (const field of this.#fields) this.#fill(field, person.dofs[field.dof], state, field.dof === selected);
+    showLock(this.#lock, this.#posing.isLocked(dofs), `${spoken(point)} (O), its limb (Shift+O)`);
+    this.#lock.disabled = dofs.length === 0;
+    this.#reset.title = `Reset ${limb.name} to the neutral pose (R)`;
+    this.#reset.setAttribute("aria-label", `Reset ${limb.name}`);
+  }
+
+  /**
+   * @param {import("../model/protocol.js").DofInfo} info
+   * @param {number} dof
+   * @param {boolean} isShort
+   * @param {string} point
+   * @returns {Field}
+   */
+  #field(info, dof, isShort, point) {
+    const name = info.joint === point ? info.name : `${spoken(info.joint)} ${info.name}`;
+    const row = document.createElement("div");
+    row.className = isShort ? "dof is-short" : "dof";
+    row.title = `${spoken(info.joint)} ${info.name}, ${range(info)}. Draw its name sideways (Shift: finely), or U selects the next, + and - turn the selected one.`;
+    const label = document.createElement("span");
+    label.className = "dof-name";
+    label.textContent = isShort ? info.name.slice(0, 3) : name;
+    makeScrubber(label, {
+      begin: () => (this.#posing.isLocked([dof]) ? null : (this.#store.facts.state?.dofs[dof] ?? null)),
+      perPixel: PER_PIXEL[info.unit],
+      change: (value) => this.#posing.slide(dof, within(value, info)),
+    });
+    const entry = numberEntry({
+      name: `${spoken(info.joint)} ${info.name}, ${UNITS[info.unit]}`,
+      take: (text) => this.#take(info, dof, text),
+      refuse: (text) => this.#notify({ type: "notice", level: "info", text }),
+      step: (factor) => this.#posing.turn(factor),
+    });
+    entry.element.addEventListener("focus", () => this.#posing.selectDof(dof));
+    const unit = document.createElement("span");
+    unit.className = "dof-unit";
+    unit.textContent = UNITS[info.unit];
+    const lock = document.createElement("button");
+    lock.type = "button";
+    lock.className = "is-lock";
+    lock.addEventListener("click", (event) => {
+      if (event.detail > 0) lock.blur();
+      this.#posing.toggleLock([dof]);
+    });
+    row.addEventListener("pointerdown", () => this.#posing.selectDof(dof));
+    row.append(label, entry.element, unit, lock);
+    return { dof, row, entry, lock };
+  }
+
+  /**
+   * @param {import("../model/protocol.js").DofInfo} info
+   * @param {number} dof
+   * @param {string} text
+   */
+  #take(info, dof, text) {
+    const value = Number(text);
+    const isWithin = (info.low === null || value >= info.low - 0.05) && (info.high === null || value <= info.high + 0.05);
+    if (text === "" || !Number.isFinite(value) || !isWithin || Math.abs(value) > 1e5) {
+      return `${spoken(info.joint)} ${info.name}: expected a number ${range(info)}, found “${text}”.`;
+    }
+    this.#posing.set(dof, value);
+    return null;
+  }
+
+  /**
+   * @param {Field} field
+   * @param {import("../model/protocol.js").DofInfo} info
+   * @param {import("../model/protocol.js").StateMessage} state
+   * @param {boolean} isSelected
+   */
+  #fill({ dof, row, entry, lock }, info, state, isSelected) {
+    const value = state.dofs[dof] ?? 0;
+    const isLocked = state.locked.includes(dof);
+    entry.show((Math.abs(value) < 0.05 ? 0 : value).toFixed(1));
+    entry.element.disabled = isLocked;
+    row.classList.toggle("is-selected", isSelected);
+    row.classList.toggle("is-locked", isLocked);
+    row.classList.toggle("is-bounded", info.low !== null && info.high !== null);
+    if (info.low !== null && info.high !== null) {
+      row.style.setProperty("--at", String((value - info.low) / Math.max(1e-9, info.high - info.low)));
+    }
+    showLock(lock, isLocked, `${spoken(info.joint)} ${info.name}`);
+  }
+}
+
+/**
+ * @param {number} value
+ * @param {import("../model/protocol.js").DofInfo} info
+ */
+function within(value, { low, high }) {
+  return Math.max(low ?? -Infinity, Math.min(high ?? Infinity, value));
+}
+
+/** @param {import("../model/protocol.js").DofInfo} info */
+function range({ low, high, unit }) {
+  const number = (/** @type {number} */ limit) => `${Math.round(10 * limit) / 10}`;
+  if (low !== null && high !== null) return `from ${number(low)} to ${number(high)} ${UNITS[unit]}`;
+  return `in ${unit === "cm" ? "centimetres" : "degrees"}, without limits`;
+}
+
+/**
+ * @param {HTMLButtonElement} lock
+ * @param {boolean} isLocked
+ * @param {string} what
+ */
+function showLock(lock, isLocked, what) {
+  lock.setAttribute("aria-pressed", String(isLocked));
+  const title = `${isLocked ? "Unlock" : "Lock"} ${what}`;
+  if (lock.title === title) return;
+  lock.title = title;
+  lock.setAttribute("aria-label", title);
+  lock.innerHTML = `<svg viewBox="0 0 16 16" aria-hidden="true">${isLocked ? LOCK : UNLOCKED}</svg>`;
+}

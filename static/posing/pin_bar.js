@@ -1,0 +1,73 @@
+/** The pins of the selected joint in figures, and what can be done with pins. */
+
+import { button, byId } from "../widgets/elements.js";
+
+export class PinBar {
+  #store;
+  #mode;
+  #fit;
+  #clear;
+  #figures = byId("pin-figures", HTMLOutputElement);
+  #live = byId("pin-live", HTMLInputElement);
+  #hint = byId("pin-hint", HTMLElement);
+  #panes = byId("panes", HTMLElement);
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {import("./pinning.js").Pinning} pinning
+   */
+  constructor(store, pinning) {
+    this.#store = store;
+    this.#mode = button("pin-mode", () => pinning.toggle());
+    this.#fit = button("pin-fit", () => pinning.fit());
+    this.#clear = button("pin-clear", () => pinning.clear());
+    this.#live.addEventListener("change", () => {
+      pinning.toggleLive();
+      this.#live.blur();
+    });
+    /** @type {(keyof import("../model/store.js").Facts)[]} */
+    const shown = ["state", "connected", "overlay", "pinning", "livePins", "whose"];
+    store.subscribe((changed) => shown.some((fact) => changed.has(fact)) && this.#show());
+  }
+
+  #show() {
+    const { state, connected, overlay, pinning, livePins, session, whose } = this.#store.facts;
+    const joint = state?.point?.replaceAll("_", " ") ?? null;
+    const pins = overlay?.pins ?? [];
+    const ofPerson = pins.filter(({ person }) => person === state?.person).length;
+    this.#mode.disabled = this.#fit.disabled = this.#live.disabled = !connected || !state;
+    this.#clear.disabled = !connected || ofPerson === 0;
+    this.#mode.setAttribute("aria-pressed", String(pinning));
+    this.#live.checked = livePins;
+    const several = (session?.people.length ?? 1) > 1;
+    const fitted = several && whose === "all" ? "everybody who has been placed" : "the person worked on";
+    this.#fit.title = pins.length
+      ? `Fit ${fitted} to pins and edges together (G)`
+      : `Fit ${fitted} to the edges (G); pins, where there are any, count as well`;
+    const [text, title] = joint === null ? ["", "No joint is selected"] : this.#figure(joint, ofPerson);
+    this.#figures.textContent = text;
+    this.#figures.title = title;
+    this.#hint.hidden = !pinning || joint === null;
+    if (!this.#hint.hidden) this.#hint.textContent = `Pin ${joint}: click where each view shows it. Esc ends.`;
+    this.#panes.classList.toggle("is-pinning", pinning);
+  }
+
+  /**
+   * @param {string} joint
+   * @param {number} ofPerson pins of the person on this frame
+   */
+  #figure(joint, ofPerson) {
+    const { overlay } = this.#store.facts;
+    const all = `${counted(ofPerson)} of this person on this frame`;
+    const meeting = overlay?.meeting;
+    if (!meeting) return ["no pin", `No pin of ${joint}; ${all}`];
+    if (meeting.error_px === null) return [counted(meeting.pins), `${joint}: ${meeting.why}; ${all}`];
+    const error = `${meeting.error_px.toFixed(meeting.error_px < 10 ? 1 : 0)} px`;
+    return [`${counted(meeting.pins)}, ${error}`, `The pins of ${joint} meet with an error of ${error}; ${all}`];
+  }
+}
+
+/** @param {number} pins */
+function counted(pins) {
+  return pins === 1 ? "1 pin" : `${pins} pins`;
+}

@@ -1,0 +1,290 @@
+/**
+ * Pins under the pointer: set where it clicks, dragged by their heads, removed. It watches a pane before the gestures that
+ * drag joints and views do, and keeps from them what is meant for a pin.
+ */
+
+import { whom } from "../model/selectors.js";
+import { GRAB_RADIUS } from "../panes/crowding.js";
+import { HEAD_REACH, POINT_REACH, isSame, placedPins } from "../panes/pin_drawing.js";
+
+const DRAG_THRESHOLD = 3;
+/** How long a pin that was let go waits to be drawn by the program. */
+const ANSWER_MS = 600;
+
+/**
+ * @typedef {import("../panes/pane.js").Pane} Pane
+ * @typedef {{pane: Pane, frame: number, pointer: number, start: {x: number, y: number}, offset: {u: number, v: number},
+ *   pin: import("../model/protocol.js").PinMark, begun: boolean}} Held
+ */
+
+export class Pinning {
+  #store;
+  #send;
+  #notify;
+  /** @type {Held | null} */
+  #held = null;
+  #moveScheduled = false;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+   * @param {(notice: import("../model/protocol.js").NoticeMessage) => void} notify
+   */
+  constructor(store, send, notify) {
+    this.#store = store;
+    this.#send = send;
+    this.#notify = notify;
+    store.subscribe((changed) => {
+      if (changed.has("connected")) this.#release(false);
+      if (changed.has("overlay") && !this.#held && store.facts.heldPin) store.set({ heldPin: null });
+      if (changed.has("state") && store.facts.pinning && !store.facts.state?.point) store.set({ pinning: false });
+    });
+  }
+
+  /** Let each click set a pin of the selected joint, or end that. */
+  toggle() {
+    const { pinning, state } = this.#store.facts;
+    if (!pinning && !state?.point) this.#say("Select a joint first: click it in a view, then X pins it.");
+    else this.#store.set({ pinning: !pinning, pinHover: null, hover: null, hoverPart: null });
+  }
+
+  toggleLive() {
+    this.#store.set({ livePins: !this.#store.facts.livePins });
+  }
+
+  /** Put back a pin in the hand, else end the mode in which clicks set pins; says whether there was anything. */
+  cancel() {
+    if (this.#held) {
+      if (this.#held.begun) this.#message("cancel", this.#held.pin);
+      this.#release(false);
+      return true;
+    }
+    const wasOn = this.#store.facts.pinning;
+    if (wasOn) this.#store.set({ pinning: false });
+    return wasOn;
+  }
+
+  /** Remove the pin under the pointer, or else those of the selected joint. */
+  remove() {
+    const { pinHover, state, overlay } = this.#store.facts;
+    if (pinHover) this.#unpin(pinHover.person, pinHover.point, pinHover.camera);
+    else if (state?.point && overlay?.pins.some((p) => p.person === state.person && p.point === state.point)) {
+      this.#unpin(state.person, state.point, null);
+    } else this.#say("There is no pin to remove: point at one, or select a joint that has pins.");
+  }
+
+  /** Remove all pins of the person worked on, on this frame. */
+  clear() {
+    const { state, overlay } = this.#store.facts;
+    if (!state) return;
+    if (overlay?.pins.some((p) => p.person === state.person)) this.#unpin(state.person, null, null);
+    else this.#say("There is no pin of this person on this frame.");
+  }
+
+  /** Fit everybody who has been placed, or the person worked on alone, to pins and edges. */
+  fit() {
+    const { facts } = this.#store;
+    if (facts.state) this.#send({ type: "fit", frame: facts.state.frame, person: whom(facts) });
+  }
+
+  /**
+   * Watch the pointer in a pane.
+   *
+   * @param {Pane} pane
+   * @param {number} camera
+   */
+  watch(pane, camera) {
+    const { surface } = pane;
+    surface.addEventListener("pointerdown", (event) => this.#down(event, pane, camera));
+    surface.addEventListener("pointermove", (event) => this.#move(event, pane, camera));
+    surface.addEventListener("pointerup", (event) => this.#up(event));
+    surface.addEventListener("pointercancel", () => this.#held && this.cancel());
+    surface.addEventListener("pointerleave", () => this.#store.facts.pinHover && this.#store.set({ pinHover: null }));
+    surface.addEventListener("contextmenu", (event) => event.preventDefault());
+    surface.addEventListener("dblclick", (event) => {
+      // Two pins in a row are not a wish for a larger pane.
+      if (this.#store.facts.pinning || this.#store.facts.pinHover || event.ctrlKey) event.stopImmediatePropagation();
+    });
+  }
+
+  /**
+   * The pin that a pointer means: by its head, or by its point where no joint is nearer.
+   *
+   * @param {Pane} pane
+   * @param {number} camera
+   * @param {{x: number, y: number}} at
+   */
+  #hit(pane, camera, at) {
+    const { facts } = this.#store;
+    let nearest = null;
+    let reach = HEAD_REACH;
+    for (const one of placedPins(facts, pane.view, camera)) {
+      const distance = Math.hypot(one.headX - at.x, one.headY - at.y);
+      if (distance < reach) [nearest, reach] = [one, distance];
+    }
+    if (nearest || this.#joint(pane, at)) return nearest?.pin ?? null;
+    return placedPins(facts, pane.view, camera).find(({ x, y }) => Math.hypot(x - at.x, y - at.y) < POINT_REACH)?.pin ?? null;
+  }
+
+  /**
+   * The joint under a pointer.
+   *
+   * @param {Pane} pane
+   * @param {{x: number, y: number}} at
+   */
+  #joint(pane, at) {
+    if (!this.#store.facts.layers.shown.joints) return null;
+    const from = (/** @type {{x: number, y: number}} */ { x, y }) => Math.hypot(x - at.x, y - at.y);
+    const [nearest] = pane.graspableHandles().sort((a, b) => from(a) - from(b));
+    return nearest && from(nearest) <= GRAB_RADIUS ? nearest.handle : null;
+  }
+
+  /**
+   * @param {PointerEvent} event
+   * @param {Pane} pane
+   * @param {number} camera
+   */
+  #down(event, pane, camera) {
+    const { pinning, state, shown } = this.#store.facts;
+    if (this.#held || event.button === 1 || !state || !shown) return;
+    const at = pane.locate(event);
+    const hit = this.#hit(pane, camera, at);
+    const isSetting = event.button === 0 && (pinning || event.ctrlKey || event.metaKey);
+    if (!hit && !isSetting) return;
+    event.stopImmediatePropagation();
+    if (!this.#store.isSettled) return;
+    if (event.button === 2 && hit) {
+      this.#unpin(hit.person, hit.point, camera);
+      this.#store.set({ pinHover: null });
+      return;
+    }
+    if (event.button !== 0) return;
+    const joint = state.point === null ? this.#joint(pane, at) : { person: state.person, point: state.point };
+    if (!hit && !joint) {
+      this.#say("Select a joint first: click it in a view, then Ctrl and a click pin it.");
+      return;
+    }
+    // Where joints crowd, a click means the selected one, whatever pin of another stands there.
+    const isOwn = hit && (!isSetting || (hit.person === joint?.person && hit.point === joint.point));
+    const pointer = pane.view.toImage(at.x, at.y);
+    const model = { model_u: null, model_v: null };
+    const pin = isOwn || !joint ? /** @type {NonNullable<typeof hit>} */ (hit) : { camera, ...joint, ...pointer, ...model };
+    const offset = { u: pin.u - pointer.u, v: pin.v - pointer.v };
+    pane.surface.setPointerCapture(event.pointerId);
+    pane.surface.classList.add("is-dragging");
+    this.#held = { pane, frame: shown.frame, pointer: event.pointerId, start: at, offset, pin, begun: false };
+    this.#store.set({ dragging: true, hover: null, hoverPart: null, heldPin: pin });
+    if (isOwn) this.#send({ type: "select", person: pin.person, point: pin.point });
+    else this.#begin(this.#held);
+  }
+
+  /** @param {Held} held */
+  #begin(held) {
+    held.begun = true;
+    this.#message("start", held.pin);
+  }
+
+  /**
+   * @param {PointerEvent} event
+   * @param {Pane} pane
+   * @param {number} camera
+   */
+  #move(event, pane, camera) {
+    const held = this.#held;
+    if (!held) {
+      if (event.buttons === 0) this.#hover(event, pane, camera);
+      return;
+    }
+    event.stopImmediatePropagation();
+    if (event.pointerId !== held.pointer) return;
+    const at = held.pane.locate(event);
+    const isFar = Math.hypot(at.x - held.start.x, at.y - held.start.y) >= DRAG_THRESHOLD;
+    // A click is never quite still: a pin that was just set stays where the button went down.
+    if (!isFar && held.start.x !== Infinity) return;
+    held.start = { x: Infinity, y: Infinity };
+    if (!held.begun) this.#begin(held);
+    const { u, v } = held.pane.view.toImage(at.x, at.y);
+    held.pin = { ...held.pin, ...this.#within(held.pin.camera, u + held.offset.u, v + held.offset.v) };
+    this.#store.set({ heldPin: { ...held.pin, model_u: null, model_v: null } });
+    if (this.#moveScheduled) return;
+    this.#moveScheduled = true;
+    requestAnimationFrame(() => {
+      this.#moveScheduled = false;
+      if (this.#held === held) this.#message("move", held.pin);
+    });
+  }
+
+  /** @param {PointerEvent} event */
+  #up(event) {
+    if (!this.#held) return;
+    event.stopImmediatePropagation();
+    if (event.pointerId !== this.#held.pointer) return;
+    if (this.#held.begun) this.#message("end", this.#held.pin);
+    this.#release(this.#held.begun);
+  }
+
+  /**
+   * @param {PointerEvent} event
+   * @param {Pane} pane
+   * @param {number} camera
+   */
+  #hover(event, pane, camera) {
+    const { facts } = this.#store;
+    const hit = this.#hit(pane, camera, pane.locate(event));
+    const former = facts.pinHover;
+    if (hit ? !isSame(hit, former) : former) {
+      this.#store.set({ pinHover: hit && { camera, person: hit.person, point: hit.point } });
+    }
+    pane.surface.classList.toggle("is-over-pin", hit !== null);
+    if (!hit && !facts.pinning) return;
+    event.stopImmediatePropagation();
+    pane.surface.classList.remove("is-over-joint", "is-over-part");
+    if (facts.hover || facts.hoverPart) this.#store.set({ hover: null, hoverPart: null });
+  }
+
+  /**
+   * The nearest place within the image.
+   *
+   * @param {number} camera
+   * @param {number} u
+   * @param {number} v
+   */
+  #within(camera, u, v) {
+    const { width, height } = this.#store.facts.session?.cameras[camera] ?? { width: 0, height: 0 };
+    return { u: Math.max(-0.5, Math.min(width - 0.5, u)), v: Math.max(-0.5, Math.min(height - 0.5, v)) };
+  }
+
+  /**
+   * @param {"start" | "move" | "end" | "cancel"} phase
+   * @param {import("../model/protocol.js").PinMark} pin
+   */
+  #message(phase, { camera, person, point, u, v }) {
+    const { frame } = /** @type {Held} */ (this.#held);
+    this.#send({ type: "pin", phase, frame, camera, person, point, u, v, live: this.#store.facts.livePins });
+  }
+
+  /**
+   * @param {number} person
+   * @param {string | null} point
+   * @param {number | null} camera
+   */
+  #unpin(person, point, camera) {
+    const { state } = this.#store.facts;
+    if (state) this.#send({ type: "unpin", frame: state.frame, person, point, camera });
+  }
+
+  /** @param {boolean} isKept whether the pin stays where it was let go until the program has drawn it there */
+  #release(isKept) {
+    const held = this.#held;
+    if (!held) return;
+    this.#held = null;
+    held.pane.surface.classList.remove("is-dragging");
+    this.#store.set({ dragging: false, ...(isKept ? {} : { heldPin: null }) });
+    setTimeout(() => !this.#held && this.#store.facts.heldPin && this.#store.set({ heldPin: null }), ANSWER_MS);
+  }
+
+  /** @param {string} text */
+  #say(text) {
+    this.#notify({ type: "notice", level: "info", text });
+  }
+}

@@ -1,0 +1,278 @@
+/** Posing without a drag: which joint and degree of freedom, steps of it, mirror, copies, resets and locks. */
+
+/** Steps of a key that is held down are sent together, this often at most. */
+const SEND_MS = 50;
+const ASKED_MS = 1500;
+const STEPS_KEY = "quadrille.steps";
+const DEFAULT_STEPS = { cm: 1, deg: 5 };
+
+/**
+ * @typedef {{cm: number, deg: number}} Steps
+ * @typedef {{right: number, up: number}} Way
+ */
+
+export class Posing {
+  #store;
+  #send;
+  #steps = rememberedSteps();
+  /** @type {Map<string, import("../model/protocol.js").PoseEdit>} steps that wait to be sent, by what they move */
+  #waiting = new Map();
+  #sentAt = -Infinity;
+  /** @type {{point: string, at: number} | null} the joint asked for last, until the program has taken it */
+  #asked = null;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+   */
+  constructor(store, send) {
+    this.#store = store;
+    this.#send = send;
+    store.subscribe((changed) => {
+      if (this.#asked?.point === store.facts.state?.point) this.#asked = null;
+      if (changed.has("state") || changed.has("session")) this.#keepDof();
+    });
+  }
+
+  /** How far one step goes. */
+  get steps() {
+    return this.#steps;
+  }
+
+  /** @param {Partial<Steps>} steps */
+  setSteps(steps) {
+    this.#steps = { ...this.#steps, ...steps };
+    localStorage.setItem(STEPS_KEY, JSON.stringify(this.#steps));
+  }
+
+  /** The person worked on; null before the session is known. */
+  get person() {
+    const { session, state } = this.#store.facts;
+    return (state && session?.people[state.person]) ?? null;
+  }
+
+  /** The selected joint; null for none. */
+  get selected() {
+    // Keys come faster than the program's answers. An answer that never comes must not hold for long.
+    const asked = this.#asked && performance.now() < this.#asked.at + ASKED_MS ? this.#asked.point : null;
+    return asked ?? this.#store.facts.state?.point ?? null;
+  }
+
+  /** The joint worked on: the selected one, else the root. */
+  get point() {
+    return this.selected ?? this.person?.points[0] ?? null;
+  }
+
+  /** Indices of the degrees of freedom that the joint means. */
+  get dofs() {
+    const { person, point } = this;
+    return (person && point && person.point_dofs[point]) || [];
+  }
+
+  /** The limb of the joint: its name, and its degrees of freedom. */
+  get limb() {
+    const { person, point } = this;
+    return (person && point && person.point_limbs[point]) || { name: "", dofs: [] };
+  }
+
+  /**
+   * Select the next joint in the order of the body, or the one before.
+   *
+   * @param {1 | -1} way
+   */
+  toJoint(way) {
+    const { person, selected } = this;
+    if (!person) return;
+    const points = person.points;
+    const at = selected === null ? (way > 0 ? -1 : 0) : points.indexOf(selected);
+    this.selectPoint(points[(at + way + points.length) % points.length]);
+  }
+
+  /** @param {string} point */
+  selectPoint(point) {
+    const { state } = this.#store.facts;
+    if (!state) return;
+    this.#asked = { point, at: performance.now() };
+    this.#store.set({ state });
+    this.#send({ type: "select", person: state.person, point });
+  }
+
+  /** @param {number} dof */
+  selectDof(dof) {
+    if (dof !== this.#store.facts.dof) this.#store.set({ dof });
+  }
+
+  /** Select the next degree of freedom of the joint. */
+  nextDof() {
+    const { dofs } = this;
+    if (dofs.length) this.selectDof(dofs[(dofs.indexOf(this.#store.facts.dof ?? -1) + 1) % dofs.length]);
+  }
+
+  /**
+   * Move the joint parallel to the image of the active view, by a factor of the step.
+   *
+   * @param {Way} way
+   * @param {number} factor
+   */
+  nudge(way, factor) {
+    const { state, active, filled } = this.#store.facts;
+    if (!state) return;
+    const camera = filled ?? active ?? 0;
+    const [right, up] = [way.right * factor * this.#steps.cm, way.up * factor * this.#steps.cm];
+    const point = this.selected;
+    this.#gather(`nudge ${camera} ${point}`, { ...this.#head(), action: "nudge", point, camera, right, up });
+  }
+
+  /**
+   * Turn (or move) the selected degree of freedom by a factor of the step.
+   *
+   * @param {number} factor
+   */
+  turn(factor) {
+    const { dof } = this.#store.facts;
+    const info = dof === null ? undefined : this.person?.dofs[dof];
+    if (dof === null || !info) return;
+    this.#gather(`turn ${dof}`, { ...this.#head(), action: "turn", dof, by: factor * this.#steps[info.unit] });
+  }
+
+  /**
+   * @param {number} dof
+   * @param {number} value in degrees or centimetres
+   */
+  set(dof, value) {
+    this.#edit({ ...this.#head(), action: "set", dof, value });
+  }
+
+  /**
+   * Set it again and again, as a slider does: of what waits to be sent the newest counts.
+   *
+   * @param {number} dof
+   * @param {number} value in degrees or centimetres
+   */
+  slide(dof, value) {
+    this.#gather(`set ${dof}`, { ...this.#head(), action: "set", dof, value });
+  }
+
+  mirror() {
+    this.#edit({ ...this.#head(), action: "mirror" });
+  }
+
+  /** Take the other of two poses that are about as good; said again, go back. */
+  takeOther() {
+    this.#edit({ ...this.#head(), action: "other" });
+  }
+
+  resetLimb() {
+    this.#edit({ ...this.#head(), action: "reset", point: this.selected });
+  }
+
+  /** @param {number} from */
+  copyFrom(from) {
+    this.#edit({ ...this.#head(), action: "copy", from });
+  }
+
+  /**
+   * Bend as another person does on this frame; place and turn stay.
+   *
+   * @param {number} from
+   */
+  copyPerson(from) {
+    if (from !== this.#head().person) this.#edit({ ...this.#head(), action: "copy_person", from });
+  }
+
+  /** The same of the next person in the list. */
+  copyNextPerson() {
+    const count = this.#store.facts.session?.people.length ?? 1;
+    this.copyPerson((this.#head().person + 1) % count);
+  }
+
+  /** @param {1 | -1} way */
+  copyNeighbour(way) {
+    const { frame } = this.#head();
+    const from = frame + way;
+    if (from >= 0 && from < (this.#store.facts.session?.n_frames ?? 0)) this.copyFrom(from);
+  }
+
+  /**
+   * Lock degrees of freedom, or unlock them where all of them are locked already.
+   *
+   * @param {number[]} dofs
+   */
+  toggleLock(dofs) {
+    if (dofs.length) this.#edit({ ...this.#head(), action: "lock", dofs, locked: !this.isLocked(dofs) });
+  }
+
+  /**
+   * Whether all of some degrees of freedom are locked.
+   *
+   * @param {number[]} dofs
+   */
+  isLocked(dofs) {
+    const locked = this.#store.facts.state?.locked ?? [];
+    return dofs.length > 0 && dofs.every((dof) => locked.includes(dof));
+  }
+
+  /** What every edit says: whom it is about, and the frame that the user sees. */
+  #head() {
+    const { shown, state } = this.#store.facts;
+    return { type: /** @type {const} */ ("pose"), frame: shown?.frame ?? state?.frame ?? 0, person: state?.person ?? 0 };
+  }
+
+  /** @param {import("../model/protocol.js").PoseEdit} edit */
+  #edit(edit) {
+    if (!this.#store.facts.connected) return;
+    this.#flush();
+    this.#send(edit);
+  }
+
+  /**
+   * Add a step to those that wait: a key held down asks for more steps than are worth drawing.
+   *
+   * @param {string} what
+   * @param {import("../model/protocol.js").PoseEdit & {action: "nudge" | "turn" | "set"}} step
+   */
+  #gather(what, step) {
+    if (!this.#store.facts.connected) return;
+    const key = `${step.frame} ${step.person} ${what}`;
+    const waits = this.#waiting.get(key);
+    if (waits?.action === "nudge" && step.action === "nudge") {
+      waits.right += step.right;
+      waits.up += step.up;
+    } else if (waits?.action === "turn" && step.action === "turn") {
+      waits.by += step.by;
+    } else if (waits?.action === "set" && step.action === "set") {
+      waits.value = step.value;
+    } else {
+      if (this.#waiting.size === 0) setTimeout(() => this.#flush(), this.#sentAt + SEND_MS - performance.now());
+      this.#waiting.set(key, step);
+    }
+  }
+
+  #flush() {
+    if (this.#waiting.size === 0) return;
+    this.#sentAt = performance.now();
+    for (const step of this.#waiting.values()) this.#send(step);
+    this.#waiting.clear();
+  }
+
+  /** Keep the selected degree of freedom among those of the joint. */
+  #keepDof() {
+    const { dofs } = this;
+    const { dof } = this.#store.facts;
+    if (dof === null || !dofs.includes(dof)) {
+      const first = dofs[0] ?? null;
+      if (first !== dof) this.#store.set({ dof: first });
+    }
+  }
+}
+
+/** @returns {Steps} */
+function rememberedSteps() {
+  try {
+    const found = JSON.parse(localStorage.getItem(STEPS_KEY) ?? "{}");
+    const good = (/** @type {"cm" | "deg"} */ unit) => (found[unit] > 0 ? Number(found[unit]) : DEFAULT_STEPS[unit]);
+    return { cm: good("cm"), deg: good("deg") };
+  } catch {
+    return DEFAULT_STEPS;
+  }
+}

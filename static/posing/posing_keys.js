@@ -1,0 +1,54 @@
+/** The keys of posing without a drag. */
+
+/** @type {[string, string, import("./posing.js").Way][]} */
+const WAYS = [
+  ["←", "left", { right: -1, up: 0 }],
+  ["→", "right", { right: 1, up: 0 }],
+  ["↑", "up", { right: 0, up: 1 }],
+  ["↓", "down", { right: 0, up: -1 }],
+];
+
+/**
+ * @param {import("./posing.js").Posing} posing
+ * @param {import("./inspector.js").Inspector} inspector
+ * @param {(key: string, code?: string, shift?: boolean) => (event: KeyboardEvent) => boolean} plain
+ * @returns {import("../widgets/key_matching.js").Binding[]}
+ */
+export function posingBindings(posing, inspector, plain) {
+  const alt = (/** @type {string} */ code) => (/** @type {KeyboardEvent} */ event) =>
+    event.altKey && !event.ctrlKey && !event.metaKey && !event.shiftKey && event.code === code;
+  const sign = (/** @type {string[]} */ keys) => (/** @type {KeyboardEvent} */ event) =>
+    keys.includes(event.key) && !event.ctrlKey && !event.metaKey && !event.altKey;
+  return [
+    { keys: ["J"], label: "Next joint", matches: plain("j"), run: () => posing.toJoint(1) },
+    { keys: ["Shift J"], label: "Previous joint", matches: plain("j", undefined, true), run: () => posing.toJoint(-1) },
+    ...WAYS.map(([arrow, name, way]) => ({
+      keys: [arrow],
+      label: `Joint or body one step ${name} in the active view (Shift: ten, Ctrl: a tenth)`,
+      matches: (/** @type {KeyboardEvent} */ event) =>
+        event.key === `Arrow${name[0].toUpperCase()}${name.slice(1)}` && !event.altKey && !event.metaKey,
+      run: (/** @type {KeyboardEvent} */ event) => posing.nudge(way, event.shiftKey ? 10 : event.ctrlKey ? 0.1 : 1),
+    })),
+    { keys: ["U"], label: "Next degree of freedom of the joint", matches: plain("u"), run: () => posing.nextDof() },
+    { keys: ["+"], label: "Selected degree of freedom: one step more", matches: sign(["+", "="]), run: () => posing.turn(1) },
+    { keys: ["-"], label: "Selected degree of freedom: one step less", matches: sign(["-", "_"]), run: () => posing.turn(-1) },
+    { keys: ["Enter"], label: "Type the selected degree of freedom in", matches: plain("enter"), run: () => inspector.type() },
+    { keys: ["O"], label: "Lock the joint, or unlock it", matches: plain("o"), run: () => posing.toggleLock(posing.dofs) },
+    {
+      keys: ["Shift O"],
+      label: "Lock the joint's limb, or unlock it",
+      matches: plain("o", undefined, true),
+      run: () => posing.toggleLock(posing.limb.dofs),
+    },
+    { keys: ["M"], label: "Mirror the pose left to right", matches: plain("m"), run: () => posing.mirror() },
+    {
+      keys: ["Shift X"],
+      label: "Take the other of two poses that are as good, or go back",
+      matches: plain("x", undefined, true),
+      run: () => posing.takeOther(),
+    },
+    { keys: ["R"], label: "Reset the joint's limb to neutral", matches: plain("r"), run: () => posing.resetLimb() },
+    { keys: ["Alt ,"], label: "Copy the pose of the previous frame", matches: alt("Comma"), run: () => posing.copyNeighbour(-1) },
+    { keys: ["Alt ."], label: "Copy the pose of the next frame", matches: alt("Period"), run: () => posing.copyNeighbour(1) },
+  ];
+}

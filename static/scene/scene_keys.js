@@ -1,0 +1,34 @@
+/** The keys of the 3-D view, and of setting the floor. */
+
+/**
+ * @param {import("./camera_view.js").Snap} snap
+ * @param {import("./floor.js").Floor} floor
+ * @param {(key: string, code?: string, shift?: boolean) => (event: KeyboardEvent) => boolean} plain
+ * @returns {import("../widgets/key_matching.js").Binding[]}
+ */
+export function sceneBindings(snap, floor, plain) {
+  const why = () => (floor.isOn ? null : "The floor is not being set; Shift+Y begins that.");
+  return [
+    { keys: ["Y"], label: "3-D view: look through the camera pointed at, or let go", matches: plain("y"), run: () => snap.toggle() },
+    {
+      keys: ["Shift Y"],
+      label: "Set the floor from three clicked points, or leave that",
+      matches: plain("y", undefined, true),
+      run: () => floor.toggle(),
+    },
+    {
+      keys: ["Enter"],
+      label: "While the floor is set: next point, then apply",
+      matches: (event) => floor.isOn && plain("enter")(event),
+      why,
+      run: () => floor.goOn(),
+    },
+    {
+      keys: ["Backspace"],
+      label: "While the floor is set: take the last click back",
+      matches: (event) => floor.isOn && plain("backspace")(event),
+      why,
+      run: () => floor.takeBack(),
+    },
+  ];
+}

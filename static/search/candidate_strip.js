@@ -1,0 +1,158 @@
+/** The best poses that a search came by, as stick figures over the view that tells them apart best. */
+
+import { prepare } from "../panes/drawing.js";
+import { byId } from "../widgets/elements.js";
+import { keyOf } from "../model/pictures.js";
+import { runLookedAt } from "../model/search_runs.js";
+
+const WIDTH = 76;
+const HEIGHT = 58;
+/** Share of the figures' height that is left around them. */
+const MARGIN = 0.08;
+
+export class CandidateStrip {
+  #store;
+  #send;
+  #element = byId("candidates", HTMLElement);
+  #list = document.createElement("div");
+  #label = document.createElement("span");
+  /** @type {unknown[]} what is drawn: a search at work tells of every step, but seldom of other candidates */
+  #drawn = [];
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+   */
+  constructor(store, send) {
+    this.#store = store;
+    this.#send = send;
+    this.#label.className = "strip-label";
+    this.#list.className = "strip-list";
+    this.#element.append(this.#label, this.#list);
+  }
+
+  /** @param {Set<keyof import("../model/store.js").Facts>} changed */
+  update(changed) {
+    const facts = ["drawer", "searchCandidates", "searchRun", "filled", "shown"];
+    if (facts.some((fact) => changed.has(/** @type {"drawer"} */ (fact)))) this.#show();
+  }
+
+  #show() {
+    const { searchCandidates, session, filled, shown } = this.#store.facts;
+    const run = runLookedAt(this.#store.facts);
+    const found = searchCandidates.get(run?.number ?? -1);
+    const n = run ? (found?.costs.length ?? 0) : 0;
+    while (this.#list.children.length > n) this.#list.lastElementChild?.remove();
+    while (this.#list.children.length < n) this.#list.append(this.#make(this.#list.children.length));
+    const camera = filled ?? found?.telling ?? 0;
+    const drawn = [found, camera, session, devicePixelRatio, shown?.pictures.get(keyOf("image", camera))?.bitmap];
+    if (drawn.every((one, index) => one === this.#drawn[index])) return;
+    this.#drawn = drawn;
+    this.#label.textContent = n ? `Best, ${session?.cameras[camera]?.name ?? ""}` : "";
+    this.#label.title = "The best candidates that differ by 3 cm or more, in the view that fills the grid, else the one that tells them apart best";
+    if (!found || n === 0 || !session) return;
+    const box = frameOf(found, camera);
+    [...this.#list.children].forEach((element, index) => {
+      const cost = found.costs[index];
+      const text = cost === null ? "–" : cost.toFixed(2);
+      const output = element.querySelector("output");
+      if (output) output.textContent = text;
+      /** @type {HTMLElement} */ (element).title = `Candidate ${index + 1}, ${text} px: point at it to see it in all views, click to take it (undo brings back)`;
+      element.setAttribute("aria-label", `Take candidate ${index + 1}, ${text} px`);
+      const canvas = element.querySelector("canvas");
+      if (canvas) this.#draw(canvas, found, index, camera, box);
+    });
+  }
+
+  /** @param {number} index */
+  #make(index) {
+    const element = document.createElement("button");
+    element.type = "button";
+    element.className = "candidate";
+    element.append(document.createElement("canvas"), document.createElement("output"));
+    const preview = (/** @type {number | null} */ candidate) => {
+      const run = runLookedAt(this.#store.facts);
+      if (run) this.#send({ type: "preview", run: run.number, candidate });
+    };
+    element.addEventListener("pointerenter", () => preview(index));
+    element.addEventListener("pointerleave", () => preview(null));
+    element.addEventListener("focus", () => element.matches(":focus-visible") && preview(index));
+    element.addEventListener("blur", () => preview(null));
+    element.addEventListener("click", (event) => {
+      if (event.detail > 0) element.blur();
+      const run = runLookedAt(this.#store.facts);
+      if (run) this.#send({ type: "take", run: run.number, candidate: index });
+    });
+    return element;
+  }
+
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {import("../model/search_runs.js").Candidates} found
+   * @param {number} index
+   * @param {number} camera
+   * @param {{u: number, v: number, width: number, height: number}} box
+   */
+  #draw(canvas, found, index, camera, box) {
+    const { session, shown } = this.#store.facts;
+    canvas.style.width = `${WIDTH}px`;
+    canvas.style.height = `${HEIGHT}px`;
+    const context = prepare(canvas, WIDTH, HEIGHT, true);
+    const scale = Math.min(WIDTH / box.width, HEIGHT / box.height);
+    const x0 = WIDTH / 2 - scale * (box.u + box.width / 2);
+    const y0 = HEIGHT / 2 - scale * (box.v + box.height / 2);
+    const bitmap = shown?.pictures.get(keyOf("image", camera))?.bitmap;
+    const info = session?.cameras[camera];
+    if (bitmap && info && bitmap.width > 0) {
+      context.globalAlpha = 0.55;
+      context.drawImage(bitmap, x0 - 0.5 * scale, y0 - 0.5 * scale, info.width * scale, info.height * scale);
+      context.globalAlpha = 1;
+    }
+    const each = found.people.reduce((sum, n) => sum + n, 0);
+    let first = 2 * each * (index * found.cameras + camera);
+    session?.people.forEach((person, p) => {
+      const line = new Path2D();
+      const at = (/** @type {string} */ name) => {
+        const i = first + 2 * person.points.indexOf(name);
+        return /** @type {[number, number]} */ ([x0 + scale * found.points[i], y0 + scale * found.points[i + 1]]);
+      };
+      for (const [from, to] of person.bones) {
+        const [a, b] = [at(from), at(to)];
+        if (![...a, ...b].every(Number.isFinite)) continue;
+        line.moveTo(...a);
+        line.lineTo(...b);
+      }
+      context.lineCap = "round";
+      context.strokeStyle = "rgba(0, 0, 0, 0.6)";
+      context.lineWidth = 3.5;
+      context.stroke(line);
+      context.strokeStyle = person.color;
+      context.lineWidth = 1.75;
+      context.stroke(line);
+      first += 2 * found.people[p];
+    });
+  }
+}
+
+/**
+ * Where all candidates lie in a view, with a margin.
+ *
+ * @param {import("../model/search_runs.js").Candidates} found
+ * @param {number} camera
+ */
+function frameOf(found, camera) {
+  const each = 2 * found.people.reduce((sum, n) => sum + n, 0);
+  let [left, right, top, bottom] = [Infinity, -Infinity, Infinity, -Infinity];
+  found.costs.forEach((_, index) => {
+    const first = each * (index * found.cameras + camera);
+    for (let i = first; i < first + each; i += 2) {
+      const [u, v] = [found.points[i], found.points[i + 1]];
+      if (!Number.isFinite(u) || !Number.isFinite(v)) continue;
+      [left, right] = [Math.min(left, u), Math.max(right, u)];
+      [top, bottom] = [Math.min(top, v), Math.max(bottom, v)];
+    }
+  });
+  if (!(right > left) || !(bottom > top)) return { u: 0, v: 0, width: 1, height: 1 };
+  const margin = MARGIN * Math.max(right - left, bottom - top);
+  return { u: left - margin, v: top - margin, width: right - left + 2 * margin, height: bottom - top + 2 * margin };
+}

@@ -1,0 +1,228 @@
+/**
+ * Least and tested cost against the poses scored, with the stages marked; other runs beside it. A click goes to that step.
+ */
+
+import { colorName } from "../timeline/curve_drawing.js";
+import { prepare } from "../panes/drawing.js";
+import { byId } from "../widgets/elements.js";
+import { Plot } from "../widgets/plot.js";
+import { runLookedAt } from "../model/search_runs.js";
+import { count } from "../widgets/text.js";
+
+/** @typedef {import("../model/search_runs.js").Steps} Steps */
+
+/** Costs above this share of all that were tested are cut off: a few bad ones would flatten the rest. */
+const SHOWN_SHARE = 0.95;
+const NAME_GAP = 70;
+const READOUT_HEIGHT = 18;
+
+export class CostCurve {
+  #store;
+  #send;
+  #element = byId("cost-curve", HTMLElement);
+  #lines = document.createElement("canvas");
+  #read = document.createElement("output");
+  #hovered = /** @type {number | null} */ (null);
+  #plot = /** @type {Plot | null} */ (null);
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+   */
+  constructor(store, send) {
+    this.#store = store;
+    this.#send = send;
+    this.#read.className = "curve-readout";
+    this.#element.append(this.#lines, this.#read);
+    new ResizeObserver(() => this.#draw()).observe(this.#element);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#draw());
+    this.#listen();
+  }
+
+  /** @param {Set<keyof import("../model/store.js").Facts>} changed */
+  update(changed) {
+    if (["drawer", "searchSteps", "searchRuns", "searchRun"].some((f) => changed.has(/** @type {"drawer"} */ (f)))) this.#draw();
+  }
+
+  get #run() {
+    return runLookedAt(this.#store.facts);
+  }
+
+  get #steps() {
+    return this.#store.facts.searchSteps.get(this.#run?.number ?? -1) ?? null;
+  }
+
+  #listen() {
+    const element = this.#element;
+    element.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      element.setPointerCapture(event.pointerId);
+      this.#goTo(event);
+    });
+    element.addEventListener("pointermove", (event) => {
+      if (element.hasPointerCapture(event.pointerId)) this.#goTo(event);
+      this.#hovered = this.#stepUnder(event);
+      requestAnimationFrame(() => this.#draw());
+    });
+    element.addEventListener("pointerleave", () => {
+      this.#hovered = null;
+      this.#draw();
+    });
+  }
+
+  /** @param {PointerEvent} event */
+  #goTo(event) {
+    const [run, step] = [this.#run, this.#stepUnder(event)];
+    if (run && step !== null && run.state !== "running") this.#send({ type: "replay", run: run.number, step });
+  }
+
+  /**
+   * @param {PointerEvent} event
+   * @returns {number | null}
+   */
+  #stepUnder(event) {
+    const steps = this.#steps;
+    if (!this.#plot || !steps || steps.count === 0) return null;
+    const value = this.#plot.valueAt(event.clientX - this.#element.getBoundingClientRect().left);
+    let [low, high] = [0, steps.count - 1];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (steps.evaluations[middle] < value) low = middle + 1;
+      else high = middle;
+    }
+    const isFormerNearer = low > 0 && value - steps.evaluations[low - 1] < steps.evaluations[low] - value;
+    return isFormerNearer ? low - 1 : low;
+  }
+
+  #draw() {
+    const { clientWidth, clientHeight } = this.#element;
+    if (clientWidth === 0 || this.#store.facts.drawer !== "search") return;
+    const context = prepare(this.#lines, clientWidth, clientHeight, true);
+    const { searchRuns, searchSteps } = this.#store.facts;
+    const style = getComputedStyle(this.#element);
+    const runs = (searchRuns?.runs ?? []).filter(({ number }) => searchSteps.get(number)?.count);
+    const [run, steps] = [this.#run, this.#steps];
+    if (runs.length === 0) {
+      this.#plot = null;
+      this.#read.textContent = "";
+      context.font = "12px system-ui, sans-serif";
+      context.textAlign = "center";
+      context.fillStyle = style.getPropertyValue("--muted");
+      context.fillText("Step (S), Stage (Shift+S) or Frame (F) begins a search of this frame", clientWidth / 2, clientHeight / 2);
+      return;
+    }
+    const all = runs.map(({ number }) => /** @type {Steps} */ (searchSteps.get(number)));
+    const plot = new Plot(clientWidth, clientHeight, { least: 0, most: Math.max(...all.map((s) => s.evaluations[s.count - 1]), 1) }, costs(all), READOUT_HEIGHT);
+    this.#plot = plot;
+    plot.drawFrame(context, style, "");
+    plot.within(context, () => {
+      if (run && steps) drawStages(context, plot, run, steps, style);
+      runs.forEach((one, index) => {
+        const of = all[index];
+        const isLookedAt = one.number === run?.number;
+        if (isLookedAt) drawTested(context, plot, of, style);
+        context.strokeStyle = style.getPropertyValue(runColor(one.number));
+        context.globalAlpha = isLookedAt ? 1 : 0.6;
+        context.lineWidth = isLookedAt ? 2 : 1.25;
+        context.setLineDash(isLookedAt ? [] : [5, 4]);
+        plot.drawLine(context, of.evaluations, of.best, true);
+        context.setLineDash([]);
+        context.globalAlpha = 1;
+      });
+    });
+    if (run && steps) this.#drawMarks(context, plot, run, steps, style);
+  }
+
+  /**
+   * The step replayed, the step under the pointer, and what it says.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {Plot} plot
+   * @param {import("../model/protocol.js").SearchRun} run
+   * @param {Steps} steps
+   * @param {CSSStyleDeclaration} style
+   */
+  #drawMarks(context, plot, run, steps, style) {
+    const replay = this.#store.facts.searchRuns?.replay ?? null;
+    const replayed = replay?.run === run.number ? Math.min(replay.step, steps.count - 1) : null;
+    context.fillStyle = style.getPropertyValue("--text");
+    for (const [step, alpha] of /** @type {[number | null, number][]} */ ([[replayed, 1], [this.#hovered, 0.5]])) {
+      if (step === null || step < 0 || step >= steps.count) continue;
+      context.globalAlpha = alpha;
+      context.fillRect(plot.x(steps.evaluations[step]) - 0.5, plot.top, 1, plot.bottom - plot.top);
+      context.globalAlpha = 1;
+    }
+    const at = this.#hovered ?? replayed ?? steps.count - 1;
+    if (at < 0 || at >= steps.count) {
+      this.#read.textContent = "";
+      return;
+    }
+    const stage = run.stages[steps.stages[at]];
+    const where = stage ? `${stage.name} ×${stage.factor} · ` : "";
+    this.#read.textContent = `${where}${count(steps.evaluations[at])} poses · tested ${steps.tested[at].toFixed(2)} · best ${steps.best[at].toFixed(2)} px`;
+  }
+}
+
+/**
+ * Name of the style's colour of a run.
+ *
+ * @param {number} number
+ */
+export function runColor(number) {
+  return colorName(number - 1);
+}
+
+/**
+ * @param {Steps[]} all
+ * @returns {import("../widgets/plot.js").Range}
+ */
+function costs(all) {
+  const tested = all.flatMap((steps) => [...steps.tested]).sort((a, b) => a - b);
+  const least = Math.min(...all.map((steps) => steps.best[steps.count - 1]));
+  const most = Math.max(tested[Math.floor(SHOWN_SHARE * (tested.length - 1))], ...all.map((steps) => steps.best[0]));
+  const margin = Math.max(0.05, 0.06 * (most - least));
+  return { least: Math.max(0, least - margin), most: most + margin };
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {Plot} plot
+ * @param {Steps} steps
+ * @param {CSSStyleDeclaration} style
+ */
+function drawTested(context, plot, steps, style) {
+  context.fillStyle = style.getPropertyValue("--muted");
+  for (let i = 0; i < steps.count; i += 1) {
+    context.fillRect(plot.x(steps.evaluations[i]) - 1.5, plot.y(steps.tested[i]) - 1.5, 3, 3);
+  }
+}
+
+/**
+ * Where stages begin, with their names as far as there is room.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {Plot} plot
+ * @param {import("../model/protocol.js").SearchRun} run
+ * @param {Steps} steps
+ * @param {CSSStyleDeclaration} style
+ */
+function drawStages(context, plot, run, steps, style) {
+  context.font = "10.5px system-ui, sans-serif";
+  context.textAlign = "left";
+  context.textBaseline = "top";
+  let free = -Infinity;
+  for (let i = 0; i < steps.count; i += 1) {
+    if (i > 0 && steps.stages[i] === steps.stages[i - 1]) continue;
+    const x = plot.x(i > 0 ? steps.evaluations[i - 1] : 0);
+    context.fillStyle = style.getPropertyValue("--faint");
+    context.globalAlpha = 0.6;
+    context.fillRect(x, plot.top, 1, plot.bottom - plot.top);
+    context.globalAlpha = 1;
+    const stage = run.stages[steps.stages[i]];
+    if (!stage || x < free) continue;
+    const name = `${stage.name} ×${stage.factor}`;
+    context.fillStyle = style.getPropertyValue("--muted");
+    context.fillText(name, x + 4, plot.top + 2);
+    free = x + Math.max(NAME_GAP, context.measureText(name).width + 10);
+  }
+}

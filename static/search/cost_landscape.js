@@ -1,0 +1,222 @@
+/** The landscape tab of the drawer: the cost over the range of one degree of freedom. Hovering reads it, a click sets the value. */
+
+import { colorName } from "../timeline/curve_drawing.js";
+import { prepare } from "../panes/drawing.js";
+import { byId } from "../widgets/elements.js";
+import { Plot } from "../widgets/plot.js";
+import { makeButton } from "./search_widgets.js";
+
+/** @typedef {import("../model/search_runs.js").Landscape} Landscape */
+
+const UNITS = { rad: { factor: 180 / Math.PI, sign: "°" }, m: { factor: 100, sign: " cm" } };
+
+export class LandscapePanel {
+  #store;
+  #send;
+  #element = byId("landscape", HTMLElement);
+  #controls = byId("landscape-controls", HTMLElement);
+  #canvas = document.createElement("canvas");
+  #choice = document.createElement("select");
+  #legend = document.createElement("div");
+  #toLeast;
+  #hovered = /** @type {number | null} */ (null);
+  #plot = /** @type {Plot | null} */ (null);
+  #isOpen = false;
+  /** What the list of degrees of freedom was built for. */
+  #listed = "";
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+   */
+  constructor(store, send) {
+    this.#store = store;
+    this.#send = send;
+    this.#choice.title = "The degree of freedom that varies; everything else stays as it is";
+    this.#choice.setAttribute("aria-label", "Degree of freedom");
+    this.#choice.addEventListener("change", () => {
+      send({ type: "landscape", dof: this.#choice.value });
+      this.#choice.blur();
+    });
+    this.#toLeast = makeButton("To minimum", "Set this degree of freedom where the cost is least", () => {
+      const found = store.facts.landscape;
+      if (found) this.#setTo(found.values[leastOf(found.total)]);
+    });
+    this.#legend.className = "landscape-legend";
+    this.#controls.append(this.#choice, this.#toLeast, this.#legend);
+    this.#element.append(this.#canvas);
+    store.subscribe((changed) => {
+      if (changed.has("drawer")) this.#open();
+      if (!this.#isOpen) return;
+      if (changed.has("connected") && store.facts.connected) send({ type: "watch", tab: "landscape" });
+      if (changed.has("landscape") || changed.has("session")) this.#show();
+    });
+    new ResizeObserver(() => this.#draw()).observe(this.#element);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#show());
+    this.#listen();
+    this.#open();
+  }
+
+  #open() {
+    const { drawer, connected } = this.#store.facts;
+    const isOpen = drawer === "landscape";
+    this.#element.hidden = this.#controls.hidden = !isOpen;
+    if (isOpen === this.#isOpen) return;
+    this.#isOpen = isOpen;
+    if (connected && (isOpen || drawer !== "search")) this.#send({ type: "watch", tab: isOpen ? "landscape" : null });
+    if (isOpen) this.#show();
+  }
+
+  #listen() {
+    const element = this.#element;
+    element.addEventListener("pointermove", (event) => {
+      const found = this.#store.facts.landscape;
+      if (!found || !this.#plot) return;
+      const value = this.#plot.valueAt(event.clientX - element.getBoundingClientRect().left) / UNITS[found.unit].factor;
+      this.#hovered = nearest(found.values, value);
+      requestAnimationFrame(() => this.#draw());
+    });
+    element.addEventListener("pointerleave", () => {
+      this.#hovered = null;
+      this.#draw();
+    });
+    element.addEventListener("click", () => {
+      const found = this.#store.facts.landscape;
+      if (found && this.#hovered !== null) this.#setTo(found.values[this.#hovered]);
+    });
+  }
+
+  /** @param {number} value rad or metres */
+  #setTo(value) {
+    const found = this.#store.facts.landscape;
+    if (found) this.#send({ type: "landscape_set", person: found.person, dof: found.dof, value });
+  }
+
+  #show() {
+    const { landscape: found, session } = this.#store.facts;
+    this.#toLeast.disabled = this.#choice.disabled = !found;
+    if (found && found.names.join() !== this.#listed) {
+      this.#listed = found.names.join();
+      const groups = new Map(found.names.map((name) => [name.split(".")[0], document.createElement("optgroup")]));
+      for (const [joint, group] of groups) group.label = joint.replaceAll("_", " ");
+      for (const name of found.names) groups.get(name.split(".")[0])?.append(new Option(name.replaceAll("_", " ").replace(".", " "), name));
+      this.#choice.replaceChildren(...groups.values());
+    }
+    if (found) {
+      this.#choice.value = found.names[found.dof];
+      const labels = ["mean", ...(session?.cameras.map(({ name }) => name) ?? [])];
+      this.#legend.replaceChildren(...["", ...labels].map((label, index) => legendEntry(label, index - 1)));
+    }
+    this.#draw();
+  }
+
+  #draw() {
+    const { clientWidth, clientHeight } = this.#element;
+    if (clientWidth === 0 || !this.#isOpen) return;
+    const context = prepare(this.#canvas, clientWidth, clientHeight, true);
+    const found = this.#store.facts.landscape;
+    if (!found) return;
+    const { factor, sign } = UNITS[found.unit];
+    const style = getComputedStyle(this.#element);
+    const curves = [found.total, ...found.views];
+    const known = curves.flatMap((curve) => [...curve].filter(Number.isFinite));
+    const [least, most] = [Math.min(...known, found.current_px ?? Infinity), Math.max(...known)];
+    const margin = Math.max(0.05, 0.06 * (most - least));
+    const xs = found.values.map((value) => value * factor);
+    const plot = new Plot(clientWidth, clientHeight, { least: xs[0], most: xs[xs.length - 1] }, { least: Math.max(0, least - margin), most: most + margin });
+    this.#plot = plot;
+    plot.drawFrame(context, style, sign);
+    plot.within(context, () => {
+      curves.slice(1).forEach((curve, view) => {
+        context.strokeStyle = style.getPropertyValue(colorName(view + 1));
+        context.lineWidth = 1.25;
+        plot.drawLine(context, xs, curve);
+      });
+      context.strokeStyle = style.getPropertyValue(colorName(0));
+      context.lineWidth = 2.25;
+      plot.drawLine(context, xs, found.total);
+    });
+    this.#drawMarks(context, plot, found, factor, style);
+    this.#readOut(found, this.#hovered, factor, sign);
+  }
+
+  /**
+   * The current value, the least cost, and the value under the pointer.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {Plot} plot
+   * @param {Landscape} found
+   * @param {number} factor
+   * @param {CSSStyleDeclaration} style
+   */
+  #drawMarks(context, plot, found, factor, style) {
+    const height = plot.bottom - plot.top;
+    const now = plot.x(found.current * factor);
+    context.fillStyle = context.strokeStyle = style.getPropertyValue("--text");
+    context.fillRect(now - 0.5, plot.top, 1, height);
+    context.font = "600 10.5px system-ui, sans-serif";
+    context.textBaseline = "top";
+    const isRight = now > (plot.left + plot.right) / 2;
+    context.textAlign = isRight ? "right" : "left";
+    context.fillText("now", now + (isRight ? -4 : 4), plot.top + 2);
+    const least = leastOf(found.total);
+    const [x, y] = [plot.x(found.values[least] * factor), plot.y(found.total[least])];
+    context.beginPath();
+    context.arc(x, y, 4.5, 0, 2 * Math.PI);
+    context.lineWidth = 2;
+    context.stroke();
+    if (this.#hovered !== null) {
+      context.globalAlpha = 0.5;
+      context.fillRect(plot.x(found.values[this.#hovered] * factor) - 0.5, plot.top, 1, height);
+      context.globalAlpha = 1;
+    }
+  }
+
+  /**
+   * @param {Landscape} found
+   * @param {number | null} hovered
+   * @param {number} factor
+   * @param {string} sign
+   */
+  #readOut(found, hovered, factor, sign) {
+    const least = leastOf(found.total);
+    const at = hovered ?? nearest(found.values, found.current);
+    const value = hovered === null ? found.current : found.values[at];
+    const outputs = this.#legend.querySelectorAll("output");
+    const texts = [`${(value * factor).toFixed(1)}${sign}`, ...[found.total, ...found.views].map((c) => (Number.isFinite(c[at]) ? c[at].toFixed(2) : "–"))];
+    outputs.forEach((output, index) => (output.textContent = texts[index] ?? ""));
+    this.#toLeast.title = `Set it to ${(found.values[least] * factor).toFixed(1)}${sign}, where the mean cost is least (${found.total[least].toFixed(2)} px); an edit, which can be undone`;
+    this.#element.title = hovered === null ? "" : "Click to set the value";
+  }
+}
+
+/**
+ * @param {string} label empty for the value itself
+ * @param {number} color
+ */
+function legendEntry(label, color) {
+  const entry = document.createElement("span");
+  if (label) {
+    const swatch = document.createElement("i");
+    swatch.style.background = `var(${colorName(color)})`;
+    entry.append(swatch, label);
+    entry.title = color === 0 ? "Mean over the views, px" : `Cost in ${label}, px`;
+  } else {
+    entry.title = "The value under the pointer, else that of the pose";
+  }
+  entry.append(document.createElement("output"));
+  return entry;
+}
+
+/** @param {Float32Array} costs */
+function leastOf(costs) {
+  return costs.reduce((best, cost, index) => (cost < costs[best] ? index : best), 0);
+}
+
+/**
+ * @param {Float32Array} values ascending
+ * @param {number} value
+ */
+function nearest(values, value) {
+  return values.reduce((best, one, index) => (Math.abs(one - value) < Math.abs(values[best] - value) ? index : best), 0);
+}

@@ -1,0 +1,129 @@
+/** Replays the run that is looked at, back and forth. The stored pose stays what it is. */
+
+import { byId, iconButton } from "../widgets/elements.js";
+import { makeButton } from "./search_widgets.js";
+import { runLookedAt } from "../model/search_runs.js";
+
+const STEPS_PER_S = 12;
+
+export class ReplayBar {
+  #store;
+  #send;
+  #slider = document.createElement("input");
+  #text = document.createElement("output");
+  #badge = byId("replay-badge", HTMLElement);
+  #buttons;
+  #leave;
+  #play;
+  /** @type {ReturnType<typeof setInterval> | null} */
+  #timer = null;
+  /** The step asked for last: the program's answer may be on its way. */
+  #asked = -1;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+   */
+  constructor(store, send) {
+    this.#store = store;
+    this.#send = send;
+    const go = (/** @type {number} */ by) => () => this.#goTo(this.#at + by);
+    this.#play = iconButton("M5 3v10l8-5z", "Replay the search from here, or from its start", () => this.#togglePlay());
+    this.#buttons = [
+      iconButton("M4 3.5v9M12.5 3.5 6.5 8l6 4.5z", "Start of the search", () => this.#goTo(-1)),
+      iconButton("M10 3.5 5 8l5 4.5", "One step back", go(-1)),
+      this.#play,
+      iconButton("m6 3.5 5 4.5-5 4.5", "One step on", go(1)),
+      iconButton("M12 3.5v9M3.5 3.5l6 4.5-6 4.5z", "Last step of the search", () => this.#goTo(Infinity)),
+    ];
+    const slider = this.#slider;
+    slider.type = "range";
+    slider.min = "-1";
+    slider.setAttribute("aria-label", "Step of the search");
+    slider.title = "Drag to replay the search; arrow keys go step by step";
+    slider.addEventListener("input", () => this.#goTo(Number(slider.value)));
+    this.#text.className = "replay-text";
+    this.#leave = makeButton("Leave", "Leave the replay: the true pose again (Esc)", () => {
+      this.#pause();
+      this.#send({ type: "replay", run: null, step: 0 });
+    });
+    const group = document.createElement("div");
+    group.className = "group";
+    group.append(...this.#buttons);
+    byId("replay-bar", HTMLElement).append(group, slider, this.#text, this.#leave);
+    store.subscribe((changed) => changed.has("state") && this.#showBadge());
+  }
+
+  /** Whoever sees the panes must know that they do not show the true pose, whether the drawer is open or not. */
+  #showBadge() {
+    const replay = this.#store.facts.state?.replay;
+    this.#badge.hidden = !replay;
+    if (replay) this.#badge.textContent = `Replay of run ${replay.run}, step ${replay.step + 1} of ${replay.steps} · Esc leaves`;
+  }
+
+  /** @param {Set<keyof import("../model/store.js").Facts>} changed */
+  update(changed) {
+    if (!["drawer", "searchRuns", "searchRun", "searchSteps"].some((f) => changed.has(/** @type {"drawer"} */ (f)))) return;
+    const { searchRuns } = this.#store.facts;
+    const run = runLookedAt(this.#store.facts);
+    const replay = searchRuns?.replay ?? null;
+    const isReady = !!run && run.steps > 0 && run.state !== "running";
+    this.#slider.disabled = !isReady;
+    for (const one of this.#buttons) one.disabled = !isReady;
+    this.#leave.disabled = !replay;
+    if (!replay || !isReady) this.#pause();
+    this.#slider.max = String((run?.steps ?? 0) - 1);
+    this.#slider.value = String(replay ? replay.step : (run?.steps ?? 0) - 1);
+    if (replay) {
+      const best = replay.best_px === null ? "" : ` · best ${replay.best_px.toFixed(2)} px`;
+      this.#text.textContent = `${replay.step + 1} of ${run?.steps ?? 0}`;
+      this.#text.title = `${replay.stage ?? "the start"}, ${replay.evaluations} poses scored${best}`;
+    } else {
+      this.#text.textContent = run && isReady ? `${run.steps} steps` : "";
+      this.#text.title = run?.thinned ? "Steps that can be replayed; of so long a search not all are kept" : "Steps that can be replayed";
+    }
+  }
+
+  get #at() {
+    const replay = this.#store.facts.searchRuns?.replay;
+    if (this.#timer !== null) return this.#asked;
+    return replay ? replay.step : (runLookedAt(this.#store.facts)?.steps ?? 0) - 1;
+  }
+
+  /** @param {number} step */
+  #goTo(step) {
+    const run = runLookedAt(this.#store.facts);
+    if (!run) return;
+    this.#asked = Math.max(-1, Math.min(run.steps - 1, step));
+    this.#send({ type: "replay", run: run.number, step: this.#asked });
+  }
+
+  #togglePlay() {
+    if (this.#timer !== null) {
+      this.#pause();
+      return;
+    }
+    const run = runLookedAt(this.#store.facts);
+    if (!run) return;
+    const at = this.#at;
+    this.#goTo(at >= run.steps - 1 ? -1 : at);
+    this.#store.set({ replaying: true });
+    this.#timer = setInterval(() => {
+      if (!this.#store.facts.replaying) {
+        this.#pause();
+        return;
+      }
+      this.#goTo(this.#asked + 1);
+      if (this.#asked >= (runLookedAt(this.#store.facts)?.steps ?? 0) - 1) this.#pause();
+    }, 1000 / STEPS_PER_S);
+    this.#play.setAttribute("aria-pressed", "true");
+  }
+
+  #pause() {
+    if (this.#timer === null) return;
+    clearInterval(this.#timer);
+    this.#store.set({ replaying: false });
+    this.#timer = null;
+    this.#play.setAttribute("aria-pressed", "false");
+  }
+}

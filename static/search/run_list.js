@@ -1,0 +1,100 @@
+/** The runs of the shown frame: what each was told that differs, what it found and cost; to compare, take, or run again. */
+
+import { runColor } from "./cost_curve.js";
+import { byId } from "../widgets/elements.js";
+import { makeButton } from "./search_widgets.js";
+import { runLookedAt } from "../model/search_runs.js";
+import { count, px } from "../widgets/text.js";
+
+/** @typedef {{element: HTMLElement, figures: HTMLElement, differs: HTMLElement, compare: HTMLButtonElement, take: HTMLButtonElement}} Row */
+
+export class RunList {
+  #store;
+  #send;
+  #list = document.createElement("div");
+  /** @type {Map<number, Row>} */
+  #rows = new Map();
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+   */
+  constructor(store, send) {
+    this.#store = store;
+    this.#send = send;
+    const head = document.createElement("h3");
+    head.textContent = "Runs";
+    head.title = "Searches of this frame. The first stays for comparison when another is run with other settings";
+    this.#list.className = "run-rows";
+    byId("search-runs", HTMLElement).append(head, this.#list);
+  }
+
+  /** @param {Set<keyof import("../model/store.js").Facts>} changed */
+  update(changed) {
+    if (!["drawer", "searchRuns", "searchRun"].some((fact) => changed.has(/** @type {"drawer"} */ (fact)))) return;
+    const { searchRuns } = this.#store.facts;
+    const runs = [...(searchRuns?.runs ?? [])].reverse();
+    const numbers = runs.map(({ number }) => number);
+    if (numbers.join() !== [...this.#rows.keys()].join()) {
+      const former = this.#rows;
+      this.#rows = new Map(numbers.map((number) => [number, former.get(number) ?? this.#makeRow(number)]));
+      this.#list.replaceChildren(...[...this.#rows.values()].map(({ element }) => element));
+      if (numbers.length === 0) this.#list.textContent = "None yet";
+    }
+    for (const run of runs) this.#show(run);
+  }
+
+  /**
+   * @param {number} number
+   * @returns {Row}
+   */
+  #makeRow(number) {
+    const element = document.createElement("div");
+    element.className = "run-row";
+    const swatch = document.createElement("i");
+    swatch.style.background = `var(${runColor(number)})`;
+    const look = makeButton(`Run ${number}`, `Look at run ${number}: its costs, stages and candidates`, () => {
+      this.#store.set({ searchRun: number });
+    });
+    look.className = "run-name";
+    look.prepend(swatch);
+    const figures = document.createElement("div");
+    figures.className = "run-figures";
+    const differs = document.createElement("div");
+    differs.className = "run-differs";
+    const compare = makeButton("Compare", `Draw the pose that run ${number} found over the views, dashed`, () => {
+      const isOn = this.#store.facts.searchRuns?.compared === number;
+      this.#send({ type: "compare", run: isOn ? null : number });
+    });
+    const take = makeButton("Take", `Take the pose that run ${number} found: an edit, which can be undone`, () =>
+      this.#send({ type: "take", run: number, candidate: null }),
+    );
+    element.append(look, figures, compare, take, differs);
+    return { element, figures, differs, compare, take };
+  }
+
+  /** @param {import("../model/protocol.js").SearchRun} run */
+  #show(run) {
+    const row = this.#rows.get(run.number);
+    if (!row) return;
+    const { searchRuns } = this.#store.facts;
+    row.element.classList.toggle("is-looked-at", runLookedAt(this.#store.facts)?.number === run.number);
+    const state = run.state === "over" ? "" : run.state === "running" ? "running · " : "stands · ";
+    const thinned = run.thinned ? `; of its many steps ${count(run.steps)} are kept` : "";
+    set(row.figures, `${state}${px(run.best_px)} · ${count(run.evaluations)} · ${run.seconds.toFixed(2)} s`);
+    row.figures.title = `Least cost (began at ${px(run.start_px)}), poses scored, seconds of work${thinned}`;
+    const differs = Object.entries(run.differs).map(([label, value]) => `${label} ${value}`);
+    set(row.differs, differs.join(" · "));
+    row.differs.title = differs.length ? `What this run was told that another was not:\n${differs.join("\n")}` : "";
+    row.compare.setAttribute("aria-pressed", String(searchRuns?.compared === run.number));
+    row.compare.disabled = row.take.disabled = run.steps === 0 || run.state === "running";
+  }
+}
+
+/**
+ * @param {HTMLElement} element
+ * @param {string} text
+ */
+function set(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}

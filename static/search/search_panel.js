@@ -1,0 +1,141 @@
+/** The search tab of the drawer: its controls, and what lies below them, each in a module of its own. */
+
+import { hasSearch, hasTrack } from "../model/selectors.js";
+import { CandidateStrip } from "./candidate_strip.js";
+import { CostCurve } from "./cost_curve.js";
+import { byId } from "../widgets/elements.js";
+import { ReplayBar } from "./replay_bar.js";
+import { RunList } from "./run_list.js";
+import { SearchTree } from "./search_tree.js";
+import { makeButton, makeNumber } from "./search_widgets.js";
+import { runLookedAt } from "../model/search_runs.js";
+import { count, px } from "../widgets/text.js";
+
+/** Expansions a second that can be watched; 0 stands for as many as there can be. */
+const SPEEDS = [1, 2, 5, 10, 30, 0];
+/** Why the cost at the top is another once the search is over. */
+const MEASURED = "Measured on the edges near the pose it began from, as all its poses are: the cost of the found pose by itself may differ";
+
+export class SearchPanel {
+  #store;
+  #actions;
+  #send;
+  #panel = byId("search-panel", HTMLElement);
+  #controls = byId("search-controls", HTMLElement);
+  #speed = document.createElement("select");
+  #figures = document.createElement("output");
+  #buttons;
+  #theta;
+  #isOpen = false;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {import("../model/actions.js").Actions} actions
+   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+   */
+  constructor(store, actions, send) {
+    this.#store = store;
+    this.#actions = actions;
+    this.#send = send;
+    this.#buttons = this.#makeButtons();
+    this.#theta = makeNumber({
+      label: "θ, px",
+      title: "Outlier distance theta, px: edges farther away say nothing. Empty: 3% of the longer side of the image",
+      placeholder: "auto",
+      change: (value) => this.#set({ theta_px: value }),
+    });
+    this.#build();
+    const views = [
+      new SearchTree(store, (changes) => this.#set(changes)),
+      new CostCurve(store, send),
+      new RunList(store, send),
+      new ReplayBar(store, send),
+      new CandidateStrip(store, send),
+    ];
+    store.subscribe((changed) => {
+      if (changed.has("drawer")) this.#open();
+      if (!this.#isOpen) return;
+      if (changed.has("connected") && store.facts.connected) send({ type: "watch", tab: "search" });
+      if (["state", "connected", "searchSetup", "searchRuns", "searchRun"].some((f) => changed.has(/** @type {"state"} */ (f)))) {
+        this.#show();
+      }
+      for (const view of views) view.update(changed);
+    });
+    this.#open();
+  }
+
+  #makeButtons() {
+    const { actions, store } = { actions: this.#actions, store: this.#store };
+    const search = (/** @type {"step" | "stage" | "frame" | "stop"} */ action) => () => actions.search(action);
+    const track = () => (hasTrack(store.facts.state) ? actions.togglePause() : actions.track("forward"));
+    return {
+      step: makeButton("Step", "One expansion of the search (S)", search("step")),
+      stage: makeButton("Stage", "To the end of the stage at hand (Shift+S)", search("stage")),
+      frame: makeButton("Frame", "Search this frame to the end (F)", search("frame")),
+      again: makeButton("Rerun", "Search again from where the run looked at began, by the settings of now (Shift+F)", () =>
+        actions.searchAgain(),
+      ),
+      track: makeButton("Track", "Track forward from here (T); while it runs, pause or go on (Alt+P)", track),
+      stop: makeButton("Stop", "Stop what is at work, keep the best pose (Esc)", () =>
+        hasTrack(store.facts.state) ? actions.stopTracking() : actions.search("stop"),
+      ),
+    };
+  }
+
+  #build() {
+    const group = document.createElement("div");
+    group.className = "group";
+    group.setAttribute("role", "group");
+    group.setAttribute("aria-label", "Search");
+    group.append(...Object.values(this.#buttons));
+    const speed = document.createElement("label");
+    speed.className = "search-field";
+    speed.title = "How fast the search goes while you watch: expansions a second. A change takes effect at once";
+    this.#speed.append(...SPEEDS.map((one) => new Option(one ? `${one}/s` : "full", String(one))));
+    this.#speed.setAttribute("aria-label", "Expansions a second");
+    this.#speed.addEventListener("change", () => {
+      this.#send({ type: "search_speed", per_second: Number(this.#speed.value) || null });
+      this.#speed.blur();
+    });
+    speed.append("Speed", this.#speed);
+    this.#figures.className = "search-figures";
+    this.#figures.setAttribute("aria-label", "Progress of the search");
+    this.#controls.append(group, speed, this.#theta.element, this.#figures);
+  }
+
+  #open() {
+    const { drawer, connected } = this.#store.facts;
+    const isOpen = drawer === "search";
+    this.#panel.hidden = this.#controls.hidden = !isOpen;
+    if (isOpen === this.#isOpen) return;
+    this.#isOpen = isOpen;
+    if (!isOpen && connected) this.#actions.leaveReplay();
+    if (connected && (isOpen || drawer !== "landscape")) this.#send({ type: "watch", tab: isOpen ? "search" : null });
+    if (isOpen) this.#show();
+  }
+
+  /** @param {Record<string, unknown>} changes */
+  #set(changes) {
+    this.#send({ type: "search_settings", changes });
+  }
+
+  #show() {
+    const { state, connected, searchSetup } = this.#store.facts;
+    const isReady = connected && !!state;
+    const isRunning = !!state?.job.running;
+    const { step, stage, frame, again, track, stop } = this.#buttons;
+    step.disabled = stage.disabled = frame.disabled = !isReady || isRunning;
+    const run = runLookedAt(this.#store.facts);
+    again.disabled = !isReady || isRunning || run === null;
+    track.disabled = !isReady;
+    track.textContent = state?.track.running ? "Pause" : "Track";
+    stop.disabled = !isReady || !(hasSearch(state) || hasTrack(state));
+    if (searchSetup) {
+      this.#theta.show(searchSetup.theta_px);
+      if (document.activeElement !== this.#speed) this.#speed.value = String(searchSetup.speed ?? 0);
+    }
+    const rate = run && run.seconds > 0 ? ` · ${count(run.evaluations / run.seconds)}/s` : "";
+    this.#figures.textContent = run ? `${count(run.evaluations)} poses${rate} · best ${px(run.best_px)}` : "No search yet";
+    this.#figures.title = run ? `Run ${run.number}: poses scored, poses a second of work, least cost. ${MEASURED}` : "";
+  }
+}

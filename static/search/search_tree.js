@@ -1,0 +1,233 @@
+/**
+ * The decomposition of the search as a tree (GD96 Fig. 2), the passes beside it: what each stage searches, within which bounds
+ * and by which steps, what it cost and gained, and which one is at work.
+ */
+
+import { byId } from "../widgets/elements.js";
+import { runLookedAt } from "../model/search_runs.js";
+import { makeNumber } from "./search_widgets.js";
+import { count } from "../widgets/text.js";
+
+/** @typedef {import("../model/protocol.js").SearchLeaf} SearchLeaf */
+
+const DEGREES = 180 / Math.PI;
+const CENTIMETRES = 100;
+/** @type {{key: "bound_rad" | "step_rad" | "bound_m" | "step_m", has: "angles" | "lengths", head: string, unit: number, title: string}[]} */
+const FIELDS = [
+  { key: "bound_rad", has: "angles", head: "± °", unit: DEGREES, title: "Bound: largest change of an angle, degrees" },
+  { key: "step_rad", has: "angles", head: "step °", unit: DEGREES, title: "Step: spacing of the poses tried, degrees" },
+  { key: "bound_m", has: "lengths", head: "± cm", unit: CENTIMETRES, title: "Bound: largest change of a position, cm" },
+  { key: "step_m", has: "lengths", head: "step cm", unit: CENTIMETRES, title: "Step: spacing of the positions tried, cm" },
+];
+
+export class SearchTree {
+  #store;
+  #change;
+  #element = byId("search-tree", HTMLElement);
+  /** What the tree was built for. */
+  #built = "";
+  /** @type {Map<string, HTMLElement>} cells by person, group and pass */
+  #cells = new Map();
+  /** @type {{field: ReturnType<typeof makeNumber>, read: (setup: import("../model/protocol.js").SearchSetupMessage) => number | null}[]} */
+  #fields = [];
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {(changes: Record<string, unknown>) => void} change
+   */
+  constructor(store, change) {
+    this.#store = store;
+    this.#change = change;
+  }
+
+  /** @param {Set<keyof import("../model/store.js").Facts>} changed */
+  update(changed) {
+    const { searchSetup: setup, session } = this.#store.facts;
+    if (!setup || !session) return;
+    if (changed.has("searchSetup") || changed.has("session") || changed.has("drawer")) this.#build(setup, session);
+    this.#showRun();
+  }
+
+  /**
+   * @param {import("../model/protocol.js").SearchSetupMessage} setup
+   * @param {import("../model/protocol.js").SessionMessage} session
+   */
+  #build(setup, session) {
+    const shape = JSON.stringify([setup.leaves.map(({ person, name, dofs }) => [person, name, dofs]), setup.passes]);
+    if (shape !== this.#built) {
+      this.#built = shape;
+      this.#cells.clear();
+      this.#fields = [];
+      const table = document.createElement("div");
+      table.className = "tree-table";
+      table.style.setProperty("--passes", String(setup.passes.length));
+      table.append(...this.#head(setup));
+      session.people.forEach((person, index) => {
+        const leaves = setup.leaves.filter((leaf) => leaf.person === index);
+        const dofs = leaves.reduce((sum, leaf) => sum + leaf.dofs.length, 0);
+        table.append(...this.#root(setup, person.name, dofs, index));
+        leaves.forEach((leaf, i) => table.append(...this.#row(setup, leaf, i === leaves.length - 1)));
+      });
+      this.#element.replaceChildren(table, this.#rest(setup));
+    }
+    for (const { field, read } of this.#fields) field.show(read(setup));
+    for (const mark of /** @type {NodeListOf<HTMLElement>} */ (this.#element.querySelectorAll("[data-leaf]"))) {
+      const leaf = setup.leaves.find(({ person, name }) => mark.dataset.leaf === `${person} ${name}`);
+      mark.classList.toggle("is-own", !!leaf?.own);
+    }
+  }
+
+  /** @param {import("../model/protocol.js").SearchSetupMessage} setup */
+  #head(setup) {
+    const passes = setup.passes.map((factor) => cell("tree-head", `steps ×${factor}`, `Pass with the steps times ${factor}: poses scored, and what they lowered the cost by`));
+    return [
+      cell("tree-head", "Stage", "The groups of degrees of freedom that are searched one after the other"),
+      cell("tree-head", "DOF", "How many degrees of freedom are searched together"),
+      ...FIELDS.map(({ head, title }) => cell("tree-head", head, title)),
+      ...passes,
+    ];
+  }
+
+  /**
+   * The root of a person's tree; of the first it holds the bounds and steps that all follow.
+   *
+   * @param {import("../model/protocol.js").SearchSetupMessage} setup
+   * @param {string} name
+   * @param {number} dofs
+   * @param {number} person
+   */
+  #root(setup, name, dofs, person) {
+    const fields = FIELDS.map(({ key, unit, title }) => {
+      if (person > 0) return cell("", "", "");
+      const field = makeNumber({
+        label: "",
+        title: `${title}, of all that have none of their own`,
+        change: (value) => value !== null && this.#change({ [key]: value / unit }),
+      });
+      this.#fields.push({ field, read: (now) => now[key] * unit });
+      return field.element;
+    });
+    return [
+      cell("tree-name", name, `${name}: ${dofs} degrees of freedom`),
+      cell("tree-count", String(dofs), `${dofs} degrees of freedom`),
+      ...fields,
+      ...setup.passes.map(() => cell("", "", "")),
+    ];
+  }
+
+  /**
+   * @param {import("../model/protocol.js").SearchSetupMessage} setup
+   * @param {SearchLeaf} leaf
+   * @param {boolean} isLast
+   */
+  #row(setup, leaf, isLast) {
+    const { person, name, dofs } = leaf;
+    const list = dofs.map((dof) => dof.replaceAll("_", " ").replace(".", " ")).join(", ");
+    const label = cell(`tree-name is-leaf${isLast ? " is-last" : ""}`, name, `${name}: ${list}`);
+    label.dataset.leaf = `${person} ${name}`;
+    const fields = FIELDS.map(({ key, has, unit, title }) => {
+      if (leaf[has] === 0) return cell("", "", "");
+      const field = makeNumber({
+        label: "",
+        title: `${title}, of ${name}; empty it to follow the others`,
+        placeholder: "mixed",
+        change: (value) => this.#change({ leaf: { person, name, [key]: value === null ? null : value / unit } }),
+      });
+      this.#fields.push({ field, read: (now) => valueOf(now, person, name, key, unit) });
+      return field.element;
+    });
+    const passes = setup.passes.map((factor) => {
+      const one = cell("tree-pass", "", "");
+      this.#cells.set(`${person} ${name} ${factor}`, one);
+      return one;
+    });
+    return [label, cell("tree-count", String(dofs.length), list), ...fields, ...passes];
+  }
+
+  /**
+   * What is told to all stages.
+   *
+   * @param {import("../model/protocol.js").SearchSetupMessage} setup
+   */
+  #rest(setup) {
+    const line = document.createElement("div");
+    line.className = "tree-rest";
+    const patience = makeNumber({
+      label: "Patience",
+      title: "A stage ends after so many expansions that found nothing better",
+      change: (value) => value !== null && this.#change({ patience: Math.round(value) }),
+    });
+    const most = makeNumber({
+      label: "at most",
+      title: "A stage ends after so many expansions in any case",
+      change: (value) => value !== null && this.#change({ max_expansions: Math.round(value) }),
+    });
+    this.#fields.push({ field: patience, read: (now) => now.patience }, { field: most, read: (now) => now.max_expansions });
+    const passes = document.createElement("label");
+    passes.className = "search-field";
+    passes.title = "Factors on the steps: all stages are searched once per factor. The paper's mode is 1";
+    const text = document.createElement("input");
+    text.type = "text";
+    text.value = setup.passes.join(" ");
+    text.setAttribute("aria-label", passes.title);
+    text.addEventListener("change", () => {
+      const factors = text.value.split(/[\s,;]+/).filter(Boolean).map(Number);
+      this.#change({ passes: factors.map((factor) => (Number.isFinite(factor) ? factor : 0)) });
+      text.value = this.#store.facts.searchSetup?.passes.join(" ") ?? "";
+    });
+    text.addEventListener("keydown", (event) => event.stopPropagation());
+    passes.append("Passes", text);
+    const apart = document.createElement("label");
+    apart.className = "search-field";
+    apart.title = "Search the limbs of a group one after the other, not together as in the paper";
+    const box = document.createElement("input");
+    box.type = "checkbox";
+    box.checked = setup.limbs_apart;
+    box.addEventListener("change", () => {
+      this.#change({ limbs_apart: box.checked });
+      box.blur();
+    });
+    apart.append(box, "limbs apart");
+    line.append(passes, patience.element, most.element, apart);
+    return line;
+  }
+
+  #showRun() {
+    const run = runLookedAt(this.#store.facts);
+    const stages = new Map(run?.stages.map((stage) => [`${stage.person} ${stage.name} ${stage.factor}`, stage]));
+    for (const [key, element] of this.#cells) {
+      const stage = stages.get(key);
+      const isBegun = !!stage && stage.evaluations > 0;
+      const text = stage?.done || isBegun ? `${count(stage.evaluations)} · −${stage.gain_px.toFixed(2)}` : "";
+      if (element.textContent !== text) element.textContent = text;
+      element.classList.toggle("is-done", !!stage?.done);
+      element.classList.toggle("is-running", !!stage?.running);
+      element.title = stage && text ? `${stage.name}, steps ×${stage.factor}: ${count(stage.evaluations)} poses scored, ${stage.gain_px.toFixed(3)} px less${stage.running ? "; at work" : ""}` : "Not searched yet";
+    }
+  }
+}
+
+/**
+ * @param {string} className
+ * @param {string} text
+ * @param {string} title
+ */
+function cell(className, text, title) {
+  const element = document.createElement("div");
+  element.className = className;
+  element.textContent = text;
+  element.title = title;
+  return element;
+}
+
+/**
+ * @param {import("../model/protocol.js").SearchSetupMessage} setup
+ * @param {number} person
+ * @param {string} name
+ * @param {"bound_rad" | "step_rad" | "bound_m" | "step_m"} key
+ * @param {number} unit
+ */
+function valueOf(setup, person, name, key, unit) {
+  const value = setup.leaves.find((leaf) => leaf.person === person && leaf.name === name)?.[key] ?? null;
+  return value === null ? null : value * unit;
+}

@@ -1,0 +1,135 @@
+/** Everything that can be done on the page, as a list for the palette: keys, buttons, layers, and places to jump to. */
+
+import { LAYERS } from "../model/layers.js";
+import { spoken } from "../widgets/text.js";
+
+/**
+ * @typedef {object} Command
+ * @property {string} id stays the same from one session to the next
+ * @property {string} area
+ * @property {string} label
+ * @property {string[]} keys
+ * @property {string} words further words that find it
+ * @property {() => string | null} why why it is not possible now; null where it is
+ * @property {() => void} run
+ *
+ * @typedef {object} Places
+ * @property {import("../model/store.js").Store} store
+ * @property {import("../model/navigation.js").Navigation} navigation
+ * @property {import("../panes/pane_grid.js").PaneGrid} grid
+ * @property {import("../posing/posing.js").Posing} posing
+ * @property {import("../model/layers.js").Layers} layers
+ * @property {import("../model/actions.js").Actions} actions
+ * @property {() => string | null} away why nothing is possible while the program is away
+ */
+
+const BUTTONS =
+  ".top-bar button, .top-bar input, #inspector button, .transport button, .transport input, #range-bar button, .drawer-bar label";
+
+/**
+ * The commands of the keys; those that want to know which of many keys was pressed have commands of their own.
+ *
+ * @param {import("../widgets/key_matching.js").Binding[]} table
+ * @returns {Command[]}
+ */
+export function keyCommands(table) {
+  return table
+    .filter(({ keys, label }) => !keys.some((key) => key.includes("–")) && label !== "Commands")
+    .map(({ keys, label, area, why, run }) => ({
+      id: `key ${label}`,
+      area: area ?? "More",
+      label,
+      keys,
+      words: "",
+      why: () => why?.() ?? null,
+      run: () => run(new KeyboardEvent("keydown")),
+    }));
+}
+
+/**
+ * Buttons and switches that no key of the table presses. Their titles name the key where there is one.
+ *
+ * @param {import("../widgets/key_matching.js").Binding[]} table
+ * @returns {Command[]}
+ */
+export function buttonCommands(table) {
+  const known = new Set(table.flatMap(({ keys, label }) => [...keys, label]));
+  const commands = [];
+  for (const control of document.querySelectorAll(BUTTONS)) {
+    if (!(control instanceof HTMLElement) || !isThere(control)) continue;
+    const { label, title } = wordsOf(control);
+    const named = [...title.matchAll(/\(([^)]*)\)/g)].flatMap(([, inside]) => inside.split(/[,:]/));
+    if (!label || known.has(label) || named.some((key) => known.has(key.trim().replaceAll("+", " ").replace(/ $/, "+")))) continue;
+    const input = control.matches("input") ? control : (control.querySelector("input") ?? control);
+    commands.push({
+      id: `button ${control.id || label}`,
+      area: control.closest("[role=group], fieldset, [role=toolbar]")?.getAttribute("aria-label") ?? "More",
+      label,
+      keys: [],
+      words: title,
+      why: () => {
+        if (control.closest("#range-bar[hidden]")) return "No range is marked: [ begins one, ] ends it.";
+        return input.matches(":disabled") ? `Not possible now: ${title}.` : null;
+      },
+      run: () => input.click(),
+    });
+  }
+  return commands;
+}
+
+/**
+ * Layers, cameras, people, joints; and the frame, where the query is a number.
+ *
+ * @param {Places} places
+ * @param {string} query
+ * @returns {Command[]}
+ */
+export function placeCommands({ store, navigation, grid, posing, layers, actions, away }, query) {
+  const { session, state, filled } = store.facts;
+  /** @type {Command[]} */
+  const commands = [];
+  const add = (/** @type {string} */ area, /** @type {string} */ label, /** @type {() => void} */ run, words = "") =>
+    commands.push({ id: `${area} ${label}`, area, label, keys: [], words, why: away, run });
+  const frame = /^(?:go to\s+)?(?:frame\s*)?(\d+)$/i.exec(query.trim());
+  const last = (session?.n_frames ?? 1) - 1;
+  if (frame) {
+    const number = Number(frame[1]);
+    add("Frame", `Go to frame ${number}`, () => navigation.goTo(number), query);
+    if (number > last) commands[0].why = () => `The last frame is ${last}.`;
+  }
+  for (const { id, label, title } of LAYERS) {
+    const isShown = store.facts.layers.shown[id];
+    add("Layer", `${isShown ? "Hide" : "Show"} ${label.toLowerCase()}`, () => layers.toggle([id]), `layer show hide ${title}`);
+    commands[commands.length - 1].id = `layer ${id}`;
+  }
+  session?.cameras.forEach(({ name }, index) => {
+    const label = filled === index ? "Show all cameras" : `Fill the grid with ${name}`;
+    add("Camera", label, () => grid.toggleFill(index), `camera view ${index + 1} ${name}`);
+    commands[commands.length - 1].id = `camera ${name}`;
+  });
+  if ((session?.people.length ?? 0) > 1) {
+    session?.people.forEach(({ name }, index) => {
+      const isShown = state?.people[index]?.shown ?? true;
+      add("Person", `Work on ${name}`, () => actions.selectPerson(index), "person");
+      add("Person", `${isShown ? "Hide" : "Show"} ${name}`, () => actions.showPerson(index, !isShown), "person show hide");
+      commands[commands.length - 1].id = `shown ${name}`;
+      if (index !== state?.person) add("Person", `Copy the pose of ${name}`, () => posing.copyPerson(index), "person bend");
+    });
+  }
+  const points = session?.people[state?.person ?? 0]?.points ?? [];
+  for (const point of points) add("Joint", `Select ${spoken(point)}`, () => posing.selectPoint(point), "joint");
+  return commands;
+}
+
+/** @param {HTMLElement} control */
+function wordsOf(control) {
+  const title = control.title || control.closest("label")?.title || "";
+  const text = control.getAttribute("aria-label") ?? (control.matches("input") ? control.closest("label") : control)?.textContent ?? "";
+  return { label: (text.trim().length > 1 ? text : title).trim(), title };
+}
+
+/** @param {HTMLElement} control */
+function isThere(control) {
+  const hidden = control.closest("[hidden]");
+  return (!hidden || hidden.id === "range-bar") && !control.hasAttribute("data-no-command");
+}

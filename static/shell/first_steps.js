@@ -1,0 +1,36 @@
+/** What to do first, on one card: shown until it is dismissed for good, found again in the palette. */
+
+import { button, byId } from "../widgets/elements.js";
+
+const STORED = "quadrille.first_steps";
+
+export class FirstSteps {
+  #card = byId("first-steps", HTMLElement);
+
+  /** @param {import("../model/store.js").Store} store */
+  constructor(store) {
+    button("close-first-steps", () => this.#close());
+    this.#card.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape") return;
+      event.preventDefault();
+      this.#close();
+    });
+    store.subscribe((changed) => {
+      if (!changed.has("session")) return;
+      const isAlone = (store.facts.session?.people.length ?? 1) < 2;
+      byId("first-choose-person", HTMLElement).hidden = isAlone;
+      if (localStorage.getItem(STORED) !== "seen") this.#card.hidden = false;
+    });
+  }
+
+  /** Show the card again, and where it can be closed. */
+  show() {
+    this.#card.hidden = false;
+    byId("close-first-steps", HTMLButtonElement).focus();
+  }
+
+  #close() {
+    localStorage.setItem(STORED, "seen");
+    this.#card.hidden = true;
+  }
+}

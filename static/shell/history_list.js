@@ -1,0 +1,163 @@
+/** The history as a list: what was done, by whom, when; a click goes there. */
+
+import { byId } from "../widgets/elements.js";
+import { opensPopover, togglePopover } from "../widgets/popovers.js";
+
+const FIRST_LIMIT = 100;
+const MOST = 2000;
+
+export class HistoryList {
+  #store;
+  #send;
+  #panel = byId("history-panel", HTMLElement);
+  #button = byId("show-history", HTMLButtonElement);
+  #list = byId("history-list", HTMLElement);
+  #limit = 0;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+   */
+  constructor(store, send) {
+    this.#store = store;
+    this.#send = send;
+    opensPopover(this.#panel, this.#button, () => this.toggle());
+    this.#panel.addEventListener("toggle", () => {
+      const isOpen = this.#panel.matches(":popover-open");
+      if (isOpen) this.#list.querySelector("[aria-current]")?.scrollIntoView({ block: "center" });
+      else this.#ask(0);
+    });
+    this.#list.addEventListener("keydown", (event) => this.#onKey(event));
+    store.subscribe((changed) => {
+      if (changed.has("history")) this.#show();
+      if (changed.has("connected") && store.facts.connected && this.#limit > 0) this.#ask(this.#limit);
+    });
+  }
+
+  toggle() {
+    togglePopover(this.#panel, this.#button);
+    if (!this.#panel.matches(":popover-open")) return;
+    this.#ask(FIRST_LIMIT);
+    this.#panel.focus();
+  }
+
+  /** @param {number} limit entries each way; 0 for no more */
+  #ask(limit) {
+    this.#limit = limit;
+    this.#send({ type: "history", limit });
+  }
+
+  #show() {
+    const { history } = this.#store.facts;
+    if (!history) return;
+    const had = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.edit : undefined;
+    const wasEmpty = this.#list.childElementCount === 0;
+    const { entries, earlier, later } = history;
+    const current = entries.find(({ undone }) => !undone)?.edit ?? null;
+    const rows = entries.map((entry) => this.#row(entry, entry.edit === current));
+    if (later) rows.unshift(this.#more("Show later entries"));
+    if (earlier) rows.push(this.#more("Show earlier entries"));
+    else rows.push(this.#beginning(current === null));
+    this.#list.replaceChildren(...rows);
+    const again = had === undefined ? null : this.#list.querySelector(`[data-edit="${had}"]`);
+    if (again instanceof HTMLElement) again.focus();
+    else if (wasEmpty || this.#panel.matches(":focus-within")) this.#currentRow?.focus();
+  }
+
+  get #currentRow() {
+    const row = this.#list.querySelector("[aria-current]");
+    return row instanceof HTMLElement ? row : null;
+  }
+
+  /**
+   * @param {import("../model/protocol.js").HistoryEntry} entry
+   * @param {boolean} isCurrent
+   */
+  #row({ edit, label, author, time, undone }, isCurrent) {
+    const when = new Date(time);
+    const [what, frame] = split(label);
+    const where = [what, frame, author, spokenTime(when)];
+    const title = `${label}${author ? `, by ${author}` : ""}, ${when.toLocaleString()}${undone ? "; undone" : ""}. ${
+      isCurrent ? "This is where the history stands." : undone ? "Redo up to here." : "Undo down to here."
+    }`;
+    return this.#entry(edit, where, title, isCurrent, undone);
+  }
+
+  /** @param {boolean} isCurrent */
+  #beginning(isCurrent) {
+    const title = isCurrent ? "This is where the history stands." : "Undo everything, to where this session began.";
+    return this.#entry(null, ["Beginning", "", "", ""], title, isCurrent, false);
+  }
+
+  /**
+   * @param {number | null} edit
+   * @param {string[]} cells
+   * @param {string} title
+   * @param {boolean} isCurrent
+   * @param {boolean} isUndone
+   */
+  #entry(edit, cells, title, isCurrent, isUndone) {
+    const row = document.createElement("button");
+    row.type = "button";
+    row.title = title;
+    row.dataset.edit = String(edit);
+    row.classList.toggle("is-undone", isUndone);
+    if (isCurrent) row.setAttribute("aria-current", "step");
+    row.append(
+      ...cells.map((text) => {
+        const cell = document.createElement("span");
+        cell.textContent = text;
+        return cell;
+      }),
+    );
+    row.addEventListener("click", () => isCurrent || this.#send({ type: "go_to", edit }));
+    const item = document.createElement("li");
+    item.append(row);
+    return item;
+  }
+
+  /** @param {string} text */
+  #more(text) {
+    const item = document.createElement("li");
+    const row = document.createElement("button");
+    row.type = "button";
+    row.className = "is-more";
+    const isLast = this.#limit >= MOST;
+    row.textContent = isLast ? `Only ${MOST.toLocaleString("en")} entries are listed; undo reaches the others` : text;
+    row.title = row.textContent;
+    row.disabled = isLast;
+    row.addEventListener("click", () => this.#ask(Math.min(MOST, 4 * this.#limit)));
+    item.append(row);
+    return item;
+  }
+
+  /** @param {KeyboardEvent} event */
+  #onKey(event) {
+    const rows = [...this.#list.querySelectorAll("button")];
+    const at = rows.findIndex((row) => row === document.activeElement);
+    const to = { ArrowDown: at + 1, ArrowUp: at - 1, Home: 0, End: rows.length - 1 }[event.key];
+    if (to === undefined) return;
+    event.preventDefault();
+    rows[Math.max(0, Math.min(rows.length - 1, to))]?.focus();
+  }
+}
+
+/**
+ * `drag left wrist, frame 3` as what was done and where.
+ *
+ * @param {string} label
+ */
+function split(label) {
+  const found = /^(.*) (frames? [\d ,to–-]+)$/.exec(label);
+  return found ? [found[1].replace(/,$/, ""), found[2]] : [label, ""];
+}
+
+/** @param {Date} when */
+function spokenTime(when) {
+  const minutes = (Date.now() - when.getTime()) / 60_000;
+  if (minutes < 1) return "just now";
+  if (minutes < 60) return `${Math.floor(minutes)} min ago`;
+  const time = when.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
+  const isToday = when.toDateString() === new Date().toDateString();
+  return isToday ? time : `${when.toLocaleDateString([], { day: "numeric", month: "short" })}, ${time}`;
+}

@@ -1,0 +1,58 @@
+/** The list of keys: grouped by what they are about, and searched by a few letters. */
+
+import { button, byId, keyCaps } from "../widgets/elements.js";
+import { fitness } from "../widgets/fuzzy.js";
+
+export class KeyMap {
+  #dialog = byId("help", HTMLDialogElement);
+  #query = byId("help-query", HTMLInputElement);
+  #list = byId("help-keys", HTMLElement);
+  #none = byId("help-none", HTMLElement);
+
+  /** @param {import("../widgets/key_matching.js").Binding[]} table */
+  constructor(table) {
+    /** @type {Map<string, HTMLElement>} */
+    const areas = new Map();
+    for (const { keys, label, area = "More" } of table.filter((binding) => binding.keys.length > 0)) {
+      let section = areas.get(area);
+      if (!section) {
+        section = document.createElement("section");
+        const heading = document.createElement("h3");
+        heading.textContent = area;
+        section.append(heading, document.createElement("dl"));
+        areas.set(area, section);
+      }
+      const row = document.createElement("div");
+      const [term, description] = [document.createElement("dt"), document.createElement("dd")];
+      term.append(keyCaps(keys));
+      description.textContent = label;
+      row.append(term, description);
+      section.querySelector("dl")?.append(row);
+    }
+    this.#list.replaceChildren(...areas.values());
+    this.#query.addEventListener("input", () => this.#search());
+    button("show-help", () => this.show());
+    this.#dialog.addEventListener("click", (event) => event.target === this.#dialog && this.#dialog.close());
+  }
+
+  show() {
+    this.#query.value = "";
+    this.#search();
+    this.#dialog.showModal();
+  }
+
+  #search() {
+    const query = this.#query.value;
+    for (const section of this.#list.children) {
+      const area = section.querySelector("h3")?.textContent ?? "";
+      let some = false;
+      for (const row of section.querySelectorAll("dl > div")) {
+        const fits = fitness(query, `${row.textContent} ${area}`) !== null;
+        /** @type {HTMLElement} */ (row).hidden = !fits;
+        some ||= fits;
+      }
+      /** @type {HTMLElement} */ (section).hidden = !some;
+    }
+    this.#none.hidden = this.#list.querySelector("section:not([hidden])") !== null;
+  }
+}

@@ -1,0 +1,155 @@
+/** What the program has to say: sentences that pass, errors that wait to be read, a log of them all, and the banner while it is away. */
+
+import { button, byId } from "../widgets/elements.js";
+import { opensPopover, togglePopover } from "../widgets/popovers.js";
+
+const INFO_MS = 5000;
+const ERROR_MS = 20000;
+const MOST_SHOWN = 3;
+const MOST_LOGGED = 100;
+
+/**
+ * @typedef {import("../model/protocol.js").NoticeMessage} Notice
+ * @typedef {Notice & {time: Date, count: number}} Logged
+ * @typedef {{element: HTMLElement, text: string, count: number, timer: number}} Shown
+ */
+
+export class Notices {
+  #place = byId("notices", HTMLElement);
+  #panel = byId("notice-log", HTMLElement);
+  #list = byId("notice-log-list", HTMLElement);
+  #button = byId("show-notices", HTMLButtonElement);
+  /** @type {Shown[]} oldest first */
+  #shown = [];
+  /** @type {Logged[]} latest first */
+  #log = [];
+
+  constructor() {
+    opensPopover(this.#panel, this.#button, () => this.toggleLog());
+    button("clear-notices", () => {
+      this.#log = [];
+      this.#showLog();
+    });
+    this.#showLog();
+  }
+
+  /** @param {Notice} notice */
+  show({ type, level, text }) {
+    const known = this.#shown.find((shown) => shown.text === text);
+    const first = this.#log[0];
+    if (first?.text === text) Object.assign(first, { count: first.count + 1, time: new Date() });
+    else this.#log.unshift({ type, level, text, time: new Date(), count: 1 });
+    this.#log.length = Math.min(this.#log.length, MOST_LOGGED);
+    this.#showLog();
+    if (known) this.#again(known, level);
+    else this.#add(level, text);
+  }
+
+  toggleLog() {
+    togglePopover(this.#panel, this.#button);
+  }
+
+  /** Close the notice that came last; says whether there was one. */
+  dismiss() {
+    const last = this.#shown.at(-1);
+    if (last) this.#remove(last);
+    return last !== undefined;
+  }
+
+  dismissAll() {
+    for (const shown of [...this.#shown]) this.#remove(shown);
+  }
+
+  /** Whether there is a notice to close. */
+  get areShown() {
+    return this.#shown.length > 0;
+  }
+
+  /**
+   * @param {"error" | "info"} level
+   * @param {string} text
+   */
+  #add(level, text) {
+    const element = document.createElement("div");
+    element.className = `notice is-${level}`;
+    element.setAttribute("role", level === "error" ? "alert" : "status");
+    const sentence = document.createElement("span");
+    sentence.textContent = text;
+    const close = document.createElement("button");
+    close.type = "button";
+    close.textContent = "×";
+    close.setAttribute("aria-label", "Dismiss");
+    close.title = "Dismiss (Shift+Esc)";
+    element.append(sentence, close);
+    const shown = { element, text, count: 1, timer: 0 };
+    close.addEventListener("click", () => this.#remove(shown));
+    // Nothing goes while it is being read.
+    for (const event of ["pointerenter", "focusin"]) element.addEventListener(event, () => clearTimeout(shown.timer));
+    for (const event of ["pointerleave", "focusout"]) element.addEventListener(event, () => this.#wait(shown, level));
+    this.#shown.push(shown);
+    this.#place.append(element);
+    this.#wait(shown, level);
+    while (this.#shown.length > MOST_SHOWN) this.#remove(this.#shown[0]);
+  }
+
+  /**
+   * The same sentence again, by a key held down, say: counted, not repeated.
+   *
+   * @param {Shown} shown
+   * @param {"error" | "info"} level
+   */
+  #again(shown, level) {
+    shown.count += 1;
+    shown.element.dataset.count = `× ${shown.count}`;
+    this.#wait(shown, level);
+  }
+
+  /**
+   * @param {Shown} shown
+   * @param {"error" | "info"} level
+   */
+  #wait(shown, level) {
+    clearTimeout(shown.timer);
+    shown.timer = setTimeout(() => this.#remove(shown), level === "error" ? ERROR_MS : INFO_MS);
+  }
+
+  /** @param {Shown} shown */
+  #remove(shown) {
+    clearTimeout(shown.timer);
+    shown.element.remove();
+    this.#shown = this.#shown.filter((other) => other !== shown);
+  }
+
+  #showLog() {
+    this.#list.replaceChildren(
+      ...this.#log.map(({ level, text, time, count }) => {
+        const item = document.createElement("li");
+        item.className = `is-${level}`;
+        const when = document.createElement("time");
+        when.textContent = time.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit" });
+        const sentence = document.createElement("span");
+        sentence.textContent = count > 1 ? `${text} (${count} times)` : text;
+        item.append(when, sentence);
+        return item;
+      }),
+    );
+    byId("notice-log-none", HTMLElement).hidden = this.#log.length > 0;
+  }
+}
+
+/**
+ * @param {HTMLElement} banner
+ * @param {import("../model/store.js").Store} store
+ */
+export function watchConnection(banner, store) {
+  const show = () => {
+    const { connected, session } = store.facts;
+    banner.textContent = session ? "Connection lost. Reconnecting…" : "Connecting…";
+    banner.classList.toggle("is-shown", !connected);
+    document.body.classList.toggle("is-cut-off", !connected);
+  };
+  store.subscribe((changed) => {
+    if (changed.has("connected") || changed.has("session")) show();
+  });
+  show();
+}

@@ -1,0 +1,153 @@
+/** The command palette: everything that can be done, found by a few letters, done by Enter. */
+
+import { buttonCommands, keyCommands, placeCommands } from "./commands.js";
+import { byId, keyCaps } from "../widgets/elements.js";
+import { fitness } from "../widgets/fuzzy.js";
+
+const RECENT = "quadrille.palette.recent";
+const MOST_RECENT = 12;
+const MOST_SHOWN = 60;
+/** What was used lately comes a little before what fits as well. */
+const RECENT_BONUS = 6;
+
+/** @typedef {import("./commands.js").Command} Command */
+
+export class Palette {
+  #dialog = byId("palette", HTMLDialogElement);
+  #input = byId("palette-query", HTMLInputElement);
+  #list = byId("palette-list", HTMLElement);
+  #why = byId("palette-why", HTMLElement);
+  #places;
+  #table;
+  /** @type {Command[]} what is shown, in order */
+  #found = [];
+  #at = 0;
+
+  /**
+   * @param {import("./commands.js").Places} places
+   * @param {() => import("../widgets/key_matching.js").Binding[]} table
+   */
+  constructor(places, table) {
+    this.#places = places;
+    this.#table = table;
+    this.#input.addEventListener("input", () => this.#search());
+    this.#input.addEventListener("keydown", (event) => this.#onKey(event));
+    this.#dialog.addEventListener("click", (event) => event.target === this.#dialog && this.#dialog.close());
+    this.#list.addEventListener("click", (event) => {
+      const option = event.target instanceof Element ? event.target.closest("[role=option]") : null;
+      if (option) this.#choose([...this.#list.children].indexOf(option));
+    });
+  }
+
+  toggle() {
+    if (this.#dialog.open) {
+      this.#dialog.close();
+      return;
+    }
+    this.#input.value = "";
+    this.#dialog.showModal();
+    this.#search();
+  }
+
+  #search() {
+    const query = this.#input.value;
+    const table = this.#table();
+    const recent = recentIds();
+    const commands = [...placeCommands(this.#places, query), ...keyCommands(table), ...buttonCommands(table)];
+    const scored = commands.flatMap((command) => {
+      const found = fitness(query, `${command.label} ${command.area} ${command.words} ${command.keys.join(" ")}`);
+      if (found === null) return [];
+      const inLabel = fitness(query, command.label) ?? 0;
+      const lately = recent.indexOf(command.id);
+      const bonus = lately < 0 ? 0 : RECENT_BONUS * (query.trim() ? 1 : 1000) * (1 - lately / MOST_RECENT);
+      return [{ command, isRecent: lately >= 0 && !query.trim(), score: found + inLabel + bonus }];
+    });
+    // Without a query the order is that of the table, but for what was used lately.
+    scored.sort((a, b) => (query.trim() || a.isRecent || b.isRecent ? b.score - a.score : 0));
+    const shown = scored.slice(0, MOST_SHOWN);
+    this.#found = shown.map(({ command }) => command);
+    this.#list.replaceChildren(...shown.map(({ command, isRecent }, index) => option(command, isRecent, index)));
+    this.#list.scrollTop = 0;
+    this.#show(0);
+    if (!shown.length) this.#why.textContent = `Nothing is called “${query}”. A number goes to that frame.`;
+  }
+
+  /** @param {KeyboardEvent} event */
+  #onKey(event) {
+    const count = this.#found.length;
+    const page = 8;
+    const to = {
+      ArrowDown: (this.#at + 1) % Math.max(1, count),
+      ArrowUp: (this.#at - 1 + count) % Math.max(1, count),
+      PageDown: Math.min(count - 1, this.#at + page),
+      PageUp: Math.max(0, this.#at - page),
+    }[event.key];
+    const isToggle = event.key.toLowerCase() === "k" && (event.ctrlKey || event.metaKey);
+    if (to !== undefined) this.#show(to);
+    else if (event.key === "Enter") this.#choose(this.#at);
+    else if (isToggle) this.#dialog.close();
+    else return;
+    event.preventDefault();
+  }
+
+  /** @param {number} index */
+  #show(index) {
+    this.#list.children[this.#at]?.setAttribute("aria-selected", "false");
+    this.#at = index;
+    const now = this.#list.children[index];
+    now?.setAttribute("aria-selected", "true");
+    now?.scrollIntoView({ block: "nearest" });
+    this.#input.setAttribute("aria-activedescendant", now?.id ?? "");
+    this.#why.textContent = this.#found[index]?.why() ?? "";
+  }
+
+  /** @param {number} index */
+  #choose(index) {
+    const command = this.#found[index];
+    if (!command) return;
+    this.#show(index);
+    if (command.why() !== null) {
+      this.#why.classList.remove("is-asked");
+      void this.#why.offsetWidth; // begins its animation again
+      this.#why.classList.add("is-asked");
+      return;
+    }
+    const recent = [command.id, ...recentIds().filter((id) => id !== command.id)].slice(0, MOST_RECENT);
+    localStorage.setItem(RECENT, JSON.stringify(recent));
+    this.#dialog.close();
+    command.run();
+  }
+}
+
+/**
+ * @param {Command} command
+ * @param {boolean} isRecent
+ * @param {number} index
+ */
+function option({ area, label, keys, why }, isRecent, index) {
+  const item = document.createElement("li");
+  item.id = `palette-option-${index}`;
+  item.setAttribute("role", "option");
+  item.setAttribute("aria-selected", "false");
+  const reason = why();
+  if (reason !== null) {
+    item.setAttribute("aria-disabled", "true");
+    item.title = reason;
+  }
+  const text = document.createElement("span");
+  text.textContent = label;
+  const where = document.createElement("small");
+  where.textContent = isRecent ? `${area}, used lately` : area;
+  item.append(text, where, keyCaps(keys));
+  return item;
+}
+
+/** @returns {string[]} */
+function recentIds() {
+  try {
+    const found = JSON.parse(localStorage.getItem(RECENT) ?? "[]");
+    return Array.isArray(found) ? found : [];
+  } catch {
+    return [];
+  }
+}

@@ -1,0 +1,135 @@
+/** The people of the session: who is worked on, who is shown, who is dimmed, and whom searches and fits move. */
+
+import { button, byId, iconButton } from "../widgets/elements.js";
+import { opensPopover, togglePopover } from "../widgets/popovers.js";
+
+const EYE = "M1.5 8S4 3.5 8 3.5 14.5 8 14.5 8 12 12.5 8 12.5 1.5 8 1.5 8zM8 6a2 2 0 1 0 .01 0z";
+const SHUT = "M1.5 7.5S4 11.5 8 11.5s6.5-4 6.5-4M3.5 10.3 2.3 12M8 11.5v2M12.5 10.3l1.2 1.7";
+const COPY = "M5.5 5.5h8v8h-8zM3.5 10.5h-1v-8h8v1";
+
+/** @typedef {{row: HTMLElement, radio: HTMLInputElement, eye: HTMLButtonElement, copy: HTMLButtonElement, told: HTMLElement}} Row */
+
+export class People {
+  #store;
+  #actions;
+  #posing;
+  #bar = byId("people", HTMLElement);
+  #list = byId("people-list", HTMLElement);
+  #panel = byId("people-panel", HTMLElement);
+  #open = byId("show-people", HTMLButtonElement);
+  #solo;
+  #whose = byId("search-whose", HTMLSelectElement);
+  /** @type {HTMLInputElement[]} */
+  #chips = [];
+  /** @type {Row[]} */
+  #rows = [];
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {import("../model/actions.js").Actions} actions
+   * @param {import("../posing/posing.js").Posing} posing
+   */
+  constructor(store, actions, posing) {
+    this.#store = store;
+    this.#actions = actions;
+    this.#posing = posing;
+    this.#solo = button("solo", () => actions.toggleSolo());
+    opensPopover(this.#panel, this.#open, () => this.toggle());
+    this.#whose.addEventListener("change", () => {
+      store.set({ whose: this.#whose.value === "one" ? "one" : "all" });
+      this.#whose.blur();
+    });
+    store.subscribe((changed) => {
+      if (changed.has("session")) this.#build();
+      if (["session", "state", "connected", "whose"].some((f) => changed.has(/** @type {"state"} */ (f)))) this.#show();
+    });
+  }
+
+  toggle() {
+    if ((this.#store.facts.session?.people.length ?? 0) > 1) togglePopover(this.#panel, this.#open);
+  }
+
+  #build() {
+    const everybody = this.#store.facts.session?.people ?? [];
+    const people = everybody.length > 1 ? everybody : [];
+    byId("people-group", HTMLElement).hidden = this.#whose.hidden = people.length === 0;
+    this.#chips = people.map((info, person) => this.#choice(this.#bar, "person", info, person));
+    this.#bar.replaceChildren(...this.#chips.map((chip) => /** @type {HTMLElement} */ (chip.parentElement)));
+    this.#rows = people.map((info, person) => this.#row(info, person));
+    this.#list.replaceChildren(...this.#rows.map(({ row }) => row));
+  }
+
+  /**
+   * A switch among the people, in a person's colour.
+   *
+   * @param {HTMLElement} within
+   * @param {string} name of the group of switches
+   * @param {import("../model/protocol.js").PersonInfo} info
+   * @param {number} person
+   */
+  #choice(within, name, info, person) {
+    const label = document.createElement("label");
+    label.title = `Work on ${info.name} (P: the next person)`;
+    const input = Object.assign(document.createElement("input"), { type: "radio", name, value: String(person) });
+    input.addEventListener("change", () => {
+      this.#actions.selectPerson(person);
+      if (within === this.#bar) input.blur();
+    });
+    const text = document.createElement("span");
+    text.className = "person-name";
+    text.style.setProperty("--person", info.color);
+    text.textContent = info.name;
+    label.append(input, text);
+    return input;
+  }
+
+  /**
+   * @param {import("../model/protocol.js").PersonInfo} info
+   * @param {number} person
+   * @returns {Row}
+   */
+  #row(info, person) {
+    const row = document.createElement("li");
+    const radio = this.#choice(row, "person-in-list", info, person);
+    const model = document.createElement("span");
+    model.className = "quiet";
+    model.textContent = `${info.model}, ${info.height_m.toFixed(2)} m`;
+    const told = document.createElement("span");
+    told.className = "quiet";
+    const bend = `Bend the person worked on as ${info.name}; place and turn stay`;
+    const copy = iconButton(COPY, bend, () => this.#posing.copyPerson(person));
+    copy.setAttribute("aria-label", `Copy the pose of ${info.name}`);
+    const eye = iconButton(EYE, `Show ${info.name}`, () =>
+      this.#actions.showPerson(person, !this.#store.facts.state?.people[person]?.shown),
+    );
+    row.append(/** @type {HTMLElement} */ (radio.parentElement), model, told, copy, eye);
+    return { row, radio, eye, copy, told };
+  }
+
+  #show() {
+    const { state, session, connected, whose } = this.#store.facts;
+    if (!state || !session || session.people.length < 2) return;
+    const name = session.people[state.person].name;
+    this.#chips.forEach((chip, person) => {
+      chip.checked = person === state.person;
+      chip.disabled = !connected;
+      chip.parentElement?.classList.toggle("is-unseen", !state.people[person]?.shown);
+    });
+    this.#rows.forEach(({ radio, eye, copy, told }, person) => {
+      const { shown, source, status } = state.people[person];
+      radio.checked = person === state.person;
+      radio.disabled = eye.disabled = !connected;
+      copy.disabled = !connected || person === state.person;
+      told.textContent = source === null ? "not placed here" : [source, status].filter(Boolean).join(", ");
+      eye.setAttribute("aria-pressed", String(shown));
+      eye.title = `${shown ? "Hide" : "Show"} ${session.people[person].name} in all views${person === state.person ? " (Shift+V)" : ""}`;
+      eye.querySelector("path")?.setAttribute("d", shown ? EYE : SHUT);
+    });
+    this.#solo.disabled = !connected;
+    this.#solo.setAttribute("aria-pressed", String(state.solo));
+    this.#whose.disabled = !connected;
+    const only = this.#whose.options[1];
+    if (only.textContent !== `Only ${name}`) only.textContent = `Only ${name}`;
+    this.#whose.value = whose;
+  }
+}

@@ -1,0 +1,32 @@
+/** Says what goes on beside the page after an installation or with new footage: kernels are compiled, frames are listed. */
+
+import { byId } from "../widgets/elements.js";
+
+/** @param {import("../model/store.js").Store} store */
+export function showProgress(store) {
+  const compiling = byId("compiling", HTMLElement);
+  const listing = byId("listing", HTMLElement);
+  store.subscribe((changed) => {
+    if (!changed.has("state")) return;
+    compiling.hidden = !store.facts.state?.compiling;
+    showListing(listing, store.facts.state?.footage);
+  });
+}
+
+/**
+ * Frames that are not listed yet can be asked for, and are waited for.
+ * @param {HTMLElement} mark
+ * @param {import("../model/protocol.js").StateMessage["footage"] | undefined} footage
+ */
+function showListing(mark, footage) {
+  const { listed = null, error = null } = footage ?? {};
+  mark.hidden = listed === null && error === null;
+  mark.classList.toggle("is-failed", error !== null);
+  if (error !== null) {
+    mark.textContent = "Footage damaged";
+    mark.title = error;
+  } else if (listed !== null) {
+    mark.textContent = `Indexing ${Math.floor(100 * listed)}%`;
+    mark.title = "The footage is opened for the first time and its frames are being listed. Frames listed by now are shown, others as soon as they are.";
+  }
+}

@@ -1,0 +1,49 @@
+/** Whether everything is on disk: always visible, with the reason and another try where it is not. */
+
+import { button, byId } from "../widgets/elements.js";
+
+export class SavedMark {
+  #store;
+  #mark;
+  #bar = byId("unsaved", HTMLElement);
+  #why = byId("unsaved-why", HTMLElement);
+  #retry;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
+   */
+  constructor(store, send) {
+    this.#store = store;
+    const retry = () => send({ type: "save" });
+    this.#mark = button("saved", retry);
+    this.#retry = button("retry-saving", retry);
+    store.subscribe((changed) => {
+      if (changed.has("state") || changed.has("connected")) this.#show();
+    });
+    addEventListener("beforeunload", (event) => {
+      if (this.isSafe) return;
+      event.preventDefault();
+      event.returnValue = true; // older browsers ask for this
+    });
+  }
+
+  /** Whether nothing is lost when the page closes: all is on disk, and no hand holds anything. */
+  get isSafe() {
+    const { state, dragging } = this.#store.facts;
+    return !state || (state.save_error === null && !dragging);
+  }
+
+  #show() {
+    const { state, connected } = this.#store.facts;
+    if (!state) return;
+    const { saved, save_error } = state;
+    const failed = save_error !== null;
+    this.#mark.className = failed ? "is-failed" : saved ? "is-saved" : "is-saving";
+    this.#mark.textContent = failed ? "Not saved" : saved ? "All saved" : "Saving";
+    this.#mark.title = failed ? `Not saved: ${save_error}. Press to try again.` : saved ? "Every edit is on disk" : "Saving";
+    this.#mark.disabled = this.#retry.disabled = !failed || !connected;
+    this.#bar.hidden = !failed;
+    this.#why.textContent = failed ? `Not saved: ${save_error}. What you do is kept in memory until then.` : "";
+  }
+}

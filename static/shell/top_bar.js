@@ -1,0 +1,96 @@
+/** The bar at the top: search, cost, history. */
+
+import { hasSearch, hasTrack } from "../model/selectors.js";
+import { button, byId } from "../widgets/elements.js";
+import { count, px } from "../widgets/text.js";
+
+export class TopBar {
+  #store;
+  #session = byId("session-name", HTMLElement);
+  #cost = byId("cost", HTMLElement);
+  #stage = byId("search-stage", HTMLElement);
+  #stages = byId("search-stages", HTMLElement);
+  #figures = byId("search-figures", HTMLElement);
+  #step;
+  #frame;
+  #stop;
+  #undo;
+  #redo;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {import("../model/actions.js").Actions} actions
+   */
+  constructor(store, actions) {
+    this.#store = store;
+    this.#step = button("search-step", () => actions.search("step"));
+    this.#frame = button("search-frame", () => actions.search("frame"));
+    this.#stop = button("search-stop", () => actions.search("stop"));
+    this.#undo = button("undo", () => actions.undo());
+    this.#redo = button("redo", () => actions.redo());
+    store.subscribe((changed) => {
+      if (changed.has("session")) this.#showSession();
+      if (changed.has("state") || changed.has("connected") || changed.has("session")) this.#showState();
+    });
+  }
+
+  #showSession() {
+    const { session } = this.#store.facts;
+    if (!session) return;
+    this.#session.textContent = session.name;
+    this.#session.title = session.name;
+    document.title = `${session.name} – Quadrille`;
+  }
+
+  #showState() {
+    const { state, connected } = this.#store.facts;
+    const isReady = connected && !!state;
+    const isRunning = !!state?.job.running;
+    this.#step.disabled = this.#frame.disabled = !isReady || isRunning;
+    this.#stop.disabled = !isReady || !hasSearch(state);
+    this.#undo.disabled = !isReady || state.undo === null;
+    this.#redo.disabled = !isReady || state.redo === null;
+    if (!state) return;
+    this.#undo.title = state.undo === null ? "Nothing to undo" : `Undo ${state.undo} (Ctrl+Z)`;
+    this.#redo.title = state.redo === null ? "Nothing to redo" : `Redo ${state.redo} (Ctrl+Shift+Z)`;
+    this.#cost.textContent = state.cost_px === null ? "–" : state.cost_px.toFixed(2);
+    if (hasTrack(state) || state.track.message) this.#showTrack(state.track);
+    else this.#showJob(state.job);
+    const isToBegin = (state.track.running && state.track.done === 0) || (isRunning && state.job.evaluations === 0);
+    if (state.compiling && isToBegin) this.#figures.textContent = "waits for the compiler";
+  }
+
+  /** @param {import("../model/protocol.js").Job} job */
+  #showJob(job) {
+    const stands = job.running || job.kind !== null;
+    const at = stands && job.stage !== null ? job.stages.indexOf(job.stage) : -1;
+    const stage = (job.stage ?? "starting").replaceAll("_", " ");
+    this.#stage.textContent = stands ? `${stage} · ${count(job.evaluations)} poses` : job.message;
+    this.#stage.title = this.#stage.textContent;
+    this.#figures.textContent = stands ? `best ${px(job.best_px)} · ${count(job.per_second)}/s` : "";
+    this.#stages.replaceChildren(
+      ...(stands ? job.stages : []).map((_, index) => {
+        const mark = document.createElement("i");
+        mark.className = index < at ? "is-done" : index === at ? "is-current" : "";
+        return mark;
+      }),
+    );
+  }
+
+  /** @param {import("../model/protocol.js").Track} track */
+  #showTrack({ running, first, last, at, done, total, per_second, doubtful, lost, back, message }) {
+    const stands = first !== null;
+    const [how, ...rest] = message.split(", ");
+    const work = back ? "followed" : "tracked";
+    const way = back ? "Following back who was lost" : `Frame ${at ?? first}, on the way to frame ${last}`;
+    this.#stage.textContent = stands ? `${running ? work : "paused"} ${done} of ${total}` : how;
+    this.#stage.title = stands ? way : message;
+    const counts = [doubtful && `${doubtful} doubtful`, lost && `${lost} lost`].filter(Boolean);
+    const figures = [`${per_second.toFixed(1)}/s`, ...counts].join(" · ");
+    this.#figures.textContent = stands ? figures : rest.join(" · ");
+    const bar = document.createElement("i");
+    bar.style.setProperty("--done", `${(100 * done) / Math.max(1, total)}%`);
+    bar.className = "is-share";
+    this.#stages.replaceChildren(...(stands ? [bar] : []));
+  }
+}

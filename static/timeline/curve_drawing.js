@@ -1,0 +1,170 @@
+/** Draws plots of curves above one another, along the timeline's axis of frames. Sizes are CSS pixels. */
+
+import { roundUp } from "../widgets/frame_axis.js";
+import { extent, trace } from "../model/series.js";
+import { drawDiamond, placesOf } from "./timeline_drawing.js";
+
+/**
+ * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
+ * @typedef {import("../model/series.js").Curves} Curves
+ * @typedef {{top: number, bottom: number, least: number, most: number}} Scale
+ */
+
+const TICKS_HEIGHT = 16;
+const PLOT_GAP = 6;
+const TICK_GAP = 22;
+/** An angle that hardly moves must not look like one that swings. */
+const LEAST_SPAN = { deg: 20, cm: 10, px: 1 };
+const UNITS = { deg: "degrees", cm: "cm", px: "px" };
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {number} height
+ * @param {Curves} curves
+ * @param {string[]} labels all names of curves, in the order of the colours
+ * @param {Set<string>} hidden names of the curves that are switched off
+ * @param {Iterable<number>} keyframes
+ * @param {CSSStyleDeclaration} style
+ */
+export function drawCurves(context, axis, height, curves, labels, hidden, keyframes, style) {
+  const each = (height - TICKS_HEIGHT - PLOT_GAP * (curves.plots.length - 1)) / curves.plots.length;
+  const keys = placesOf(keyframes, axis);
+  curves.plots.forEach((plot, index) => {
+    const series = curves.series.filter((one) => one.plot === index && !hidden.has(one.label));
+    const top = index * (each + PLOT_GAP);
+    const scale = scaleOf(plot.unit, series.map(({ values }) => values), top, top + each);
+    drawFrame(context, axis, scale, style);
+    drawKeyframes(context, keys, scale, style);
+    context.save();
+    context.beginPath();
+    context.rect(axis.left, scale.top, axis.right - axis.left, scale.bottom - scale.top);
+    context.clip();
+    context.lineWidth = 1.4;
+    context.lineJoin = "round";
+    for (const { label, values } of series) {
+      const path = new Path2D();
+      trace(path, values, axis, (value) => toY(scale, value));
+      context.strokeStyle = style.getPropertyValue(colorName(labels.indexOf(label)));
+      context.stroke(path);
+    }
+    context.restore();
+    drawTitle(context, axis, top, `${plot.title}, ${UNITS[plot.unit]}`, style);
+  });
+  drawFrameNumbers(context, axis, height, style);
+}
+
+/**
+ * Name of the style's colour of a curve.
+ *
+ * @param {number} index
+ */
+export function colorName(index) {
+  return `--series-${index % 8}`;
+}
+
+/**
+ * Round limits round the values, with 0 among them for costs.
+ *
+ * @param {import("../model/protocol.js").Plot["unit"]} unit
+ * @param {Float32Array[]} curves
+ * @param {number} top
+ * @param {number} bottom
+ * @returns {Scale}
+ */
+function scaleOf(unit, curves, top, bottom) {
+  let { least, most } = extent(curves) ?? { least: 0, most: 0 };
+  if (unit === "px") least = 0;
+  const lacking = Math.max(0, LEAST_SPAN[unit] - (most - least));
+  if (unit !== "px") least -= lacking / 2;
+  most += unit === "px" ? lacking : lacking / 2;
+  const margin = 0.06 * (most - least);
+  return { top, bottom, least: unit === "px" ? 0 : least - margin, most: most + margin };
+}
+
+/**
+ * @param {Scale} scale
+ * @param {number} value
+ */
+function toY({ top, bottom, least, most }, value) {
+  return bottom - ((bottom - top) * (value - least)) / (most - least);
+}
+
+/**
+ * The ground of a plot, with lines at round values and their numbers in the gutter.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {Scale} scale
+ * @param {CSSStyleDeclaration} style
+ */
+function drawFrame(context, axis, scale, style) {
+  context.fillStyle = style.getPropertyValue("--plot");
+  context.fillRect(axis.left, scale.top, axis.right - axis.left, scale.bottom - scale.top);
+  const step = roundUp(((scale.most - scale.least) * TICK_GAP) / (scale.bottom - scale.top));
+  context.font = "10.5px system-ui, sans-serif";
+  context.textAlign = "right";
+  context.textBaseline = "middle";
+  for (let value = Math.ceil(scale.least / step) * step; value <= scale.most; value += step) {
+    const y = Math.round(toY(scale, value));
+    context.fillStyle = style.getPropertyValue("--line");
+    context.fillRect(axis.left, y, axis.right - axis.left, 1);
+    // Numbers at the edges would touch those of the next plot.
+    if (y < scale.top + 5 || y > scale.bottom - 4) continue;
+    context.fillStyle = style.getPropertyValue("--muted");
+    context.fillText(String(Number(value.toPrecision(6))), axis.left - 6, y);
+  }
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {number} top
+ * @param {string} text
+ * @param {CSSStyleDeclaration} style
+ */
+function drawTitle(context, axis, top, text, style) {
+  context.font = "600 11px system-ui, sans-serif";
+  context.textAlign = "left";
+  context.textBaseline = "top";
+  const width = context.measureText(text).width;
+  context.fillStyle = style.getPropertyValue("--plot");
+  context.globalAlpha = 0.8;
+  context.fillRect(axis.left, top, width + 12, 16);
+  context.globalAlpha = 1;
+  context.fillStyle = style.getPropertyValue("--muted");
+  context.fillText(text, axis.left + 6, top + 3);
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {number[]} xs
+ * @param {Scale} scale
+ * @param {CSSStyleDeclaration} style
+ */
+function drawKeyframes(context, xs, { top, bottom }, style) {
+  context.fillStyle = style.getPropertyValue("--muted");
+  context.globalAlpha = 0.35;
+  for (const x of xs) context.fillRect(x - 0.5, top, 1, bottom - top);
+  context.globalAlpha = 1;
+  for (const x of xs) drawDiamond(context, x, bottom - 4, 3.5);
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {number} height
+ * @param {CSSStyleDeclaration} style
+ */
+function drawFrameNumbers(context, axis, height, style) {
+  context.font = "10.5px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.textBaseline = "bottom";
+  context.fillStyle = style.getPropertyValue("--muted");
+  for (const frame of axis.ticks(70)) {
+    context.fillRect(axis.middle(frame) - 0.5, height - TICKS_HEIGHT, 1, 3);
+    context.fillText(String(frame), Math.min(axis.middle(frame), axis.right - 14), height);
+  }
+  context.textAlign = "right";
+  context.fillText("frame", axis.left - 6, height);
+}

@@ -1,0 +1,121 @@
+/** The drawer above the timeline: one tab of curves, of the search, or of the cost's landscape; its height and tab are kept. */
+
+import { button, byId } from "../widgets/elements.js";
+
+
+/** @type {readonly import("../model/protocol.js").CurveGroup[]} */
+export const CURVE_GROUPS = ["arms", "torso", "legs", "cost"];
+
+const STORED_OPEN = "quadrille.drawer-open";
+const STORED_TAB = "quadrille.drawer-tab";
+const STORED_CURVES = "quadrille.drawer-curves";
+const STORED_HEIGHT = "quadrille.drawer-height-";
+/** Height of what lies below the tabs: the usual share of the window, and what it never goes below, CSS pixels. */
+const USUAL_SHARES = { curves: 0.21, search: 0.3 };
+const LEAST_PX = 140;
+/** What the panes keep of the window, CSS pixels. */
+const REST_PX = 340;
+/** Height of the tabs, between the grip and the stage, CSS pixels. */
+const BAR_PX = 34;
+const KEY_STEP_PX = 16;
+
+export class Drawer {
+  #store;
+  #panel = byId("drawer", HTMLElement);
+  #stage = byId("drawer-stage", HTMLElement);
+  #grip = byId("drawer-grip", HTMLElement);
+  #tabs = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll("input[name=drawer]")]);
+  #toggle;
+
+  /** @param {import("../model/store.js").Store} store */
+  constructor(store) {
+    this.#store = store;
+    this.#toggle = button("show-curves", () => this.#open(this.#isOpen ? null : this.#lastTab));
+    button("close-drawer", () => this.#open(null));
+    for (const tab of this.#tabs) {
+      tab.addEventListener("change", () => {
+        this.#open(/** @type {import("../model/series.js").Tab} */ (tab.value));
+        tab.blur();
+      });
+    }
+    this.#listen();
+    addEventListener("resize", () => this.#fit());
+    this.#open(localStorage.getItem(STORED_OPEN) === "yes" ? this.#lastTab : null);
+  }
+
+  /**
+   * Open a tab, or close the drawer where it is the one that is open.
+   *
+   * @param {import("../model/series.js").Tab} tab
+   */
+  toggle(tab) {
+    this.#open(this.#store.facts.drawer === tab ? null : tab);
+  }
+
+  /** The curves shown last, or none. */
+  toggleCurves() {
+    const stored = localStorage.getItem(STORED_CURVES);
+    const isShown = CURVE_GROUPS.some((group) => group === this.#store.facts.drawer);
+    this.#open(isShown ? null : (CURVE_GROUPS.find((group) => group === stored) ?? "arms"));
+  }
+
+  get #isOpen() {
+    return this.#store.facts.drawer !== null;
+  }
+
+  get #lastTab() {
+    const stored = localStorage.getItem(STORED_TAB);
+    return /** @type {import("../model/series.js").Tab} */ (this.#tabs.find(({ value }) => value === stored)?.value ?? "arms");
+  }
+
+  /** @param {import("../model/series.js").Tab | null} tab */
+  #open(tab) {
+    localStorage.setItem(STORED_OPEN, tab === null ? "no" : "yes");
+    if (tab !== null) localStorage.setItem(STORED_TAB, tab);
+    if (CURVE_GROUPS.some((group) => group === tab)) localStorage.setItem(STORED_CURVES, String(tab));
+    this.#panel.hidden = tab === null;
+    this.#toggle.setAttribute("aria-pressed", String(tab !== null));
+    for (const one of this.#tabs) one.checked = one.value === tab;
+    this.#store.set({ drawer: tab });
+    this.#fit();
+  }
+
+  /** Curves are content with less than the search: each keeps its height. */
+  get #kind() {
+    return CURVE_GROUPS.some((group) => group === this.#store.facts.drawer) ? "curves" : "search";
+  }
+
+  /** Give the stage the height that was chosen, as far as the window has room for it. */
+  #fit() {
+    const most = Math.max(LEAST_PX, innerHeight - REST_PX);
+    const chosen = Number(localStorage.getItem(STORED_HEIGHT + this.#kind)) || USUAL_SHARES[this.#kind] * innerHeight;
+    const height = Math.round(Math.max(LEAST_PX, Math.min(most, chosen)));
+    this.#stage.style.height = `${height}px`;
+    this.#grip.setAttribute("aria-valuenow", String(height));
+    this.#grip.setAttribute("aria-valuemin", String(LEAST_PX));
+    this.#grip.setAttribute("aria-valuemax", String(most));
+  }
+
+  /** @param {number | null} height null for the usual one */
+  #resize(height) {
+    localStorage.setItem(STORED_HEIGHT + this.#kind, height === null ? "" : String(Math.max(LEAST_PX, Math.round(height))));
+    this.#fit();
+  }
+
+  #listen() {
+    const grip = this.#grip;
+    grip.addEventListener("pointerdown", (event) => {
+      if (event.button === 0) grip.setPointerCapture(event.pointerId);
+    });
+    grip.addEventListener("pointermove", (event) => {
+      if (grip.hasPointerCapture(event.pointerId)) this.#resize(this.#stage.getBoundingClientRect().bottom - event.clientY - BAR_PX);
+    });
+    grip.addEventListener("dblclick", () => this.#resize(null));
+    grip.addEventListener("keydown", (event) => {
+      const step = { ArrowUp: KEY_STEP_PX, ArrowDown: -KEY_STEP_PX }[event.key];
+      if (step === undefined) return;
+      event.preventDefault();
+      this.#resize(this.#stage.clientHeight + step);
+    });
+  }
+}

@@ -1,0 +1,115 @@
+/** The buttons that lead from one doubtful frame to the next, and the menu of everything else there is to go to. */
+
+import { button, byId, iconButton } from "../widgets/elements.js";
+import { KINDS } from "./jumps.js";
+import { count } from "../widgets/text.js";
+
+const PREVIOUS = "M10 3.5 5 8l5 4.5";
+const NEXT = "m6 3.5 5 4.5-5 4.5";
+
+export class JumpMenu {
+  #store;
+  #jumps;
+  #former;
+  #next;
+  #open;
+  #menu = byId("jump-menu", HTMLElement);
+  /** @type {Map<import("./jumps.js").Kind, {count: HTMLElement, buttons: HTMLButtonElement[]}>} */
+  #rows = new Map();
+  #gap = document.createElement("button");
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {import("./jumps.js").Jumps} jumps
+   */
+  constructor(store, jumps) {
+    this.#store = store;
+    this.#jumps = jumps;
+    this.#former = button("former-doubt", () => jumps.go("doubt", -1));
+    this.#next = button("next-doubt", () => jumps.go("doubt", 1));
+    this.#open = button("show-jumps", () => this.#show(this.#menu.hidden));
+    this.#build();
+    document.addEventListener("pointerdown", (event) => {
+      const at = /** @type {Node} */ (event.target);
+      if (!this.#menu.contains(at) && !this.#open.contains(at)) this.#show(false);
+    });
+    // A click into the 3-D view reaches this page only as the loss of its focus.
+    addEventListener("blur", () => this.#show(false));
+    // Opened by the mouse it has no focus; Escape closes it all the same, and does nothing else.
+    const closes = (/** @type {KeyboardEvent} */ event) => {
+      if (event.key !== "Escape" || this.#menu.hidden) return;
+      event.preventDefault();
+      event.stopPropagation();
+      const hadFocus = this.#menu.contains(document.activeElement);
+      this.#show(false);
+      if (hadFocus) this.#open.focus();
+    };
+    document.addEventListener("keydown", closes, true);
+    store.subscribe((changed) => {
+      if (["timeline", "disagreeing", "connected", "session"].some((f) => changed.has(/** @type {"timeline"} */ (f)))) {
+        this.#count();
+      }
+    });
+  }
+
+  #build() {
+    const rows = KINDS.map(({ kind, label, title, key, more }) => {
+      const row = document.createElement("div");
+      row.className = "jump-row";
+      row.title = title;
+      const name = document.createElement("span");
+      name.textContent = label;
+      const number = document.createElement("output");
+      number.setAttribute("aria-label", `Number of frames: ${label}`);
+      const keyOf = (/** @type {boolean} */ back) => (key ? ` (${back ? formerKey(key) : key.replace(" ", "+")})` : "");
+      const buttons = [
+        iconButton(PREVIOUS, `Former ${more}${keyOf(true)}`, () => this.#jumps.go(kind, -1)),
+        iconButton(NEXT, `Next ${more}${keyOf(false)}`, () => this.#jumps.go(kind, 1)),
+      ];
+      const group = document.createElement("div");
+      group.className = "group";
+      group.append(...buttons);
+      const cap = document.createElement("kbd");
+      cap.textContent = key.replace(" ", "+");
+      row.append(name, number, cap, group);
+      this.#rows.set(kind, { count: number, buttons });
+      return row;
+    });
+    this.#gap.type = "button";
+    this.#gap.className = "jump-gap";
+    this.#gap.textContent = "Longest gap between keyframes";
+    this.#gap.title = "Go to the middle of the longest stretch without a keyframe: the best place for the next one (Q)";
+    this.#gap.addEventListener("click", () => this.#jumps.toLongestGap());
+    this.#menu.append(...rows, this.#gap);
+  }
+
+  /** @param {boolean} isShown */
+  #show(isShown) {
+    this.#menu.hidden = !isShown;
+    this.#open.setAttribute("aria-expanded", String(isShown));
+    if (isShown) this.#count();
+  }
+
+  #count() {
+    const { connected, session } = this.#store.facts;
+    const doubts = this.#jumps.count("doubt");
+    this.#former.disabled = this.#next.disabled = !connected || doubts === 0;
+    this.#open.disabled = !connected || !session;
+    if (this.#menu.hidden) return;
+    for (const [kind, { count: number, buttons }] of this.#rows) {
+      const found = this.#jumps.count(kind);
+      number.textContent = count(found);
+      for (const one of buttons) one.disabled = found === 0;
+    }
+    const gap = this.#jumps.longestGap;
+    this.#gap.disabled = !gap;
+    this.#gap.textContent = gap
+      ? `Longest gap between keyframes: ${count(gap.last - gap.first + 1)}`
+      : "Every frame is a keyframe";
+  }
+}
+
+/** @param {string} key */
+function formerKey(key) {
+  return key.startsWith("Alt ") ? `Alt+Shift+${key.slice(4)}` : `Shift+${key}`;
+}

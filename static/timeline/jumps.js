@@ -1,0 +1,130 @@
+/** Frames worth going to: by kind, how many there are, and the next of them in either direction. */
+
+import { AMBIGUOUS, KEYFRAME, NO_POSE, REVIEWED, STATUSES, keyframesOf } from "../model/cells.js";
+
+/** @typedef {"doubt" | "ambiguous" | "unreviewed" | "disagreeing" | "keyframe" | "empty"} Kind */
+
+/** @type {{kind: Kind, label: string, title: string, key: string, more: string}[]} */
+export const KINDS = [
+  {
+    kind: "doubt",
+    label: "Doubtful or lost",
+    title: "The tracker is not sure of them",
+    key: "N",
+    more: "doubtful or lost frame",
+  },
+  {
+    kind: "ambiguous",
+    label: "Two poses as good",
+    title: "The tracker cannot tell which of two poses is true: the other is drawn dashed, Shift+X takes it, K keeps this one",
+    key: "Alt A",
+    more: "frame with another pose as good",
+  },
+  {
+    kind: "unreviewed",
+    label: "Not reviewed",
+    title: "They have a pose that nobody has vouched for or looked at",
+    key: "Alt N",
+    more: "frame that nobody has reviewed",
+  },
+  {
+    kind: "disagreeing",
+    label: "Disagreeing",
+    title: "The body jumps there by more than a motion explains: two runs, or a run and a keyframe, do not agree",
+    key: "D",
+    more: "frame that disagrees with its neighbours",
+  },
+  { kind: "keyframe", label: "Keyframes", title: "A person set or verified them", key: "W", more: "keyframe" },
+  { kind: "empty", label: "Without a pose", title: "Nobody has set or found a pose", key: "", more: "frame without a pose" },
+];
+
+const DOUBT = STATUSES.indexOf("doubtful");
+
+export class Jumps {
+  #store;
+  #navigation;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {import("../model/navigation.js").Navigation} navigation
+   */
+  constructor(store, navigation) {
+    this.#store = store;
+    this.#navigation = navigation;
+  }
+
+  /** @param {Kind} kind */
+  count(kind) {
+    const { timeline, disagreeing } = this.#store.facts;
+    if (kind === "disagreeing") return disagreeing.length;
+    if (kind === "empty") return timeline.frames - timeline.size;
+    const is = tests(timeline)[kind];
+    let count = 0;
+    for (let frame = 0; frame < timeline.frames; frame += 1) if (is(frame)) count += 1;
+    return count;
+  }
+
+  /**
+   * Go to the nearest frame of a kind in one direction; nowhere where there is none.
+   *
+   * @param {Kind} kind
+   * @param {1 | -1} way
+   */
+  go(kind, way) {
+    const { timeline, target, disagreeing } = this.#store.facts;
+    const among = kind === "disagreeing" ? new Set(disagreeing) : null;
+    const is = kind === "disagreeing" ? (/** @type {number} */ frame) => among?.has(frame) : tests(timeline)[kind];
+    this.#navigation.pause();
+    for (let frame = target + way; frame >= 0 && frame < timeline.frames; frame += way) {
+      if (is(frame)) return this.#navigation.goTo(frame);
+    }
+  }
+
+  /** The longest stretch without a keyframe; null where there is none. */
+  get longestGap() {
+    const { timeline } = this.#store.facts;
+    let [first, last] = [0, -1];
+    let former = -1;
+    for (const frame of [...keyframesOf(timeline), timeline.frames]) {
+      if (frame - former - 2 > last - first) [first, last] = [former + 1, frame - 1];
+      former = frame;
+    }
+    return last >= first ? { first, last } : null;
+  }
+
+  /** Go to the middle of the longest stretch without a keyframe: the best place for the next one. */
+  toLongestGap() {
+    const gap = this.longestGap;
+    this.#navigation.pause();
+    if (gap) this.#navigation.goTo(Math.floor((gap.first + gap.last) / 2));
+  }
+
+  /**
+   * The stretch between the keyframes around a frame, both included; the recording's end where there is none.
+   *
+   * @param {number} frame
+   */
+  stretchAround(frame) {
+    const { timeline } = this.#store.facts;
+    const isKey = (/** @type {number} */ at) => (timeline.marks[at] & KEYFRAME) !== 0;
+    let [first, last] = [frame, frame];
+    while (first > 0 && !(first < frame && isKey(first))) first -= 1;
+    while (last < timeline.frames - 1 && !(last > frame && isKey(last))) last += 1;
+    // On a keyframe the stretch that begins there is meant.
+    return { first: isKey(frame) && last > frame ? frame : first, last };
+  }
+}
+
+/**
+ * @param {import("../model/cells.js").Cells} cells
+ * @returns {Record<Exclude<Kind, "disagreeing">, (frame: number) => boolean>}
+ */
+function tests({ sources, statuses, marks }) {
+  return {
+    doubt: (frame) => statuses[frame] >= DOUBT,
+    ambiguous: (frame) => (marks[frame] & AMBIGUOUS) !== 0,
+    unreviewed: (frame) => sources[frame] !== NO_POSE && !(marks[frame] & REVIEWED),
+    keyframe: (frame) => (marks[frame] & KEYFRAME) !== 0,
+    empty: (frame) => sources[frame] === NO_POSE,
+  };
+}

@@ -1,0 +1,107 @@
+/**
+ * Playing: at real time or a share or multiple of it, in a loop or to the end. Frames that would come late are skipped, or,
+ * where every frame is wanted, waited for.
+ */
+
+const GAP_MS = 2000;
+
+/** Shares and multiples of real time. */
+export const RATES = [1 / 8, 1 / 4, 1 / 2, 1, 2, 4];
+
+export class Playback {
+  #store;
+  #navigation;
+  /** Where it counts from. */
+  #anchor = { frame: 0, time: 0 };
+  #ticked = 0;
+  /** The frame it asked for last. */
+  #asked = 0;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {import("../model/navigation.js").Navigation} navigation
+   */
+  constructor(store, navigation) {
+    this.#store = store;
+    this.#navigation = navigation;
+    store.subscribe((changed) => {
+      if (changed.has("rate") || changed.has("everyFrame")) this.#anchor = this.#here();
+    });
+  }
+
+  toggle() {
+    const { playing, session, connected, target } = this.#store.facts;
+    if (playing || !session || !connected) return this.#navigation.pause();
+    const { first, last } = this.#stretch;
+    const isOutside = target < first || target >= last;
+    this.#store.set({ playing: true });
+    this.#anchor = { frame: isOutside ? first : target, time: performance.now() };
+    this.#ticked = performance.now();
+    this.#ask(this.#anchor.frame);
+    requestAnimationFrame((now) => this.#tick(now));
+  }
+
+  toggleLoop() {
+    this.#store.set({ loops: !this.#store.facts.loops });
+  }
+
+  toggleEveryFrame() {
+    this.#store.set({ everyFrame: !this.#store.facts.everyFrame });
+  }
+
+  /** @param {1 | -1} way to the next of the rates */
+  changeRate(way) {
+    const at = RATES.indexOf(this.#store.facts.rate);
+    this.#store.set({ rate: RATES[Math.max(0, Math.min(RATES.length - 1, at + way))] });
+  }
+
+  /** @param {number} rate one of `RATES` */
+  setRate(rate) {
+    if (RATES.includes(rate)) this.#store.set({ rate });
+  }
+
+  /** First and last frame that are played: in a loop those of the marked range, else to the end of the recording. */
+  get #stretch() {
+    const { session, range, loops } = this.#store.facts;
+    return loops && range ? range : { first: 0, last: (session?.n_frames ?? 1) - 1 };
+  }
+
+  #here() {
+    return { frame: this.#store.facts.target, time: performance.now() };
+  }
+
+  /** @param {number} now */
+  #tick(now) {
+    const { playing, session, rate, everyFrame, target, loops } = this.#store.facts;
+    if (!playing || !session) return;
+    requestAnimationFrame((then) => this.#tick(then));
+    // A hidden tab draws nothing, and a hand may have gone elsewhere: go on from there instead of jumping.
+    // The next frame is due at once, so that a machine that draws so seldom goes on all the same.
+    if (now - this.#ticked > GAP_MS) this.#anchor = { frame: target + 1, time: now };
+    if (target !== this.#asked) {
+      this.#asked = target;
+      this.#anchor = this.#here();
+    }
+    this.#ticked = now;
+    if (this.#navigation.isUnderWay) return;
+    const { first, last } = this.#stretch;
+    let due = this.#anchor.frame + Math.floor(((now - this.#anchor.time) * session.fps * rate) / 1000);
+    if (everyFrame && due > target + 1) {
+      due = target + 1;
+      this.#anchor = { frame: due, time: now }; // what was late is not made up for
+    }
+    if (due > last || (due >= last && !loops)) {
+      if (loops) this.#anchor = { frame: first, time: now };
+      else this.#navigation.pause();
+      this.#ask(loops ? first : last);
+    } else if (due > target) {
+      this.#ask(due);
+    }
+  }
+
+  /** @param {number} frame */
+  #ask(frame) {
+    this.#asked = frame;
+    this.#navigation.request(frame);
+  }
+}

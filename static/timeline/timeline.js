@@ -1,0 +1,246 @@
+/**
+ * One cell per frame, coloured by who set it, with its status and cost above it and what has been reviewed below. A click or a
+ * drag goes there; with Shift it marks a range of frames. It can be zoomed; the strip at the bottom is the whole recording.
+ */
+
+import { AMBIGUOUS, framesWith, keyframesOf } from "../model/cells.js";
+import { prepare } from "../panes/drawing.js";
+import { FrameAxis } from "../widgets/frame_axis.js";
+import { zoomByWheel } from "./frame_window.js";
+import { px } from "../widgets/text.js";
+import * as drawing from "./timeline_drawing.js";
+
+/** The strip of the whole recording takes the pointer a little beyond its edge. */
+const REACH = 1;
+const MIDDLE_BUTTON = 1;
+
+/** @typedef {"scrub" | "mark" | "pan" | "overview"} Gesture what the pointer does while it is down */
+
+export class Timeline {
+  #element;
+  #store;
+  #navigation;
+  #jumps;
+  #frameWindow;
+  #cells = document.createElement("canvas");
+  #cursor = document.createElement("canvas");
+  #hovered = /** @type {number | null} */ (null);
+  #gesture = /** @type {Gesture | null} */ (null);
+  /** Where a range began that is being marked. */
+  #marked = 0;
+  /** The place under the pointer that pans, which stays under it. */
+  #held = 0;
+
+  /**
+   * @param {HTMLElement} element
+   * @param {{store: import("../model/store.js").Store, navigation: import("../model/navigation.js").Navigation,
+   *   jumps: import("./jumps.js").Jumps, frameWindow: import("./frame_window.js").FrameWindow}} parts
+   */
+  constructor(element, { store, navigation, jumps, frameWindow }) {
+    this.#element = element;
+    this.#store = store;
+    this.#navigation = navigation;
+    this.#jumps = jumps;
+    this.#frameWindow = frameWindow;
+    element.append(this.#cells, this.#cursor);
+    store.subscribe((changed) => {
+      const has = (/** @type {(keyof import("../model/store.js").Facts)[]} */ ...facts) => facts.some((f) => changed.has(f));
+      if (has("session")) element.style.height = `${this.#layout.height}px`;
+      if (has("timeline", "lanes", "session", "visible")) this.#drawCells();
+      if (has("target", "session", "range", "visible")) this.#drawCursor();
+      if (has("target", "timeline", "lanes", "session")) this.#describe();
+    });
+    new ResizeObserver(() => this.#drawAll()).observe(element);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#drawAll());
+    this.#listen();
+  }
+
+  get #layout() {
+    return drawing.layout(this.#store.facts.session?.people.length ?? 1);
+  }
+
+  get #axis() {
+    return new FrameAxis(this.#element.clientWidth, this.#store.facts.session?.n_frames ?? 1, this.#store.facts.visible);
+  }
+
+  /** The axis of the strip at the bottom. */
+  get #whole() {
+    return new FrameAxis(this.#element.clientWidth, this.#store.facts.session?.n_frames ?? 1, null);
+  }
+
+  #listen() {
+    const element = this.#element;
+    element.addEventListener("pointerdown", (event) => this.#press(event));
+    element.addEventListener("pointermove", (event) => {
+      if (this.#gesture) this.#drag(event);
+      const frame = this.#isOverview(event) ? null : this.#axis.frameUnder(event, element);
+      if (frame === this.#hovered) return;
+      this.#hovered = frame;
+      element.title = frame === null ? "The whole recording: drag to move what is shown" : this.#describeFrame(frame);
+      requestAnimationFrame(() => this.#drawCursor());
+    });
+    for (const end of /** @type {const} */ (["pointerup", "pointercancel"])) {
+      element.addEventListener(end, () => {
+        this.#gesture = null;
+        element.classList.remove("is-panning");
+      });
+    }
+    element.addEventListener("pointerleave", () => {
+      this.#hovered = null;
+      requestAnimationFrame(() => this.#drawCursor());
+    });
+    element.addEventListener("dblclick", (event) => {
+      if (this.#isOverview(event)) this.#frameWindow.zoom(0, 0);
+      else this.#store.set({ range: this.#jumps.stretchAround(this.#axis.frameUnder(event, element)) });
+    });
+    zoomByWheel(element, this.#frameWindow, () => this.#axis);
+    element.addEventListener("keydown", (event) => {
+      const step = { ArrowLeft: -1, ArrowRight: 1, PageDown: -10, PageUp: 10 }[event.key];
+      if (step === undefined || event.ctrlKey || event.altKey || event.metaKey) return;
+      event.preventDefault();
+      this.#navigation.step(step);
+    });
+  }
+
+  /** @param {PointerEvent} event */
+  #press(event) {
+    const element = this.#element;
+    if (event.button !== 0 && event.button !== MIDDLE_BUTTON) return;
+    event.preventDefault();
+    element.setPointerCapture(event.pointerId);
+    const frame = this.#axis.frameUnder(event, element);
+    if (event.button === MIDDLE_BUTTON) {
+      this.#gesture = "pan";
+      this.#held = this.#placeUnder(event);
+      element.classList.add("is-panning");
+    } else if (this.#store.facts.visible && this.#isOverview(event)) {
+      this.#gesture = "overview";
+      this.#drag(event);
+    } else if (event.shiftKey) {
+      this.#gesture = "mark";
+      this.#marked = frame;
+      this.#store.set({ range: null });
+    } else {
+      this.#gesture = "scrub";
+      this.#navigation.pause();
+      this.#navigation.goTo(frame);
+    }
+  }
+
+  /** @param {PointerEvent} event */
+  #drag(event) {
+    const frame = this.#axis.frameUnder(event, this.#element);
+    if (this.#gesture === "scrub") this.#navigation.goTo(frame);
+    else if (this.#gesture === "pan") this.#frameWindow.move(this.#held - this.#placeUnder(event));
+    else if (this.#gesture === "overview") this.#frameWindow.centre(this.#whole.placeAt(this.#x(event)));
+    else if (frame !== this.#marked || this.#store.facts.range) {
+      this.#store.set({ range: { first: Math.min(frame, this.#marked), last: Math.max(frame, this.#marked) } });
+    }
+  }
+
+  /** @param {MouseEvent} event */
+  #x(event) {
+    return event.clientX - this.#element.getBoundingClientRect().left;
+  }
+
+  /** @param {MouseEvent} event */
+  #placeUnder(event) {
+    return this.#axis.placeAt(this.#x(event));
+  }
+
+  /** @param {MouseEvent} event */
+  #isOverview(event) {
+    return event.clientY - this.#element.getBoundingClientRect().top >= this.#layout.overview.top - REACH;
+  }
+
+  #drawAll() {
+    this.#drawCells();
+    this.#drawCursor();
+  }
+
+  #drawCells() {
+    const { clientWidth, clientHeight } = this.#element;
+    const context = prepare(this.#cells, clientWidth, clientHeight, true);
+    const { timeline, lanes, session } = this.#store.facts;
+    if (!session) return;
+    const style = getComputedStyle(this.#element);
+    const axis = this.#axis;
+    const { lanes: bands, review, overview } = this.#layout;
+    drawing.drawLabels(context, axis, style, bands, session.people);
+    context.save();
+    context.beginPath();
+    context.rect(axis.left, 0, axis.right - axis.left + 2, overview.top);
+    context.clip();
+    for (const [lane, band] of bands.entries()) {
+      const cells = bands.length > 1 ? lanes[lane] : timeline;
+      if (!cells) continue; // it comes right behind
+      drawing.drawSources(context, axis, cells, style, band);
+      drawing.drawKeyframes(context, axis, keyframesOf(cells), band);
+      drawing.drawAmbiguous(context, axis, framesWith(cells, AMBIGUOUS), band);
+    }
+    drawing.drawReviewed(context, axis, timeline, style, review);
+    drawing.drawStatuses(context, axis, timeline, style);
+    drawing.drawCosts(context, axis, timeline, style);
+    context.restore();
+    drawing.drawOverview(context, this.#whole, timeline, style, overview);
+  }
+
+  #drawCursor() {
+    const { clientWidth, clientHeight } = this.#element;
+    const context = prepare(this.#cursor, clientWidth, clientHeight, true);
+    const { session, target, range, visible } = this.#store.facts;
+    if (!session) return;
+    const style = getComputedStyle(this.#element);
+    const axis = this.#axis;
+    const { cells, overview } = this.#layout;
+    if (range) drawing.drawRange(context, axis, range, style, overview.top - 3);
+    if (this.#hovered !== null) {
+      context.fillStyle = style.getPropertyValue("--muted");
+      context.globalAlpha = 0.5;
+      context.fillRect(axis.middle(this.#hovered) - 0.5, 0, 1, overview.top - REACH);
+      context.globalAlpha = 1;
+    }
+    drawing.drawWindow(context, this.#whole, visible, target, style, overview);
+    if (!axis.shows(target)) return;
+    const width = Math.max(2, axis.pitch);
+    const [top, bottom] = [cells.top - 2, cells.bottom + 2];
+    context.fillStyle = context.strokeStyle = style.getPropertyValue("--text");
+    context.fillRect(axis.middle(target) - 0.5, 2, 1, top - 2);
+    context.lineWidth = 2;
+    context.strokeRect(axis.middle(target) - width / 2, top, width, bottom - top);
+  }
+
+  /** @param {number} frame */
+  #describeFrame(frame) {
+    const cell = this.#store.facts.timeline.get(frame);
+    if (!cell) return `Frame ${frame}: no pose`;
+    const { source, keyframe, status, remark, cost_px, reviewed, ambiguous } = cell;
+    const seen = keyframe ? "keyframe" : ambiguous ? "another pose is as good" : reviewed && "reviewed";
+    const parts = [source, seen, status, px(cost_px)].filter(Boolean).join(", ") + this.#describeLanes(frame);
+    const jumps = this.#store.facts.disagreeing.includes(frame) ? "\ndisagrees with the frames beside it" : "";
+    return `Frame ${frame}: ${parts}${remark && `\n${remark}`}${jumps}`;
+  }
+
+  /**
+   * A line for each of several people.
+   *
+   * @param {number} frame
+   */
+  #describeLanes(frame) {
+    const { lanes, session } = this.#store.facts;
+    return lanes
+      .map((lane, person) => {
+        const { source = "no pose", keyframe = false, status = "" } = lane.get(frame) ?? {};
+        const told = [source, keyframe && "keyframe", status].filter(Boolean).join(", ");
+        return `\n${session?.people[person]?.name}: ${told}`;
+      })
+      .join("");
+  }
+
+  #describe() {
+    const { target, session } = this.#store.facts;
+    this.#element.setAttribute("aria-valuemax", String((session?.n_frames ?? 1) - 1));
+    this.#element.setAttribute("aria-valuenow", String(target));
+    this.#element.setAttribute("aria-valuetext", this.#describeFrame(target));
+  }
+}

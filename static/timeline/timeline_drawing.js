@@ -1,0 +1,337 @@
+/**
+ * Draws the timeline: cost curve, strip of statuses, cells by source with their keyframes, what has been reviewed, the marked
+ * range, and the whole recording small. Sizes are CSS pixels.
+ */
+
+import { NO_POSE, REVIEWED, SOURCES, STATUSES as ALL, keyframesOf } from "../model/cells.js";
+import { trace } from "../model/series.js";
+
+/**
+ * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
+ * @typedef {import("../model/cells.js").Cells} Cells
+ */
+
+const COST = { top: 4, bottom: 24 };
+const STATUS = { top: 28, bottom: 40 };
+const KEYFRAME_GAP = 5;
+const CELLS_TOP = 44;
+/** Height of the cells, of one person and of each of several, and the gap between lanes. */
+const [CELL_HEIGHT, LANE_HEIGHT, LANE_GAP] = [12, 10, 2];
+
+/** @typedef {{top: number, bottom: number}} Band */
+
+/**
+ * Where things lie below each other: one person has a single lane of cells, each of several a lane of his own.
+ *
+ * @param {number} people
+ * @returns {{cells: Band, lanes: Band[], review: Band, overview: Band, height: number}}
+ */
+export function layout(people) {
+  const several = people > 1;
+  const height = several ? LANE_HEIGHT : CELL_HEIGHT;
+  const lanes = Array.from({ length: Math.max(1, people) }, (_, lane) => {
+    const top = CELLS_TOP + lane * (height + LANE_GAP);
+    return { top, bottom: top + height };
+  });
+  const { bottom } = lanes[lanes.length - 1];
+  const overview = { top: bottom + 8, bottom: bottom + 14 };
+  const cells = { top: CELLS_TOP, bottom };
+  return { cells, lanes, review: { top: bottom + 2, bottom: bottom + 4 }, overview, height: overview.bottom + 2 };
+}
+
+/** Statuses that are drawn, the worst last and on top: each has a height of its own besides its colour. */
+export const STATUSES = /** @type {const} */ (["good", "doubtful", "lost"]);
+const STATUS_HEIGHTS = { good: 3, doubtful: 7, lost: 12 };
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {CSSStyleDeclaration} style
+ * @param {Band[]} lanes of the cells
+ * @param {import("../model/protocol.js").PersonInfo[]} people
+ */
+export function drawLabels(context, axis, style, lanes, people) {
+  context.font = "10.5px system-ui, sans-serif";
+  context.textAlign = "right";
+  context.textBaseline = "middle";
+  context.fillStyle = style.getPropertyValue("--muted");
+  /** @type {[string, Band][]} */
+  const rows = [["cost", COST], ["status", STATUS]]; // prettier-ignore
+  if (people.length < 2) rows.push(["pose", lanes[0]]);
+  for (const [text, { top, bottom }] of rows) context.fillText(text, axis.left - 8, (top + bottom) / 2);
+  if (people.length > 1) people.forEach((person, lane) => drawName(context, axis, person, lanes[lane]));
+}
+
+/**
+ * The name of a lane, as much of it as there is room for, and a strip in the colour of its person.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {import("../model/protocol.js").PersonInfo} person
+ * @param {Band} lane
+ */
+function drawName(context, axis, { name, color }, { top, bottom }) {
+  const room = axis.left - 12;
+  let text = name;
+  while (text.length > 1 && context.measureText(text).width > room) text = `${text.slice(0, -2)}…`;
+  context.fillText(text, axis.left - 9, (top + bottom) / 2);
+  const { fillStyle } = context;
+  context.fillStyle = color;
+  context.fillRect(axis.left - 6, top, 4, bottom - top);
+  context.fillStyle = fillStyle;
+}
+
+/**
+ * Runs of neighbouring frames that look the same, each as one rectangle: where frames share a pixel the next one begins where
+ * the run ends, so that a long recording costs as many rectangles as it has changes, or pixels.
+ *
+ * @param {FrameAxis} axis
+ * @param {(frame: number) => number} look of a frame; below 0 for nothing to draw
+ * @param {number} gap between frames, pixels
+ * @param {(look: number, x: number, width: number) => void} draw
+ */
+function eachRun(axis, look, gap, draw) {
+  for (let frame = axis.first; frame <= axis.last; ) {
+    const found = look(frame);
+    let next = frame + 1;
+    if (gap === 0) while (next <= axis.last && look(next) === found) next += 1;
+    if (found >= 0) draw(found, axis.start(frame), Math.max(1, (next - frame) * axis.pitch - gap));
+    frame = next;
+  }
+}
+
+/** @param {FrameAxis} axis */
+function gapOf(axis) {
+  return axis.pitch >= 5 ? 1 : 0;
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {Cells} cells
+ * @param {CSSStyleDeclaration} style
+ * @param {Band} lane
+ */
+export function drawSources(context, axis, cells, style, { top, bottom }) {
+  const height = bottom - top;
+  context.fillStyle = style.getPropertyValue("--track");
+  context.fillRect(axis.left, top, axis.right - axis.left, height);
+  const colors = SOURCES.map((source) => style.getPropertyValue(`--source-${source}`));
+  const { sources } = cells;
+  eachRun(axis, (frame) => (sources[frame] === NO_POSE ? -1 : sources[frame]), gapOf(axis), (source, x, width) => {
+    context.fillStyle = colors[source];
+    context.fillRect(x, top, width, height);
+  });
+}
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {Iterable<number>} keyframes
+ * @param {Band} lane
+ */
+export function drawKeyframes(context, axis, keyframes, { top, bottom }) {
+  const y = (top + bottom) / 2;
+  for (const x of placesOf(keyframes, axis)) drawDiamond(context, x, y, 4);
+}
+
+/**
+ * Two rings, one over the other, where another pose is as good.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {Iterable<number>} frames
+ * @param {Band} lane
+ */
+export function drawAmbiguous(context, axis, frames, { top, bottom }) {
+  const middle = (top + bottom) / 2;
+  context.lineWidth = 1.25;
+  for (const x of placesOf(frames, axis)) {
+    for (const y of [middle - 2, middle + 2]) {
+      context.beginPath();
+      context.arc(x, y, 2, 0, 2 * Math.PI);
+      context.fillStyle = "#fff";
+      context.strokeStyle = "rgba(0, 0, 0, 0.7)";
+      context.fill();
+      context.stroke();
+    }
+  }
+}
+
+/**
+ * Where keyframes are marked: of those that would cover each other only one, and none out of sight.
+ *
+ * @param {Iterable<number>} frames
+ * @param {FrameAxis} axis
+ */
+export function placesOf(frames, axis) {
+  const places = new Map();
+  for (const frame of frames) {
+    if (axis.shows(frame)) places.set(Math.floor(axis.middle(frame) / KEYFRAME_GAP), axis.middle(frame));
+  }
+  return [...places.values()];
+}
+
+/**
+ * A line under the frames that a person has vouched for or looked at.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {Cells} cells
+ * @param {CSSStyleDeclaration} style
+ * @param {Band} band
+ */
+export function drawReviewed(context, axis, cells, style, { top, bottom }) {
+  context.fillStyle = style.getPropertyValue("--good");
+  const { marks } = cells;
+  eachRun(axis, (frame) => (marks[frame] & REVIEWED ? 0 : -1), 0, (_, x, width) => {
+    context.fillRect(x, top, width, bottom - top);
+  });
+}
+
+/**
+ * Bars that stand the higher the worse a frame is; the worst of the frames that share a pixel is the one seen.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {Cells} cells
+ * @param {CSSStyleDeclaration} style
+ */
+export function drawStatuses(context, axis, cells, style) {
+  const { statuses } = cells;
+  for (const status of STATUSES) {
+    const index = ALL.indexOf(status);
+    const height = STATUS_HEIGHTS[status];
+    // What is seldom must still be seen: a single bad frame among thousands is two pixels wide.
+    const least = status === "good" ? 1 : 2;
+    context.fillStyle = style.getPropertyValue(`--status-${status}`);
+    eachRun(axis, (frame) => (statuses[frame] === index ? index : -1), gapOf(axis), (_, x, width) => {
+      context.fillRect(x, STATUS.bottom - height, Math.max(least, width), height);
+    });
+  }
+}
+
+/**
+ * The cost curve, from 0 at the bottom to the 98th percentile at the top: one lost frame must not flatten the rest.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {Cells} cells
+ * @param {CSSStyleDeclaration} style
+ */
+export function drawCosts(context, axis, cells, style) {
+  const ordered = cells.costs.filter((value) => value === value).sort();
+  if (ordered.length === 0) return;
+  const most = Math.max(1e-6, ordered[Math.floor(0.98 * (ordered.length - 1))]);
+  const path = new Path2D();
+  trace(path, cells.costs, axis, (value) => COST.bottom - (COST.bottom - COST.top) * Math.min(1, value / most));
+  context.save();
+  context.beginPath();
+  context.rect(axis.left, 0, axis.right - axis.left, STATUS.top);
+  context.clip();
+  context.strokeStyle = style.getPropertyValue("--text");
+  context.globalAlpha = 0.75;
+  context.lineWidth = 1.25;
+  context.lineJoin = "round";
+  context.stroke(path);
+  context.restore();
+}
+
+/**
+ * The whole recording small: what has been reviewed, keyframes, what is doubtful or lost.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} whole axis of all frames
+ * @param {Cells} cells
+ * @param {CSSStyleDeclaration} style
+ * @param {Band} overview
+ */
+export function drawOverview(context, whole, cells, style, overview) {
+  const height = overview.bottom - overview.top;
+  context.fillStyle = style.getPropertyValue("--track");
+  context.fillRect(whole.left, overview.top, whole.right - whole.left, height);
+  const { statuses, marks, sources } = cells;
+  /** @type {[(frame: number) => boolean, string, number, number][]} what, colour, share of the height, least width */
+  const layers = [
+    [(frame) => sources[frame] !== NO_POSE, "--faint", 0.5, 1],
+    [(frame) => (marks[frame] & REVIEWED) !== 0, "--good", 0.5, 1],
+    [(frame) => STATUSES[statuses[frame] - 1] === "doubtful", "--status-doubtful", 1, 1],
+    [(frame) => STATUSES[statuses[frame] - 1] === "lost", "--status-lost", 1, 1],
+  ];
+  for (const [is, color, share, least] of layers) {
+    context.fillStyle = style.getPropertyValue(color);
+    eachRun(whole, (frame) => (is(frame) ? 0 : -1), 0, (_, x, width) => {
+      context.fillRect(x, overview.bottom - share * height, Math.max(least, width), share * height);
+    });
+  }
+  context.fillStyle = style.getPropertyValue("--text");
+  for (const x of placesOf(keyframesOf(cells), whole)) context.fillRect(x - 0.5, overview.top, 1, 3);
+}
+
+/**
+ * The frame round the part of the overview that is shown, and where in it the shown frame lies.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} whole axis of all frames
+ * @param {import("../widgets/frame_axis.js").Span | null} visible
+ * @param {number} target
+ * @param {CSSStyleDeclaration} style
+ * @param {Band} overview
+ */
+export function drawWindow(context, whole, visible, target, style, overview) {
+  context.fillStyle = style.getPropertyValue("--text");
+  context.fillRect(whole.middle(target) - 0.5, overview.top - 1, 1, overview.bottom - overview.top + 2);
+  if (!visible) return;
+  const [left, right] = [whole.start(visible.start), whole.start(visible.end)];
+  const width = Math.max(6, right - left);
+  context.fillStyle = context.strokeStyle = style.getPropertyValue("--accent");
+  context.globalAlpha = 0.25;
+  context.fillRect(left, overview.top - 2, width, overview.bottom - overview.top + 4);
+  context.globalAlpha = 1;
+  context.lineWidth = 1.5;
+  context.strokeRect(left, overview.top - 2, width, overview.bottom - overview.top + 4);
+}
+
+/**
+ * A bracket over the frames that the user has marked.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {{first: number, last: number}} range
+ * @param {CSSStyleDeclaration} style
+ * @param {number} bottom of what is marked
+ */
+export function drawRange(context, axis, { first, last }, style, bottom) {
+  const left = Math.max(axis.left, axis.start(first));
+  const right = Math.min(axis.right, axis.start(last + 1));
+  if (right <= axis.left || left >= axis.right) return;
+  context.fillStyle = style.getPropertyValue("--accent");
+  context.globalAlpha = 0.14;
+  context.fillRect(left, 0, right - left, bottom);
+  context.globalAlpha = 1;
+  context.fillRect(left, 0, Math.max(2, right - left), 2);
+  if (axis.shows(first)) context.fillRect(left, 0, 2, 7);
+  if (axis.shows(last)) context.fillRect(Math.max(left, right - 2), 0, 2, 7);
+}
+
+/**
+ * The mark of a keyframe.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {number} x
+ * @param {number} y
+ * @param {number} radius
+ */
+export function drawDiamond(context, x, y, radius) {
+  context.beginPath();
+  context.moveTo(x, y - radius);
+  context.lineTo(x + radius, y);
+  context.lineTo(x, y + radius);
+  context.lineTo(x - radius, y);
+  context.closePath();
+  context.fillStyle = "#fff";
+  context.strokeStyle = "rgba(0, 0, 0, 0.7)";
+  context.lineWidth = 1;
+  context.fill();
+  context.stroke();
+}

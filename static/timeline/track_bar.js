@@ -1,0 +1,47 @@
+/** The buttons that track. */
+
+import { hasTrack } from "../model/selectors.js";
+import { button, byId } from "../widgets/elements.js";
+
+export class TrackBar {
+  #store;
+  #back;
+  #forward;
+  #pause;
+  #stop;
+  #follow = byId("follow", HTMLInputElement);
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {import("../model/actions.js").Actions} actions
+   */
+  constructor(store, actions) {
+    this.#store = store;
+    this.#back = button("track-backward", () => actions.track("backward"));
+    this.#forward = button("track-forward", () => actions.track("forward"));
+    this.#pause = button("track-pause", () => actions.togglePause());
+    this.#stop = button("track-stop", () => actions.stopTracking());
+    this.#follow.addEventListener("change", () => {
+      actions.follow(this.#follow.checked);
+      this.#follow.blur();
+    });
+    store.subscribe((changed) => {
+      if (changed.has("state") || changed.has("connected") || changed.has("range")) this.#showRun();
+    });
+  }
+
+  #showRun() {
+    const { state, connected, range } = this.#store.facts;
+    const stands = hasTrack(state);
+    const isRunning = !!state?.track.running;
+    this.#back.disabled = this.#forward.disabled = !connected || !state || isRunning;
+    this.#pause.disabled = this.#stop.disabled = this.#follow.disabled = !connected || !stands;
+    const to = range ? "to the end of the marked range" : "to the end of the recording";
+    this.#forward.title = `Track forward from this frame, ${to} (T)`;
+    this.#back.title = `Track backward from this frame, ${range ? to : "to its beginning"} (Shift+T)`;
+    this.#pause.classList.toggle("is-paused", stands && !isRunning);
+    this.#pause.title = stands && !isRunning ? "Go on tracking (Alt+P)" : "Pause tracking (Alt+P)";
+    this.#pause.setAttribute("aria-label", stands && !isRunning ? "Go on tracking" : "Pause tracking");
+    this.#follow.checked = state?.follow ?? true;
+  }
+}

@@ -1,0 +1,136 @@
+/** The row above the timeline: where the recording stands, how to move it, and what the colours mean. */
+
+import { button, byId } from "../widgets/elements.js";
+import { clock } from "../widgets/text.js";
+import { SOURCES, STATUSES as CELL_STATUSES } from "../model/cells.js";
+import { STATUSES } from "./timeline_drawing.js";
+
+export class Transport {
+  #store;
+  #play;
+  #loop;
+  #every;
+  #keyframe;
+  #reviewed;
+  #rate = byId("rate", HTMLSelectElement);
+  #frame = byId("frame", HTMLInputElement);
+  #total = byId("frame-total", HTMLElement);
+  #clock = byId("clock", HTMLElement);
+  #source = byId("source", HTMLElement);
+  #legend = byId("legend", HTMLElement);
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {import("../model/navigation.js").Navigation} navigation
+   * @param {import("./playback.js").Playback} playback
+   * @param {import("../model/actions.js").Actions} actions
+   */
+  constructor(store, navigation, playback, actions) {
+    this.#store = store;
+    button("first-frame", () => navigation.first());
+    button("previous-frame", () => navigation.step(-1));
+    this.#play = button("play", () => playback.toggle());
+    button("next-frame", () => navigation.step(1));
+    button("last-frame", () => navigation.last());
+    this.#loop = button("loop", () => playback.toggleLoop());
+    this.#every = button("every-frame", () => playback.toggleEveryFrame());
+    this.#keyframe = button("toggle-keyframe", () => actions.toggleMark("keyframe"));
+    this.#reviewed = button("toggle-reviewed", () => actions.toggleMark("reviewed"));
+    this.#rate.addEventListener("change", () => {
+      playback.setRate(Number(this.#rate.value));
+      this.#rate.blur();
+    });
+    this.#frame.addEventListener("focus", () => this.#frame.select());
+    this.#frame.addEventListener("change", () => {
+      const wanted = this.#frame.valueAsNumber;
+      navigation.pause();
+      if (Number.isFinite(wanted)) navigation.goTo(wanted);
+      this.#frame.value = String(this.#store.facts.target);
+    });
+    this.#frame.addEventListener("keydown", (event) => {
+      if (event.key === "Enter" || event.key === "Escape") this.#frame.blur();
+    });
+    store.subscribe((changed) => {
+      if (changed.has("session")) this.#showSession();
+      if (changed.has("target") || changed.has("session")) this.#showFrame();
+      if (changed.has("playing")) this.#showPlaying();
+      if (changed.has("rate") || changed.has("loops") || changed.has("everyFrame")) this.#showHow();
+      if (["state", "timeline", "target", "connected"].some((f) => changed.has(/** @type {"state"} */ (f)))) {
+        this.#showSource();
+      }
+      if (changed.has("timeline")) this.#showLegend();
+    });
+  }
+
+  #showSession() {
+    const frames = this.#store.facts.session?.n_frames ?? 1;
+    this.#frame.max = String(frames - 1);
+    this.#total.textContent = `/ ${frames - 1}`;
+  }
+
+  #showFrame() {
+    const { target, session } = this.#store.facts;
+    if (document.activeElement !== this.#frame) this.#frame.value = String(target);
+    this.#clock.textContent = clock(target / (session?.fps ?? 1));
+  }
+
+  #showPlaying() {
+    const { playing } = this.#store.facts;
+    this.#play.setAttribute("aria-label", playing ? "Pause" : "Play");
+    this.#play.title = `${playing ? "Pause" : "Play"} (Space)`;
+    this.#play.classList.toggle("is-playing", playing);
+  }
+
+  #showHow() {
+    const { rate, loops, everyFrame } = this.#store.facts;
+    this.#rate.value = String(rate);
+    this.#loop.setAttribute("aria-pressed", String(loops));
+    this.#every.setAttribute("aria-pressed", String(everyFrame));
+  }
+
+  #showSource() {
+    const source = this.#store.facts.state?.source ?? null;
+    const other = this.#store.facts.state?.other_sizes ?? false;
+    this.#source.textContent = source === null ? "No pose yet" : `Pose: ${source}${other ? ", former sizes" : ""}`;
+    this.#source.title = other
+      ? "Made with other sizes than the body has now, and shown with them. To take keyframes over: the panel Body, Refit keyframes, Apply"
+      : "";
+    const { timeline, target, connected, state } = this.#store.facts;
+    const cell = timeline.get(target);
+    this.#keyframe.disabled = !connected || !state;
+    this.#reviewed.disabled = !connected || !cell || cell.keyframe;
+    this.#keyframe.setAttribute("aria-pressed", String(!!cell?.keyframe));
+    this.#reviewed.setAttribute("aria-pressed", String(!!cell?.reviewed));
+  }
+
+  #showLegend() {
+    const { timeline } = this.#store.facts;
+    const sources = new Set(SOURCES.filter((_, index) => timeline.sources.includes(index)));
+    const statuses = new Set(CELL_STATUSES.filter((_, index) => timeline.statuses.includes(index)));
+    const rows = [
+      STATUSES.filter((status) => statuses.has(status)).map((status) => swatch(status, `--status-${status}`, status)),
+      SOURCES.filter((source) => sources.has(source)).map((source) => swatch(source, `--source-${source}`, "")),
+    ];
+    this.#legend.replaceChildren(
+      ...rows.map((swatches) => {
+        const row = document.createElement("div");
+        row.append(...swatches);
+        return row;
+      }),
+    );
+  }
+}
+
+/**
+ * @param {string} text
+ * @param {string} color name of the style's colour
+ * @param {string} kind class of the mark, which gives it its shape
+ */
+function swatch(text, color, kind) {
+  const item = document.createElement("span");
+  const mark = document.createElement("i");
+  mark.style.background = `var(${color})`;
+  if (kind) mark.className = `is-${kind}`;
+  item.append(mark, text);
+  return item;
+}
