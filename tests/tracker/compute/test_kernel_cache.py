@@ -20,7 +20,7 @@ camera = Camera("a", (640, 480), np.array([[520.0, 0, 320], [0, 520, 240], [0, 0
                 transform(R, np.array([4.0, 0.0, 0.0])))
 body = Body(model, model.neutral())
 behind = body.points_world - (0.5, 0.0, 0.0)
-print(int(part_edges.points_hidden([body], [camera], behind).sum()))
+print(int(part_edges.points_occluded([body], [camera], behind).sum()))
 """
 
 

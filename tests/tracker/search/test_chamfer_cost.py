@@ -273,7 +273,7 @@ def by_hand(cost, views, model, values, piece_px):
     for view in range(len(views)):
         v, theta = views[view], default_theta_px(views[view].camera)
         contour = occluding_contours.trace([Body(model, values)], v.camera, piece_px)
-        pieces = contour.pieces_px[~contour.hidden]
+        pieces = contour.pieces_px[~contour.occluded]
         middles, lengths = (pieces[:, :2] + pieces[:, 2:]) / 2, np.linalg.norm(pieces[:, 2:] - pieces[:, :2], axis=1)
         inside = np.clip(middles, 0, np.array(v.camera.size) - 1)
         sampled = cv2.remap(v.distance, inside[None].astype(np.float32), None, cv2.INTER_LINEAR)[0]
