@@ -372,7 +372,7 @@ class ContourTerm(NamedTuple):
 
 
 WITH_JACOBIAN, COST_ONLY = np.bool_(True), np.bool_(False)
-"""Values of `with_jacobian`. A literal True or False in a kernel would have `accumulate_normal_equations` compiled again."""
+"""Values of `with_jacobian`. Literals in a kernel would have `accumulate_normal_equations` compiled once for each."""
 
 
 @njit(**FAST)

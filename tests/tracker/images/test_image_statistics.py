@@ -45,6 +45,6 @@ def test_larger_footage_is_read_at_the_scale_of_matching():
 
 
 def test_small_images_have_probes_too():
-    statistics = SampleGrid((32, 20), 1.0).read(np.full((20, 32, 3), 77, np.uint8))
+    statistics = SampleGrid((32, 20), 1.0).measure(np.full((20, 32, 3), 77, np.uint8))
     np.testing.assert_allclose(statistics.colors, 77, rtol=1e-5)
     np.testing.assert_allclose(statistics.strengths, 0, atol=1e-3)

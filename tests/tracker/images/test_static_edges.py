@@ -112,7 +112,7 @@ def test_edges_of_the_room_are_no_evidence(model):
     gradients[0] = 100
     learn(model, line(20))
     pieces = np.array([[u, y, u, y + 2] for u in (21, 49) for y in range(10, 40, 2)], np.float32)
-    view = view_evidence(camera, 1.0, edges, gradients=gradients, predicted_px=pieces, model=model)
+    view = view_evidence(camera, 1.0, edges, gradients=gradients, predicted_px=pieces, static_edges=model)
     assert set(view.points_px[:, 0]) == {50.0}
     assert view.distance[20, 20] == view.distance.max()
     everything = with_all_segments(view)

@@ -280,8 +280,8 @@ def by_hand(cost, views, model, values, piece_px):
         forward = np.minimum(sampled + np.linalg.norm(middles - inside, axis=1), theta)
         t = np.linspace(0, 1, 9)[:, None, None]
         along = (pieces[:, :2] + t * (pieces[:, 2:] - pieces[:, :2])).reshape(-1, 2)
-        first = cost._scene.firsts[view]
-        scene = cost._scene.points[:, first : first + cost._scene.counts[view]].T
+        first = cost._arrays.firsts[view]
+        scene = cost._arrays.points[:, first : first + cost._arrays.counts[view]].T
         backward = np.minimum(cKDTree(along).query(scene)[0], theta)
         total.append((np.average(forward, weights=lengths) + backward.mean()) / 2)
     return np.mean(total)
