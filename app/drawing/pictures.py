@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours.label_image import part_labels
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.cameras import Camera
@@ -59,7 +59,7 @@ def labels(parts: NDArray[np.uint8], colors: Sequence[str]) -> bytes:
     return _png(parts, parts.shape[1], 8, colors)
 
 
-def parts(bodies: Sequence[Body], camera: Camera, colors: Sequence[str], reduction: float) -> bytes:
+def parts(bodies: Sequence[PosedBody], camera: Camera, colors: Sequence[str], reduction: float) -> bytes:
     """What the parts of the bodies cover, each in its colour, as PNG.
 
     Args:

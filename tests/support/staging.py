@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import view_evidence
@@ -60,7 +60,7 @@ def solid(half_axes, exponents=(1, 1), name="solid"):
 
 def at(model, *place, turns=(0.0, 0.0, 0.0)):
     """A solid placed in the world."""
-    return Body(model, np.array([*place, *turns], dtype=float))
+    return PosedBody(model, np.array([*place, *turns], dtype=float))
 
 
 def edge_map(bodies, camera):

@@ -204,7 +204,7 @@ class BodyModel:
 
     def points_world(self, values: Array) -> Array:
         """Positions of the body's points (see `point_names`), (n_points, 3), metres."""
-        return Body(self, values).points_world
+        return PosedBody(self, values).points_world
 
     def points_at(self, kinematics: Kinematics, points: IntArray) -> Array:
         """Positions of some of the points, given by index (N,), where the parts are known, (N, 3), metres."""
@@ -294,7 +294,7 @@ class BodyModel:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class PosedBody:
     """A body model in a pose. Everything that synthesizes, hides or scores takes a list of these."""
 
     model: BodyModel

@@ -22,7 +22,7 @@ import numpy as np
 from numba import njit
 
 from tracker.body.kinematics import IntArray, Kinematics, Tree, forward_kinematics
-from tracker.body.model import Body, BodyModel, parts_of
+from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import Kept, kept_for
 from tracker.evidence.view_evidence import ViewEvidence
@@ -84,7 +84,7 @@ class ContourMatch:
     def __init__(
         self,
         views: Sequence[ViewEvidence],
-        bodies: Sequence[Body],
+        bodies: Sequence[PosedBody],
         person: int = 0,
         settings: MatchSettings | None = None,
         theta_px: float | None = None,

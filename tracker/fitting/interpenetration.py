@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import IntArray, Kinematics
-from tracker.body.model import Body, BodyModel, parts_of
+from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours.surfaces import surfaces_of
 from tracker.fitting.gauss_newton import Normal
 from tracker.geometry.rigid import Array
@@ -53,7 +53,12 @@ class KeepBodiesApart:
     """
 
     def __init__(
-        self, bodies: Sequence[Body], person: int, weight: float, sigma_m: float = SIGMA_M, softness: float = SOFTNESS
+        self,
+        bodies: Sequence[PosedBody],
+        person: int,
+        weight: float,
+        sigma_m: float = SIGMA_M,
+        softness: float = SOFTNESS,
     ) -> None:
         """Take the others' parts where they are.
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.model import Body, BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import ContourMatch
 from tracker.fitting.gauss_newton import Block, of_values
@@ -77,7 +77,7 @@ def fit_frame(
     for reach in _REACHES if views is not None else ():
         for person in people:
             assert views is not None
-            bodies, model = [Body(m, v) for m, v in zip(models, now, strict=True)], models[person]
+            bodies, model = [PosedBody(m, v) for m, v in zip(models, now, strict=True)], models[person]
             theta_px = settings.theta_px  # None: that of each view
             if reach != 1.0:
                 theta_px = reach * (theta_px or float(np.median([v.theta_px / v.scale for v in views])))

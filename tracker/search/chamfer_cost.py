@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import Tree, forward_kinematics
-from tracker.body.model import Body, BodyModel, parts_of
+from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.numba_options import FAST
 from tracker.compute.threads import helpers
 from tracker.contours import occluding_contours
@@ -106,7 +106,7 @@ class ChamferCost:
     def __init__(
         self,
         views: Sequence[ViewEvidence],
-        predicted: Sequence[Body],
+        predicted: Sequence[PosedBody],
         theta_px: float | None = None,
         outliers: Outliers = "truncated",
         threads: int = 2,
@@ -205,7 +205,7 @@ class ChamferCost:
         return directed
 
     def _part_poses(self, poses: Sequence[Array]) -> Array:
-        return occluding_contours.part_poses([Body(m, p) for m, p in zip(self.models, poses, strict=True)])
+        return occluding_contours.part_poses([PosedBody(m, p) for m, p in zip(self.models, poses, strict=True)])
 
     def _scratch(self) -> _Scratch:
         """Room of the calling thread's own: several threads may score at a time."""

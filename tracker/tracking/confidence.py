@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import ColorScore, PartColors
 from tracker.body.limbs import limbs, spoken
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import Fit, covariance
 from tracker.geometry.rigid import Array
@@ -120,7 +120,7 @@ def _log_odds(found: Quality) -> Array:
 
 
 def quality(
-    body: Body,
+    body: PosedBody,
     fit: Fit,
     costs: PartCosts,
     thetas_px: Array,
@@ -209,7 +209,7 @@ def worst(statuses: Sequence[Status]) -> Status:
     return max(statuses, key=("good", "doubtful", "lost").index, default="good")
 
 
-def _end_spreads(body: Body, fit: Fit) -> Array:
+def _end_spreads(body: PosedBody, fit: Fit) -> Array:
     """Standard deviation of the end of each limb, (n_limbs,), metres."""
     model = body.model
     ends = np.array([np.flatnonzero(model.point_parts == c.parts[-1])[-1] for c in limbs(model)], dtype=np.int64)

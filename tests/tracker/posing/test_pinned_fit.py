@@ -5,7 +5,7 @@ import pytest
 from bodies import ARM
 from staging import cameras_around, own_evidence, posed, seen, shaken
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.fitting.gauss_newton import fit_to_points
@@ -66,7 +66,7 @@ def two_people():
     left[1] -= 0.5
     right[1] += 0.5
     rng = np.random.default_rng(5)
-    views = own_evidence([Body(GAVRILA, left), Body(GAVRILA, right)], CAMERAS)
+    views = own_evidence([PosedBody(GAVRILA, left), PosedBody(GAVRILA, right)], CAMERAS)
     return [left, right], views, [shaken(GAVRILA, v, rng, 0.12, 0.04) for v in (left, right)]
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import Limb
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.compute.threads import side_by_side
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch, PartCosts
@@ -106,7 +106,7 @@ class Scene:
         self._views, self._settings = views, settings
         self._memories, self._models, self._predicted = memories, [m.model for m in memories], tuple(poses)
         self._sharing, self._shares = Sharing(views), list[Shares]()
-        self._placed: dict[tuple[int, int], Body] = {}  # poses are kept: no other gets their number
+        self._placed: dict[tuple[int, int], PosedBody] = {}  # poses are kept: no other gets their number
         self._thetas = np.array([v.outlier_px(settings.theta_px) for v in views])
 
     def teach(self, scenery: Sequence[Scenery]) -> None:
@@ -378,18 +378,18 @@ class Scene:
         self._shares.append(Shares(self._sharing, bodies))
         return [self._shares[-1].own(p, everywhere) for p in people]
 
-    def _around(self, person: int) -> tuple[list[Body], int]:
+    def _around(self, person: int) -> tuple[list[PosedBody], int]:
         """Who is in the scene for a person, and their index there."""
         bodies = self._bodies()
         return (bodies, person) if self._settings.occlusion else ([bodies[person]], 0)
 
-    def _bodies(self) -> list[Body]:
+    def _bodies(self) -> list[PosedBody]:
         """Everybody where they stand so far."""
         return [self._body(i, pose) for i, pose in enumerate(self.poses)]
 
-    def _body(self, person: int, values: Array) -> Body:
+    def _body(self, person: int, values: Array) -> PosedBody:
         """A person in a pose, (n_values,); each is asked for many times."""
         key = person, id(values)  # people who are exchanged take each other's poses
         if key not in self._placed:
-            self._placed[key] = Body(self._models[person], values)
+            self._placed[key] = PosedBody(self._models[person], values)
         return self._placed[key]
