@@ -20,7 +20,7 @@ from tracker.fitting.gauss_newton import Block, Fit, StayNear, damped_step
 from tracker.fitting.gauss_newton_compiled import solve
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings, search
 from tracker.search.chamfer_cost import ChamferCost
 from tracker.session.session import Session

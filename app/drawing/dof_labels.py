@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tracker.body.limbs import spoken
 from tracker.body.model import BodyModel
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.posing.edits import joint_of, limb_of
 
 

@@ -5,9 +5,9 @@ import numpy as np
 from app.drawing.overlays import EPIPOLAR_COLOR, Path
 from app.state.floor_picking import Picking
 from app.state.state import State
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera, epipolar_segment
 from tracker.geometry.ground_plane import Floor, up_rotation
-from tracker.geometry.rigid import Array
 from tracker.session.session import Session
 
 FLOOR_COLOR = "#7ee08a"

@@ -12,8 +12,8 @@ from tracker.contours import occluding_contours, part_edges
 from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera, epipolar_segment
-from tracker.geometry.rigid import Array, FloatArray
 from tracker.images.background_subtraction import Mask
 from tracker.images.edge_segments import accept
 from tracker.posing.retarget import rebodied

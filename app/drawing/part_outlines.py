@@ -7,7 +7,7 @@ import numpy as np
 from app.state.page_view import View
 from app.state.state import State
 from tracker.body.model import PosedBody
-from tracker.geometry.rigid import FloatArray
+from tracker.geometry.arrays import FloatArray
 from tracker.posing import picking
 from tracker.session.session import Session
 

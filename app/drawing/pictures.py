@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from tracker.body.model import PosedBody
 from tracker.contours.label_image import part_labels
 from tracker.evidence.view_evidence import ViewEvidence
+from tracker.geometry.arrays import Image
 from tracker.geometry.cameras import Camera
-from tracker.images.background_subtraction import Image, Mask
+from tracker.images.background_subtraction import Mask
 
 SILHOUETTE_COLOR = "#4ae08c"
 _JPEG_QUALITY = 85

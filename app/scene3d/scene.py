@@ -20,9 +20,9 @@ from app.state.view_3d import View3d
 from tracker.body.model import BodyModel, PosedBody
 from tracker.contours.occluding_contours import part_poses
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera, viewed_point
 from tracker.geometry.ground_plane import up_rotation
-from tracker.geometry.rigid import Array
 from tracker.session.session import Session
 
 _REST_S = 0.08

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tracker.errors import TrackerError
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import Floor, floor_through
-from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import triangulate
 
 N_POINTS = 3

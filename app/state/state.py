@@ -7,7 +7,7 @@ import numpy as np
 from app.state.floor_picking import FloorState
 from app.state.view_3d import View3d
 from tracker.body.model import BodyModel
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import ViewPin
 from tracker.tracking.chamfer.settings import TrackSettings
 

@@ -14,7 +14,7 @@ from app.storage.tracked_changes import keyframes_of, tracked_changes
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, parse_model
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import ViewPin
 from tracker.posing.retarget import rebodied
 from tracker.session.session import Session

@@ -30,8 +30,7 @@ from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.numba_options import BORROW
 from tracker.contours.occluding_contours import part_poses, projection
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.rigid import Array
-from tracker.images.background_subtraction import Image
+from tracker.geometry.arrays import Array, Image
 from tracker.images.color_histogram import BINS, bin_of
 
 _SMOOTHING_BINS = 0.7

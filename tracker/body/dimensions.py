@@ -13,7 +13,7 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.body.parts import Joint, Landmark, Part
 from tracker.errors import TrackerError
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 _LEAST_HEIGHT_M, _MOST_HEIGHT_M = 0.3, 3.0
 _LEAST_M, _MOST_SHARE = 0.005, 0.7

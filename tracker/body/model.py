@@ -13,19 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import (
-    BALL,
-    REVOLVE,
-    TRANSLATE,
-    IntArray,
-    Kinematics,
-    Tree,
-    forward_kinematics,
-    point_jacobian,
-)
+from tracker.body.kinematics import BALL, REVOLVE, TRANSLATE, Kinematics, Tree, forward_kinematics, point_jacobian
 from tracker.body.parts import Joint, Landmark, Part, SearchGroup
 from tracker.geometry import rigid
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.shapes import Shape
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.numba_options import FAST
 from tracker.contours.occluding_contours import part_poses, projection
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
 
 _RINGS, _SECTORS = 16, 24
 _NEAREST_M = 0.05

@@ -20,8 +20,8 @@ from tracker.compute.numba_options import FAST
 from tracker.contours.generator import MAX_POINTS, grid_outline, revolved_outline
 from tracker.contours.surfaces import Surfaces, surfaces_of
 from tracker.contours.visibility import JOINT_MARGIN_M, LANES, hide
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array, FloatArray
 
 PIECE_PX = 4.0
 """Longest piece of contour that is scored or hidden as a whole, px."""

@@ -11,8 +11,8 @@ from tracker.compute.numba_options import FAST
 from tracker.contours import occluding_contours
 from tracker.contours.surfaces import N_RINGS, N_SECTORS
 from tracker.contours.visibility import LANES, hide
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array, FloatArray
 
 _LIFT_M = 0.012
 """How far a curve is lifted off the surfaces to see whether they hide it, metres."""

@@ -6,7 +6,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import IntArray
 from tracker.compute.numba_options import FAST
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import (
@@ -20,7 +19,7 @@ from tracker.contours.static_cache import (
 )
 from tracker.evidence.view_evidence import SCENE_SPACING_PX
 from tracker.fitting.twists import add_twists
-from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray, IntArray
 from tracker.geometry.segment_distance import LANES, cells_within
 from tracker.images.distance_transform import bilinear
 

@@ -13,11 +13,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import IntArray, Kinematics
+from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours.surfaces import surfaces_of
 from tracker.fitting.gauss_newton import Normal
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 
 _SAMPLES = 5
 """Points along the axis of each part that are asked whether they lie within another part."""

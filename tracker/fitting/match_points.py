@@ -10,12 +10,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import IntArray
 from tracker.body.model import PosedBody
 from tracker.compute.numba_options import BORROW
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import SCENE_SPACING_PX, ViewEvidence
-from tracker.geometry.rigid import FloatArray
+from tracker.geometry.arrays import FloatArray, IntArray
 
 N_COLUMNS = 7
 """u, v, the normal's u and v, the weight, and how many points it stands for: in all, and of the silhouette."""

@@ -9,11 +9,11 @@ from functools import cached_property
 
 import numpy as np
 
-from tracker.body.kinematics import IntArray, Kinematics
+from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import Normal, normal_of
+from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import _NEAREST_M, ViewPin, sigma_px
 
 

@@ -23,7 +23,8 @@ import numpy as np
 from tracker.errors import RecordingError
 from tracker.files import write_text_whole
 from tracker.footage.frame_index import stamp_of
-from tracker.footage.video import Footage, Image
+from tracker.footage.video import Footage
+from tracker.geometry.arrays import Image
 
 FOLDER = "proxies"
 VERSION = 1

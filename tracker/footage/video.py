@@ -17,14 +17,12 @@ import numpy as np
 from av.packet import Packet
 from av.video.frame import VideoFrame
 from av.video.reformatter import VideoReformatter
-from numpy.typing import NDArray
 
 from tracker.errors import RecordingError
 from tracker.footage import frame_index, packet_scan
 from tracker.footage.frame_index import Index
 from tracker.footage.packet_scan import Listed
-
-Image = NDArray[np.uint8]
+from tracker.geometry.arrays import Image
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 

@@ -15,8 +15,8 @@ import tomli_w
 from tracker.errors import CalibrationError
 from tracker.files import read_toml, write_text_whole
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import DISTORTION_COUNTS, Camera
-from tracker.geometry.rigid import Array
 
 Units = Literal["m", "mm"]
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel
 from tracker.errors import FormatError
 from tracker.files import write_text_whole
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 VERSION = 1
 

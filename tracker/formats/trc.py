@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tracker.errors import FormatError
 from tracker.files import write_text_whole
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 _METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "cm": 0.01, "mm": 0.001, "millimeters": 0.001}
 

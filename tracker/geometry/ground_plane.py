@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracker.errors import TrackerError
-from tracker.geometry.rigid import Array, so3_exp
+from tracker.geometry.arrays import Array
+from tracker.geometry.rigid import so3_exp
 
 _LEAST_HEIGHT_M = 0.2
 """Three points whose triangle is flatter than this do not say how a floor lies: a click a few cm off would tilt it."""

@@ -12,9 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.numba_options import BORROW, FAST
-from tracker.geometry.rigid import FloatArray
-
-IntArray = NDArray[np.int64]
+from tracker.geometry.arrays import FloatArray, IntArray
 
 _ZERO, _HALF, _ONE = (
     np.float32(0.0),

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
 
 _SIGMA_SHARE = 0.001
 """Standard deviation of a pin against the longer side of the image: 0.64 px of 640. A hand is off by three times as

@@ -13,10 +13,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.numba_options import FAST
-from tracker.geometry.rigid import FloatArray
+from tracker.geometry.arrays import FloatArray, IntArray
 from tracker.geometry.segment_distance import LANES, Sorted, cells_within, sort_points
-
-IntArray = NDArray[np.int64]
 
 MAX_LENGTH = 30
 """Most pixels of a segment: where body and background are linked in a smooth line, they part here at the latest."""

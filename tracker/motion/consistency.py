@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 _MOST_M_S2 = 90.0
 _LEAST_M, _MOST_M = 0.05, 0.25

@@ -12,8 +12,8 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.fitting.gauss_newton import Block, Normal, StayNear, normal_of, solve
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
 from tracker.posing.orient import orient
 from tracker.posing.picking import place_on_part
 

@@ -4,11 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.dimensions import twin
-from tracker.body.kinematics import IntArray
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.body.parts import Joint
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.posing.orient import orient
 
 _MIRROR = np.diag([1.0, -1.0, 1.0])

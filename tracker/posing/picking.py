@@ -9,8 +9,8 @@ import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array, FloatArray
 from tracker.geometry.shapes import Shape
 
 _NEAREST_M = 0.05

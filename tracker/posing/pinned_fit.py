@@ -18,8 +18,8 @@ from tracker.fitting.contour_residuals import ContourMatch
 from tracker.fitting.gauss_newton import Block, of_values
 from tracker.fitting.gauss_newton_compiled import solve
 from tracker.fitting.pins import PinBlock, pin_block
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import ViewPin
 from tracker.tracking.chamfer.settings import TrackSettings, prior_blocks
 

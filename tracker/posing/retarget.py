@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import Block, PointTargets, StayNear, solve
 from tracker.fitting.pins import pin_block
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import ViewPin
 
 _JOINT_M = 0.005

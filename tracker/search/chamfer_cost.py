@@ -22,7 +22,7 @@ from tracker.compute.numba_options import FAST
 from tracker.compute.threads import helpers
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.segment_distance import (
     Segments,
     Sorted,

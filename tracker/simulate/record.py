@@ -19,8 +19,8 @@ from tracker.footage.video import open_footage
 from tracker.formats.model_toml import format_model, load_model
 from tracker.formats.pose_csv import write_pose_table
 from tracker.formats.trc import write_trc
+from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
 from tracker.session.session import PALETTE, Person, Session, load_session, save_session
 from tracker.simulate.motion.postures import Role, perform
 from tracker.simulate.motion.scenes import cast_of
@@ -28,7 +28,7 @@ from tracker.simulate.people.model_figure import PartsFigure
 from tracker.simulate.people.skeleton import altered_model
 from tracker.simulate.people.skin import make_skin
 from tracker.simulate.stage.camera_rig import make_cameras
-from tracker.simulate.stage.film import Image, exposed, film, freeze
+from tracker.simulate.stage.film import exposed, film, freeze
 from tracker.simulate.stage.rasterizer import Figure
 from tracker.simulate.stage.room import Backdrop, see_room
 from tracker.simulate.stage.video_writer import VideoWriter

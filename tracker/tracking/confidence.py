@@ -16,7 +16,7 @@ from tracker.body.limbs import limbs, spoken
 from tracker.body.model import PosedBody
 from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import Fit, covariance
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 Status = Literal["good", "doubtful", "lost"]
 

@@ -20,7 +20,7 @@ from tracker.contours import occluding_contours
 from tracker.contours.occluding_contours import PIECE_PX, Contour, trace_view
 from tracker.contours.surfaces import Surfaces
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence, findable, unfiltered, with_segments
-from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.images.edge_segments import MAX_ANGLE_RAD, Samples, Segments, nearest_alongside, sampled
 
 _CLEARLY = 0.5

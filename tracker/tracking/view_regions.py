@@ -6,8 +6,8 @@ import numpy as np
 
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
+from tracker.geometry.arrays import FloatArray
 from tracker.geometry.cameras import Camera, Region
-from tracker.geometry.rigid import FloatArray
 from tracker.images.matching_view import region_around
 
 _NEAREST_M = 0.3

@@ -9,7 +9,7 @@ import numpy as np
 from app.control.session.session_state import Screen, spoken
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.posing import drag
 from tracker.posing.edits import bent_alike, limb_of, mirrored, taken_over
 from tracker.posing.orient import orient

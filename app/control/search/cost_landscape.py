@@ -12,7 +12,7 @@ from app.state.state import Landscape, State
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.tracking.chamfer.settings import TrackSettings, pose_cost
 
 SAMPLES = 121

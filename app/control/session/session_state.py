@@ -14,8 +14,8 @@ from app.state.state import Shown, State, finite_or_none
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import held
+from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
-from tracker.geometry.rigid import Array
 from tracker.geometry.triangulation import ViewPin
 from tracker.posing.default_pose import standing_pose
 from tracker.posing.retarget import rebodied

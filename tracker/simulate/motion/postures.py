@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from tracker.body.model import BodyModel, IntArray
+from tracker.body.model import BodyModel
 from tracker.geometry import rigid
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.simulate.people.anatomy import ANKLE_HEIGHT
 from tracker.simulate.people.builds import MAN, Build
 from tracker.simulate.people.outfit import Outfit

@@ -21,7 +21,7 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import ContourMatch
 from tracker.fitting.gauss_newton import held
 from tracker.fitting.interpenetration import KeepBodiesApart
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.tracking.chamfer.frame_estimator import Scene
 from tracker.tracking.chamfer.pose_paths import ROUNDS, Candidates, Sight, carry, cheapest_way
 from tracker.tracking.chamfer.settings import TrackSettings

@@ -22,7 +22,7 @@ from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch, PartCo
 from tracker.fitting.gauss_newton import Block, Fit, covariance, held
 from tracker.fitting.gauss_newton_compiled import solve
 from tracker.fitting.interpenetration import KeepBodiesApart
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.images.static_edges import Scenery
 from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings
 from tracker.tracking import confidence

@@ -12,7 +12,7 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MatchSettings
 from tracker.fitting.gauss_newton import Block, StayNear
 from tracker.fitting.interpenetration import KeepApart
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.motion.prediction import PredictSettings
 from tracker.search.best_first import SearchSettings, SearchStep, search
 from tracker.search.chamfer_cost import ChamferCost, Outliers

@@ -9,8 +9,8 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.threads import side_by_side
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Region
-from tracker.geometry.rigid import Array
 from tracker.images.static_edges import Scenery
 from tracker.motion.prediction import PredictSettings
 from tracker.tracking.chamfer.frame_estimator import Found, Scene
