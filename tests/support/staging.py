@@ -13,7 +13,7 @@ from tracker.evidence.view_evidence import view_evidence
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import parse_model
 from tracker.geometry.cameras import Camera
-from tracker.geometry.triangulation import ViewPin
+from tracker.geometry.triangulation import PointObservation
 
 SIZE = (640, 480)
 
@@ -194,7 +194,7 @@ def seen(model, values, names, cameras, noise_px=0.0, seed=0):
     rng = np.random.default_rng(seed)
     places = dict(zip(model.point_names, model.points_world(values), strict=True))
     return [
-        ViewPin(name, i, tuple(camera.pinhole.project(places[name]) + rng.normal(0, noise_px, 2)))
+        PointObservation(name, i, tuple(camera.pinhole.project(places[name]) + rng.normal(0, noise_px, 2)))
         for name in names
         for i, camera in enumerate(cameras)
     ]

@@ -41,7 +41,7 @@ class Scene(NamedTuple):
     distances: FloatArray
     """The distance images, one after the other, row by row."""
     points: FloatArray
-    """The columns of `points_to_match`, (N_COLUMNS, N); one view after the other, each as `nearest.Sorted`; those that
+    """The columns of `points_to_match`, (N_COLUMNS, N); one view after the other, each as `RowSortedPoints`; those that
     it is filled up with stand for nothing."""
     firsts: NDArray[np.int64]
     """Index of the first point of each view, and the number of all, (V + 1,)."""

@@ -16,7 +16,7 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 
 
-def between(model: BodyModel, start: Array, end: Array, shares: Array) -> Array:
+def interpolate_pose(model: BodyModel, start: Array, end: Array, shares: Array) -> Array:
     """Interpolate from one pose to another.
 
     Args:

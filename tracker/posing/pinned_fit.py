@@ -20,7 +20,7 @@ from tracker.fitting.gauss_newton_compiled import solve
 from tracker.fitting.pins import PinBlock, pin_block
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.geometry.triangulation import ViewPin
+from tracker.geometry.triangulation import PointObservation
 from tracker.tracking.chamfer.settings import TrackSettings, prior_blocks
 
 _REACHES = (2.0, 1.0)
@@ -45,7 +45,7 @@ class FrameFit(NamedTuple):
 def fit_frame(
     models: Sequence[BodyModel],
     poses: Sequence[Array],
-    pins: Sequence[Sequence[ViewPin]],
+    pins: Sequence[Sequence[PointObservation]],
     cameras: Sequence[Camera],
     views: Sequence[ViewEvidence] | None,
     settings: TrackSettings,

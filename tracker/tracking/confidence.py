@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import ColorScore, PartColors
-from tracker.body.limbs import limbs, spoken
+from tracker.body.limbs import limb_display_name, limbs
 from tracker.body.model import PosedBody
 from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import Fit, covariance
@@ -201,7 +201,7 @@ def reason(found: Quality) -> str:
     odds = found.log_odds
     if odds.max() <= _DOUBTFUL:
         return "part of the silhouette unexplained"
-    return f"{spoken(found.limbs[int(odds.argmax())].name)} uncertain"
+    return f"{limb_display_name(found.limbs[int(odds.argmax())].name)} uncertain"
 
 
 def worst(statuses: Sequence[Status]) -> Status:

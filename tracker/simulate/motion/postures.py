@@ -65,7 +65,7 @@ class Posture:
     """Where the `left` and the `right` arm reach to, where they do."""
 
 
-def perform(role: Role, model: BodyModel, n_frames: int, fps: float) -> Array:
+def solve_posture(role: Role, model: BodyModel, n_frames: int, fps: float) -> Array:
     """Poses of a role played by a body, (n_frames, n_values)."""
     R_world_place = rigid.so3_exp(np.array([0.0, 0.0, HEADING_RAD]))
     at_twist = model.value_names.index("torso.twist")

@@ -11,7 +11,7 @@ from tracker.geometry.arrays import Array, IntArray
 
 
 @dataclass(frozen=True, eq=False)
-class PartsFigure:
+class ModelFigure:
     """A body model drawn with the shapes and colours of its own parts."""
 
     model: BodyModel

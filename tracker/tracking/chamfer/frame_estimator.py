@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.appearance.part_colors import Colors
-from tracker.body.limbs import Limb
+from tracker.body.limbs import Limb, limb_display_name
 from tracker.body.model import PosedBody
 from tracker.compute.threads import side_by_side
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
@@ -246,7 +246,7 @@ class Scene:
         for limb in due:
             memory.searched(limb, found, turned[limb.dofs].max() > _MOVED_RAD)
             if turned[limb.dofs].max() > _ANEW_RAD:
-                remarks.append(f"{confidence.spoken(limb.name)} searched anew")
+                remarks.append(f"{limb_display_name(limb.name)} searched anew")
         return _Seen(match, poses, better, suspects, None, evaluations, tuple(remarks), tuple(r.values for r in rivals))
 
     def _judged(self, person: int, seen: _Seen) -> Found:
@@ -260,7 +260,7 @@ class Scene:
             return out
         model = self._models[person]
         turned = np.abs([model.difference(rival, seen.fit.values) for rival in seen.rivals]).max(axis=0)
-        names = [confidence.spoken(x.name) for x in confidence.limbs(model) if turned[x.dofs].max() > _ANEW_RAD]
+        names = [limb_display_name(x.name) for x in confidence.limbs(model) if turned[x.dofs].max() > _ANEW_RAD]
         remark = f"{' and '.join(names) or 'body'} may be elsewhere"
         return _in_doubt(out, remark, [self._with(person, rival) for rival in seen.rivals])
 
