@@ -100,7 +100,7 @@ def _track(controller: Controller, _: int, message: Message) -> None:
         "forward": lambda: controller.track(False, last),
         "backward": lambda: controller.track(True, last),
         "pause": controller.pause_tracking,
-        "go_on": controller.go_on_tracking,
+        "resume": controller.go_on_tracking,
         "stop": controller.stop,
     }
     actions[message["action"]]()
@@ -164,7 +164,7 @@ _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "people": _people,
     "track": _track,
     "follow": lambda controller, _, message: controller.follow(bool(message["follow"])),
-    "hold_3d": lambda controller, page, message: controller.hold_3d(page, bool(message["hold"])),
+    "pause_3d": lambda controller, page, message: controller.hold_3d(page, bool(message["pause"])),
     "range": _range,
     "mark": _mark,
     "stop_range": lambda controller, _, __: controller.ranges.halt(),
