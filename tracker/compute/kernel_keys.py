@@ -50,7 +50,7 @@ class KernelKeys:
         """Return the key of the kernel `name` in the module of the dotted name `module`.
 
         Raises:
-            UnknownSourceError: the source cannot be followed (star imports, a name that is made at run time, syntax errors).
+            UnknownSourceError: the source cannot be followed (star imports, syntax errors, missing names).
         """
         if not self._is_own(module) or name not in self._module(module).definitions:
             raise UnknownSourceError(f"{module}.{name}")
