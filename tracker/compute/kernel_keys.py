@@ -125,11 +125,13 @@ class KernelKeys:
                 tree = ast.parse(path.read_bytes())
             except (SyntaxError, ValueError, OSError) as problem:
                 raise UnknownSourceError(name) from problem
-            self._modules[name] = self._read(_Plain().visit(tree), name)
+            self._modules[name] = self._read(tree, name)
         return self._modules[name]
 
     def _read(self, tree: ast.Module, name: str) -> _Module:
-        module = _Module({_REST: []}, {}, tuple(s.name for s in tree.body if _is_kernel(s)))
+        _Plain().visit(tree)
+        kernels = tuple(s.name for s in tree.body if isinstance(s, ast.FunctionDef) and _is_kernel(s))
+        module = _Module({_REST: []}, {}, kernels)
         for statement in tree.body:
             if isinstance(statement, ast.Import | ast.ImportFrom):
                 module.imports.update(self._imported(statement, name))
@@ -161,9 +163,8 @@ class KernelKeys:
             yield alias.asname or alias.name, (source, alias.name)
 
 
-def _is_kernel(statement: ast.stmt) -> bool:
-    decorators = statement.decorator_list if isinstance(statement, ast.FunctionDef) else []
-    return any(isinstance(n, ast.Name) and n.id == "njit" for d in decorators for n in ast.walk(d))
+def _is_kernel(function: ast.FunctionDef) -> bool:
+    return any(isinstance(n, ast.Name) and n.id == "njit" for d in function.decorator_list for n in ast.walk(d))
 
 
 def _assigned(statement: ast.stmt) -> list[str]:
