@@ -23,8 +23,8 @@ from tracker.evidence.view_evidence import (
 )
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
+from tracker.geometry.arrays import FloatArray
 from tracker.geometry.cameras import Camera, Region
-from tracker.geometry.rigid import FloatArray
 from tracker.images import background_subtraction
 from tracker.images.edge_segments import link_edges, sample_segments
 from tracker.images.edges import detect_edges, levels

@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from tracker.body.kinematics import IntArray, Kinematics, Tree, forward_kinematics
-from tracker.body.model import Body, BodyModel, parts_of
+from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
+from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import StaticContours, static_contours_buffer
 from tracker.evidence.view_evidence import ViewEvidence
@@ -37,7 +37,7 @@ from tracker.fitting.contour_kernels import (
 from tracker.fitting.gauss_newton import NormalEquations
 from tracker.fitting.match_points import points_to_match
 from tracker.fitting.twists import twists_to_dofs
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.segment_distance import sort_points, stack_rows
 
 _CAPTURE = 2.0
@@ -90,7 +90,7 @@ class ContourResiduals:
     def __init__(
         self,
         views: Sequence[ViewEvidence],
-        bodies: Sequence[Body],
+        bodies: Sequence[PosedBody],
         person: int = 0,
         settings: MatchSettings | None = None,
         theta_px: float | None = None,

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import IntArray, Kinematics, Tree, forward_kinematics
+from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
 from tracker.body.model import BodyModel
 from tracker.compute.numba_options import BORROW
 from tracker.fitting import gauss_newton
@@ -36,7 +36,7 @@ from tracker.fitting.interpenetration import (
     add_penetration,
 )
 from tracker.fitting.twists import twists_to_dofs
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 
 _KNOWN = (ContourResiduals, PosePrior, SelfPenetration, BodyPenetration)
 
