@@ -33,6 +33,7 @@ ROOMS = [
     "tracker.simulate.motion",
     "tracker.simulate.stage",
     "tracker.simulate",
+    "tracker.pipeline",
     "app",
     "app.runtime",
     "app.state",
