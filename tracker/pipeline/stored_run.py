@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, get_args
 from tracker.errors import SessionError
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.track_session import StoreSink, TrackSession
 from tracker.pipeline.tracked_changes import StoredPerson, keyframes_of, recorded_method, settings_record

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 Keyframes = Mapping[int, Mapping[int, Array]]
 """Poses that a tracker takes as they are, (n_values,), by frame and index of the person."""

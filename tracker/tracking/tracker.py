@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 from tracker.evidence.observer import Observer
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
 from tracker.tracking.subjects import Subjects
 
