@@ -12,7 +12,7 @@ def track(observer, models, start, frames, settings=None, **subjects):
     return ChamferTracker(settings or TrackSettings()).estimates(run)
 
 
-def track_back(observer, models, tracked, settings=None, **subjects):
+def track_back(observer, models, found, settings=None, **subjects):
     """The steps of the second pass; keywords as of `Subjects.of`."""
     run = TrackingRun(observer, Subjects.of(models, **subjects), (), ())
-    return ChamferTracker(settings or TrackSettings()).second_pass(run, tracked)
+    return ChamferTracker(settings or TrackSettings()).second_pass(run, found)

@@ -357,7 +357,7 @@ def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folde
     start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).values
     with Recording(session.cameras) as recording:
         observer = Observer(session.cameras, recording)
-        found = list(track(observer, [model], [start], frames, TrackSettings(), {0: {0: start}}))
+        found = list(track(observer, [model], [start], frames, TrackSettings(), keyframes={0: {0: start}}))
     poses = {f.frame: f.poses[0] for f in found}
     errors = evaluate_joints(joints_of_poses(model, poses, session.fps), reference, frames)
     assert errors.mpjpe_mm < 42
