@@ -138,7 +138,7 @@ if (inSoftware) new SceneRest(scene, store);
 // The panes come first: viser's program is large, and would hold their first pictures up.
 store.onceKnown("shown", () => followScheme(scene));
 
-const connection = new Connection(receiver, inSoftware ? { type: "hold_3d", hold: true } : null);
+const connection = new Connection(receiver, inSoftware ? { type: "pause_3d", pause: true } : null);
 
 Object.assign(window, {
   quadrille: {

@@ -69,7 +69,7 @@ def state(session: Session, state: State) -> dict[str, Any]:
         "person": state.person,
         "point": state.point,
         "people": [
-            {"source": p.source, "status": p.status, "shown": i not in state.cast.hidden, "others": len(p.others)}
+            {"source": p.source, "status": p.status, "shown": i not in state.cast.hidden, "alternatives": len(p.others)}
             for i, p in enumerate(state.people)
         ],
         "solo": state.cast.solo,
@@ -78,7 +78,7 @@ def state(session: Session, state: State) -> dict[str, Any]:
         "source": shown.source,
         "status": shown.status,
         "remark": shown.remark,
-        "parts_px": list(shown.parts_px),
+        "part_costs_px": list(shown.parts_px),
         "dofs": dof_labels.shown(session.people[state.person].model, shown.values),
         "locked": sorted(state.locked[state.person]),
         "other_sizes": state.revisions[state.person] != state.present[state.person],
@@ -134,7 +134,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         parts.append(what | {"first": first, "count": count})
         segments.append(outline.segments_px)
         first += count
-    meeting = pin_marks.meeting(session, state)
+    met = pin_marks.meeting(session, state)
     header = {
         "type": "overlay",
         "frame": state.frame,
@@ -147,7 +147,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         if state.look.replay is None
         else [],
         "pins": [p._asdict() for p in pin_marks.pin_marks(session, state)],
-        "meeting": None if meeting is None else meeting._asdict() | {"marks": [m._asdict() for m in meeting.marks]},
+        "triangulation": None if met is None else met._asdict() | {"marks": [m._asdict() for m in met.marks]},
     }
     return binary(header, np.concatenate(segments).astype("<f4").tobytes() if segments else b"")
 
@@ -207,7 +207,7 @@ def history(entries: Sequence[HistoryEntry], limit: int) -> dict[str, Any]:
 
 def disagreeing(frames: Sequence[int]) -> dict[str, Any]:
     """The frames that disagree with their neighbours, all of them."""
-    return {"type": "disagreeing", "frames": list(frames)}
+    return {"type": "inconsistent", "frames": list(frames)}
 
 
 def curves(

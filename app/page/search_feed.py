@@ -143,7 +143,7 @@ def candidates(session: Session, run: Run) -> bytes:
         "run": run.number,
         "costs_px": [finite_or_none(c.px) for c in run.candidates],
         "points": people,
-        "telling": _most_telling(points),
+        "clearest_view": _clearest_view(points),
     }
     return binary(header, points.astype("<f4").tobytes())
 
@@ -169,7 +169,7 @@ def _run(run: Run, differs: dict[str, str], state: State) -> dict[str, Any]:
     at = max((i for i, c in enumerate(run.counts) if c.expansions), default=-1)
     return {
         "number": run.number,
-        "state": "over" if not is_current else "running" if state.job.running else "stands",
+        "state": "over" if not is_current else "running" if state.job.running else "paused",
         "start_px": finite_or_none(run.start_px),
         "best_px": finite_or_none(run.best_px),
         "evaluations": run.evaluations,
@@ -205,7 +205,7 @@ def _replay(replay: ReplayState | None) -> dict[str, Any] | None:
     }
 
 
-def _most_telling(points: np.ndarray) -> int:
+def _clearest_view(points: np.ndarray) -> int:
     """The view in which candidates, (n, V, N, 2) px, differ most."""
     if len(points) < 2:
         return 0

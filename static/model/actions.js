@@ -59,7 +59,7 @@ export class Actions {
   /** Pause a tracking run that is at work, go on with one that is paused. */
   togglePause() {
     const { state } = this.#store.facts;
-    if (hasTrack(state)) this.#send({ type: "track", action: state?.track.running ? "pause" : "go_on" });
+    if (hasTrack(state)) this.#send({ type: "track", action: state?.track.running ? "pause" : "resume" });
   }
 
   stopTracking() {

@@ -21,10 +21,10 @@
  *   "none"} RangeAction
  * @typedef {{point: number, views: number, marked: boolean, known: boolean, error_px: number | null, ready: boolean,
  *   why: string}} FloorPicking
- * @typedef {{source: string | null, status: Status, shown: boolean, others: number}} PersonState
+ * @typedef {{source: string | null, status: Status, shown: boolean, alternatives: number}} PersonState
  * @typedef {{type: "state", frame: number, person: number, point: string | null, people: PersonState[], solo: boolean,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
- *   parts_px: (number | null)[], dofs: number[], locked: number[], other_sizes: boolean, job: Job, track: Track, range: RangeWork,
+ *   part_costs_px: (number | null)[], dofs: number[], locked: number[], other_sizes: boolean, job: Job, track: Track, range: RangeWork,
  *   replay: {run: number, step: number, steps: number, stage: string | null} | null, follow: boolean, snapped: number | null,
  *   floor: FloorPicking | null, footage: {listed: number | null, error: string | null}, compiling: boolean,
  *   undo: string | null, redo: string | null,
@@ -42,15 +42,15 @@
  *   step_m: number, speed: number | null, leaves: SearchLeaf[]}} SearchSetupMessage
  * @typedef {{person: number, name: string, factor: number, evaluations: number, gain_px: number, done: boolean,
  *   running: boolean}} SearchStage
- * @typedef {{number: number, state: "running" | "stands" | "over", start_px: number | null, best_px: number | null,
+ * @typedef {{number: number, state: "running" | "paused" | "over", start_px: number | null, best_px: number | null,
  *   evaluations: number, seconds: number, steps: number, thinned: number, differs: Record<string, string>,
  *   stages: SearchStage[]}} SearchRun
  * @typedef {{run: number, step: number, stage: string | null, candidate_px: number | null, best_px: number | null,
  *   evaluations: number}} Replay
  * @typedef {{type: "search_runs", runs: SearchRun[], replay: Replay | null, compared: number | null}} SearchRunsMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | SearchSetupMessage |
- *   SearchRunsMessage | DisagreeingMessage} TextMessage
- * @typedef {{type: "disagreeing", frames: number[]}} DisagreeingMessage
+ *   SearchRunsMessage | InconsistentMessage} TextMessage
+ * @typedef {{type: "inconsistent", frames: number[]}} InconsistentMessage
  *
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number,
  *   limit_px: number | null}} ImageHeader
@@ -62,9 +62,9 @@
  * @typedef {{camera: number, person: number, point: string, u: number, v: number, model_u: number | null,
  *   model_v: number | null}} PinMark
  * @typedef {{person: number, point: string, pins: number, error_px: number | null, why: string,
- *   marks: {camera: number, u: number, v: number, error_px: number | null}[]}} Meeting
+ *   marks: {camera: number, u: number, v: number, error_px: number | null}[]}} PinTriangulation
  * @typedef {{type: "overlay", frame: number, seq: number, job: boolean, paths: Path[], outlines: Outline[],
- *   handles: Handle[], pins: PinMark[], meeting: Meeting | null}} OverlayHeader
+ *   handles: Handle[], pins: PinMark[], triangulation: PinTriangulation | null}} OverlayHeader
  * @typedef {OverlayHeader & {segments: Float32Array}} Overlay
  * @typedef {"arms" | "torso" | "legs" | "cost"} CurveGroup
  * @typedef {{title: string, unit: "deg" | "cm" | "px", labels: string[]}} Plot
@@ -72,7 +72,7 @@
  *   plots: Plot[]}} CurvesHeader
  * @typedef {{type: "search_steps", run: number, first: number, count: number}} SearchStepsHeader
  * @typedef {{type: "search_candidates", run: number, costs_px: (number | null)[], points: number[],
- *   telling: number}} SearchCandidatesHeader
+ *   clearest_view: number}} SearchCandidatesHeader
  * @typedef {{type: "landscape", person: number, dof: number, names: string[], unit: "rad" | "m", current: number,
  *   current_px: number | null, count: number}} LandscapeHeader
  * @typedef {ImageHeader | OverlayHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
@@ -84,7 +84,7 @@
  * @typedef {{type: "pose", frame: number, person: number} & (
  *   {action: "set", dof: number, value: number} | {action: "turn", dof: number, by: number} |
  *   {action: "nudge", point: string | null, camera: number, right: number, up: number} |
- *   {action: "mirror" | "other"} | {action: "copy" | "copy_person", from: number} | {action: "reset", point: string | null} |
+ *   {action: "mirror" | "alternative"} | {action: "copy" | "copy_person", from: number} | {action: "reset", point: string | null} |
  *   {action: "lock", dofs: number[], locked: boolean})} PoseEdit
  * @typedef {{type: "seek", frame: number} |
  *   {type: "select", person: number, point: string | null} |
@@ -109,13 +109,13 @@
  *   {type: "unpin", frame: number, person: number, point: string | null, camera: number | null} |
  *   {type: "fit", frame: number, person: number | null} |
  *   {type: "track", action: "forward" | "backward", until: number | null} |
- *   {type: "track", action: "pause" | "go_on" | "stop"} |
+ *   {type: "track", action: "pause" | "resume" | "stop"} |
  *   {type: "range", action: RangeAction, first: number, last: number, person: number | null} |
  *   {type: "stop_range"} |
  *   {type: "mark", toggle: "keyframe" | "reviewed"} |
  *   {type: "follow", follow: boolean} |
  *   {type: "curves", group: CurveGroup | null} |
- *   {type: "hold_3d", hold: boolean} |
+ *   {type: "pause_3d", pause: boolean} |
  *   {type: "snap", camera: number | null} |
  *   {type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "revert"} |
  *   {type: "floor", action: "mark", camera: number, u: number, v: number} |

@@ -54,7 +54,7 @@ export class Receiver {
       case "search_runs":
         this.#store.set(takeRuns(this.#store.facts, message));
         break;
-      case "disagreeing":
+      case "inconsistent":
         this.#store.set({ disagreeing: message.frames });
         break;
       case "history":

@@ -3,7 +3,7 @@
 /**
  * @typedef {{count: number, evaluations: Float32Array, tested: Float32Array, best: Float32Array,
  *   stages: Float32Array}} Steps figures of the recorded steps of a run: poses scored so far, costs in px, index of the stage
- * @typedef {{costs: (number | null)[], telling: number, people: number[], cameras: number,
+ * @typedef {{costs: (number | null)[], clearest_view: number, people: number[], cameras: number,
  *   points: Float32Array}} Candidates costs in px; points are those of each candidate, in each view, u and v
  * @typedef {import("./protocol.js").LandscapeHeader & {values: Float32Array, total: Float32Array,
  *   views: Float32Array[]}} Landscape
@@ -75,11 +75,11 @@ export function mergeSteps(known, { run, first, count }, payload) {
  * @param {import("./protocol.js").SearchCandidatesHeader} header
  * @param {ArrayBuffer} payload
  */
-export function mergeCandidates(known, { run, costs_px, points, telling }, payload) {
+export function mergeCandidates(known, { run, costs_px, points, clearest_view }, payload) {
   const values = new Float32Array(payload);
   const each = 2 * points.reduce((sum, n) => sum + n, 0);
   const cameras = costs_px.length ? values.length / (each * costs_px.length) : 0;
-  return new Map(known).set(run, { costs: costs_px, telling, people: points, cameras, points: values });
+  return new Map(known).set(run, { costs: costs_px, clearest_view, people: points, cameras, points: values });
 }
 
 /**

@@ -137,7 +137,7 @@ function drawPin(context, { x, y, headX, headY }, color, isGrown) {
  * @param {number} paneWidth
  */
 function drawMeeting(context, view, overlay, camera, paneWidth) {
-  const mark = overlay?.meeting?.marks.find((one) => one.camera === camera);
+  const mark = overlay?.triangulation?.marks.find((one) => one.camera === camera);
   if (!mark) return;
   const { x, y } = view.toScreen(mark.u, mark.v);
   const diamond = new Path2D();

@@ -35,16 +35,16 @@ export class FrameCard {
   #show() {
     const { state, session } = this.#store.facts;
     if (!state || !session) return;
-    const { status, remark, parts_px, person, people } = state;
-    this.#other.hidden = !people.some(({ others, shown }) => others > 0 && shown);
-    this.#card.hidden = status === "" && parts_px.length === 0;
+    const { status, remark, part_costs_px, person, people } = state;
+    this.#other.hidden = !people.some(({ alternatives, shown }) => alternatives > 0 && shown);
+    this.#card.hidden = status === "" && part_costs_px.length === 0;
     this.#badge.className = `status-badge is-${status}`;
     this.#badge.textContent = status || "not judged";
     this.#remark.textContent = remark;
     if (this.#card.hidden || !this.#card.open) return;
     const names = session.people[person].parts;
-    const cells = leftBesideRight(names).flatMap((part) => (part === null ? gap() : row(names[part], parts_px[part] ?? null)));
-    this.#parts.replaceChildren(...(parts_px.length ? cells : []));
+    const cells = leftBesideRight(names).flatMap((part) => (part === null ? gap() : row(names[part], part_costs_px[part] ?? null)));
+    this.#parts.replaceChildren(...(part_costs_px.length ? cells : []));
   }
 }
 

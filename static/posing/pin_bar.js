@@ -59,11 +59,11 @@ export class PinBar {
   #figure(joint, ofPerson) {
     const { overlay } = this.#store.facts;
     const all = `${counted(ofPerson)} of this person on this frame`;
-    const meeting = overlay?.meeting;
-    if (!meeting) return ["no pin", `No pin of ${joint}; ${all}`];
-    if (meeting.error_px === null) return [counted(meeting.pins), `${joint}: ${meeting.why}; ${all}`];
-    const error = `${meeting.error_px.toFixed(meeting.error_px < 10 ? 1 : 0)} px`;
-    return [`${counted(meeting.pins)}, ${error}`, `The pins of ${joint} meet with an error of ${error}; ${all}`];
+    const triangulation = overlay?.triangulation;
+    if (!triangulation) return ["no pin", `No pin of ${joint}; ${all}`];
+    if (triangulation.error_px === null) return [counted(triangulation.pins), `${joint}: ${triangulation.why}; ${all}`];
+    const error = `${triangulation.error_px.toFixed(triangulation.error_px < 10 ? 1 : 0)} px`;
+    return [`${counted(triangulation.pins)}, ${error}`, `The pins of ${joint} meet with an error of ${error}; ${all}`];
   }
 }
 

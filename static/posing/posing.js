@@ -159,7 +159,7 @@ export class Posing {
 
   /** Take the other of two poses that are about as good; said again, go back. */
   takeOther() {
-    this.#edit({ ...this.#head(), action: "other" });
+    this.#edit({ ...this.#head(), action: "alternative" });
   }
 
   resetLimb() {

@@ -44,7 +44,7 @@ export class CandidateStrip {
     const n = run ? (found?.costs.length ?? 0) : 0;
     while (this.#list.children.length > n) this.#list.lastElementChild?.remove();
     while (this.#list.children.length < n) this.#list.append(this.#make(this.#list.children.length));
-    const camera = filled ?? found?.telling ?? 0;
+    const camera = filled ?? found?.clearest_view ?? 0;
     const drawn = [found, camera, session, devicePixelRatio, shown?.pictures.get(keyOf("image", camera))?.bitmap];
     if (drawn.every((one, index) => one === this.#drawn[index])) return;
     this.#drawn = drawn;

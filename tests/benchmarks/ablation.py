@@ -1,4 +1,4 @@
-"""What each piece of the tracker is good for: docs/ablation.md, made anew by `python tests/benchmarks/ablation.py`.
+"""What each piece of the tracker is good for: docs/accuracy.md, made anew by `python tests/benchmarks/ablation.py`.
 
 Every variant tracks the same recordings from the pose fitted to the true joints of frame 0: simulated scenes that this
 script makes itself (smooth-skinned people whose bones are not the model's, clutter, noise) and, with `--data DIR`, the
@@ -32,7 +32,7 @@ from tracker.simulate import simulate
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import track_chamfer
 
-OUT = Path(__file__).resolve().parents[2] / "docs" / "ablation.md"
+OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
 DEFAULT = TrackSettings()
 VARIANTS: Mapping[str, TrackSettings] = {
     "as it is": DEFAULT,
@@ -112,7 +112,7 @@ def measure(clip: Clip, settings: TrackSettings) -> tuple[float, int, float]:
 def section(clips: Sequence[Clip], rows: Mapping[str, Sequence[tuple[float, int, float]]]) -> str:
     """The results as Markdown."""
     lines = [
-        "# What each piece of the chamfer tracker is good for",
+        "## What each piece of the chamfer tracker contributes",
         "",
         "Made by `python tests/benchmarks/ablation.py`. Each cell: mean error of the 12 limb joints in mm / lost "
         "frames (a limb joint off by more than 150 mm) / frames per second. Frames: "

@@ -1,6 +1,6 @@
 """What mutual occlusion, joint refinement and the penalty on interpenetration are good for, by how near two people are.
 
-A section of docs/ablation.md, made anew by `python tests/benchmarks/closeness.py`. Every variant tracks the same
+A section of docs/accuracy.md, made anew by `python tests/benchmarks/closeness.py`. Every variant tracks the same
 simulated couples (smooth-skinned people whose bones are not the model's, in a furnished room, with noise) from the
 poses fitted to the true joints of frame 0. Accuracy is the mean error of the 12 limb joints of both; a frame of a
 person is lost when one of them is off by more than 150 mm.
@@ -22,13 +22,13 @@ from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.session.session import Session
 from tracker.simulate import simulate
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import track_chamfer
 
-OUT = Path(__file__).resolve().parents[2] / "docs" / "ablation.md"
+OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
 DEFAULT = TrackSettings()
 UNSEARCHED = replace(DEFAULT, recover=None)
 VARIANTS: Mapping[str, TrackSettings] = {
@@ -115,7 +115,7 @@ def _owner(joints: MarkerTable, references: Sequence[MarkerTable], frame: int) -
 def section(couples: Sequence[Couple], rows: Mapping[str, Sequence[Cell]]) -> str:
     """The results as a section of Markdown."""
     lines = [
-        "# Two people, by how near they are",
+        "## Two people, by their distance",
         "",
         "Made by `python tests/benchmarks/closeness.py`. Each cell: mean error of the 12 limb joints of both in mm / "
         "lost frames of both / frames on which somebody is nearer to the other's joints. Simulated couples, "

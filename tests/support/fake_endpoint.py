@@ -120,10 +120,13 @@ class FakeEndpoint:
         self.state = {
             "type": "state", "frame": 12, "person": 0, "point": None,
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
-            "source": "manual", "status": "", "remark": "", "parts_px": [], "job": self.idle_job(""), "replay": None,
+            "source": "manual", "status": "", "remark": "", "part_costs_px": [], "replay": None,
+            "job": self.idle_job(""),
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "dofs": [1.0, 2.0, 90.0, 30.0], "locked": [], "other_sizes": False, "solo": False,
-            "people": [{"source": "manual", "status": "", "shown": True, "others": 0} for _ in range(self.n_people)],
+            "people": [
+                {"source": "manual", "status": "", "shown": True, "alternatives": 0} for _ in range(self.n_people)
+            ],
             "snapped": None, "floor": None, "footage": {"listed": None, "error": None}, "compiling": False,
             "saved": True, "save_error": None,
         }  # fmt: skip
@@ -146,7 +149,7 @@ class FakeEndpoint:
             async for message in socket:
                 if message.type is WSMsgType.TEXT:
                     told = json.loads(message.data)
-                    kept = {"hold_3d": self.greetings, "view": self.views}.get(told["type"], self.received)
+                    kept = {"pause_3d": self.greetings, "view": self.views}.get(told["type"], self.received)
                     kept.append(told)
                     if told["type"] == "seek":
                         self.seek_times.append(time.monotonic())
@@ -238,7 +241,8 @@ class FakeEndpoint:
         """What the state says of a frame."""
         status = status_of(frame)
         remark = REMARK if status == "doubtful" else ""
-        return {"frame": frame, "status": status, "remark": remark, "parts_px": [0.8, 4.5, 1.5, 1.2, 2.5, None, 0.9]}
+        parts = [0.8, 4.5, 1.5, 1.2, 2.5, None, 0.9]
+        return {"frame": frame, "status": status, "remark": remark, "part_costs_px": parts}
 
     async def track(self, action, until):
         if self.track_task:
@@ -256,7 +260,7 @@ class FakeEndpoint:
         elif action == "stop":
             track |= NO_TRACK | {"message": f"stopped: {track['done']} frames"}
         else:
-            track["running"] = action == "go_on"
+            track["running"] = action == "resume"
         if track["running"]:
             self.track_task = asyncio.create_task(self.run_track())
         await self.broadcast(self.state)
@@ -354,7 +358,7 @@ class FakeEndpoint:
         for person in (None, *(range(self.n_people) if self.n_people > 1 else ())):
             told = {"type": "timeline", "person": person, "cells": cells, "replace": True}
             await socket.send_str(json.dumps(told))
-        await socket.send_str(json.dumps({"type": "disagreeing", "frames": DISAGREEING}))
+        await socket.send_str(json.dumps({"type": "inconsistent", "frames": DISAGREEING}))
         if self.views:
             await self.send_frame([socket])
 
@@ -420,7 +424,7 @@ class FakeEndpoint:
                 add(camera, 0, "epipolar", "#ff5d8f", np.array([[0, v, WIDTH - 1, v]]))
         header = {
             "type": "overlay", "frame": self.state["frame"], "seq": self.seq, "job": candidate is not None,
-            "paths": paths, "outlines": [], "handles": handles, "pins": [], "meeting": None,
+            "paths": paths, "outlines": [], "handles": handles, "pins": [], "triangulation": None,
         }  # fmt: skip
         await self.send_binary(header, np.concatenate(segments).astype("<f4").tobytes(), sockets)
 

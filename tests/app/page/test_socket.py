@@ -30,7 +30,7 @@ async def test_a_page_is_told_all_when_it_connects(controller):
         session = await page.hear("session")
         assert session["people"][0]["parts"][0] == "torso"
         state = await page.hear("state")
-        assert (state["frame"], state["source"], state["status"], state["parts_px"]) == (2, "manual", "", [])
+        assert (state["frame"], state["source"], state["status"], state["part_costs_px"]) == (2, "manual", "", [])
         assert state["track"]["first"] is None
         assert state["follow"]
         timeline = await page.hear("timeline")
@@ -47,7 +47,7 @@ async def test_a_run_is_watched_frame_by_frame(controller, tracker):
         tracker.let_go(2)
         state = await page.hear("state", lambda m: m["frame"] == 4)
         assert (state["status"], state["remark"]) == ("doubtful", "left arm searched anew")
-        assert state["parts_px"] == [0.5] * 9 + [None]
+        assert state["part_costs_px"] == [0.5] * 9 + [None]
         assert state["view_costs_px"] == [1.0, None, 2.0, 3.0]
         await page.hear("overlay", lambda m: m["frame"] == 4)
         for camera in range(4):
@@ -92,7 +92,7 @@ async def test_pause_go_on_follow_and_stop(controller, tracker):
         await page.send("track", action="pause")
         state = await page.hear("state", lambda m: not m["track"]["running"])
         assert state["track"]["first"] == 3
-        await page.send("track", action="go_on")
+        await page.send("track", action="resume")
         await page.hear("state", lambda m: m["track"]["running"])
         await page.send("track", action="stop")
         await page.hear("state", lambda m: m["track"]["message"].startswith("stopped"))
@@ -201,7 +201,7 @@ def kinds(message):
 
 async def test_a_range_is_worked_on_and_told(controller):
     async with visiting(controller) as page:
-        await page.hear("disagreeing", lambda m: m["frames"] == [])
+        await page.hear("inconsistent", lambda m: m["frames"] == [])
         await page.send("seek", frame=6)
         await page.send("mark", toggle="keyframe")
         await page.hear("timeline", lambda m: m["cells"].get("6", {}).get("keyframe"))

@@ -78,7 +78,7 @@ async def test_a_run_is_watched_paused_looked_at_and_taken_back(live):
     assert 0 < np.hypot(*np.subtract(after, before)) < 12 * (at - START)  # it follows the arm
     state = (await state_of(live))["state"]
     assert state["status"] in ("good", "doubtful", "lost")
-    assert len(state["parts_px"]) == 10
+    assert len(state["part_costs_px"]) == 10
 
     # All of it is in the timeline and in the curves, and a click on a curve leads there.
     await shows(live, f"Number.isFinite(quadrille.state.curves.series[0].values[{at}])", 20)

@@ -19,7 +19,7 @@ SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 FRAME = 0
 FRONT, RIGHT, BACK, LEFT = range(4)
 PINS = "quadrille.state.overlay.pins"
-MEETING = "quadrille.state.overlay.meeting"
+MEETING = "quadrille.state.overlay.triangulation"
 
 
 class Truth:

@@ -78,7 +78,7 @@ async def test_a_search_goes_stage_by_stage_and_the_tree_marks_where_it_is(page)
     assert [s["evaluations"] > 0 for s in stages] == [True] + [False] * (len(stages) - 1)
     assert await passes.first.inner_text() == f"{stages[0]['evaluations']} · −{stages[0]['gain_px']:.2f}"
     await page.keyboard.press("s")
-    await shows(page, f"{RUNS}[0].stages[1].evaluations > 0 && {RUNS}[0].state === 'stands'", 30)
+    await shows(page, f"{RUNS}[0].stages[1].evaluations > 0 && {RUNS}[0].state === 'paused'", 30)
     # The stage at work is marked, as long as it takes; a speed that is chosen counts at once.
     await page.get_by_label("Expansions a second").select_option("1")
     await shows(page, "quadrille.state.searchSetup.speed === 1")

@@ -109,7 +109,7 @@ async def test_keys_work_while_the_scene_has_the_focus_except_those_of_its_camer
 
 async def test_a_page_without_a_graphics_card_asks_the_3d_view_to_wait(page, endpoint):
     """Headless Chromium draws WebGL in software (chromium.FLAGS)."""
-    await until(lambda: endpoint.greetings == [{"type": "hold_3d", "hold": True}])
+    await until(lambda: endpoint.greetings == [{"type": "pause_3d", "pause": True}])
 
 
 async def test_vectors_wait_for_the_images_of_their_own_frame(page, endpoint):

@@ -79,8 +79,8 @@ async def test_each_has_a_lane_and_two_poses_as_good_are_gone_to(couple, endpoin
     await couple.keyboard.press("Alt+a")
     await shows(couple, "quadrille.state.state.frame === 71")
     assert not await couple.locator("#take-other").is_visible()
-    endpoint.state["people"][1]["others"] = 1
+    endpoint.state["people"][1]["alternatives"] = 1
     await endpoint.broadcast(endpoint.state)
     await couple.locator("#take-other").click()
     await couple.keyboard.press("Shift+X")
-    await until(lambda: [m["action"] for m in endpoint.heard("pose")] == ["other", "other"])
+    await until(lambda: [m["action"] for m in endpoint.heard("pose")] == ["alternative", "alternative"])

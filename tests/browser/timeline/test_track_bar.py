@@ -52,7 +52,7 @@ async def test_a_run_is_watched_paused_and_stopped(page, endpoint):
     await page.locator("#track-stop").click()
     await shows(page, "quadrille.state.state.track.first === null")
     assert (await page.locator("#search-stage").inner_text()).startswith("Stopped: ")
-    assert [m["action"] for m in endpoint.heard("track")] == ["forward", "pause", "go_on", "stop"]
+    assert [m["action"] for m in endpoint.heard("track")] == ["forward", "pause", "resume", "stop"]
     assert endpoint.heard("track")[0]["until"] is None
     assert not endpoint.heard("seek")  # following asks for nothing
     seen = (await state_of(page))["timeline"]
