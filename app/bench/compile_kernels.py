@@ -13,12 +13,12 @@ from dataclasses import replace
 from app.bench.sample_frames import FRAME, read_crowd
 from app.session.samples import bundled
 from tracker.body.model import BodyModel
-from tracker.compute.kernel_cache import compiled_mark
+from tracker.compute.kernel_cache import compiled_mark, record_compiled
 from tracker.errors import SessionError
 from tracker.evidence.observer import Observer
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.session.lock import SessionLock
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import track_chamfer
@@ -38,7 +38,7 @@ def main() -> None:
             with SessionLock(mark.parent):
                 if not mark.exists():  # now that whoever held the lock is done
                     _call_kernels()
-                    mark.touch()
+                    record_compiled()
         except SessionError:
             time.sleep(_WAIT_S)
 
