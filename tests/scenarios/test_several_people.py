@@ -58,7 +58,8 @@ def test_people_are_refined_again_only_where_others_moved(monkeypatch, off_m, so
     expected = values.copy()
     expected[1, 0] += off_m
     monkeypatch.setattr(
-        "tracker.tracking.chamfer.frame_estimator.solve", lambda *a, **k: done.append(a) or solve(*a, **k)
+        "tracker.tracking.chamfer.frame_estimator.solve_compiled",
+        lambda *a, **k: done.append(a) or solve_compiled(*a, **k),
     )
     scene = Scene(
         views, [Memory(ball, v, alone=False) for v in expected], expected, TrackSettings(recover=None, rounds=5)
