@@ -8,7 +8,7 @@ from staging import at, cameras_around, filmed, own_evidence, posed, solid
 from tracking_runs import track
 
 from tracker.body.model import PosedBody
-from tracker.fitting.gauss_newton import solve
+from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.motion.prediction import PredictSettings
 from tracker.tracking.chamfer.frame_estimator import Scene
 from tracker.tracking.chamfer.limb_recovery import search_limbs
