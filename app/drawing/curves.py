@@ -1,7 +1,7 @@
 """Poses and costs as curves against the frame, in the units that people read (GD96 Fig. 8)."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -9,7 +9,8 @@ from tracker.body.model import BodyModel
 from tracker.geometry.rigid import Array, FloatArray
 from tracker.store.records import FrameNumbers
 
-GROUPS = ("arms", "torso", "legs", "cost")
+CurveGroup = Literal["arms", "torso", "legs", "cost"]
+GROUPS: tuple[CurveGroup, ...] = get_args(CurveGroup)
 
 # What the joints of limbs are called; all other joints belong to the trunk.
 _LIMBS = {

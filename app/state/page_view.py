@@ -4,19 +4,30 @@ The choice of layers belongs to whoever looks, not to the session: two windows o
 So it is no part of the `State`; a page says it when it connects and whenever it changes (docs/protocol.md).
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 Picture = Literal["image", "silhouette", "distance", "parts"]
 PICTURES: tuple[Picture, ...] = get_args(Picture)
 """Layers that are sent as pictures."""
-VECTORS = ("accepted", "rejected", "contours", "hidden", "part_edges", "skeleton", "joints", "epipolar")
-"""Layers that are sent as line segments and joints."""
-LAYERS = (*PICTURES, *VECTORS)
+Layer = Literal[
+    "image",
+    "silhouette",
+    "distance",
+    "parts",
+    "accepted",
+    "rejected",
+    "contours",
+    "hidden",
+    "part_edges",
+    "skeleton",
+    "joints",
+    "epipolar",
+]
+LAYERS: tuple[Layer, ...] = get_args(Layer)
+"""Every layer: pictures, then those that are sent as line segments and joints."""
 EVIDENCE = frozenset(("silhouette", "distance", "accepted", "rejected"))
 """Layers that need the evidence of the frame."""
-_MOST_REDUCED = 64
 
 
 @dataclass(frozen=True)
@@ -39,21 +50,3 @@ class View:
     def pictures(self) -> tuple[Picture, ...]:
         """The layers shown that are pictures."""
         return tuple(name for name in PICTURES if name in self.layers)
-
-
-def view_of(message: Mapping[str, Any], n_cameras: int) -> View:
-    """Read a `view` message.
-
-    Args:
-        message: as it came.
-        n_cameras: of the session.
-
-    Raises:
-        KeyError, TypeError, ValueError: the message is not understood.
-    """
-    layers, reductions = frozenset(message["layers"]), tuple(float(r) for r in message["reductions"])
-    if not layers.issubset(LAYERS):
-        raise ValueError(f"no layers are called {', '.join(sorted(map(str, layers.difference(LAYERS))))}")
-    if len(reductions) != n_cameras or not all(r == 0 or 1 <= r <= _MOST_REDUCED for r in reductions):
-        raise ValueError(f"expected 0 or a reduction from 1 to {_MOST_REDUCED} for each of {n_cameras} cameras")
-    return View(layers, reductions, bool(message["by_part"]))
