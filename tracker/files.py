@@ -9,7 +9,7 @@ from typing import Any
 from tracker.errors import TrackerError
 
 
-def write_text_whole(path: Path, text: str) -> None:
+def write_text_atomic(path: Path, text: str) -> None:
     """Write UTF-8 text to a temporary sibling, then rename it onto `path`: a crash leaves the old file or the new.
 
     Raises:

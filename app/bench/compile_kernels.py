@@ -18,7 +18,7 @@ from tracker.errors import SessionError
 from tracker.evidence.observer import Observer
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.session.lock import SessionLock
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import track_chamfer

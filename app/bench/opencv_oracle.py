@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 SAMPLE_PX = 4.0
 _RINGS, _SECTORS = 12, 16

@@ -22,7 +22,7 @@ from app.bench.rows import Row, Yardstick
 from app.bench.sample_frames import FRAME, read_crowd, read_frame
 from app.session.samples import sample_copy
 from tracker.errors import TrackerError
-from tracker.files import write_text_whole
+from tracker.files import write_text_atomic
 from tracker.simulate import simulate
 
 BASELINE = Path(__file__).with_name("baseline.json")
@@ -77,7 +77,7 @@ def read_baseline(path: Path = BASELINE) -> dict[str, Any]:
 def save_baseline(rows: list[Row], path: Path, tolerance: float) -> None:
     """Keep the ratios of rows as a baseline."""
     ratios = {r.name: round(r.ratio, 5) for r in rows}
-    write_text_whole(path, json.dumps({"tolerance": tolerance, "ratios": ratios}, indent=2) + "\n")
+    write_text_atomic(path, json.dumps({"tolerance": tolerance, "ratios": ratios}, indent=2) + "\n")
 
 
 def report(rows: list[Row], baseline: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from app.bench.opencv_oracle import PaintedCost
 from app.bench.sample_frames import BenchCrowd, BenchFrame, pose_at
-from tracker.body.model import Body, BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.observer import Observer
 from tracker.fitting.contour_residuals import ContourMatch
@@ -20,7 +20,7 @@ from tracker.fitting.gauss_newton import Block, Fit, StayNear, damped_step
 from tracker.fitting.gauss_newton_compiled import solve
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings, search
 from tracker.search.chamfer_cost import ChamferCost
 from tracker.session.session import Session
@@ -155,7 +155,7 @@ def _searched_and_refined(frame: BenchFrame, start: Array) -> Fit:
 def _refined(frame: BenchFrame, start: Array, predicted: Array) -> Fit:
     """Refine as the tracker does; see `tracker.tracking.chamfer.frame_estimator`."""
     model = frame.model
-    match = ContourMatch(frame.views, [Body(model, start)])
+    match = ContourMatch(frame.views, [PosedBody(model, start)])
     sigma = np.where(model.dof_is_length, _SETTINGS.trust_m, _SETTINGS.trust_rad)
     blocks: list[Block] = [match, StayNear(predicted, 1 / sigma)]
     return solve(model, start, blocks, max_iterations=15, tolerance=1e-3)
@@ -172,7 +172,7 @@ def iterations(cones: BenchFrame, six: BenchFrame, yardstick: Yardstick) -> Iter
     """One iteration of the symmetric Gauss-Newton: as the tracker runs it, step by step, and by a numeric Jacobian."""
     for name, of, must, aim in (("4", cones, 12, 18), ("6", six, 8, 12)):
         start = of.near_prediction()
-        match = ContourMatch(of.views, [Body(of.model, start)])
+        match = ContourMatch(of.views, [PosedBody(of.model, start)])
         steps = np.random.default_rng(3).normal(scale=0.005, size=(50, of.model.n_dofs))
         poses = [of.model.retract(start, step) for step in steps]
         # What a descent takes besides its iterations drops out of the difference between long ones and short ones.
@@ -207,7 +207,7 @@ def _edge_distances(cost: ChamferCost, frame: BenchFrame, values: Array) -> list
     """Distance of each edge point to the nearest visible piece of contour, cut off, (n,) for each view, px."""
     out: list[Array] = []
     for view, scene in zip(frame.views, cost.scene_px, strict=True):
-        contour = occluding_contours.trace([Body(frame.model, values)], view.camera)
+        contour = occluding_contours.trace([PosedBody(frame.model, values)], view.camera)
         pieces = contour.pieces_px[~contour.hidden]
         middles = 0.5 * (pieces[:, :2] + pieces[:, 2:])
         squared = np.sum((scene[:, None] - middles) ** 2, axis=-1).min(axis=1)
@@ -275,7 +275,7 @@ def _pipeline(
             next(tracked)  # opening the videos is not part of going on
             start = time.perf_counter()
             for found in islice(tracked, n - 1):
-                bodies = [Body(m, p) for m, p in zip(models, found.poses, strict=True)]
+                bodies = [PosedBody(m, p) for m, p in zip(models, found.poses, strict=True)]
                 for camera in observer.matched_cameras:
                     occluding_contours.trace(bodies, camera)
             spent.append(time.perf_counter() - start)

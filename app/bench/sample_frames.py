@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tracker.body.model import Body, BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
@@ -13,7 +13,7 @@ from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.search.chamfer_cost import ChamferCost
 from tracker.session.session import Session, load_session
 
@@ -41,7 +41,7 @@ class BenchFrame:
 
     def cost(self, predicted: Array | None = None, threads: int = 2) -> ChamferCost:
         """The cost around a prediction, the fitted pose by default."""
-        body = Body(self.model, self.values if predicted is None else predicted)
+        body = PosedBody(self.model, self.values if predicted is None else predicted)
         return ChamferCost(self.views, [body], threads=threads)
 
     def candidates(self, n: int) -> Array:
@@ -81,7 +81,7 @@ class BenchCrowd:
 
     def cost(self, n: int) -> ChamferCost:
         """The cost of the first few people around their fitted poses, on one thread."""
-        bodies = [Body(m, v) for m, v in zip(self.models[:n], self.values[:n], strict=True)]
+        bodies = [PosedBody(m, v) for m, v in zip(self.models[:n], self.values[:n], strict=True)]
         return ChamferCost(self.views, bodies, threads=1)
 
     def candidates(self, n: int) -> Array:

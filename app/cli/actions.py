@@ -18,7 +18,7 @@ from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import PoseTable
 from tracker.formats.trc import MarkerTable
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.session.lock import SessionLock
 from tracker.session.session import Person, Session, load_session, save_session
 from tracker.store.annotation_store import AnnotationStore

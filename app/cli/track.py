@@ -17,7 +17,7 @@ from tracker.errors import SessionError
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import format_model
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.session.lock import SessionLock
 from tracker.session.locked_dofs import free_of, kept_locks
 from tracker.session.session import Person

@@ -35,7 +35,7 @@ from app.session.frame_cache import Frames
 from app.state.state import State
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.session.session import Session
 from tracker.store.records import FrameNumbers
 from tracker.tracking.chamfer.settings import TrackSettings

@@ -3,9 +3,8 @@
 import cv2
 import numpy as np
 
+from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
-from tracker.images.background_subtraction import Image
 
 _AROUND = (24, 26, 29)
 """Colour of the canvas where the image does not reach, RGB."""

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.store.records import FrameNumbers
 
 CurveGroup = Literal["arms", "torso", "legs", "cost"]

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.limbs import spoken
+from tracker.body.limbs import limb_display_name
 from tracker.body.model import BodyModel
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.posing.edits import joint_of, limb_of
 
 
@@ -41,7 +41,9 @@ def described(model: BodyModel) -> dict[str, Any]:
             for i, name in enumerate(model.dof_names)
         ],
         "point_dofs": {p: _indices(dofs) for p, dofs in of_points.items()},
-        "point_limbs": {p: {"name": spoken(name), "dofs": _indices(dofs)} for p, (name, dofs) in limbs.items()},
+        "point_limbs": {
+            p: {"name": limb_display_name(name), "dofs": _indices(dofs)} for p, (name, dofs) in limbs.items()
+        },
     }
 
 

@@ -5,9 +5,9 @@ import numpy as np
 from app.drawing.overlays import EPIPOLAR_COLOR, Path
 from app.state.floor_picking import Picking
 from app.state.state import State
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera, epipolar_segment
-from tracker.geometry.ground_plane import Floor, up_rotation
-from tracker.geometry.rigid import Array
+from tracker.geometry.ground_plane import GroundPlane, up_rotation
 from tracker.session.session import Session
 
 FLOOR_COLOR = "#7ee08a"
@@ -42,7 +42,7 @@ def _middle(picking: Picking) -> Array:
     return np.mean([p.point_world for p in picking.picks if p.point_world is not None], axis=0)
 
 
-def _grid(plane: Floor, R: Array, middle: Array) -> Array:
+def _grid(plane: GroundPlane, R: Array, middle: Array) -> Array:
     """Pieces of the lines of a square grid in a plane, (N, 2, 3), metres."""
     along = np.arange(-_HALF_WIDTH_M, _HALF_WIDTH_M + 1e-9, _PIECE_M)
     across = np.arange(-_HALF_WIDTH_M, _HALF_WIDTH_M + 1e-9, _STEP_M)

@@ -7,13 +7,13 @@ import numpy as np
 
 from app.state.page_view import View
 from app.state.state import State
-from tracker.body.model import Body, BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.contours import occluding_contours, part_edges
 from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera, epipolar_segment
-from tracker.geometry.rigid import Array, FloatArray
 from tracker.images.background_subtraction import Mask
 from tracker.images.edge_segments import accept
 from tracker.posing.retarget import rebodied
@@ -80,7 +80,7 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         views: the evidence of the shown frame; without it there are no segments of edges to draw.
     """
     state = state.drawn
-    bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
+    bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
     tried = state.job.candidate if state.job.running or state.look.replay is not None else None
     drafted, others = _with_draft(state, bodies), _others(state, bodies)
@@ -110,7 +110,7 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
 
 def handles(session: Session, state: State, cameras: Collection[int]) -> list[Handle]:
     """The joints of everybody shown, in some views, given by index; those behind a camera are left out."""
-    bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
+    bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     points = [b.points_world for b in bodies]
     seen = {index: session.cameras[index].camera.pinhole for index in sorted(cameras)}
     out, hidden_by_view = [], part_edges.points_hidden(bodies, list(seen.values()), np.concatenate(points))
@@ -131,11 +131,11 @@ def part_colors(people: Sequence[Person]) -> list[str]:
     return [part.color for person in people for part in person.model.parts]
 
 
-def _traced(bodies: Sequence[Body], camera: Camera) -> Contour:
+def _traced(bodies: Sequence[PosedBody], camera: Camera) -> Contour:
     return occluding_contours.trace(bodies, camera, occluding_contours.PIECE_PX * max(1.0, max(camera.size) / 640))
 
 
-def _model(session: Session, bodies: Sequence[Body], camera: Camera, index: int, view: View) -> list[Path]:
+def _model(session: Session, bodies: Sequence[PosedBody], camera: Camera, index: int, view: View) -> list[Path]:
     """The contours of the poses shown: what one sees of them, and what parts hide."""
     contour = _traced(bodies, camera)
     out = []
@@ -151,28 +151,28 @@ def _outlined(
     session: Session, poses: Sequence[Array], camera: Camera, index: int, kind: str, color: str
 ) -> list[Path]:
     """What one would see of other poses of everybody, all in one colour."""
-    bodies = [Body(p.model, v) for p, v in zip(session.people, poses, strict=True)]
+    bodies = [PosedBody(p.model, v) for p, v in zip(session.people, poses, strict=True)]
     contour = _traced(bodies, camera)
     return _by_person(bodies, contour, ~contour.hidden, index, kind, [color] * len(bodies))
 
 
-def _with_draft(state: State, bodies: Sequence[Body]) -> list[Body]:
+def _with_draft(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
     """Everybody in the poses shown, the person whose sizes are being edited in the draft's body."""
     people, draft = list(bodies), state.draft
     if draft is not None:
         shown = people[draft.person]
-        people[draft.person] = Body(draft.model, rebodied(shown.values, shown.model, draft.model))
+        people[draft.person] = PosedBody(draft.model, rebodied(shown.values, shown.model, draft.model))
     return people
 
 
-def _others(state: State, bodies: Sequence[Body]) -> list[Body]:
+def _others(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
     """Everybody in the poses shown, but for those of whom another is about as good: in the best of these."""
     if not any(shown.others for shown in state.people):
         return []
-    return [Body(b.model, s.others[0]) if s.others else b for b, s in zip(bodies, state.people, strict=True)]
+    return [PosedBody(b.model, s.others[0]) if s.others else b for b, s in zip(bodies, state.people, strict=True)]
 
 
-def _ghosts(chosen: Collection[int], people: Sequence[Body], camera: Camera, index: int, color: str) -> list[Path]:
+def _ghosts(chosen: Collection[int], people: Sequence[PosedBody], camera: Camera, index: int, color: str) -> list[Path]:
     """What one would see of some of the people, given by index, if everybody stood so."""
     contour = _traced(people, camera)
     found = _by_person(people, contour, ~contour.hidden, index, "ghost", [color] * len(people))
@@ -180,7 +180,7 @@ def _ghosts(chosen: Collection[int], people: Sequence[Body], camera: Camera, ind
 
 
 def _by_person(
-    bodies: Sequence[Body], contour: Contour, those: Mask, index: int, kind: str, colors: Sequence[str]
+    bodies: Sequence[PosedBody], contour: Contour, those: Mask, index: int, kind: str, colors: Sequence[str]
 ) -> list[Path]:
     """Those pieces of a contour, one path for each person."""
     people = occluding_contours.surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
@@ -191,7 +191,7 @@ def _by_person(
 
 
 def _by_part(
-    session: Session, bodies: Sequence[Body], contour: Contour, those: Mask, index: int, kind: str
+    session: Session, bodies: Sequence[PosedBody], contour: Contour, those: Mask, index: int, kind: str
 ) -> list[Path]:
     """Those pieces of a contour, one path for each part that has any."""
     people, colors = occluding_contours.surfaces_of(tuple(b.model for b in bodies)).people, part_colors(session.people)
@@ -201,7 +201,7 @@ def _by_part(
     ]
 
 
-def _segments(bodies: Sequence[Body], view: ViewEvidence, index: int, shown: View) -> list[Path]:
+def _segments(bodies: Sequence[PosedBody], view: ViewEvidence, index: int, shown: View) -> list[Path]:
     """The segments of edges that the poses shown explain, and those that they do not (GD96 Fig. 6)."""
     if shown.layers.isdisjoint(("accepted", "rejected")):
         return []

@@ -6,8 +6,8 @@ import numpy as np
 
 from app.state.page_view import View
 from app.state.state import State
-from tracker.body.model import Body
-from tracker.geometry.rigid import FloatArray
+from tracker.body.model import PosedBody
+from tracker.geometry.arrays import FloatArray
 from tracker.posing import picking
 from tracker.session.session import Session
 
@@ -33,7 +33,7 @@ def outlines(session: Session, state: State, view: View) -> list[Outline]:
     drag = state.drag
     if "joints" not in view.layers or state.look.replay is not None or (drag is not None and not drag.by_surface):
         return []
-    bodies = [Body(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
+    bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
     seen = sorted(view.cameras)
     found = picking.part_outlines(bodies, [session.cameras[index].camera.pinhole for index in seen])

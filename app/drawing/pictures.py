@@ -8,11 +8,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours.label_image import part_labels
 from tracker.evidence.view_evidence import ViewEvidence
+from tracker.geometry.arrays import Image
 from tracker.geometry.cameras import Camera
-from tracker.images.background_subtraction import Image, Mask
+from tracker.images.background_subtraction import Mask
 
 SILHOUETTE_COLOR = "#4ae08c"
 _JPEG_QUALITY = 85
@@ -59,7 +60,7 @@ def labels(parts: NDArray[np.uint8], colors: Sequence[str]) -> bytes:
     return _png(parts, parts.shape[1], 8, colors)
 
 
-def parts(bodies: Sequence[Body], camera: Camera, colors: Sequence[str], reduction: float) -> bytes:
+def parts(bodies: Sequence[PosedBody], camera: Camera, colors: Sequence[str], reduction: float) -> bytes:
     """What the parts of the bodies cover, each in its colour, as PNG.
 
     Args:

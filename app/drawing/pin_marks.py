@@ -8,7 +8,7 @@ from app.drawing.overlays import EPIPOLAR_COLOR, Path
 from app.state.page_view import View
 from app.state.state import State, finite_or_none
 from tracker.geometry.cameras import epipolar_segment
-from tracker.geometry.triangulation import ViewPin, triangulate
+from tracker.geometry.triangulation import PointObservation, triangulate
 from tracker.session.session import Session
 
 
@@ -56,10 +56,10 @@ def pin_marks(session: Session, state: State) -> list[PinMark]:
         if not pins or person in state.cast.hidden:
             continue
         points = info.model.points_world(state.poses[person])
-        for point, camera, place_px in pins:
+        for point, camera, position_px in pins:
             view = session.cameras[camera].camera.pinhole
             u, v = view.project(points[info.model.point_names.index(point)])
-            out.append(PinMark(camera, person, point, *place_px, finite_or_none(u), finite_or_none(v)))
+            out.append(PinMark(camera, person, point, *position_px, finite_or_none(u), finite_or_none(v)))
     return out
 
 
@@ -69,7 +69,7 @@ def meeting(session: Session, state: State) -> Meeting | None:
     if not pins or state.point is None:
         return None
     views = [c.camera.pinhole for c in session.cameras]
-    found = triangulate([views[p.camera] for p in pins], np.array([p.place_px for p in pins]))
+    found = triangulate([views[p.camera] for p in pins], np.array([p.position_px for p in pins]))
     if found.point_world is None:
         return Meeting(state.person, state.point, len(pins), None, found.why, ())
     errors = dict(zip((p.camera for p in pins), found.errors_px.tolist(), strict=True))
@@ -87,19 +87,19 @@ def pin_lines(session: Session, state: State, view: View) -> list[Path]:
     out: list[Path] = []
     if "epipolar" not in view.layers:
         return out
-    for _, camera, place_px in _of_joint(state):
+    for _, camera, position_px in _of_joint(state):
         source = session.cameras[camera].camera.pinhole
         for index, target in enumerate(session.cameras):
             segment = None
             if index != camera and index in view.cameras:
-                segment = epipolar_segment(source, target.camera.pinhole, np.array(place_px))
+                segment = epipolar_segment(source, target.camera.pinhole, np.array(position_px))
             if segment is not None:
                 row = segment.reshape(1, 4).astype(np.float32)
                 out.append(Path(index, state.person, "epipolar", EPIPOLAR_COLOR, row))
     return out
 
 
-def _of_joint(state: State) -> list[ViewPin]:
+def _of_joint(state: State) -> list[PointObservation]:
     """The pins of the joint worked on; none of a person who is not shown."""
     if not state.pins or state.person in state.cast.hidden:
         return []

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from tracker.body.model import BodyModel
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.motion.prediction import PredictSettings, predict
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 _MOST_GAP = 5
 """Poses more frames apart are not joined: nobody knows what lies between."""

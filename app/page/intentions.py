@@ -49,14 +49,14 @@ def _drag(controller: Controller, page: int, message: Message) -> None:
 
 
 def _pin(controller: Controller, page: int, message: Message) -> None:
-    pinning, phase, place_px = controller.pinning, message["phase"], _place(message)
+    pinning, phase, position_px = controller.pinning, message["phase"], _place(message)
     if phase == "start":
         camera, person, frame = int(message["camera"]), int(message["person"]), int(message["frame"])
-        pinning.begin(page, frame, camera, person, message["point"], place_px, bool(message["live"]))
+        pinning.begin(page, frame, camera, person, message["point"], position_px, bool(message["live"]))
     elif phase == "cancel":
         pinning.cancel(page)
     else:
-        pinning.move(page, place_px)
+        pinning.move(page, position_px)
     if phase == "end":
         pinning.end(page)
 
@@ -88,10 +88,10 @@ def _person(controller: Controller, message: Message) -> int:
 
 def _place(message: Message) -> tuple[float, float]:
     """Where the pointer is, undistorted px."""
-    place_px = float(message["u"]), float(message["v"])
-    if not np.all(np.isfinite(place_px)):
+    position_px = float(message["u"]), float(message["v"])
+    if not np.all(np.isfinite(position_px)):
         raise ValueError("a position that is not a number")
-    return place_px
+    return position_px
 
 
 def _track(controller: Controller, _: int, message: Message) -> None:

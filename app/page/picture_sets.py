@@ -8,7 +8,7 @@ from app.drawing import overlays, pictures
 from app.page import messages
 from app.state.page_view import EVIDENCE, Picture, View
 from app.state.state import State
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 
 Key = tuple[Picture, int]
 """Layer and camera."""
@@ -68,7 +68,7 @@ class PictureSets:
             return frames.image(state.frame, camera, reduction), None
         if layer == "parts":
             shown = [i for i in range(len(session.people)) if i not in state.cast.hidden]
-            bodies = [Body(session.people[i].model, state.drawn.poses[i]) for i in shown]
+            bodies = [PosedBody(session.people[i].model, state.drawn.poses[i]) for i in shown]
             colors = overlays.part_colors([session.people[i] for i in shown])
             return pictures.parts(bodies, session.cameras[camera].camera.pinhole, colors, reduction), None
         evidence = frames.evidence(state.frame)[camera]

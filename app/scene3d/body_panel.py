@@ -10,7 +10,8 @@ import viser
 
 from app.control.controller import Controller
 from app.state.state import State
-from tracker.body.dimensions import PartSizes, sizes_of, spoken, twin
+from tracker.body.dimensions import PartDimensions, mirror_part, sizes_of
+from tracker.body.limbs import display_name
 from tracker.errors import TrackerError
 
 _REFIT, _KEEP = "refit keyframes", "keep poses"
@@ -54,9 +55,9 @@ class BodyPanel:
         _put(controls.alike, state.sides_alike)
         for name, row in controls.parts.items():
             _put(row, _row(sizes.parts[name]))
-            other = twin(name)
+            other = mirror_part(name)
             row.visible = not (state.sides_alike and other in controls.parts and name.startswith("right_"))
-            row.label = spoken(name.removeprefix("left_") if state.sides_alike else name)
+            row.label = display_name(name.removeprefix("left_") if state.sides_alike else name)
         for name, number in controls.widths.items():
             _put(number, _cm(sizes.widths_m[name]))
         controls.discard.disabled = not drafted
@@ -78,9 +79,9 @@ class BodyPanel:
             gui.add_markdown(_HEADING)
             parts = {
                 name: gui.add_vector3(
-                    spoken(name), _row(own), step=0.1,
-                    hint=f"{spoken(name).capitalize()}: length between its joints; half its thickness, front to back "
-                    "and side to side, at its middle; cm",
+                    display_name(name), _row(own), step=0.1,
+                    hint=f"{display_name(name).capitalize()}: length between its joints; half its thickness, front to "
+                    "back and side to side, at its middle; cm",
                 )
                 for name, own in sizes.parts.items()
             }  # fmt: skip
@@ -120,7 +121,7 @@ class BodyPanel:
         before = sizes_of(self._sizing.model(person)).parts[part]
         same = zip((before.length_m, *before.girths_m), _row(before), row_cm, strict=True)
         length, first, second = (own if shown == entered else entered / 100 for own, shown, entered in same)
-        self._sizing.set_part(person, part, PartSizes(length, (first, second)))
+        self._sizing.set_part(person, part, PartDimensions(length, (first, second)))
 
     def _set_width(self, person: int, name: str, cm: float) -> None:
         self._sizing.set_width(person, name, cm / 100)
@@ -154,5 +155,5 @@ def _cm(length_m: float) -> float:
     return round(100 * length_m, 1)
 
 
-def _row(sizes: PartSizes) -> tuple[float, float, float]:
+def _row(sizes: PartDimensions) -> tuple[float, float, float]:
     return _cm(sizes.length_m), _cm(sizes.girths_m[0]), _cm(sizes.girths_m[1])

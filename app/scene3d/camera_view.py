@@ -13,9 +13,8 @@ from app.drawing.centred_image import centred, field_of_view
 from app.runtime.jobs import Latest
 from app.state.state import State
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera, viewed_point
-from tracker.geometry.rigid import Array
-from tracker.images.background_subtraction import Image
 
 _MOVED_M = 1e-3
 _MOVED_RAD = 1e-3

@@ -11,7 +11,7 @@ from app.runtime.jobs import Latest
 from app.scene3d.pace import Pace
 from app.state.state import State
 from tracker.geometry import rigid
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.posing.edits import joint_of
 
 _ROOT_SCALE, _JOINT_SCALE = 0.3, 0.2

@@ -17,12 +17,12 @@ from app.scene3d.view_panel import ViewPanel
 from app.state.floor_picking import FloorState
 from app.state.state import State
 from app.state.view_3d import View3d
-from tracker.body.model import Body, BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.contours.occluding_contours import part_poses
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera, viewed_point
 from tracker.geometry.ground_plane import up_rotation
-from tracker.geometry.rigid import Array
 from tracker.session.session import Session
 
 _REST_S = 0.08
@@ -222,7 +222,7 @@ class _Parts:
         """Put everybody where a pose, (n_values,), says; who has none stays. Nobody is shown or hidden by it."""
         for person, handles, values in zip(self._people, self.handles, poses, strict=True):
             if values is not None:
-                Ts = part_poses([Body(person.model, values)])
+                Ts = part_poses([PosedBody(person.model, values)])
                 turns = rigid.quaternion_from_matrix(Ts[:, :3, :3])
                 for handle, T, wxyz in zip(handles, Ts, turns, strict=True):
                     handle.position, handle.wxyz = T[:3, 3], wxyz

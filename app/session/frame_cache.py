@@ -16,7 +16,7 @@ from tracker.errors import RecordingError
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.footage.proxy import Proxy
-from tracker.images.background_subtraction import Image
+from tracker.geometry.arrays import Image
 from tracker.images.matching_view import MatchedView
 
 _LOG = logging.getLogger(__name__)

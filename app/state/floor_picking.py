@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tracker.errors import TrackerError
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.geometry.ground_plane import Floor, floor_through
-from tracker.geometry.rigid import Array
+from tracker.geometry.ground_plane import GroundPlane, floor_through
 from tracker.geometry.triangulation import triangulate
 
 N_POINTS = 3
@@ -34,7 +34,7 @@ class Picking:
 
     picks: tuple[Pick, ...] = (Pick(),)
     """Up to `N_POINTS`; the last is at hand."""
-    plane: Floor | None = None
+    plane: GroundPlane | None = None
     """The plane through three points."""
     why: str = ""
     """Why three points give none."""
@@ -46,7 +46,7 @@ class FloorState:
 
     up: str = "z"
     """World axis that points up, or is nearest to it."""
-    plane: Floor | None = None
+    plane: GroundPlane | None = None
     """As a person has set it; None for the plane through the world's origin."""
     picking: Picking | None = None
     """None while nobody sets another."""

@@ -7,8 +7,8 @@ import numpy as np
 from app.state.floor_picking import FloorState
 from app.state.view_3d import View3d
 from tracker.body.model import BodyModel
-from tracker.geometry.rigid import Array
-from tracker.geometry.triangulation import ViewPin
+from tracker.geometry.arrays import Array
+from tracker.geometry.triangulation import PointObservation
 from tracker.tracking.chamfer.settings import TrackSettings
 
 
@@ -249,7 +249,7 @@ class State:
     ranges: RangeState = field(default_factory=RangeState)
     disagreeing: tuple[int, ...] = ()
     """Frames whose poses do not go together with those around them, ascending (see `tracker.motion.consistency`)."""
-    pins: tuple[tuple[ViewPin, ...], ...] = ()
+    pins: tuple[tuple[PointObservation, ...], ...] = ()
     """The pins of each person on the frame, by point and camera."""
     holds_pin: bool = False
     """Whether a hand holds a pin."""

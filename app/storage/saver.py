@@ -14,8 +14,8 @@ from app.storage.tracked_changes import keyframes_of, tracked_changes
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, parse_model
-from tracker.geometry.rigid import Array
-from tracker.geometry.triangulation import ViewPin
+from tracker.geometry.arrays import Array
+from tracker.geometry.triangulation import PointObservation
 from tracker.posing.retarget import rebodied
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
@@ -132,7 +132,7 @@ class Saver:
         present = self._session.people[person].model
         return values if revision is None else rebodied(values, self.body(revision), present)
 
-    def pins(self, person: int, frame: int) -> tuple[ViewPin, ...]:
+    def pins(self, person: int, frame: int) -> tuple[PointObservation, ...]:
         """The stored pins of a person on a frame, undistorted px; those of other cameras and bodies are passed over."""
         info, cameras = self._session.people[person], self._session.cameras
         index = {c.camera.name: i for i, c in enumerate(cameras)}
@@ -144,7 +144,7 @@ class Saver:
             if pin.camera in index and pin.point in info.model.point_names:
                 camera = index[pin.camera]
                 u, v = cameras[camera].camera.undistort_points(np.array(pin.position_px))
-                found.append(ViewPin(pin.point, camera, (float(u), float(v))))
+                found.append(PointObservation(pin.point, camera, (float(u), float(v))))
         return tuple(found)
 
     def frames(self, person: int) -> list[int]:
@@ -218,18 +218,18 @@ class Saver:
         changes: list[Change] = []
         for person, shown in enumerate(state.pins):
             name = self._session.people[person].name
-            before = {(p.point, p.camera): p.place_px for p in self.pins(person, state.frame)}
-            after = {(p.point, p.camera): p.place_px for p in shown}
+            before = {(p.point, p.camera): p.position_px for p in self.pins(person, state.frame)}
+            after = {(p.point, p.camera): p.position_px for p in shown}
             for point, index in sorted({*before, *after}):
                 camera = self._session.cameras[index].camera
                 old, new = before.get((point, index)), after.get((point, index))
                 if old is not None and new is not None and np.allclose(old, new, rtol=0, atol=_SAME_PX):
                     continue
-                place_px = None
+                position_px = None
                 if new is not None:
                     u, v = camera.distort_points(np.array(new))
-                    place_px = (float(u), float(v))
-                changes.append(PinChange(name, state.frame, point, camera.name, place_px))
+                    position_px = (float(u), float(v))
+                changes.append(PinChange(name, state.frame, point, camera.name, position_px))
         return changes
 
     def save_tracked(

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.session.session import Person
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import Alternative, PoseChange, PoseRecord

@@ -25,7 +25,7 @@ from tracker.body.model import BodyModel
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.simulate import simulate
 from tracker.simulate.motion.scenes import cast_of
 from tracker.tracking import confidence

@@ -22,7 +22,7 @@ from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.session.session import Session
 from tracker.simulate import simulate
 from tracker.tracking.chamfer.settings import TrackSettings

@@ -11,7 +11,7 @@ from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.session.assemble import DEFAULT_MODEL
 from tracker.session.session import Session, load_session
 

@@ -15,7 +15,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
 from scripted_user import LIMBS, TRUNK, ScriptedUser
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours.part_edges import points_hidden
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
@@ -50,7 +50,7 @@ def main(folder):
 def true_body(stem):
     """Who hides whom is seen in the footage, which shows the true bodies."""
     model = load_model(stem.with_name(f"{stem.name}_model.toml"))
-    return Body(model, read_pose_table(stem.with_suffix(".csv")).values_for(model)[FRAME])
+    return PosedBody(model, read_pose_table(stem.with_suffix(".csv")).values_for(model)[FRAME])
 
 
 def views_of(cameras, truths, person):

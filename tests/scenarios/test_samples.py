@@ -13,7 +13,7 @@ from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.formats.trc import read_trc
 from tracker.session.session import load_session
-from tracker.simulate.motion.postures import perform
+from tracker.simulate.motion.postures import solve_posture
 from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.people.skin import make_skin
 from tracker.simulate.stage.camera_rig import make_cameras
@@ -69,7 +69,7 @@ def test_it_is_what_the_recipe_makes_now(session):
     for k, (role, person) in enumerate(zip(cast_of(session.name), session.people, strict=True)):
         true = load_model(session.folder / f"{truth_of(session, k)}_model.toml")
         skins.append(make_skin(true, role.outfit, role.build))
-        poses.append(perform(role, true, session.n_frames, 25.0))
+        poses.append(solve_posture(role, true, session.n_frames, 25.0))
         kept = read_pose_table(session.folder / f"{truth_of(session, k)}.csv").values
         assert np.allclose(kept, poses[k], atol=1e-5)
         preset = load_model("gavrila22", role.height_m)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from staging import at, cameras_around, filmed, own_evidence, posed, solid
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.fitting.gauss_newton import solve
 from tracker.motion.prediction import PredictSettings
 from tracker.tracking.chamfer.frame_estimator import Scene
@@ -35,7 +35,7 @@ def crowd(model, n):
 @pytest.mark.parametrize("n", [3, 4])
 def test_people_a_metre_apart_stay_who_they_are(gavrila, n):
     truth = crowd(gavrila, n)
-    observer = filmed([[Body(gavrila, poses[k]) for poses in truth] for k in range(N_FRAMES)])
+    observer = filmed([[PosedBody(gavrila, poses[k]) for poses in truth] for k in range(N_FRAMES)])
     settings = replace(TrackSettings(), predict=PredictSettings(order=0), rounds=1)
     found = list(track_chamfer(observer, [gavrila] * n, truth[:, 0], range(N_FRAMES), settings))
     for k, estimate in enumerate(found):
@@ -72,7 +72,7 @@ def test_nothing_depends_on_who_is_done_first(gavrila, monkeypatch):
     """Two people, each with an arm that is expected elsewhere and is searched: in threads, and one by one from the last
     to the first."""
     truth = crowd(gavrila, 2)[:, 0]
-    views, expected = own_evidence([Body(gavrila, v) for v in truth], cameras_around(4)), truth.copy()
+    views, expected = own_evidence([PosedBody(gavrila, v) for v in truth], cameras_around(4)), truth.copy()
     for values, side in zip(expected, ("left", "right"), strict=True):
         values[gavrila.dof_names.index(f"{side}_shoulder.elevation")] += 1.2
     searched = []

@@ -6,14 +6,14 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import view_evidence
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import parse_model
 from tracker.geometry.cameras import Camera
-from tracker.geometry.triangulation import ViewPin
+from tracker.geometry.triangulation import PointObservation
 
 SIZE = (640, 480)
 
@@ -60,7 +60,7 @@ def solid(half_axes, exponents=(1, 1), name="solid"):
 
 def at(model, *place, turns=(0.0, 0.0, 0.0)):
     """A solid placed in the world."""
-    return Body(model, np.array([*place, *turns], dtype=float))
+    return PosedBody(model, np.array([*place, *turns], dtype=float))
 
 
 def edge_map(bodies, camera):
@@ -194,7 +194,7 @@ def seen(model, values, names, cameras, noise_px=0.0, seed=0):
     rng = np.random.default_rng(seed)
     places = dict(zip(model.point_names, model.points_world(values), strict=True))
     return [
-        ViewPin(name, i, tuple(camera.pinhole.project(places[name]) + rng.normal(0, noise_px, 2)))
+        PointObservation(name, i, tuple(camera.pinhole.project(places[name]) + rng.normal(0, noise_px, 2)))
         for name in names
         for i, camera in enumerate(cameras)
     ]

@@ -12,7 +12,7 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import load_model
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.session.session import load_session
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"

@@ -8,7 +8,7 @@ from tracker.body.model import BodyModel
 from tracker.body.parts import Joint, Landmark, Part
 from tracker.errors import TrackerError
 from tracker.formats.trc import MarkerTable
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 _SIDES = ("left", "right")
 _SEGMENTS = (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
 from tracker.compute.numba_options import BORROW
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 ALONG = 7
 """Samples along the axis of each part."""

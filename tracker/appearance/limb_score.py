@@ -21,11 +21,10 @@ from tracker.appearance.axis_visibility import (
     place_before,
     see_axis,
 )
-from tracker.body.kinematics import IntArray, Kinematics, chain_poses
+from tracker.body.kinematics import Kinematics, chain_poses
 from tracker.body.model import BodyModel
 from tracker.compute.numba_options import BORROW
-from tracker.geometry.rigid import Array, FloatArray
-from tracker.images.background_subtraction import Image
+from tracker.geometry.arrays import Array, FloatArray, Image, IntArray
 from tracker.images.color_histogram import BINS, bin_of
 
 _STEP_PX = 2

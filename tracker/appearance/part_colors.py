@@ -26,12 +26,11 @@ from tracker.appearance.axis_visibility import (
 )
 from tracker.appearance.limb_score import ColorView, LimbLook, Standing
 from tracker.body.kinematics import Kinematics, chain_poses
-from tracker.body.model import Body, BodyModel, parts_of
+from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.numba_options import BORROW
 from tracker.contours.occluding_contours import part_poses, projection
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.rigid import Array
-from tracker.images.background_subtraction import Image
+from tracker.geometry.arrays import Array, Image
 from tracker.images.color_histogram import BINS, bin_of
 
 _SMOOTHING_BINS = 0.7
@@ -78,7 +77,7 @@ class ColorScore(NamedTuple):
 class Colors:
     """The colours of the parts of one person in the views of one frame."""
 
-    def __init__(self, views: Sequence[ViewEvidence], bodies: Sequence[Body], person: int = 0) -> None:
+    def __init__(self, views: Sequence[ViewEvidence], bodies: Sequence[PosedBody], person: int = 0) -> None:
         """Take the colours of the views.
 
         Args:

@@ -10,10 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel
 from tracker.body.parts import Joint, Landmark, Part
 from tracker.errors import TrackerError
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 _LEAST_HEIGHT_M, _MOST_HEIGHT_M = 0.3, 3.0
 _LEAST_M, _MOST_SHARE = 0.005, 0.7
@@ -23,7 +24,7 @@ _WIDTHS = ("shoulder", "hip")
 """Joints, one on each side, whose distance is a size of its own where one part carries both."""
 
 
-class PartSizes(NamedTuple):
+class PartDimensions(NamedTuple):
     """The sizes of one part."""
 
     length_m: float
@@ -32,29 +33,31 @@ class PartSizes(NamedTuple):
     """Half its thickness across, front to back and side to side (up and down where it lies across), metres."""
 
 
-class BodySizes(NamedTuple):
+class BodyDimensions(NamedTuple):
     """The sizes of a body."""
 
     height_m: float
     """By which everything is scaled, metres."""
-    parts: Mapping[str, PartSizes]
+    parts: Mapping[str, PartDimensions]
     """By name of the part."""
     widths_m: Mapping[str, float]
     """Distance of the two shoulders, or hips, by name (`hip`), where one part carries both, metres."""
 
 
-def sizes_of(model: BodyModel) -> BodySizes:
+def sizes_of(model: BodyModel) -> BodyDimensions:
     """Measure a body."""
     parts = {}
     for index, part in enumerate(model.parts):
         axis = _main_axis(model, index)
         across = [a for a in range(3) if a != axis]
         girths = (part.half_axes[across[0]] * model.height_m, part.half_axes[across[1]] * model.height_m)
-        parts[part.name] = PartSizes(_length(model, index) * model.height_m, girths)
-    return BodySizes(model.height_m, parts, {w: 2 * _half_width(model, w) * model.height_m for w in _girdles(model)})
+        parts[part.name] = PartDimensions(_length(model, index) * model.height_m, girths)
+    return BodyDimensions(
+        model.height_m, parts, {w: 2 * _half_width(model, w) * model.height_m for w in _girdles(model)}
+    )
 
 
-def with_sizes(model: BodyModel, sizes: BodySizes) -> BodyModel:
+def with_sizes(model: BodyModel, sizes: BodyDimensions) -> BodyModel:
     """The same body of other sizes.
 
     Args:
@@ -75,7 +78,7 @@ def with_sizes(model: BodyModel, sizes: BodySizes) -> BodyModel:
         own = _length(model, index)
         across = [a for a in range(3) if a != axis]
         for name, size_m in (("length", wanted.length_m), ("girth", wanted.girths_m[0]), ("girth", wanted.girths_m[1])):
-            _check(f"{name} of {spoken(part.name)}", size_m, sizes.height_m)
+            _check(f"{name} of {display_name(part.name)}", size_m, sizes.height_m)
         stretch[index, axis] = wanted.length_m / sizes.height_m / own
         for a, girth_m in zip(across, wanted.girths_m, strict=True):
             stretch[index, a] = girth_m / sizes.height_m / part.half_axes[a]
@@ -96,24 +99,21 @@ def with_sizes(model: BodyModel, sizes: BodySizes) -> BodyModel:
     )
 
 
-def scaled(sizes: BodySizes, height_m: float) -> BodySizes:
+def scaled(sizes: BodyDimensions, height_m: float) -> BodyDimensions:
     """The same proportions at another height."""
     by = height_m / sizes.height_m
-    parts = {n: PartSizes(p.length_m * by, (p.girths_m[0] * by, p.girths_m[1] * by)) for n, p in sizes.parts.items()}
-    return BodySizes(height_m, parts, {n: w * by for n, w in sizes.widths_m.items()})
+    parts = {
+        n: PartDimensions(p.length_m * by, (p.girths_m[0] * by, p.girths_m[1] * by)) for n, p in sizes.parts.items()
+    }
+    return BodyDimensions(height_m, parts, {n: w * by for n, w in sizes.widths_m.items()})
 
 
-def twin(name: str) -> str | None:
+def mirror_part(name: str) -> str | None:
     """Name of the part or joint on the other side; None for one in the middle."""
     for own, other in (_SIDES, _SIDES[::-1]):
         if name.startswith(own):
             return other + name.removeprefix(own)
     return None
-
-
-def spoken(name: str) -> str:
-    """`left_upper_arm` as people say it."""
-    return name.replace("_", " ")
 
 
 def _check(what: str, size_m: float, height_m: float) -> None:
@@ -135,7 +135,7 @@ def _ends(model: BodyModel, part: int) -> Array:
         *(m for m in model.landmarks if m.part == name),
     ]
     places = {x.name: np.array(x.position) for x in on_it}
-    return np.array([np.zeros(3), *((p + places.get(twin(n) or n, p)) / 2 for n, p in places.items())])
+    return np.array([np.zeros(3), *((p + places.get(mirror_part(n) or n, p)) / 2 for n, p in places.items())])
 
 
 def _main_axis(model: BodyModel, part: int) -> int:

@@ -7,9 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.numba_options import BORROW
-from tracker.geometry.rigid import Array
-
-IntArray = NDArray[np.int64]
+from tracker.geometry.arrays import Array, IntArray
 
 TRANSLATE, REVOLVE, BALL = 0, 1, 2
 """What an operation of a joint does."""

@@ -36,6 +36,11 @@ def limbs(model: BodyModel) -> tuple[Limb, ...]:
     return tuple(out)
 
 
-def spoken(limb: str) -> str:
-    """The name of a limb as people say it."""
-    return limb.replace("forearm", "arm").replace("calf", "leg").replace("_", " ")
+def display_name(name: str) -> str:
+    """Format the name of a part, joint or degree of freedom for display: "left shoulder abduction"."""
+    return name.replace("_", " ").replace(".", " ")
+
+
+def limb_display_name(limb: str) -> str:
+    """Format the name of a limb for display: `left_forearm`, its last part, gives "left arm"."""
+    return display_name(limb.replace("forearm", "arm").replace("calf", "leg"))

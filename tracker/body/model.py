@@ -13,19 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import (
-    BALL,
-    REVOLVE,
-    TRANSLATE,
-    IntArray,
-    Kinematics,
-    Tree,
-    forward_kinematics,
-    point_jacobian,
-)
+from tracker.body.kinematics import BALL, REVOLVE, TRANSLATE, Kinematics, Tree, forward_kinematics, point_jacobian
 from tracker.body.parts import Joint, Landmark, Part, SearchGroup
 from tracker.geometry import rigid
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.shapes import Shape
 
 
@@ -204,7 +195,7 @@ class BodyModel:
 
     def points_world(self, values: Array) -> Array:
         """Positions of the body's points (see `point_names`), (n_points, 3), metres."""
-        return Body(self, values).points_world
+        return PosedBody(self, values).points_world
 
     def points_at(self, kinematics: Kinematics, points: IntArray) -> Array:
         """Positions of some of the points, given by index (N,), where the parts are known, (N, 3), metres."""
@@ -294,7 +285,7 @@ class BodyModel:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class PosedBody:
     """A body model in a pose. Everything that synthesizes, hides or scores takes a list of these."""
 
     model: BodyModel

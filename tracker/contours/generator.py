@@ -10,7 +10,7 @@ from numba import njit
 
 from tracker.compute.numba_options import FAST
 from tracker.contours.surfaces import N_RINGS, N_SECTORS, Surfaces
-from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray
 
 MAX_POINTS = 512
 """Room for the points of one curve."""

@@ -8,11 +8,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.model import Body, BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.numba_options import FAST
 from tracker.contours.occluding_contours import part_poses, projection
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
 
 _RINGS, _SECTORS = 16, 24
 _NEAREST_M = 0.05
@@ -30,7 +30,7 @@ class _Mesh(NamedTuple):
     """Indices of the corners of each triangle, (F, 3)."""
 
 
-def part_labels(bodies: Sequence[Body], camera: Camera) -> NDArray[np.uint8]:
+def part_labels(bodies: Sequence[PosedBody], camera: Camera) -> NDArray[np.uint8]:
     """Label the pixels that the bodies cover, occlusion by depth.
 
     Args:

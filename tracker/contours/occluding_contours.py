@@ -15,13 +15,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.compute.numba_options import FAST
 from tracker.contours.generator import MAX_POINTS, grid_outline, revolved_outline
 from tracker.contours.surfaces import Surfaces, surfaces_of
 from tracker.contours.visibility import JOINT_MARGIN_M, LANES, hide
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array, FloatArray
 
 PIECE_PX = 4.0
 """Longest piece of contour that is scored or hidden as a whole, px."""
@@ -89,12 +89,12 @@ class Pieces(NamedTuple):
     """Whether each part stands where its pieces were kept, (P,): what stands has hidden them already, see `kept`."""
 
 
-def part_poses(bodies: Sequence[Body]) -> Array:
+def part_poses(bodies: Sequence[PosedBody]) -> Array:
     """World poses of all parts of all bodies, (P, 4, 4), metres."""
     return np.concatenate([b.kinematics.Ts_world_part for b in bodies])
 
 
-def trace(bodies: Sequence[Body], camera: Camera, piece_px: float = PIECE_PX) -> Contour:
+def trace(bodies: Sequence[PosedBody], camera: Camera, piece_px: float = PIECE_PX) -> Contour:
     """Trace the occluding contours of all bodies in a view, hidden pieces included and marked.
 
     Args:

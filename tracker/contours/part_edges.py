@@ -6,19 +6,19 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.compute.numba_options import FAST
 from tracker.contours import occluding_contours
 from tracker.contours.surfaces import N_RINGS, N_SECTORS
 from tracker.contours.visibility import LANES, hide
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array, FloatArray
 
 _LIFT_M = 0.012
 """How far a curve is lifted off the surfaces to see whether they hide it, metres."""
 
 
-def points_hidden(bodies: Sequence[Body], cameras: Sequence[Camera], points_world: Array) -> NDArray[np.bool_]:
+def points_hidden(bodies: Sequence[PosedBody], cameras: Sequence[Camera], points_world: Array) -> NDArray[np.bool_]:
     """Whether a part hides each point, (V, n); parts that hold the point itself, as around a joint, do not count.
 
     Args:
@@ -39,7 +39,7 @@ def points_hidden(bodies: Sequence[Body], cameras: Sequence[Camera], points_worl
     return np.array(hidden, dtype=bool).reshape(len(cameras), len(points_world))
 
 
-def part_edges(bodies: Sequence[Body], camera: Camera) -> FloatArray:
+def part_edges(bodies: Sequence[PosedBody], camera: Camera) -> FloatArray:
     """Where surfaces of parts intersect: drawn for the eye, never matched (GD96 Sect. 5).
 
     The surface of each part is cut by the implicit function of every part near it; what some part hides is left out.

@@ -11,12 +11,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import IntArray
 from tracker.compute.numba_options import BORROW, FAST
 from tracker.contours.generator import MAX_POINTS
 from tracker.contours.occluding_contours import Pieces, face, focal_px, hide_all, trace_part
 from tracker.contours.surfaces import Surfaces
-from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray, IntArray
 
 
 class Kept(NamedTuple):

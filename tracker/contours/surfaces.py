@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.shapes import Shape, TaperedSuperquadric
 
 N_RINGS, N_SECTORS = 14, 24

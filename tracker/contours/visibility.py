@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tracker.compute.numba_options import FAST
 from tracker.contours.surfaces import ALONG, N_ALONG, N_SECTION, SECTION
-from tracker.geometry.rigid import FloatArray
+from tracker.geometry.arrays import FloatArray
 
 JOINT_MARGIN_M = 0.03
 """How far in front of an adjoining part a contour must lie to be seen as one, metres."""

@@ -12,7 +12,7 @@ from tracker.errors import FormatError
 from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 LOST_M = 0.15
 """A frame with a limb joint farther off than this is lost, metres."""

@@ -14,7 +14,7 @@ from tracker.formats.joint_maps import joints_of, read_joint_map
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 from tracker.formats.pose_csv import PoseTable, read_pose_table
 from tracker.formats.trc import MarkerTable, read_trc
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.session.session import SESSION_FILE, Session, load_session
 from tracker.store.annotation_store import AnnotationStore
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import read_background, read_mask
+from tracker.geometry.arrays import FloatArray, Image
 from tracker.geometry.cameras import Region
-from tracker.geometry.rigid import FloatArray
 from tracker.images import background_subtraction
-from tracker.images.background_subtraction import Changes, Image
+from tracker.images.background_subtraction import Changes
 from tracker.images.image_statistics import Probes, Readings
 from tracker.images.matching_view import MatchedView
 

@@ -17,8 +17,8 @@ from tracker.evidence.foreground import Foreground, Prepared
 from tracker.evidence.view_evidence import Look, ViewEvidence, default_theta_px, expecting, silhouette_evidence
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
+from tracker.geometry.arrays import FloatArray
 from tracker.geometry.cameras import Camera, Region
-from tracker.geometry.rigid import FloatArray
 from tracker.images import background_subtraction
 from tracker.images.edge_segments import link_edges, sampled
 from tracker.images.edges import detect_edges, levels

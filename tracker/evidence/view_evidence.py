@@ -12,9 +12,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.geometry.arrays import FloatArray, Image
 from tracker.geometry.cameras import Camera, Region
-from tracker.geometry.rigid import FloatArray
-from tracker.images.background_subtraction import Image, Mask
+from tracker.images.background_subtraction import Mask
 from tracker.images.color_histogram import BINS, count_colors
 from tracker.images.distance_transform import distance_image
 from tracker.images.edge_segments import Samples, Segments, accept, link_edges, sampled

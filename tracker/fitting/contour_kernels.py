@@ -6,7 +6,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import IntArray
 from tracker.compute.numba_options import FAST
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import (
@@ -20,7 +19,7 @@ from tracker.contours.static_cache import (
 )
 from tracker.evidence.view_evidence import SCENE_SPACING_PX
 from tracker.fitting.twists import add_twists
-from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray, IntArray
 from tracker.geometry.segment_distance import LANES, cells_within
 from tracker.images.distance_transform import bilinear
 
@@ -42,7 +41,7 @@ class Scene(NamedTuple):
     distances: FloatArray
     """The distance images, one after the other, row by row."""
     points: FloatArray
-    """The columns of `points_to_match`, (N_COLUMNS, N); one view after the other, each as `nearest.Sorted`; those that
+    """The columns of `points_to_match`, (N_COLUMNS, N); one view after the other, each as `RowSortedPoints`; those that
     it is filled up with stand for nothing."""
     firsts: NDArray[np.int64]
     """Index of the first point of each view, and the number of all, (V + 1,)."""

@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from tracker.body.kinematics import IntArray, Kinematics, Tree, forward_kinematics
-from tracker.body.model import Body, BodyModel, parts_of
+from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
+from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import Kept, kept_for
 from tracker.evidence.view_evidence import ViewEvidence
@@ -30,7 +30,7 @@ from tracker.fitting.contour_kernels import SUM_UP, Scene, Sums, Work, gather, s
 from tracker.fitting.gauss_newton import Normal
 from tracker.fitting.match_points import points_to_match
 from tracker.fitting.twists import to_dofs
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.segment_distance import sort_points, stack_rows
 
 _CAPTURE = 2.0
@@ -84,7 +84,7 @@ class ContourMatch:
     def __init__(
         self,
         views: Sequence[ViewEvidence],
-        bodies: Sequence[Body],
+        bodies: Sequence[PosedBody],
         person: int = 0,
         settings: MatchSettings | None = None,
         theta_px: float | None = None,

@@ -14,10 +14,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import IntArray, Kinematics
+from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e8
 FELT_DAMPING = 1e-2

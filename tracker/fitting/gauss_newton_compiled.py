@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import IntArray, Kinematics, Tree, forward_kinematics
+from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
 from tracker.body.model import BodyModel
 from tracker.compute.numba_options import BORROW
 from tracker.fitting import gauss_newton
@@ -30,7 +30,7 @@ from tracker.fitting.gauss_newton import (
 )
 from tracker.fitting.interpenetration import NOTHING_APART, Apart, KeepApart, KeepBodiesApart, push_apart
 from tracker.fitting.twists import to_dofs
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 
 _KNOWN = (ContourMatch, StayNear, KeepApart, KeepBodiesApart)
 

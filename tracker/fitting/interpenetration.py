@@ -13,11 +13,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import IntArray, Kinematics
-from tracker.body.model import Body, BodyModel, parts_of
+from tracker.body.kinematics import Kinematics
+from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours.surfaces import surfaces_of
 from tracker.fitting.gauss_newton import Normal
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 
 _SAMPLES = 5
 """Points along the axis of each part that are asked whether they lie within another part."""
@@ -53,7 +53,12 @@ class KeepBodiesApart:
     """
 
     def __init__(
-        self, bodies: Sequence[Body], person: int, weight: float, sigma_m: float = SIGMA_M, softness: float = SOFTNESS
+        self,
+        bodies: Sequence[PosedBody],
+        person: int,
+        weight: float,
+        sigma_m: float = SIGMA_M,
+        softness: float = SOFTNESS,
     ) -> None:
         """Take the others' parts where they are.
 

@@ -10,12 +10,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import IntArray
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.compute.numba_options import BORROW
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import SCENE_SPACING_PX, ViewEvidence
-from tracker.geometry.rigid import FloatArray
+from tracker.geometry.arrays import FloatArray, IntArray
 
 N_COLUMNS = 7
 """u, v, the normal's u and v, the weight, and how many points it stands for: in all, and of the silhouette."""
@@ -26,7 +25,7 @@ _SAME_PX, _SAME_COS = 2.0, 0.9
 
 
 def points_to_match(
-    view: ViewEvidence, bodies: Sequence[Body], reach_px: float, edges: float, silhouette: float
+    view: ViewEvidence, bodies: Sequence[PosedBody], reach_px: float, edges: float, silhouette: float
 ) -> FloatArray:
     """Points of a view within reach of the visible contours, (N, N_COLUMNS).
 

@@ -9,12 +9,12 @@ from functools import cached_property
 
 import numpy as np
 
-from tracker.body.kinematics import IntArray, Kinematics
+from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import Normal, normal_of
+from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
-from tracker.geometry.triangulation import _NEAREST_M, ViewPin, sigma_px
+from tracker.geometry.triangulation import _NEAREST_M, PointObservation, sigma_px
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class PinBlock:
     """The camera of each pin, (N,)."""
     points: IntArray
     """Indices into `BodyModel.point_names`, (N,)."""
-    places_px: Array
+    positions_px: Array
     """Where the points are seen, undistorted px, (N, 2)."""
     sigmas_px: Array
     """Standard deviation of each pin, (N,), px."""
@@ -47,7 +47,7 @@ class PinBlock:
         J_z = np.where(is_near[:, None], 0.0, J[:, 2])  # (N, n_dofs)
         J_slopes = (J[:, :2] - slopes[:, :, None] * J_z[:, None]) / z[:, :, None]  # (N, 2, n_dofs)
         found_px = np.einsum("nij,nj->ni", K[:, :2, :2], slopes) + K[:, :2, 2]
-        r = (found_px - self.places_px) / self.sigmas_px[:, None]
+        r = (found_px - self.positions_px) / self.sigmas_px[:, None]
         rows = K[:, :2, :2] @ J_slopes / self.sigmas_px[:, None, None]
         return normal_of(r.ravel(), rows.reshape(-1, model.n_dofs))
 
@@ -57,7 +57,7 @@ class PinBlock:
         return np.stack([c.T_camera_world for c in self.cameras]), np.stack([c.K for c in self.cameras])
 
 
-def pin_block(model: BodyModel, cameras: Sequence[Camera], pins: Sequence[ViewPin]) -> PinBlock:
+def pin_block(model: BodyModel, cameras: Sequence[Camera], pins: Sequence[PointObservation]) -> PinBlock:
     """What the pins of one person pull at its pose.
 
     Args:
@@ -67,4 +67,4 @@ def pin_block(model: BodyModel, cameras: Sequence[Camera], pins: Sequence[ViewPi
     """
     seen_by = tuple(cameras[p.camera].pinhole for p in pins)
     points = np.array([model.point_names.index(p.point) for p in pins], dtype=np.int64)
-    return PinBlock(seen_by, points, np.array([p.place_px for p in pins]), np.array([sigma_px(c) for c in seen_by]))
+    return PinBlock(seen_by, points, np.array([p.position_px for p in pins]), np.array([sigma_px(c) for c in seen_by]))

@@ -8,9 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import IntArray
 from tracker.compute.numba_options import FAST
-from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray, IntArray
 
 
 @njit(**FAST)

@@ -19,7 +19,7 @@ _BREATH_PACKETS = 100
 _BREATH_S = 0.0005
 
 
-class Listed(NamedTuple):
+class PacketScan(NamedTuple):
     """How far the listing of a video has come."""
 
     frames: Index
@@ -28,7 +28,7 @@ class Listed(NamedTuple):
     """How much of the file has been read, 0 to 1."""
 
 
-def list_frames(container: InputContainer, where: str, report: Callable[[Listed], None] | None = None) -> Index:
+def list_frames(container: InputContainer, where: str, report: Callable[[PacketScan], None] | None = None) -> Index:
     """List the frames of the first video stream.
 
     A packet holds no frame that is shown before its decoding time, and packets come in the order of decoding: what is
@@ -67,7 +67,7 @@ def list_frames(container: InputContainer, where: str, report: Callable[[Listed]
             time.sleep(_BREATH_S)
         if report and count % _EVERY_PACKETS == 0 and packet.dts is not None:
             share = 0.0 if packet.pos is None else packet.pos / max(1, container.size)
-            report(Listed(_sorted(shown, keys, position, packet.dts), min(share, 1.0)))
+            report(PacketScan(_sorted(shown, keys, position, packet.dts), min(share, 1.0)))
     index = _sorted(shown, keys, position, None)
     if not len(index.pts):
         raise RecordingError(f"{where} has no frames; record or convert it again")

@@ -21,9 +21,10 @@ import cv2
 import numpy as np
 
 from tracker.errors import RecordingError
-from tracker.files import write_text_whole
+from tracker.files import write_text_atomic
 from tracker.footage.frame_index import stamp_of
-from tracker.footage.video import Footage, Image
+from tracker.footage.video import Footage
+from tracker.geometry.arrays import Image
 
 FOLDER = "proxies"
 VERSION = 1
@@ -100,7 +101,7 @@ class Proxy:
             if not self.fits(path):
                 self.remove()
                 about = {"version": VERSION, "stamp": stamp_of(path), "n_frames": footage.n_frames}
-                write_text_whole(self._about, json.dumps(about))
+                write_text_atomic(self._about, json.dumps(about))
             ends = self._read_ends()
             done, at = len(ends), int(ends[-1]) if len(ends) else 0
             yield done

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from tracker.errors import RecordingError
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.video import IMAGE_SUFFIXES, Image, open_footage, read_image
+from tracker.footage.video import IMAGE_SUFFIXES, open_footage, read_image
+from tracker.geometry.arrays import Image
 
 DEFAULT_CACHE_BYTES = 256 * 2**20
 

@@ -17,14 +17,12 @@ import numpy as np
 from av.packet import Packet
 from av.video.frame import VideoFrame
 from av.video.reformatter import VideoReformatter
-from numpy.typing import NDArray
 
 from tracker.errors import RecordingError
 from tracker.footage import frame_index, packet_scan
 from tracker.footage.frame_index import Index
-from tracker.footage.packet_scan import Listed
-
-Image = NDArray[np.uint8]
+from tracker.footage.packet_scan import PacketScan
+from tracker.geometry.arrays import Image
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
@@ -64,7 +62,7 @@ class VideoFile:
         self._lock = threading.Lock()
         self._converter = VideoReformatter()
         self._grown = threading.Condition()  # guards the four below
-        self._listed = Listed(Index(np.empty(0, np.int64), {}, np.empty(0, np.int64)), 0.0)
+        self._listed = PacketScan(Index(np.empty(0, np.int64), {}, np.empty(0, np.int64)), 0.0)
         self._is_listed, self._closed = False, False
         self._failure: RecordingError | None = None
         self._index = self._listed.frames
@@ -185,7 +183,7 @@ class VideoFile:
             except av.InvalidDataError:
                 continue
 
-    def _list(self, report: Callable[[Listed], None] | None = None) -> None:
+    def _list(self, report: Callable[[PacketScan], None] | None = None) -> None:
         """List the frames, by a decoder of its own."""
         with av.open(str(self.path)) as container:
             index = packet_scan.list_frames(container, self._where, report)
@@ -201,7 +199,7 @@ class VideoFile:
         except RecordingError as error:
             self._fail(error)
 
-    def _grow(self, listed: Listed) -> None:
+    def _grow(self, listed: PacketScan) -> None:
         if not self.n_frames:
             with av.open(str(self.path)) as container:
                 stream = container.streams.video[0]
@@ -215,7 +213,7 @@ class VideoFile:
     def _finish(self, index: Index) -> None:
         self.fps, self.has_constant_rate = self._rate(index)
         with self._grown:
-            self._listed, self._is_listed = Listed(index, 1.0), True
+            self._listed, self._is_listed = PacketScan(index, 1.0), True
             self._grown.notify_all()
 
     def _fail(self, error: RecordingError) -> None:

@@ -13,10 +13,10 @@ import numpy as np
 import tomli_w
 
 from tracker.errors import CalibrationError
-from tracker.files import read_toml, write_text_whole
+from tracker.files import read_toml, write_text_atomic
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import DISTORTION_COUNTS, Camera
-from tracker.geometry.rigid import Array
 
 Units = Literal["m", "mm"]
 
@@ -70,7 +70,7 @@ def write_calibration(path: str | Path, cameras: Sequence[Camera]) -> None:
             "fisheye": False,
         }
     data["metadata"] = {"adjusted": False, "error": 0.0}
-    write_text_whole(Path(path), tomli_w.dumps(data))
+    write_text_atomic(Path(path), tomli_w.dumps(data))
 
 
 def _camera(section: str, data: Any, path: Path, metres_per_unit: float) -> Camera:

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
 from tracker.errors import FormatError
-from tracker.files import write_text_whole
-from tracker.geometry.rigid import Array
+from tracker.files import write_text_atomic
+from tracker.geometry.arrays import Array
 
 VERSION = 1
 
@@ -74,7 +74,7 @@ def write_pose_table(
     ]
     for frame, row in zip(frames.tolist(), np.asarray(values) * factors, strict=True):
         lines.append(",".join([str(frame), *(f"{x:.{_DIGITS}f}" for x in row)]))
-    write_text_whole(Path(path), "\n".join(lines) + "\n")
+    write_text_atomic(Path(path), "\n".join(lines) + "\n")
 
 
 def read_pose_table(path: str | Path) -> PoseTable:

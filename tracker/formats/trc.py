@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import FormatError
-from tracker.files import write_text_whole
-from tracker.geometry.rigid import Array
+from tracker.files import write_text_atomic
+from tracker.geometry.arrays import Array
 
 _METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "cm": 0.01, "mm": 0.001, "millimeters": 0.001}
 
@@ -113,7 +113,7 @@ def write_trc(
     for frame, row in zip(frames.tolist(), points, strict=True):
         cells = ["" if np.isnan(x) else f"{x * scale:.{digits}f}" for x in row.ravel()]
         lines.append("\t".join([str(frame + 1), f"{frame / rate:.6f}", *cells]))
-    write_text_whole(path, "\n".join(lines) + "\n")
+    write_text_atomic(path, "\n".join(lines) + "\n")
 
 
 def _scale(header: dict[str, str], path: Path) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 DISTORTION_COUNTS = (0, 4, 5, 8)
 

@@ -5,14 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracker.errors import TrackerError
-from tracker.geometry.rigid import Array, so3_exp
+from tracker.geometry.arrays import Array
+from tracker.geometry.rigid import so3_exp
 
 _LEAST_HEIGHT_M = 0.2
 """Three points whose triangle is flatter than this do not say how a floor lies: a click a few cm off would tilt it."""
 
 
 @dataclass(frozen=True, eq=False)
-class Floor:
+class GroundPlane:
     """A plane: the points x with `normal . x = offset_m`."""
 
     normal: Array
@@ -34,7 +35,7 @@ class Floor:
         return np.asarray(so3_exp(np.arctan2(sine, cosine) * direction) @ R_world_up)
 
 
-def floor_through(points_world: Array, centers_world: Array) -> Floor:
+def floor_through(points_world: Array, centers_world: Array) -> GroundPlane:
     """The plane through three points, its upper side towards the cameras.
 
     Args:
@@ -56,7 +57,7 @@ def floor_through(points_world: Array, centers_world: Array) -> Floor:
     normal = across / np.linalg.norm(across)
     if np.mean(centers_world @ normal) < float(normal @ a):
         normal = -normal
-    return Floor(normal, float(normal @ np.mean(points_world, axis=0)))
+    return GroundPlane(normal, float(normal @ np.mean(points_world, axis=0)))
 
 
 def nearest_axis(normal: Array) -> str:
@@ -76,7 +77,7 @@ UP_ROTATIONS = {
 """Rotations that turn the body's z axis to the world axis that points up."""
 
 
-def up_rotation(up: str, floor: Floor | None) -> Array:
+def up_rotation(up: str, floor: GroundPlane | None) -> Array:
     """Rotation whose z axis points up from the floor, (3, 3).
 
     Args:

@@ -4,11 +4,8 @@
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-FloatArray = NDArray[np.float32]
-"""What is computed per pixel, or per piece of a contour."""
+from tracker.geometry.arrays import Array
 
 
 def skew(v: Array) -> Array:

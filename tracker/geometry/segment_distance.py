@@ -12,9 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.numba_options import BORROW, FAST
-from tracker.geometry.rigid import FloatArray
-
-IntArray = NDArray[np.int64]
+from tracker.geometry.arrays import FloatArray, IntArray
 
 _ZERO, _HALF, _ONE = (
     np.float32(0.0),
@@ -48,7 +46,7 @@ def segment_buffer(room: int) -> Segments:
     return Segments(*(np.empty(room, np.float32) for _ in range(4)))
 
 
-class Sorted(NamedTuple):
+class RowSortedPoints(NamedTuple):
     """Points sorted by strip of the image, then by row."""
 
     points: FloatArray
@@ -64,18 +62,18 @@ class Sorted(NamedTuple):
         return int(self.rows[-1, -1])
 
 
-def sort_points(points: FloatArray, size: tuple[int, int]) -> Sorted:
+def sort_points(points: FloatArray, size: tuple[int, int]) -> RowSortedPoints:
     """Sort points (N, 2 + more) of an image of a width and height; those beside it count to its border."""
     n_strips = -(-size[0] // STRIP_PX)
     filled = np.zeros((points.shape[1], _room_for(len(points))), np.float32)
     filled[:2] = _FAR
     begins = np.zeros((n_strips, size[1] + 1), np.int64)
     _sort(np.ascontiguousarray(points, np.float32), np.empty(len(points), np.int64), begins, filled)
-    return Sorted(filled, begins)
+    return RowSortedPoints(filled, begins)
 
 
 def _room_for(n: int) -> int:
-    """Room for sorted points, see `Sorted`."""
+    """Room for sorted points, see `RowSortedPoints`."""
     return (n // LANES + 2) * LANES
 
 
@@ -101,13 +99,15 @@ def _sort(points: FloatArray, cells: IntArray, begins: IntArray, out: FloatArray
     flat[0] = 0
 
 
-def within_reach(everything: Sorted, pieces_px: FloatArray, hidden: NDArray[np.bool_], reach: float) -> Sorted:
+def within_reach(
+    everything: RowSortedPoints, pieces_px: FloatArray, hidden: NDArray[np.bool_], reach: float
+) -> RowSortedPoints:
     """Those of some points that come within reach, px, of a visible piece, x0, y0, x1, y1, (M, 4); hidden is (M,)."""
     points, rows = everything.points.copy(), everything.rows.copy()
     n = _keep_within(
         points, rows, pieces_px, hidden, reach, segment_buffer(len(hidden)), np.empty(points.shape[1], np.float32)
     )
-    return Sorted(points[:, : _room_for(n)], rows)
+    return RowSortedPoints(points[:, : _room_for(n)], rows)
 
 
 @njit(**BORROW)
@@ -141,7 +141,7 @@ def _keep_within(
 
 
 def stack_rows(rows: Sequence[IntArray]) -> IntArray:
-    """The `Sorted.rows` of several images in one array, (n, most strips, largest height + 1).
+    """The `RowSortedPoints.rows` of several images in one array, (n, most strips, largest height + 1).
 
     A smaller image ends in empty rows and in its last strip again; its points must lie within it.
     """
@@ -175,7 +175,7 @@ def nearest_segment(
     """Distance of each point to the nearest of n segments; exact up to the reach, beyond it at least the reach.
 
     Args:
-        u: of the points (see `Sorted`), (N,), px.
+        u: of the points (see `RowSortedPoints`), (N,), px.
         v: (N,), px.
         rows: index of the first point of each strip and row, (strips, height + 1).
         segments: the segments.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 if TYPE_CHECKING:
     import trimesh

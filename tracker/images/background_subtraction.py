@@ -8,8 +8,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.quantiles import median
+from tracker.geometry.arrays import Image
 
-Image = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
 SMOOTHING_PX = 1.0

@@ -5,7 +5,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.numba_options import BORROW
-from tracker.images.background_subtraction import Image
+from tracker.geometry.arrays import Image
 
 BINS = 12
 """Bins of colours along each channel."""

@@ -5,7 +5,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.numba_options import FAST
-from tracker.geometry.rigid import FloatArray
+from tracker.geometry.arrays import FloatArray
 
 _ZERO = np.float32(0.0)  # a plain number would turn the kernel's arithmetic into float64
 

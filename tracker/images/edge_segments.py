@@ -13,10 +13,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.numba_options import FAST
-from tracker.geometry.rigid import FloatArray
-from tracker.geometry.segment_distance import LANES, Sorted, cells_within, sort_points
-
-IntArray = NDArray[np.int64]
+from tracker.geometry.arrays import FloatArray, IntArray
+from tracker.geometry.segment_distance import LANES, RowSortedPoints, cells_within, sort_points
 
 MAX_LENGTH = 30
 """Most pixels of a segment: where body and background are linked in a smooth line, they part here at the latest."""
@@ -83,7 +81,7 @@ def accept(samples: "Samples", pieces_px: FloatArray, threshold_px: float) -> ND
 class Samples(NamedTuple):
     """Pixels of segments, every other one: distances change little from one to the next."""
 
-    pixels: Sorted
+    pixels: RowSortedPoints
     """u and v, the normal's u and v, and the index of the segment, sorted for `distances`; n pixels."""
     counts: IntArray
     """Number of them in each segment, (S,)."""

@@ -8,8 +8,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.compute.quantiles import quantiles
-from tracker.geometry.rigid import FloatArray
-from tracker.images.background_subtraction import Image, Mask
+from tracker.geometry.arrays import FloatArray, Image
+from tracker.images.background_subtraction import Mask
 
 STRONG_FRACTION, WEAK_FRACTION = 0.92, 0.80
 """Canny's thresholds, as fractions of the pixels whose gradient is weaker (without a foreground)."""

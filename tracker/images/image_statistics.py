@@ -11,8 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.geometry.rigid import FloatArray
-from tracker.images.background_subtraction import SMOOTHING_PX, Image
+from tracker.geometry.arrays import FloatArray, Image
+from tracker.images.background_subtraction import SMOOTHING_PX
 
 SPACING_PX = 20
 """Distance between neighbouring probes, matched px."""

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera, Region
-from tracker.geometry.rigid import Array
-from tracker.images.background_subtraction import Image, Mask
+from tracker.images.background_subtraction import Mask
 
 MATCH_AREA_PX = 640 * 480
 """Frames are matched at a scale at which they have about this many pixels, and never enlarged."""

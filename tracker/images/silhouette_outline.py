@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.geometry.rigid import FloatArray
+from tracker.geometry.arrays import FloatArray
 from tracker.images.background_subtraction import Mask
 from tracker.images.edges import Edges
 

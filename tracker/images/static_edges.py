@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.geometry.rigid import FloatArray
+from tracker.geometry.arrays import FloatArray
 from tracker.images.edge_segments import Segments
 
 _MEMORY = 4

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 _MOST_M_S2 = 90.0
 _LEAST_M, _MOST_M = 0.05, 0.25
@@ -27,7 +27,7 @@ def threshold_m(fps: float) -> float:
     return float(np.clip(_MOST_M_S2 / fps**2, _LEAST_M, _MOST_M))
 
 
-def steps_off_m(points_world: Array) -> Array:
+def motion_residuals_m(points_world: Array) -> Array:
     """How far each step of consecutive frames is off those before and after it.
 
     Args:
@@ -46,7 +46,7 @@ def steps_off_m(points_world: Array) -> Array:
     return np.asarray(np.linalg.norm(steps - around, axis=-1).max(axis=-1))
 
 
-def disagreeing(
+def inconsistent_frames(
     models: Sequence[BodyModel], frames: Sequence[int], values: Array, keyframes: frozenset[int] | set[int], fps: float
 ) -> list[int]:
     """Find the frames that disagree with their neighbours.
@@ -64,7 +64,11 @@ def disagreeing(
     at = np.asarray(frames, dtype=np.int64)
     found: list[int] = []
     for run in np.split(np.arange(len(at)), np.flatnonzero(np.diff(at) != 1) + 1):
-        off = steps_off_m(np.array([models[i].points_world(values[i]) for i in run])) if len(run) > 1 else np.zeros(0)
+        off = (
+            motion_residuals_m(np.array([models[i].points_world(values[i]) for i in run]))
+            if len(run) > 1
+            else np.zeros(0)
+        )
         # A jump shows, halved, in the steps beside it too: only the largest of them is one.
         beside = np.pad(off, 1)
         peaks = (off > threshold_m(fps)) & (off >= beside[:-2]) & (off > beside[2:])

@@ -13,10 +13,10 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.body.parts import Joint
 from tracker.geometry import rigid
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 
-def between(model: BodyModel, start: Array, end: Array, shares: Array) -> Array:
+def interpolate_pose(model: BodyModel, start: Array, end: Array, shares: Array) -> Array:
     """Interpolate from one pose to another.
 
     Args:

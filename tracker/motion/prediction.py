@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 MOST_ORDER = 2
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import fit_to_points
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera, viewed_point
-from tracker.geometry.rigid import Array
 
 _STRAIGHT_DOWN = 0.1
 """A camera whose axis has a smaller level component than this looks from above, or from below."""

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import Kinematics
-from tracker.body.model import Body, BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.fitting.gauss_newton import Block, Normal, StayNear, normal_of, solve
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
 from tracker.posing.orient import orient
 from tracker.posing.picking import place_on_part
 
@@ -156,7 +156,7 @@ def grab_part(
     Raises:
         TrackerError: whatever moves the part is locked.
     """
-    place = place_on_part(Body(model, values), camera, part, pointer_px)
+    place = place_on_part(PosedBody(model, values), camera, part, pointer_px)
     name, moving = model.parts[part].name, model.moves[:, part]
     return _take_hold(model, values, camera, part, place, pointer_px, free, moving, part == 0, name)
 

@@ -3,12 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.dimensions import twin
-from tracker.body.kinematics import IntArray
+from tracker.body.dimensions import mirror_part
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.body.parts import Joint
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.posing.orient import orient
 
 _MIRROR = np.diag([1.0, -1.0, 1.0])
@@ -102,7 +101,7 @@ def mirrored(model: BodyModel, values: Array) -> Array:
     names = {joint.name: i for i, joint in enumerate(model.joints)}
     before = model.kinematics(values).Ts_world_part[:, :3, :3]
     for i, joint in enumerate(model.joints):  # parents first: what is turned in the world stands on its parent
-        other = names.get(twin(joint.name) or joint.name, i)
+        other = names.get(mirror_part(joint.name) or joint.name, i)
         if i == 0 or not np.any(model.dof_joint == i):
             continue
         at, at_other = _turns(model, i), _turns(model, other)

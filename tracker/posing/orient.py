@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import Normal, normal_of, solve
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from tracker.body.model import Body, BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array, FloatArray
 from tracker.geometry.shapes import Shape
 
 _NEAREST_M = 0.05
@@ -32,7 +32,7 @@ class PartOutline(NamedTuple):
     """Convex outline, (n, 2), undistorted px."""
 
 
-def part_outlines(bodies: Sequence[Body], cameras: Sequence[Camera]) -> list[list[PartOutline]]:
+def part_outlines(bodies: Sequence[PosedBody], cameras: Sequence[Camera]) -> list[list[PartOutline]]:
     """Outlines of all parts in some views; those too near to the camera, or behind it, are left out.
 
     All kinds of parts are convex, or so nearly that nobody sees it: the hull of the surface is the outline.
@@ -49,7 +49,7 @@ def part_outlines(bodies: Sequence[Body], cameras: Sequence[Camera]) -> list[lis
     return found
 
 
-def place_on_part(body: Body, camera: Camera, part: int, pointer_px: Array) -> Array:
+def place_on_part(body: PosedBody, camera: Camera, part: int, pointer_px: Array) -> Array:
     """The place on a part that a pointer touches, (3,), in the part's frame, metres.
 
     Where the line of sight just misses the part, as it may along its outline, it is the place nearest to the line.

@@ -12,15 +12,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.model import Body, BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import ContourMatch
 from tracker.fitting.gauss_newton import Block, of_values
 from tracker.fitting.gauss_newton_compiled import solve
 from tracker.fitting.pins import PinBlock, pin_block
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
-from tracker.geometry.triangulation import ViewPin
+from tracker.geometry.triangulation import PointObservation
 from tracker.tracking.chamfer.settings import TrackSettings, prior_blocks
 
 _REACHES = (2.0, 1.0)
@@ -45,7 +45,7 @@ class FrameFit(NamedTuple):
 def fit_frame(
     models: Sequence[BodyModel],
     poses: Sequence[Array],
-    pins: Sequence[Sequence[ViewPin]],
+    pins: Sequence[Sequence[PointObservation]],
     cameras: Sequence[Camera],
     views: Sequence[ViewEvidence] | None,
     settings: TrackSettings,
@@ -77,7 +77,7 @@ def fit_frame(
     for reach in _REACHES if views is not None else ():
         for person in people:
             assert views is not None
-            bodies, model = [Body(m, v) for m, v in zip(models, now, strict=True)], models[person]
+            bodies, model = [PosedBody(m, v) for m, v in zip(models, now, strict=True)], models[person]
             theta_px = settings.theta_px  # None: that of each view
             if reach != 1.0:
                 theta_px = reach * (theta_px or float(np.median([v.theta_px / v.scale for v in views])))

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import Block, PointTargets, StayNear, solve
 from tracker.fitting.pins import pin_block
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
-from tracker.geometry.triangulation import ViewPin
+from tracker.geometry.triangulation import PointObservation
 
 _JOINT_M = 0.005
 """Standard deviation of a joint's place, metres."""
@@ -22,7 +22,7 @@ def rebodied(
     values: Array,
     was: BodyModel,
     becomes: BodyModel,
-    pins: Sequence[ViewPin] = (),
+    pins: Sequence[PointObservation] = (),
     cameras: Sequence[Camera] = (),
     free: NDArray[np.bool_] | None = None,
 ) -> Array:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel
 from tracker.body.parts import SearchGroup
 from tracker.errors import TrackerError
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.search.chamfer_cost import ChamferCost
 
 

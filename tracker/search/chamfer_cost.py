@@ -17,15 +17,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import Tree, forward_kinematics
-from tracker.body.model import Body, BodyModel, parts_of
+from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.numba_options import FAST
 from tracker.compute.threads import helpers
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.segment_distance import (
+    RowSortedPoints,
     Segments,
-    Sorted,
     nearest_segment,
     segment_buffer,
     sort_points,
@@ -69,7 +69,7 @@ class _Scene(NamedTuple):
     distances: FloatArray
     """The distance images, one after the other, row by row."""
     points: FloatArray
-    """u and v of the edge points near the prediction, one view (see `nearest.Sorted`) after the other, (2, N)."""
+    """u and v of the edge points near the prediction, one view (see `RowSortedPoints`) after the other, (2, N)."""
     rows: NDArray[np.int64]
     """Index of the first point of each strip and row among those of its view, (V, strips, largest height + 1)."""
     firsts: NDArray[np.int64]
@@ -106,7 +106,7 @@ class ChamferCost:
     def __init__(
         self,
         views: Sequence[ViewEvidence],
-        predicted: Sequence[Body],
+        predicted: Sequence[PosedBody],
         theta_px: float | None = None,
         outliers: Outliers = "truncated",
         threads: int = 2,
@@ -205,7 +205,7 @@ class ChamferCost:
         return directed
 
     def _part_poses(self, poses: Sequence[Array]) -> Array:
-        return occluding_contours.part_poses([Body(m, p) for m, p in zip(self.models, poses, strict=True)])
+        return occluding_contours.part_poses([PosedBody(m, p) for m, p in zip(self.models, poses, strict=True)])
 
     def _scratch(self) -> _Scratch:
         """Room of the calling thread's own: several threads may score at a time."""
@@ -236,7 +236,7 @@ def _distances(views: tuple[ViewEvidence, ...]) -> FloatArray:
     return np.concatenate([v.distance.ravel() for v in views])
 
 
-def _near(view: ViewEvidence, contour: occluding_contours.Contour, theta: float) -> Sorted:
+def _near(view: ViewEvidence, contour: occluding_contours.Contour, theta: float) -> RowSortedPoints:
     """Edge points within theta of the visible model contour."""
     everything = sort_points(view.points_px, view.camera.size)
     return within_reach(everything, contour.pieces_px, contour.hidden, theta)

@@ -24,12 +24,12 @@ import tomli_w
 
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
-from tracker.files import read_toml, write_text_whole
+from tracker.files import read_toml, write_text_atomic
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model, load_model
-from tracker.geometry.ground_plane import Floor
+from tracker.geometry.ground_plane import GroundPlane
 
 VERSION = 2
 _VERSION_WITHOUT_FLOOR = 1
@@ -73,7 +73,7 @@ class Session:
     people: tuple[Person, ...]
     up: str = "z"
     """World axis that points up: x, y or z, with a minus sign where it points down."""
-    floor: Floor | None = None
+    floor: GroundPlane | None = None
     """The floor as a person has set it; None where it is the plane through the world's origin across `up`."""
 
     @property
@@ -213,7 +213,7 @@ def _load_person(row: dict[str, Any], folder: Path) -> Person:
     return Person(str(row["name"]), load_model(_resolve(row["model"], folder)), str(row["color"]))
 
 
-def save_floor(session: Session, up: str, floor: Floor | None) -> Session:
+def save_floor(session: Session, up: str, floor: GroundPlane | None) -> Session:
     """Write another floor into a session's session.toml, which is otherwise left as it is.
 
     Args:
@@ -252,14 +252,14 @@ def save_model(session: Session, person: int, model: BodyModel) -> Session:
     path = session.folder / "models" / f"{people[person].name}.toml"
     try:
         path.parent.mkdir(exist_ok=True)
-        write_text_whole(path, format_model(model))
+        write_text_atomic(path, format_model(model))
         _write_session(changed, session.folder)  # which may have named another file
     except OSError as error:
         raise SessionError(f"cannot write {path}: {error}; see that you may write to the folder") from error
     return changed
 
 
-def _load_floor(row: dict[str, Any] | None, where: str) -> Floor | None:
+def _load_floor(row: dict[str, Any] | None, where: str) -> GroundPlane | None:
     if row is None:
         return None
     _check_keys(row, _FLOOR_KEYS, where)
@@ -270,7 +270,7 @@ def _load_floor(row: dict[str, Any] | None, where: str) -> Floor | None:
             f"session {where}: expected three numbers as the 'normal' of the floor and one as its 'offset_m', found "
             f"{row['normal']} and {row['offset_m']}; correct them or take the floor out"
         )
-    return Floor(normal / length, offset_m)
+    return GroundPlane(normal / length, offset_m)
 
 
 def _write(session: Session, into: Path) -> None:
@@ -278,7 +278,7 @@ def _write(session: Session, into: Path) -> None:
     (into / "models").mkdir(exist_ok=True)
     write_calibration(into / CALIBRATION_FILE, [c.camera for c in session.cameras])
     for person in session.people:
-        write_text_whole(into / "models" / f"{person.name}.toml", format_model(person.model))
+        write_text_atomic(into / "models" / f"{person.name}.toml", format_model(person.model))
     _write_session(session, into)
 
 
@@ -303,7 +303,7 @@ def _write_session(session: Session, into: Path) -> None:
     }
     if session.floor is not None:
         data["floor"] = {"normal": session.floor.normal.tolist(), "offset_m": session.floor.offset_m}
-    write_text_whole(into / SESSION_FILE, tomli_w.dumps(data))
+    write_text_atomic(into / SESSION_FILE, tomli_w.dumps(data))
 
 
 def _check(session: Session) -> None:

@@ -13,22 +13,22 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError, TrackerError
-from tracker.files import write_text_whole
+from tracker.files import write_text_atomic
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
 from tracker.formats.model_toml import format_model, load_model
 from tracker.formats.pose_csv import write_pose_table
 from tracker.formats.trc import write_trc
+from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
 from tracker.session.session import PALETTE, Person, Session, load_session, save_session
-from tracker.simulate.motion.postures import Role, perform
+from tracker.simulate.motion.postures import Role, solve_posture
 from tracker.simulate.motion.scenes import cast_of
-from tracker.simulate.people.model_figure import PartsFigure
+from tracker.simulate.people.model_figure import ModelFigure
 from tracker.simulate.people.skeleton import altered_model
 from tracker.simulate.people.skin import make_skin
 from tracker.simulate.stage.camera_rig import make_cameras
-from tracker.simulate.stage.film import Image, exposed, film, freeze
+from tracker.simulate.stage.film import exposed, film, freeze
 from tracker.simulate.stage.rasterizer import Figure
 from tracker.simulate.stage.room import Backdrop, see_room
 from tracker.simulate.stage.video_writer import VideoWriter
@@ -85,7 +85,7 @@ def simulate(
     models = [
         altered_model(m, r.build.bone_factors) if body == "skinned" else m for r, m in zip(cast, presets, strict=True)
     ]
-    poses = [perform(role, model, n_frames, fps) for role, model in zip(cast, models, strict=True)]
+    poses = [solve_posture(role, model, n_frames, fps) for role, model in zip(cast, models, strict=True)]
     temporary = out.with_name(f".{out.name}.{secrets.token_hex(4)}.tmp")
     try:
         temporary.mkdir(parents=True)
@@ -117,7 +117,7 @@ def _check(out: Path, n_frames: int, fps: float, body: str) -> None:
 
 
 def _figure(role: Role, model: BodyModel, body: BodyKind) -> Figure:
-    return make_skin(model, role.outfit, role.build) if body == "skinned" else PartsFigure(model)
+    return make_skin(model, role.outfit, role.build) if body == "skinned" else ModelFigure(model)
 
 
 def _source(folder: Path, camera: Camera, masks: bool) -> CameraSource:
@@ -191,4 +191,4 @@ def _write_truth(
         points = np.array([model.points_world(v)[kept] for v in values])
         write_trc(folder / f"truth{suffix}.trc", [model.point_names[i] for i in kept], points, fps)
         write_pose_table(folder / f"truth{suffix}.csv", model, values)
-        write_text_whole(folder / f"truth{suffix}_model.toml", format_model(model))
+        write_text_atomic(folder / f"truth{suffix}_model.toml", format_model(model))

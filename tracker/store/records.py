@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 # From a person's hand to a foreign file. Stored by index: add at the end, never reorder.
 SOURCES = ("manual", "pinned", "searched", "fitted", "tracked", "interpolated", "smoothed", "imported")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.store.records import SOURCES, STATUSES, Alternative, FrameNumbers, FrameRow, PoseRecord
 
 SHOWN = "FROM poses p JOIN pose_changes c ON c.id = p.change"

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import ColorScore, PartColors
-from tracker.body.limbs import limbs, spoken
-from tracker.body.model import Body
+from tracker.body.limbs import limb_display_name, limbs
+from tracker.body.model import PosedBody
 from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import Fit, covariance
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 Status = Literal["good", "doubtful", "lost"]
 
@@ -120,7 +120,7 @@ def _log_odds(found: Quality) -> Array:
 
 
 def quality(
-    body: Body,
+    body: PosedBody,
     fit: Fit,
     costs: PartCosts,
     thetas_px: Array,
@@ -201,7 +201,7 @@ def reason(found: Quality) -> str:
     odds = found.log_odds
     if odds.max() <= _DOUBTFUL:
         return "part of the silhouette unexplained"
-    return f"{spoken(found.limbs[int(odds.argmax())].name)} uncertain"
+    return f"{limb_display_name(found.limbs[int(odds.argmax())].name)} uncertain"
 
 
 def worst(statuses: Sequence[Status]) -> Status:
@@ -209,7 +209,7 @@ def worst(statuses: Sequence[Status]) -> Status:
     return max(statuses, key=("good", "doubtful", "lost").index, default="good")
 
 
-def _end_spreads(body: Body, fit: Fit) -> Array:
+def _end_spreads(body: PosedBody, fit: Fit) -> Array:
     """Standard deviation of the end of each limb, (n_limbs,), metres."""
     model = body.model
     ends = np.array([np.flatnonzero(model.point_parts == c.parts[-1])[-1] for c in limbs(model)], dtype=np.int64)

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import Quality, Status
 
 

@@ -15,12 +15,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.contours.occluding_contours import PIECE_PX, Contour, trace_view
 from tracker.contours.surfaces import Surfaces
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence, findable, unfiltered, with_segments
-from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.images.edge_segments import MAX_ANGLE_RAD, Samples, Segments, nearest_alongside, sampled
 
 _CLEARLY = 0.5
@@ -52,7 +52,7 @@ class Sharing:
 class Shares:
     """The evidence of one frame as it is shared out for some poses: distances are measured once for all people."""
 
-    def __init__(self, sharing: Sharing, bodies: Sequence[Body]) -> None:
+    def __init__(self, sharing: Sharing, bodies: Sequence[PosedBody]) -> None:
         """Take the evidence, and everybody where they stand as far as is known."""
         self.poses = tuple(b.values for b in bodies)
         """Where they stand, (n_values,) each."""

@@ -9,7 +9,7 @@ from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import held
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.motion.prediction import PredictSettings, predict
 from tracker.tracking import confidence
 from tracker.tracking.confidence import Quality, Status

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
+from tracker.geometry.arrays import FloatArray
 from tracker.geometry.cameras import Camera, Region
-from tracker.geometry.rigid import FloatArray
 from tracker.images.matching_view import region_around
 
 _NEAREST_M = 0.3
@@ -19,7 +19,7 @@ _AHEAD_MARGIN_M, _LEAST_MARGIN_M = 0.25, 0.19
 
 
 def regions(
-    cameras: Sequence[Camera], bodies: Sequence[Body], margin_m: float = _REGION_MARGIN_M
+    cameras: Sequence[Camera], bodies: Sequence[PosedBody], margin_m: float = _REGION_MARGIN_M
 ) -> list[Region | None]:
     """Where to look in each view: around everybody, as predicted; None where that is the whole image."""
     points = np.concatenate([b.points_world for b in bodies])
@@ -34,12 +34,14 @@ def regions(
     return out
 
 
-def regions_ahead(cameras: Sequence[Camera], bodies: Sequence[Body]) -> list[Region | None]:
+def regions_ahead(cameras: Sequence[Camera], bodies: Sequence[PosedBody]) -> list[Region | None]:
     """Where to look in each view before the frame before is known: around everybody, as predicted two frames on."""
     return regions(cameras, bodies, _AHEAD_MARGIN_M)
 
 
-def confirmed(ahead: Sequence[Region | None], cameras: Sequence[Camera], bodies: Sequence[Body]) -> list[Region | None]:
+def confirmed(
+    ahead: Sequence[Region | None], cameras: Sequence[Camera], bodies: Sequence[PosedBody]
+) -> list[Region | None]:
     """The regions that were looked at ahead, but for views in which somebody, as predicted now, comes near the border.
 
     They follow from poses alone, so that what is found in them does not depend on what was done first.
@@ -57,13 +59,13 @@ def _holds(outer: Region | None, inner: Region | None) -> bool:
     )
 
 
-def visible_outline(bodies: Sequence[Body], camera: Camera) -> FloatArray:
+def visible_outline(bodies: Sequence[PosedBody], camera: Camera) -> FloatArray:
     """Visible pieces of the contours, x0, y0, x1, y1, (M, 4), px."""
     contour = occluding_contours.trace(bodies, camera)
     return contour.pieces_px[~contour.hidden]
 
 
-def px_per_m(cameras: Sequence[Camera], body: Body) -> float:
+def px_per_m(cameras: Sequence[Camera], body: PosedBody) -> float:
     """Length of a metre where a body stands, in the view that shows it in between the largest and the smallest."""
     middle = body.points_world.mean(axis=0)
     return float(np.median([c.K[0, 0] / max(c.depths(middle), _NEAREST_M) for c in cameras]))

@@ -10,7 +10,7 @@ import numpy as np
 from app.control.search.search_runs import Runs
 from app.control.session.session_state import Screen
 from app.state.state import SizeDraft
-from tracker.body.dimensions import BodySizes, PartSizes, scaled, sizes_of, twin, with_sizes
+from tracker.body.dimensions import BodyDimensions, PartDimensions, mirror_part, scaled, sizes_of, with_sizes
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.posing.retarget import rebodied
@@ -64,7 +64,7 @@ class Sizing:
             wrong = not (np.isfinite(height_m) and height_m > 0)
             self._draft(person, sizes._replace(height_m=height_m) if wrong else scaled(sizes, height_m))
 
-    def set_part(self, person: int, part: str, sizes: PartSizes) -> None:
+    def set_part(self, person: int, part: str, sizes: PartDimensions) -> None:
         """Give a part of the draft other sizes, and its twin where both sides are edited at once.
 
         Raises:
@@ -72,7 +72,7 @@ class Sizing:
         """
         with self._screen.lock:
             before = self._sizes(person)
-            other = twin(part) if self._screen.state.sides_alike else None
+            other = mirror_part(part) if self._screen.state.sides_alike else None
             both = {name: sizes for name in (part, other) if name is not None and name in before.parts}
             self._draft(person, before._replace(parts={**before.parts, **both}))
 
@@ -162,10 +162,10 @@ class Sizing:
             self._runs.clear()
             screen.set(draft=None, sizes_message="")
 
-    def _sizes(self, person: int) -> BodySizes:
+    def _sizes(self, person: int) -> BodyDimensions:
         return sizes_of(self.model(person))
 
-    def _draft(self, person: int, sizes: BodySizes) -> None:
+    def _draft(self, person: int, sizes: BodyDimensions) -> None:
         if sizes == self._sizes(person):
             return
         model = with_sizes(self._screen.present[person], sizes)

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.control.session.session_state import Screen, spoken
+from app.control.session.session_state import Screen
 from app.runtime.jobs import Latest
 from app.state.state import DragState, State
+from tracker.body.limbs import display_name
 from tracker.posing import drag as posing
 
 _CHECKPOINT_S = 1.0
@@ -106,7 +107,7 @@ class Hand:
             self._screen.set(people=people, drag=replace(drag, pointer_px=pointer_px), drag_seqs=seqs)
             self._costs.offer(self._screen.state)
             if time.monotonic() - self._screen.last_save > _CHECKPOINT_S:
-                self._screen.save(f"drag {spoken(drag.point)}", "manual", self._grab)
+                self._screen.save(f"drag {display_name(drag.point)}", "manual", self._grab)
 
     def end_drag(self, page: int) -> None:
         """Let go: the gesture is one entry of the history, on disk when this returns."""
@@ -129,7 +130,7 @@ class Hand:
         if hand is None or drag is None:
             return
         if not np.array_equal(hand.values, self._screen.state.poses[drag.person]) or self._screen.edit_of is hand:
-            self._screen.save(f"drag {spoken(drag.point)}", "manual", hand)
+            self._screen.save(f"drag {display_name(drag.point)}", "manual", hand)
         self._grab = self._hold = self._screen.edit_of = None
         self._screen.set(drag=None, **self._screen.costs(self._screen.state.poses))
 

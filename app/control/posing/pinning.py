@@ -7,16 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.control.session.session_state import Screen, spoken
+from app.control.session.session_state import Screen
 from app.state.state import Shown
+from tracker.body.limbs import display_name
 from tracker.errors import TrackerError
-from tracker.geometry.triangulation import ViewPin
+from tracker.geometry.triangulation import PointObservation
 from tracker.posing.pinned_fit import fit_frame
 
 _CHECKPOINT_S = 1.0
 """A long drag of a pin is on disk at least this often."""
 
-Pins = tuple[tuple[ViewPin, ...], ...]
+Pins = tuple[tuple[PointObservation, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +51,7 @@ class Pinning:
         self._held: _Held | None = None
 
     def begin(
-        self, page: int, frame: int, camera: int, person: int, point: str, place_px: tuple[float, float], live: bool
+        self, page: int, frame: int, camera: int, person: int, point: str, position_px: tuple[float, float], live: bool
     ) -> None:
         """Set a pin, or take hold of the one that the point has in this view.
 
@@ -72,27 +73,27 @@ class Pinning:
         if not (0 <= person < len(self._screen.models) and point in self._screen.models[person].point_names):
             return
         source = session.cameras[camera].camera
-        if _within(place_px, source.size) != place_px:
+        if _within(position_px, source.size) != position_px:
             raise TrackerError(
                 f"expected a pin within the {source.width}x{source.height} px of {source.name}, found it at "
-                f"({place_px[0]:.0f}, {place_px[1]:.0f}); set it where the image shows the joint"
+                f"({position_px[0]:.0f}, {position_px[1]:.0f}); set it where the image shows the joint"
             )
         with self._editing():
             self._screen.go_to(frame)
             state = self._screen.state
             self._held = _Held(page, person, point, camera, state.pins, state.people, live)
             self._screen.last_save = time.monotonic()
-            pins = _with(state.pins, person, ViewPin(point, camera, place_px))
+            pins = _with(state.pins, person, PointObservation(point, camera, position_px))
             self._screen.set(person=person, point=point, pins=pins, holds_pin=True)
 
-    def move(self, page: int, place_px: tuple[float, float]) -> None:
+    def move(self, page: int, position_px: tuple[float, float]) -> None:
         """Move the pin in the hand, at most to the border of the image; the body follows where that was wanted."""
         with self._screen.lock:
             held = self._held
             if held is None or page != held.page:
                 return
-            place_px = _within(place_px, self._screen.session.cameras[held.camera].camera.size)
-            pins = _with(self._screen.state.pins, held.person, ViewPin(held.point, held.camera, place_px))
+            position_px = _within(position_px, self._screen.session.cameras[held.camera].camera.size)
+            pins = _with(self._screen.state.pins, held.person, PointObservation(held.point, held.camera, position_px))
             if pins == self._screen.state.pins:
                 return  # a click only sets it
             if held.live:
@@ -140,7 +141,7 @@ class Pinning:
             if len(pins[person]) == len(self._screen.state.pins[person]):
                 return
             self._screen.set(pins=tuple(pins))
-            what = "remove all pins" if point is None else f"remove pin {spoken(point)}{self._in(camera)}"
+            what = "remove all pins" if point is None else f"remove pin {display_name(point)}{self._in(camera)}"
             self._screen.save(what, "manual")
 
     def fit(self, frame: int, person: int | None = None) -> None:
@@ -195,21 +196,21 @@ class Pinning:
         had = any((p.point, p.camera) == (held.point, held.camera) for p in held.pins[held.person])
         if held.pins == self._screen.state.pins and self._screen.edit_of is not held:
             return
-        what = f"{'move' if had else 'set'} pin {spoken(held.point)}{self._in(held.camera)}"
+        what = f"{'move' if had else 'set'} pin {display_name(held.point)}{self._in(held.camera)}"
         self._screen.save(what, "fitted", held)
 
     def _in(self, camera: int | None) -> str:
         return "" if camera is None else f" in {self._screen.session.cameras[camera].camera.name}"
 
 
-def _with(pins: Pins, person: int, pin: ViewPin) -> Pins:
+def _with(pins: Pins, person: int, pin: PointObservation) -> Pins:
     """The same pins but for one that is set or moved, by point and camera."""
     others = [p for p in pins[person] if (p.point, p.camera) != (pin.point, pin.camera)]
     own = tuple(sorted([*others, pin], key=lambda p: (p.point, p.camera)))
     return (*pins[:person], own, *pins[person + 1 :])
 
 
-def _within(place_px: tuple[float, float], size: tuple[int, int]) -> tuple[float, float]:
+def _within(position_px: tuple[float, float], size: tuple[int, int]) -> tuple[float, float]:
     """The nearest place within an image."""
-    u, v = np.clip(place_px, -0.5, (size[0] - 0.5, size[1] - 0.5))
+    u, v = np.clip(position_px, -0.5, (size[0] - 0.5, size[1] - 0.5))
     return float(u), float(v)

@@ -6,15 +6,15 @@ from contextlib import AbstractContextManager, contextmanager
 
 import numpy as np
 
-from app.control.session.session_state import Screen, spoken
+from app.control.session.session_state import Screen
+from tracker.body.limbs import display_name, limb_display_name
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.posing import drag
 from tracker.posing.edits import bent_alike, limb_of, mirrored, taken_over
 from tracker.posing.orient import orient
 from tracker.posing.retarget import rebodied
-from tracker.tracking import confidence
 
 _SAME_GESTURE_S = 1.0
 """Changes of one slider, or steps of one joint, within this time of each other are one entry of the history."""
@@ -52,14 +52,14 @@ class PoseEdits:
         with self._on(person, frame) as model:
             numbers = self._numbers(person)
             numbers[dof] = value
-            self._set_numbers(person, dof, numbers, f"set {spoken(model.dof_names[dof])}")
+            self._set_numbers(person, dof, numbers, f"set {display_name(model.dof_names[dof])}")
 
     def turn(self, person: int, dof: int, by: float, frame: int | None = None) -> None:
         """Change one degree of freedom by a step, rad or metres; see `set_dof`."""
         with self._on(person, frame) as model:
             numbers = self._numbers(person)
             numbers[dof] += by
-            self._set_numbers(person, dof, numbers, f"nudge {spoken(model.dof_names[dof])}")
+            self._set_numbers(person, dof, numbers, f"nudge {display_name(model.dof_names[dof])}")
 
     def nudge(
         self, person: int, point: str | None, camera: int, right_m: float, up_m: float, frame: int | None = None
@@ -85,9 +85,11 @@ class PoseEdits:
             step = view.T_world_camera[:3, :3] @ np.array([right_m, -up_m, 0.0])
             start, end = view.project(np.stack([place, place + step]))
             if not np.all(np.isfinite([start, end])):
-                raise TrackerError(f"expected {spoken(name)} before {view.name}, found it behind; choose another view")
+                raise TrackerError(
+                    f"expected {display_name(name)} before {view.name}, found it behind; choose another view"
+                )
             hand = drag.grab(model, values, view, name, start, self._screen.free(person))
-            label = f"nudge {spoken(name)}"
+            label = f"nudge {display_name(name)}"
             self._take(person, drag.drag(hand, end, values), label, ("nudge", name, camera))
 
     def place_part(self, person: int, part: int, R_world: Array, position_world: Array | None, gesture: object) -> None:
@@ -109,7 +111,7 @@ class PoseEdits:
                 values = model.retract(values, np.where(free, step, 0.0))
             if np.abs(R_world - T[:3, :3]).max() > _TURNED:
                 values = orient(model, values, part, R_world, free)
-            self._take(person, values, f"place {spoken(model.joints[part].name)}", gesture, lasting=True)
+            self._take(person, values, f"place {display_name(model.joints[part].name)}", gesture, lasting=True)
 
     def mirror(self, person: int, frame: int | None = None) -> None:
         """Exchange left and right in the body's own plane of symmetry."""
@@ -154,7 +156,7 @@ class PoseEdits:
             limb, dofs = limb_of(model, point)
             dofs = dofs & self._screen.free(person)
             values = taken_over(model, self._screen.state.poses[person], model.neutral(), dofs)
-            self._take(person, values, f"reset {confidence.spoken(limb)}")
+            self._take(person, values, f"reset {limb_display_name(limb)}")
 
     @contextmanager
     def _on(self, person: int, frame: int | None) -> Iterator[BodyModel]:
@@ -171,7 +173,7 @@ class PoseEdits:
     def _set_numbers(self, person: int, dof: int, numbers: Array, label: str) -> None:
         model, before = self._screen.models[person], self._screen.state.poses[person]
         if dof in self._screen.state.locked[person]:
-            raise TrackerError(f"{spoken(model.dof_names[dof])} is locked; unlock it to change it")
+            raise TrackerError(f"{display_name(model.dof_names[dof])} is locked; unlock it to change it")
         changed = model.clip(model.retract(model.neutral(), numbers))
         self._take(person, taken_over(model, before, changed, np.arange(model.n_dofs) == dof), label, ("dof", dof))
 

@@ -6,13 +6,14 @@ from contextlib import AbstractContextManager
 
 import numpy as np
 
-from app.control.session.session_state import Screen, spoken
+from app.control.session.session_state import Screen
 from app.runtime.jobs import Latest
 from app.state.state import Landscape, State
+from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.tracking.chamfer.settings import TrackSettings, pose_cost
 
 SAMPLES = 121
@@ -81,7 +82,7 @@ class Landscapes:
             model, state = models[person], self._screen.state
             values = model.clip(along(model, state.poses[person], dof, np.array([value]))[0])
             self._screen.pose(person, values)
-            self._screen.save(f"set {spoken(model.dof_names[dof])}", "manual")
+            self._screen.save(f"set {display_name(model.dof_names[dof])}", "manual")
 
     def close(self) -> None:
         """End the thread."""

@@ -10,7 +10,7 @@ from app.control.search.search_runs import Run, Runs
 from app.control.session.session_state import Screen
 from app.state.state import ReplayState, Shown, finite_or_none
 from tracker.errors import TrackerError
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 
 class Replay:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.geometry.rigid import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.search.best_first import SearchStep, Stage, stages
 from tracker.tracking.chamfer.settings import TrackSettings
 

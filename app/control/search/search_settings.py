@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.control.session.session_state import spoken
+from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.search.best_first import SearchSettings, stages
@@ -123,7 +123,9 @@ def described(settings: TrackSettings) -> dict[str, str]:
     for what, single in (("bound", s.bounds), ("step", s.steps)):
         for name, value in single.items():
             is_length = name.endswith((".x", ".y", ".z"))
-            found[f"{what} of {spoken(name)}"] = f"{100 * value:.3g} cm" if is_length else f"{np.degrees(value):.3g}°"
+            found[f"{what} of {display_name(name)}"] = (
+                f"{100 * value:.3g} cm" if is_length else f"{np.degrees(value):.3g}°"
+            )
     return found
 
 

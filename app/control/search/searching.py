@@ -11,7 +11,7 @@ from app.control.session.session_state import Screen
 from app.runtime.jobs import Job
 from app.state.state import JobState, Shown, finite_or_none
 from tracker.errors import TrackerError
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.search.best_first import SearchStep, stages
 from tracker.tracking.chamfer.settings import search_frame
 

@@ -14,9 +14,9 @@ from app.state.state import Shown, State, finite_or_none
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import held
+from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
-from tracker.geometry.rigid import Array
-from tracker.geometry.triangulation import ViewPin
+from tracker.geometry.triangulation import PointObservation
 from tracker.posing.default_pose import standing_pose
 from tracker.posing.retarget import rebodied
 from tracker.session.locked_dofs import free_of
@@ -197,7 +197,7 @@ class Screen:
         revisions = tuple(saver.revision(i) if p.revision is None else p.revision for i, p in enumerate(shown))
         return tuple(saver.body(r) for r in revisions), revisions
 
-    def _load_pins(self, frame: int) -> tuple[tuple[ViewPin, ...], ...]:
+    def _load_pins(self, frame: int) -> tuple[tuple[PointObservation, ...], ...]:
         """The pins of everybody on a frame."""
         return tuple(self.saver.pins(person, frame) for person in range(len(self.session.people)))
 
@@ -214,8 +214,3 @@ class _Loaded(NamedTuple):
     models: tuple[BodyModel, ...]
     revisions: tuple[int, ...]
     present: tuple[int, ...]
-
-
-def spoken(name: str) -> str:
-    """`left_shoulder.abduction` as people say it."""
-    return name.replace("_", " ").replace(".", " ")

@@ -7,7 +7,7 @@ import numpy as np
 from app.control.session.session_state import Screen
 from app.runtime.jobs import Latest
 from app.state.state import State
-from tracker.motion.consistency import disagreeing
+from tracker.motion.consistency import inconsistent_frames
 
 _REST_S = 0.3
 """A tracker writes twice a second: no need to look more often."""
@@ -60,7 +60,7 @@ class Disagreements:
         models = [screen.saver.body(r.model_revision) for r in rows]
         keyframes = {r.frame for r in screen.saver.rows(person, around) if r.keyframe}
         values = np.array([r.values for r in rows])
-        off = disagreeing(models, [r.frame for r in rows], values, keyframes, screen.session.fps)
+        off = inconsistent_frames(models, [r.frame for r in rows], values, keyframes, screen.session.fps)
         touched = range(max(0, first - _REACH), last + _REACH + 1)
         known = self._found[person]
         known -= {f for f in known if f in touched}

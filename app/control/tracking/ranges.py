@@ -13,7 +13,7 @@ from app.control.tracking.tracking import Tracking
 from app.runtime.jobs import Job
 from app.state.state import RangeState
 from tracker.errors import TrackerError
-from tracker.motion.interpolation import between
+from tracker.motion.interpolation import interpolate_pose
 from tracker.store.records import Change, FrameRow, MarkChange, PoseChange, PoseRecord
 
 Mark = Literal["keyframe", "reviewed", "unreviewed", "none"]
@@ -241,7 +241,7 @@ class Ranges:
         for at in range(0, len(frames), _AT_ONCE):
             piece = frames[at : at + _AT_ONCE]
             shares = (np.array(piece) - start) / (end - start)
-            for frame, values in zip(piece, between(model, ends[0], ends[1], shares), strict=True):
+            for frame, values in zip(piece, interpolate_pose(model, ends[0], ends[1], shares), strict=True):
                 told = {"method": "interpolate", "between": [start, end]}
                 yield PoseChange(name, frame, PoseRecord(values, sources, revision, settings=told))
 

@@ -14,7 +14,7 @@ from app.state.state import Shown, TrackState, finite_or_none
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.tracking import confidence
 from tracker.tracking.chamfer.backward_pass import Followed, Tracked, follow_back
 from tracker.tracking.chamfer.settings import TrackSettings

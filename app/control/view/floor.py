@@ -10,7 +10,7 @@ import numpy as np
 from app.control.session.session_state import Screen
 from app.state.floor_picking import FloorState, Picking, with_mark, with_next, without_last
 from tracker.errors import TrackerError
-from tracker.geometry.ground_plane import Floor, nearest_axis, up_rotation
+from tracker.geometry.ground_plane import GroundPlane, nearest_axis, up_rotation
 from tracker.session.session import UPS, save_floor
 
 _KEY = "former_floor"
@@ -40,12 +40,12 @@ class Flooring:
         """Click no more points; the floor stays as it is."""
         self._pick(None)
 
-    def mark(self, camera: int, place_px: tuple[float, float]) -> None:
+    def mark(self, camera: int, position_px: tuple[float, float]) -> None:
         """Mark the point at hand in a view, undistorted px."""
         with self._screen.lock:
             picking = self._screen.state.floor.picking
             if picking is not None and 0 <= camera < len(self._cameras):
-                self._pick(with_mark(picking, self._cameras, camera, *place_px))
+                self._pick(with_mark(picking, self._cameras, camera, *position_px))
 
     def go_on(self) -> None:
         """Go on to the next point.
@@ -94,7 +94,7 @@ class Flooring:
                 raise TrackerError("there is no former floor to go back to: this one is the calibration's")
             self._change(*former)
 
-    def _change(self, up: str, plane: Floor | None) -> None:
+    def _change(self, up: str, plane: GroundPlane | None) -> None:
         before = self._screen.state.floor
         self._screen.session = save_floor(self._screen.session, up, plane)
         self._screen.saver.keep_setting(_KEY, _kept(before.up, before.plane))
@@ -105,15 +105,15 @@ class Flooring:
         with self._screen.lock:
             self._screen.set(floor=replace(self._screen.state.floor, picking=picking))
 
-    def _former(self) -> tuple[str, Floor | None] | None:
+    def _former(self) -> tuple[str, GroundPlane | None] | None:
         data = self._screen.saver.setting(_KEY)
         if not isinstance(data, dict) or data.get("up") not in UPS:
             return None
         normal = data.get("normal")
-        return data["up"], None if normal is None else Floor(np.array(normal), float(data["offset_m"]))
+        return data["up"], None if normal is None else GroundPlane(np.array(normal), float(data["offset_m"]))
 
 
-def _kept(up: str, plane: Floor | None) -> dict[str, Any]:
+def _kept(up: str, plane: GroundPlane | None) -> dict[str, Any]:
     if plane is None:
         return {"up": up}
     return {"up": up, "normal": plane.normal.tolist(), "offset_m": plane.offset_m}

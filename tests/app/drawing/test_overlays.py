@@ -9,7 +9,7 @@ from app.drawing import overlays
 from app.drawing.overlays import Path
 from app.state.page_view import View
 from app.state.state import Shown
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.images.edge_segments import Segments
@@ -77,7 +77,7 @@ def test_segments_lie_in_undistorted_pixels_of_the_whole_image(controller):
 def test_visible_and_hidden_contours_are_what_the_tracing_says(controller):
     state, session = controller.state, controller.session
     traced = occluding_contours.trace(
-        [Body(session.people[0].model, state.poses[0])], session.cameras[1].camera.pinhole
+        [PosedBody(session.people[0].model, state.poses[0])], session.cameras[1].camera.pinhole
     )
     assert 0 < traced.hidden.sum() < len(traced.hidden)
     paths = drawn(controller, state, view=view_of("contours", "hidden"))

@@ -14,7 +14,7 @@ import pytest_asyncio
 from page_driver import shows, state_of, to_client
 from program import Program
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours.occluding_contours import part_poses
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import format_model, load_model
@@ -51,7 +51,7 @@ def seen(view, model, values):
     """What a camera sees of a body, white on black, as filmed."""
     w, h = SIZE
     painted = np.zeros((h * PAINTED, w * PAINTED), np.uint8)
-    for T, shape, center in zip(part_poses([Body(model, values)]), model.shapes, model.centers_part, strict=True):
+    for T, shape, center in zip(part_poses([PosedBody(model, values)]), model.shapes, model.centers_part, strict=True):
         mesh = shape.mesh(64, 96)
         px = view.project(rigid.apply(T, np.asarray(mesh.vertices) + center))
         corners = np.round(((px + 0.5) * PAINTED - 0.5) * 16).astype(np.int32)

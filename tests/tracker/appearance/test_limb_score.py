@@ -6,7 +6,7 @@ from staging import SUIT, at, camera_at, cameras_around, dressed, posed, solid
 
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import limbs
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours.occluding_contours import projection
 
 BINS, SAMPLES = 12, 7
@@ -30,7 +30,7 @@ def middle_depths(eye, ray, bodies):
 def plain_samples(views, bodies, person, values, limb, away=()):
     """Of each sample of a limb: its view and part, whether it is hidden, the part behind it, the pixels across it."""
     model = bodies[person].model
-    bodies = [Body(model, values) if i == person else b for i, b in enumerate(bodies)]
+    bodies = [PosedBody(model, values) if i == person else b for i, b in enumerate(bodies)]
     first = sum(len(b.model.parts) for b in bodies[:person])
     Ts = model.kinematics(values).Ts_world_part
     for view in views:
@@ -73,7 +73,7 @@ def plain_look(views, bodies, person, values, limb, ratios, away=()):
 @pytest.fixture(scope="module")
 def couple(gavrila):
     """Two figures close together, the second one is looked at; views of them in their clothes."""
-    bodies = [Body(gavrila, gavrila.retract(posed(gavrila, s), np.pad(move, (0, gavrila.n_dofs - 3))))
+    bodies = [PosedBody(gavrila, gavrila.retract(posed(gavrila, s), np.pad(move, (0, gavrila.n_dofs - 3))))
               for s, move in ((1, [0.3, 0.1, 0.0]), (2, [-0.1, -0.1, 0.0]))]  # fmt: skip
     views = dressed(bodies, cameras_around(3), SUIT)
     return views, bodies, Colors(views, bodies, 1).learn()
@@ -106,7 +106,7 @@ def test_a_limb_in_the_open(gavrila, couple):
     views, _, known = couple
     pose = np.array(gavrila.neutral())
     pose[gavrila.dof_names.index("left_shoulder.abduction")] = np.pi / 2
-    bodies = [Body(gavrila, pose)]
+    bodies = [PosedBody(gavrila, pose)]
     arm = np.array([gavrila.part_index[n] for n in ("left_upper_arm", "left_forearm")])
     for ratios in (None, known):
         found = Colors(views, bodies).look(pose, arm, ratios)(pose[None])
@@ -132,7 +132,7 @@ def test_what_hides_a_limb_beside_the_image_is_known_too(way):
 def test_a_limb_and_others_that_reach_the_cameras_plane(gavrila, distance):
     """Nothing has a bounded image there; what is said is still what the definition says, of samples that are seen."""
     stand = gavrila.neutral()
-    bodies = [Body(gavrila, stand)]
+    bodies = [PosedBody(gavrila, stand)]
     arm = next(x for x in limbs(gavrila) if x.name == "left_forearm")
     place = gavrila.points_world(stand)[gavrila.point_names.index("left_shoulder")]
     camera = camera_at("near", place + np.array([distance, 0.1, 0.3]), place)

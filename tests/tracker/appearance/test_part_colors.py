@@ -7,7 +7,7 @@ from staging import SUIT, at, camera_at, cameras_around, dressed, own_evidence, 
 
 from tracker.appearance import part_colors
 from tracker.appearance.part_colors import Colors
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.images.color_histogram import BINS
 
 GRAY = dict.fromkeys(SUIT, (120, 120, 120))
@@ -15,7 +15,7 @@ CAMERAS = cameras_around()
 
 
 def colors_of(model, values, suit=SUIT, cameras=CAMERAS):
-    bodies = [Body(model, values)]
+    bodies = [PosedBody(model, values)]
     return Colors(dressed(bodies, cameras, suit), bodies)
 
 
@@ -69,7 +69,7 @@ def test_other_clothes_score_worse(gavrila, stand, seen):
 
 
 def test_where_all_is_of_one_colour_nothing_is_said(gavrila, stand):
-    bodies = [Body(gavrila, stand)]
+    bodies = [PosedBody(gavrila, stand)]
     views = [replace(v, colors=np.full((480, 640, 3), 120, np.uint8)) for v in dressed(bodies, CAMERAS, GRAY)]
     colors = Colors(views, bodies)
     known = colors.learn()
@@ -150,7 +150,7 @@ def test_usual_is_what_the_learnt_frame_scores(gavrila, stand, seen):
 
 
 def test_views_without_colours_are_passed_over(gavrila, stand):
-    bodies = [Body(gavrila, stand)]
+    bodies = [PosedBody(gavrila, stand)]
     views = dressed(bodies, CAMERAS, SUIT)
     blind = replace(views[0], colors=None)
     two, three = Colors(views[1:], bodies), Colors([blind, *views[1:]], bodies)
@@ -169,7 +169,7 @@ def darker(views, share=0.6):
 def test_colours_follow_the_light(gavrila, stand, seen):
     """The light goes down step by step: learnt along the way, the clothes stay known; learnt once, they do not."""
     colors, first = seen
-    bodies = [Body(gavrila, stand)]
+    bodies = [PosedBody(gavrila, stand)]
     views, known = dressed(bodies, CAMERAS, SUIT), first
     for share in np.linspace(1.0, 0.6, 25):
         known = Colors(darker(views, share), bodies).learn(known, 0.3)
@@ -185,17 +185,17 @@ def test_a_part_that_is_not_there_is_not_learnt(gavrila, stand, seen):
     wrong = np.array(stand)
     for side in ("left", "right"):
         wrong[gavrila.dof_names.index(f"{side}_shoulder.abduction")] += 1.0
-    views, known = dressed([Body(gavrila, stand)], CAMERAS, SUIT), first
+    views, known = dressed([PosedBody(gavrila, stand)], CAMERAS, SUIT), first
     for _ in range(20):
-        known = Colors(views, [Body(gavrila, wrong)]).learn(known, 0.3)
+        known = Colors(views, [PosedBody(gavrila, wrong)]).learn(known, 0.3)
     arm = gavrila.part_index["left_forearm"]
-    right = Colors(views, [Body(gavrila, stand)])
+    right = Colors(views, [PosedBody(gavrila, stand)])
     assert right.score(stand, known).parts[arm] > 0.9 * first.usual[arm]
 
 
 def test_each_view_has_its_say(gavrila, stand):
     """One view shows an arm in another colour: the mean hides it, the view does not."""
-    bodies, other = [Body(gavrila, stand)], SUIT | {"forearm": (250, 250, 0)}
+    bodies, other = [PosedBody(gavrila, stand)], SUIT | {"forearm": (250, 250, 0)}
     right, wrong = dressed(bodies, CAMERAS, SUIT), dressed(bodies, CAMERAS[:1], other)
     known = Colors(right, bodies).learn()
     score = Colors([*wrong, *right[1:]], bodies).score(stand, known)
@@ -204,7 +204,7 @@ def test_each_view_has_its_say(gavrila, stand):
     drops = known.usual[arm] - score.views[:, arm]
     above = gavrila.retract(stand, np.pad([0.0, 0.0, 30.0], (0, gavrila.n_dofs - 3)))
     assert drops[0] > 1 > 0.5 > np.nanmax(drops[1:])
-    assert np.isnan(Colors(right, [Body(gavrila, stand)]).score(above, known).views).all()
+    assert np.isnan(Colors(right, [PosedBody(gavrila, stand)]).score(above, known).views).all()
 
 
 def test_a_look_tells_where_a_limb_is(gavrila, stand):
@@ -225,7 +225,7 @@ def test_a_look_tells_where_a_limb_is(gavrila, stand):
 def test_a_limb_that_is_away_hides_nothing(gavrila):
     """The left arm lies behind the right one as the body seems to stand; taken away, that says nothing against it."""
     stand = gavrila.neutral()
-    bodies = [Body(gavrila, stand)]
+    bodies = [PosedBody(gavrila, stand)]
     view = dressed(bodies, [camera_at("right", (0.0, -4.0, 0.2))], SUIT)
     colors = Colors(view, bodies)
     arm, twin = (np.array(parts(gavrila, f"{s}_upper_arm", f"{s}_forearm")) for s in ("left", "right"))

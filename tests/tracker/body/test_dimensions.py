@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tracker.body.dimensions import PartSizes, scaled, sizes_of, twin, with_sizes
+from tracker.body.dimensions import PartDimensions, mirror_part, scaled, sizes_of, with_sizes
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import PRESETS, format_model, load_model, parse_model
 
@@ -22,7 +22,7 @@ def test_sizes_go_there_and_back(name):
     model = load_model(name, 1.82)
     sizes = sizes_of(model)
     parts = {
-        n: PartSizes(p.length_m * (1 + 0.01 * i), (p.girths_m[0] * 0.9, p.girths_m[1] * 1.05))
+        n: PartDimensions(p.length_m * (1 + 0.01 * i), (p.girths_m[0] * 0.9, p.girths_m[1] * 1.05))
         for i, (n, p) in enumerate(sizes.parts.items())
     }
     wanted = sizes._replace(height_m=1.7, parts=parts, widths_m={n: 1.1 * w for n, w in sizes.widths_m.items()})
@@ -38,7 +38,7 @@ def test_a_length_is_the_distance_of_the_joints():
     model = load_model("gavrila34")
     sizes = sizes_of(model)
     assert sizes.parts["left_thigh"].length_m == pytest.approx(distance(model, "left_hip", "left_knee"))
-    longer = with_sizes(model, sizes._replace(parts={**sizes.parts, "left_thigh": PartSizes(0.5, (0.07, 0.08))}))
+    longer = with_sizes(model, sizes._replace(parts={**sizes.parts, "left_thigh": PartDimensions(0.5, (0.07, 0.08))}))
     assert distance(longer, "left_hip", "left_knee") == pytest.approx(0.5)
     assert distance(longer, "left_knee", "left_ankle") == pytest.approx(distance(model, "left_knee", "left_ankle"))
     assert distance(longer, "right_hip", "right_knee") == pytest.approx(distance(model, "right_hip", "right_knee"))
@@ -55,16 +55,16 @@ def test_another_height_keeps_the_proportions():
 
 @pytest.mark.parametrize(("name", "other"), [("left_calf", "right_calf"), ("right_calf", "left_calf"), ("head", None)])
 def test_twins(name, other):
-    assert twin(name) == other
+    assert mirror_part(name) == other
 
 
 @pytest.mark.parametrize(
     ("part", "message"),
     [
-        (PartSizes(0.0, (0.05, 0.05)), "length of left calf to be 0.5 to 122 cm, found 0"),
-        (PartSizes(4.0, (0.05, 0.05)), "found 400"),
-        (PartSizes(0.4, (-0.05, 0.05)), "girth of left calf"),
-        (PartSizes(float("nan"), (0.05, 0.05)), "found nan"),
+        (PartDimensions(0.0, (0.05, 0.05)), "length of left calf to be 0.5 to 122 cm, found 0"),
+        (PartDimensions(4.0, (0.05, 0.05)), "found 400"),
+        (PartDimensions(0.4, (-0.05, 0.05)), "girth of left calf"),
+        (PartDimensions(float("nan"), (0.05, 0.05)), "found nan"),
     ],
 )
 def test_what_no_body_has_is_refused(part, message):

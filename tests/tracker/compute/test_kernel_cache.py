@@ -10,7 +10,7 @@ import tracker
 PROGRAM = """
 import numpy as np
 from tracker.contours import part_edges
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.geometry.cameras import Camera
 from tracker.formats.model_toml import load_model
 from tracker.geometry.rigid import transform
@@ -18,7 +18,7 @@ model = load_model("gavrila22")
 R = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 camera = Camera("a", (640, 480), np.array([[520.0, 0, 320], [0, 520, 240], [0, 0, 1]]), np.zeros(0),
                 transform(R, np.array([4.0, 0.0, 0.0])))
-body = Body(model, model.neutral())
+body = PosedBody(model, model.neutral())
 behind = body.points_world - (0.5, 0.0, 0.0)
 print(int(part_edges.points_hidden([body], [camera], behind).sum()))
 """

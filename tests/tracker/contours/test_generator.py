@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial import cKDTree
 from staging import camera_at, solid
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours.occluding_contours import trace
 from tracker.formats.model_toml import parse_model
 
@@ -67,7 +67,7 @@ def test_outline_is_that_of_a_dense_mesh(name):
     bound = 0.5 if name == "trunk" else 0.3
     for _ in range(30):
         q = rng.normal(size=4)
-        body = Body(model, np.array([*rng.uniform(-0.4, 0.4, 3), *(q / np.linalg.norm(q))]))
+        body = PosedBody(model, np.array([*rng.uniform(-0.4, 0.4, 3), *(q / np.linalg.norm(q))]))
         found, expected = dense(trace([body], FRONT).pieces_px), hull_of_mesh(body, FRONT)
         assert cKDTree(expected).query(found)[0].max() < bound
         assert cKDTree(found).query(expected)[0].max() < bound + 0.25
@@ -76,7 +76,7 @@ def test_outline_is_that_of_a_dense_mesh(name):
 @pytest.mark.parametrize("tilt", [0.0, 0.05, 0.5, 1.2])
 def test_along_the_axis_only_the_ends_show(tilt):
     """A cone seen from one end: its larger end is the whole outline; tilted, two straight rulings join both ends."""
-    body = Body(
+    body = PosedBody(
         SOLIDS["cone"], np.array([0, 0, 0, np.cos((np.pi / 2 - tilt) / 2), 0, np.sin((np.pi / 2 - tilt) / 2), 0])
     )
     found = trace([body], FRONT)
@@ -88,7 +88,7 @@ def test_along_the_axis_only_the_ends_show(tilt):
 
 
 def test_rulings_are_straight_and_graze():
-    body = Body(SOLIDS["cone"], np.array([0.1, 0.2, 0.1, *_quaternion((0.3, 0.4, 0.5))]))
+    body = PosedBody(SOLIDS["cone"], np.array([0.1, 0.2, 0.1, *_quaternion((0.3, 0.4, 0.5))]))
     found = trace([body], FRONT)
     T = body.model.kinematics(body.values).Ts_world_part[0]
     points = (found.points_world - T[:3, 3]) @ T[:3, :3]
@@ -106,8 +106,8 @@ def test_rulings_are_straight_and_graze():
 def test_a_superquadric_that_nearly_is_a_cone_has_its_outline():
     blunt = solid((0.1, 0.1, 0.25), (0.05, 1.0))
     sharp = parse_model(CONE.replace("0.06, 0.1", "0.1, 0.1").replace("TAPER", "0"), "cylinder")
-    one = trace([Body(blunt, np.array([0.0, 0, 0, 0.4, 0, 0]))], FRONT)
-    other = trace([Body(sharp, np.array([0.0, 0, 0, *_quaternion((0.4, 0, 0))]))], FRONT)
+    one = trace([PosedBody(blunt, np.array([0.0, 0, 0, 0.4, 0, 0]))], FRONT)
+    other = trace([PosedBody(sharp, np.array([0.0, 0, 0, *_quaternion((0.4, 0, 0))]))], FRONT)
     assert cKDTree(dense(other.pieces_px)).query(dense(one.pieces_px))[0].max() < 0.6
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 from staging import at, camera_at, cameras_around, solid
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours.occluding_contours import PIECE_PX, trace
 from tracker.contours.surfaces import N_SECTORS
 from tracker.contours.visibility import JOINT_MARGIN_M
@@ -111,14 +111,14 @@ def test_contour_points_lie_on_the_surface_and_graze_it():
 
 def test_a_point_of_the_contour_is_seen_at_the_middle_of_its_piece(gavrila):
     camera = cameras_around(1)[0]
-    found = trace([Body(gavrila, gavrila.neutral())], camera)
+    found = trace([PosedBody(gavrila, gavrila.neutral())], camera)
     np.testing.assert_allclose(camera.project(found.points_world), middles(found), atol=0.02)
 
 
 @pytest.mark.parametrize("piece_px", [PIECE_PX, 2.0, 9.0])
 def test_pieces_are_short_and_add_up_to_the_same(gavrila, piece_px):
     camera = cameras_around(1)[0]
-    body = [Body(gavrila, gavrila.neutral())]
+    body = [PosedBody(gavrila, gavrila.neutral())]
 
     def lengths(contour):
         return np.linalg.norm(contour.pieces_px[:, 2:] - contour.pieces_px[:, :2], axis=1)
@@ -202,5 +202,5 @@ def test_nothing_is_drawn_of_what_is_behind_the_camera():
 def test_lens_distortion_is_left_out(gavrila):
     camera = cameras_around(1)[0]
     bent = replace(camera, distortion=np.array([-0.2, 0.05, 0.001, 0.001]))
-    body = [Body(gavrila, gavrila.neutral())]
+    body = [PosedBody(gavrila, gavrila.neutral())]
     np.testing.assert_array_equal(trace(body, bent).pieces_px, trace(body, camera).pieces_px)

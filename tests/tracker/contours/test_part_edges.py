@@ -2,7 +2,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from staging import at, camera_at, own_evidence, solid
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.contours.part_edges import part_edges, points_hidden
 from tracker.search.chamfer_cost import ChamferCost
@@ -63,7 +63,7 @@ def test_part_edges_never_enter_the_cost():
 
 
 def test_points_hidden(gavrila):
-    body = Body(gavrila, gavrila.neutral())
+    body = PosedBody(gavrila, gavrila.neutral())
     place = dict(zip(gavrila.point_names, gavrila.points_world(body.values), strict=True))
     side = camera_at("side", (0.0, 4.0, 0.0))  # at the body's left
     hidden = dict(zip(place, points_hidden([body], [side], np.stack(list(place.values())))[0], strict=True))
@@ -86,7 +86,7 @@ def test_points_hidden_by_another_person():
 def test_points_hidden_in_several_views_are_those_whose_sight_passes_a_part(gavrila):
     rng = np.random.default_rng(4)
     near = rng.normal(0.0, 0.2, gavrila.n_dofs)
-    bodies = [Body(gavrila, gavrila.clip(gavrila.retract(gavrila.neutral(), s * near))) for s in (1.0, -1.0)]
+    bodies = [PosedBody(gavrila, gavrila.clip(gavrila.retract(gavrila.neutral(), s * near))) for s in (1.0, -1.0)]
     points = rng.uniform((-0.4, -0.4, -0.8), (0.4, 0.4, 0.8), (200, 3))
     views = [FRONT, camera_at("side", (0.0, 4.0, 0.0))]
     hidden = points_hidden(bodies, views, points)

@@ -4,7 +4,7 @@ from contour_oracle import MatchOracle, without_ties
 from staging import cameras_around, own_evidence, posed, shaken
 
 from tracker.body.limbs import limbs
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.contours.occluding_contours import (
     PIECE_PX,
@@ -30,12 +30,12 @@ def couple(gavrila, seed=0):
     step[:2] = far[:2] - near[:2]
     near = gavrila.retract(near, step)
     step[:2] = 0.15, 0.1
-    return [Body(gavrila, gavrila.retract(near, step)), Body(gavrila, far)]
+    return [PosedBody(gavrila, gavrila.retract(near, step)), PosedBody(gavrila, far)]
 
 
 def with_limb_shaken(body, limb, rng, sigma_rad=0.6):
     step = np.where(limb.dofs, rng.normal(0.0, sigma_rad, body.model.n_dofs), 0.0)
-    return Body(body.model, body.model.clip(body.model.retract(body.values, step)))
+    return PosedBody(body.model, body.model.clip(body.model.retract(body.values, step)))
 
 
 def traced_with_kept(bodies, then, moves):
@@ -80,7 +80,7 @@ def staged(gavrila):
     settings = MatchSettings()
     views = own_evidence(bodies, CAMERAS)
     rng = np.random.default_rng(7)
-    start = [Body(gavrila, shaken(gavrila, b.values, rng, np.radians(4), 0.02)) for b in bodies]
+    start = [PosedBody(gavrila, shaken(gavrila, b.values, rng, np.radians(4), 0.02)) for b in bodies]
     return without_ties(views, start, settings, THETA), start, settings
 
 
@@ -98,7 +98,7 @@ def test_pose_after_pose_costs_what_each_costs_by_itself(gavrila, staged, person
     views, start, settings = staged
     match, rng = afresh(staged, start, person), np.random.default_rng(1)
     for _ in range(6):
-        moved = Body(gavrila, shaken(gavrila, start[person].values, rng, 0.2, 0.05))
+        moved = PosedBody(gavrila, shaken(gavrila, start[person].values, rng, 0.2, 0.05))
         bodies = [moved if i == person else b for i, b in enumerate(start)]
         found, oracle = normal(match, moved), MatchOracle(views, bodies, person, settings, THETA)
         assert found.cost == pytest.approx(oracle.cost(moved.values), rel=1e-4)
@@ -123,4 +123,4 @@ def test_a_match_of_a_limb_is_that_of_the_body_as_far_as_the_limb_goes(gavrila, 
                 np.testing.assert_allclose(off / scale[0], 0.0, atol=1e-4)
                 off = (found.hessian - expected.hessian)[np.ix_(limb.dofs, limb.dofs)]
                 np.testing.assert_allclose(off / scale[1], 0.0, atol=1e-4)
-            body = Body(gavrila, shaken(gavrila, body.values, rng, 0.05, 0.02))
+            body = PosedBody(gavrila, shaken(gavrila, body.values, rng, 0.05, 0.02))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from staging import camera_at
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.errors import RecordingError
 from tracker.evidence.observer import FOREGROUND_MARGIN, Observer
@@ -314,7 +314,7 @@ def test_what_is_wrong_with_a_frame_read_ahead_is_told_when_it_is_asked_for():
 
 
 def visible_contours(real_frame, camera):
-    seen = occluding_contours.trace([Body(real_frame.model, real_frame.values)], camera)
+    seen = occluding_contours.trace([PosedBody(real_frame.model, real_frame.values)], camera)
     return seen.pieces_px[~seen.hidden]
 
 

@@ -5,7 +5,7 @@ import pytest
 from contour_oracle import MatchOracle, without_ties
 from staging import at, camera_at, cameras_around, edge_map, own_evidence, posed, shaken, solid
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.evidence.view_evidence import SCENE_SPACING_PX, Silhouette, ViewEvidence, view_evidence
 from tracker.fitting.contour_residuals import ContourMatch, MatchSettings
 from tracker.fitting.gauss_newton import StayNear, solve
@@ -34,9 +34,9 @@ def normal(match, body):
 def staged(model, seed=0, off_deg=4.0, off_m=0.02):
     """A body beside its own evidence: the views, and the body as it stands before them."""
     values = posed(model, seed)
-    views = own_evidence([Body(model, values)], cameras_around())
+    views = own_evidence([PosedBody(model, values)], cameras_around())
     start = shaken(model, values, np.random.default_rng(seed + 100), np.radians(off_deg), off_m)
-    return views, Body(model, start), values
+    return views, PosedBody(model, start), values
 
 
 def scales(found):
@@ -109,8 +109,8 @@ def test_the_others_hide_and_draw_edges(gavrila, person, match):
     rng = np.random.default_rng(3)
     poses = [posed(gavrila, 1), gavrila.retract(posed(gavrila, 2), np.pad([0.35, 0.3], (0, gavrila.n_dofs - 2)))]
     models = [gavrila, gavrila.with_height(1.6)]
-    views = own_evidence([Body(m, p) for m, p in zip(models, poses, strict=True)], cameras_around())
-    bodies = [Body(m, shaken(m, p, rng, 0.06, 0.02)) for m, p in zip(models, poses, strict=True)]
+    views = own_evidence([PosedBody(m, p) for m, p in zip(models, poses, strict=True)], cameras_around())
+    bodies = [PosedBody(m, shaken(m, p, rng, 0.06, 0.02)) for m, p in zip(models, poses, strict=True)]
     oracle = MatchOracle(views, bodies, person, match, THETA)
     found = normal(ContourMatch(views, bodies, person, match, THETA), bodies[person])
     residuals, J = oracle.rows(bodies[person].values)
@@ -270,7 +270,7 @@ def test_what_lies_outside_the_image_has_no_say():
 def test_moving_off_the_evidence_costs(gavrila):
     """Out of the images too, where half of the residuals vanish: the edges left behind cost what they can."""
     views, _, values = staged(gavrila)
-    match = ContourMatch(views, [Body(gavrila, values)])
+    match = ContourMatch(views, [PosedBody(gavrila, values)])
     ways = [d * m for d in (*np.eye(3), *-np.eye(3)) for m in (0.05, 0.2, 0.8, 3.0, 20.0)]
     moved = np.array([gavrila.retract(values, np.pad(w, (0, gavrila.n_dofs - 3))) for w in ways])
     assert match.costs(values[None])[0] < 0.3 * match.costs(moved).min()
@@ -282,7 +282,7 @@ def test_costs_are_those_of_the_normal_equations(gavrila):
     candidates = np.array([shaken(gavrila, values, rng, 0.2, 0.05) for _ in range(6)])
     for match in (MatchSettings(), FORWARD, BACKWARD):
         block = ContourMatch(views, [body], 0, match)
-        alone = [normal(block, Body(gavrila, c)).cost for c in candidates]
+        alone = [normal(block, PosedBody(gavrila, c)).cost for c in candidates]
         assert len(set(alone)) == 6
         # They are sums of residuals of single precision, here in another order.
         np.testing.assert_allclose(block.costs(candidates), alone, rtol=1e-6)
@@ -301,7 +301,7 @@ def cropped(view, bodies, region):
 def test_regions_of_the_images_change_nothing(gavrila):
     """Each view through another window that holds the body; the first is the whole image."""
     views, body, values = staged(gavrila)
-    truth = [Body(gavrila, values)]
+    truth = [PosedBody(gavrila, values)]
     # Corners at multiples of the cells that edge points are thinned by, so that the same ones are left.
     windows = [
         (0, 0, 640, 480),
@@ -320,7 +320,7 @@ def test_regions_of_the_images_change_nothing(gavrila):
 def test_half_the_scale_finds_the_same_pose(gavrila):
     views, body, values = staged(gavrila)
     small = [
-        replace(v, scale=0.5) for v in own_evidence([Body(gavrila, values)], [v.camera.scaled(0.5) for v in views])
+        replace(v, scale=0.5) for v in own_evidence([PosedBody(gavrila, values)], [v.camera.scaled(0.5) for v in views])
     ]
     rest = StayNear(body.values, np.full(gavrila.n_dofs, 1.0))
     for theta_px in (None, 30.0):  # px of the footage, which has twice as many

@@ -5,7 +5,7 @@ import pytest
 from staging import cameras_around, own_evidence, posed, shaken
 
 from tracker.body.limbs import limbs
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.fitting import gauss_newton, gauss_newton_compiled
 from tracker.fitting.contour_residuals import ContourMatch
 from tracker.fitting.gauss_newton import PointTargets, StayNear
@@ -33,8 +33,8 @@ class Staged:
         self.start = self.expected.copy()
         for name, angle in INTO_THE_TRUNK.items():
             self.start[model.dof_names.index(name)] = angle
-        self.views = own_evidence([Body(model, v) for v in (near, far)], CAMERAS)
-        self.bodies = [Body(model, self.start), Body(model, far)]
+        self.views = own_evidence([PosedBody(model, v) for v in (near, far)], CAMERAS)
+        self.bodies = [PosedBody(model, self.start), PosedBody(model, far)]
 
     def blocks(self):
         model, n = self.model, self.model.n_dofs
@@ -110,7 +110,7 @@ def test_whole_descents_without_images_are_the_same(staged, seed, how):
     """From within another body: all of it in double precision, so that dozens of steps, many refused, end alike."""
     model, n, asked = staged.model, staged.model.n_dofs, Asked()
     other = shaken(model, staged.start, np.random.default_rng(seed), 0.05, 0.03)
-    deep = [Body(model, staged.start), Body(model, other)]
+    deep = [PosedBody(model, staged.start), PosedBody(model, other)]
     blank = [replace(v, points_px=v.points_px[:0], normals=v.normals[:0]) for v in staged.views]
     match, prior = ContourMatch(blank, deep), StayNear(staged.expected, np.full(n, 2.0))
     blocks = [match, prior, KeepApart(), KeepBodiesApart(deep, 0, 1.0)]

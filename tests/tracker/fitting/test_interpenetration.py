@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from staging import at, posed, shaken, solid
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.fitting.gauss_newton import StayNear, solve
 from tracker.fitting.interpenetration import KeepApart, KeepBodiesApart
 
@@ -16,7 +16,7 @@ def normal(block, body):
 def numeric_gradient(block, body, step=1e-6):
     model = body.model
     steps = step * np.eye(model.n_dofs)
-    costs = [[normal(block, Body(model, model.retract(body.values, s * d))).cost for s in (-1, 1)] for d in steps]
+    costs = [[normal(block, PosedBody(model, model.retract(body.values, s * d))).cost for s in (-1, 1)] for d in steps]
     return np.array([(there - here) / (2 * step) for here, there in costs])
 
 
@@ -24,7 +24,7 @@ def embraced(gavrila, seed):
     """Two people whose limbs and trunks are within each other here and there."""
     one, two = posed(gavrila, seed), posed(gavrila, seed + 1)
     two[:2] += 0.12, 0.05
-    return [Body(gavrila, one), Body(gavrila, two)]
+    return [PosedBody(gavrila, one), PosedBody(gavrila, two)]
 
 
 def test_a_body_within_another_is_pushed_out():
@@ -86,13 +86,13 @@ def test_a_third_body_counts_too():
 def test_limbs_leave_the_trunk_and_stay_elsewhere(gavrila):
     """Arms pressed into the trunk come out; a body at ease costs nothing."""
     at_ease = gavrila.neutral()
-    assert normal(KeepApart(), Body(gavrila, at_ease)).cost == 0
+    assert normal(KeepApart(), PosedBody(gavrila, at_ease)).cost == 0
     rng, worse = np.random.default_rng(2), 0
     for _ in range(20):
         values = shaken(gavrila, at_ease, rng, 0.5, 0.0)
-        before = normal(KeepApart(), Body(gavrila, values)).cost
+        before = normal(KeepApart(), PosedBody(gavrila, values)).cost
         if before > 1:
             fit = solve(gavrila, values, [KeepApart(), StayNear(values, np.full(gavrila.n_dofs, 1e-2))])
-            assert normal(KeepApart(), Body(gavrila, fit.values)).cost < 0.1 * before
+            assert normal(KeepApart(), PosedBody(gavrila, fit.values)).cost < 0.1 * before
             worse += 1
     assert worse > 2

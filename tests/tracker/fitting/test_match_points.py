@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from staging import at, camera_at, cameras_around, own_evidence, posed, solid
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.evidence.view_evidence import Silhouette, ViewEvidence
 from tracker.fitting.match_points import N_COLUMNS, points_to_match
 from tracker.formats.model_toml import load_model
@@ -66,7 +66,7 @@ def test_only_what_is_near_a_contour_is_kept():
 
 def test_joined_points_weigh_what_they_did_apart():
     """On a body's own contours, with a silhouette that is a pixel off: whatever was there is there, once."""
-    bodies = [Body(m := load_model("gavrila22"), posed(m, 1))]
+    bodies = [PosedBody(m := load_model("gavrila22"), posed(m, 1))]
     view = own_evidence(bodies, cameras_around())[0]
     points = view.points_px[::2] + view.normals[::2]
     inside = np.all((points >= 0) & (points < view.camera.size), axis=1)

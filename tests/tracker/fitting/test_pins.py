@@ -10,7 +10,7 @@ from staging import camera_at, cameras_around, posed, seen, shaken
 from tracker.fitting.gauss_newton import StayNear, solve
 from tracker.fitting.pins import pin_block
 from tracker.formats.model_toml import load_model
-from tracker.geometry.triangulation import ViewPin, sigma_px, triangulate
+from tracker.geometry.triangulation import PointObservation, sigma_px, triangulate
 
 GAVRILA = load_model("gavrila34")
 CAMERAS = [replace(c, distortion=np.array([-0.2, 0.05, 0.001, -0.001])) for c in cameras_around(4)]
@@ -47,7 +47,7 @@ def test_a_pin_counts_by_the_pixels_it_is_off():
     """Half the square of 3 and 4 px in standard deviations of 0.1% of the width."""
     values = posed(GAVRILA, 0)
     (pin, *_) = seen(GAVRILA, values, ["left_wrist"], CAMERAS)
-    moved = pin._replace(place_px=(pin.place_px[0] + 3, pin.place_px[1] - 4))
+    moved = pin._replace(position_px=(pin.position_px[0] + 3, pin.position_px[1] - 4))
     found = pin_block(GAVRILA, CAMERAS, [moved]).normal(GAVRILA, values, GAVRILA.kinematics(values))
     assert found.cost == pytest.approx(0.5 * 25 / 0.64**2)
     assert sigma_px(replace(CAMERAS[0], size=(1920, 1080))) == pytest.approx(1.92)
@@ -56,7 +56,7 @@ def test_a_pin_counts_by_the_pixels_it_is_off():
 def test_behind_a_camera_pins_stay_finite_and_exact():
     values = GAVRILA.neutral()
     values[0] = 12.0
-    block = pin_block(GAVRILA, CAMERAS, [ViewPin("head", i, (300.0, 200.0)) for i in range(4)])
+    block = pin_block(GAVRILA, CAMERAS, [PointObservation("head", i, (300.0, 200.0)) for i in range(4)])
 
     def cost(step):
         moved = GAVRILA.retract(values, step)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tracker.formats.model_toml import load_model
-from tracker.motion.consistency import disagreeing, steps_off_m, threshold_m
+from tracker.motion.consistency import inconsistent_frames, motion_residuals_m, threshold_m
 
 FPS = 30.0
 N = 40
@@ -28,47 +28,47 @@ def walk(model):
 
 
 def test_a_steady_motion_agrees_with_itself(model, walk):
-    assert disagreeing([model] * N, range(N), walk, frozenset(), FPS) == []
+    assert inconsistent_frames([model] * N, range(N), walk, frozenset(), FPS) == []
 
 
 def test_a_seam_is_named_once_by_the_frame_after_it(model, walk):
     walk[20:, 0] += 0.2
-    assert disagreeing([model] * N, range(N), walk, frozenset(), FPS) == [20]
+    assert inconsistent_frames([model] * N, range(N), walk, frozenset(), FPS) == [20]
 
 
 def test_a_tracked_frame_that_misses_the_keyframe_after_it_is_named_before_it(model, walk):
     walk[20:, 0] += 0.2
-    assert disagreeing([model] * N, range(N), walk, {20}, FPS) == [19]
-    assert disagreeing([model] * N, range(N), walk, {19, 20}, FPS) == [20]
+    assert inconsistent_frames([model] * N, range(N), walk, {20}, FPS) == [19]
+    assert inconsistent_frames([model] * N, range(N), walk, {19, 20}, FPS) == [20]
 
 
 def test_a_limb_alone_that_jumps_is_found(model, walk):
     walk[25:, model.value_names.index("left_shoulder.abduction")] += np.radians(30)
-    assert disagreeing([model] * N, range(N), walk, frozenset(), FPS) == [25]
+    assert inconsistent_frames([model] * N, range(N), walk, frozenset(), FPS) == [25]
 
 
 def test_a_single_wrong_frame_is_found(model, walk):
     walk[10, 1] += 0.3
-    assert set(disagreeing([model] * N, range(N), walk, frozenset(), FPS)) <= {10, 11}
-    assert disagreeing([model] * N, range(N), walk, frozenset(), FPS)
+    assert set(inconsistent_frames([model] * N, range(N), walk, frozenset(), FPS)) <= {10, 11}
+    assert inconsistent_frames([model] * N, range(N), walk, frozenset(), FPS)
 
 
 def test_frames_without_a_pose_between_are_no_jump(model, walk):
     frames = [*range(20), *range(25, 45)]
     walk[20:, 0] += 0.5
-    assert disagreeing([model] * len(frames), frames, walk, frozenset(), FPS) == []
+    assert inconsistent_frames([model] * len(frames), frames, walk, frozenset(), FPS) == []
 
 
 def test_few_frames_say_nothing(model, walk):
     for n in range(3):
         walk[n:, 0] += 3.0
-        assert disagreeing([model] * n, range(n), walk[:n], frozenset(), FPS) == []
+        assert inconsistent_frames([model] * n, range(n), walk[:n], frozenset(), FPS) == []
 
 
 def test_a_step_is_off_by_the_jump_itself():
     points = np.cumsum(np.full((9, 2, 3), 0.01), axis=0)
     points[5:, 1, 2] += 0.5
-    off = steps_off_m(points)
+    off = motion_residuals_m(points)
     np.testing.assert_allclose(off[[0, 1, 6, 7]], 0.0, atol=1e-12)
     np.testing.assert_allclose(off[3:6], [0.25, 0.5, 0.25])
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 from tracker.formats.model_toml import load_model
-from tracker.motion.interpolation import between
+from tracker.motion.interpolation import interpolate_pose
 
 SHARES = np.linspace(0.0, 1.0, 9)
 
@@ -31,7 +31,7 @@ def test_the_ends_are_the_poses_themselves(model):
     rng = np.random.default_rng(3)
     for _ in range(20):
         start, end = random_pose(model, rng), random_pose(model, rng)
-        found = between(model, start, end, SHARES)
+        found = interpolate_pose(model, start, end, SHARES)
         np.testing.assert_allclose(model.points_world(found[0]), model.points_world(start), atol=1e-9)
         np.testing.assert_allclose(model.points_world(found[-1]), model.points_world(end), atol=1e-9)
 
@@ -39,7 +39,7 @@ def test_the_ends_are_the_poses_themselves(model):
 def test_limbs_go_straight_and_stay_within_limits(model):
     rng = np.random.default_rng(4)
     start, end = random_pose(model, rng, 2.0), random_pose(model, rng, 2.0)
-    found = between(model, start, end, SHARES)
+    found = interpolate_pose(model, start, end, SHARES)
     limbs = model.dof_value[model.dof_joint > 0]
     straight = start[limbs] + SHARES[:, None] * (end - start)[limbs]
     np.testing.assert_allclose(found[:, limbs], straight, atol=1e-12)
@@ -52,7 +52,7 @@ def test_the_root_turns_about_one_axis_at_one_speed(model):
         start, end = random_pose(model, rng, 1.5), random_pose(model, rng, 1.5)
         ends = Rotation.from_matrix([root_rotation(model, start), root_rotation(model, end)])
         truth = Slerp([0.0, 1.0], ends)(SHARES).as_matrix()
-        found = np.array([root_rotation(model, v) for v in between(model, start, end, SHARES)])
+        found = np.array([root_rotation(model, v) for v in interpolate_pose(model, start, end, SHARES)])
         np.testing.assert_allclose(found, truth, atol=1e-6)
 
 
@@ -60,16 +60,16 @@ def test_the_root_moves_along_a_straight_line(model):
     start, end = model.neutral(), model.neutral()
     at = [list(model.value_names).index(f"{model.joints[0].name}.{n}") for n in "xyz"]
     end[at] = (1.0, -2.0, 0.5)
-    np.testing.assert_allclose(between(model, start, end, SHARES)[:, at], SHARES[:, None] * end[at])
+    np.testing.assert_allclose(interpolate_pose(model, start, end, SHARES)[:, at], SHARES[:, None] * end[at])
 
 
 def test_a_turn_over_the_seam_goes_the_short_way(model):
     twist = model.value_names.index(f"{model.joints[0].name}.twist")
     start, end = model.neutral(), model.neutral()
     start[twist], end[twist] = np.radians(170.0), np.radians(-170.0)
-    found = np.degrees(between(model, start, end, SHARES)[:, twist])
+    found = np.degrees(interpolate_pose(model, start, end, SHARES)[:, twist])
     np.testing.assert_allclose(found, np.linspace(170.0, 190.0, 9), atol=1e-6)  # and no jump on the way
-    back = np.degrees(between(model, end, start, SHARES)[:, twist])
+    back = np.degrees(interpolate_pose(model, end, start, SHARES)[:, twist])
     np.testing.assert_allclose(back, np.linspace(-170.0, -190.0, 9), atol=1e-6)
 
 
@@ -78,7 +78,7 @@ def test_a_wound_up_pose_goes_on_from_where_it_is(model):
     start, end = model.neutral(), model.neutral()
     start[twist], end[twist] = np.radians(725.0), np.radians(15.0)
     np.testing.assert_allclose(
-        np.degrees(between(model, start, end, SHARES)[:, twist]), np.linspace(725, 735, 9), atol=1e-6
+        np.degrees(interpolate_pose(model, start, end, SHARES)[:, twist]), np.linspace(725, 735, 9), atol=1e-6
     )
 
 
@@ -91,9 +91,9 @@ def test_balls_turn_the_short_way_whatever_the_sign_of_the_quaternion(model):
     turn = Rotation.from_rotvec([0.4, -1.1, 0.3])
     start, end = body.neutral(), body.neutral()
     end[at] = -np.roll(turn.as_quat(), 1)  # the same rotation
-    found = Rotation.from_quat(np.roll(between(body, start, end, SHARES)[:, at], -1, axis=1))
+    found = Rotation.from_quat(np.roll(interpolate_pose(body, start, end, SHARES)[:, at], -1, axis=1))
     np.testing.assert_allclose(found.as_rotvec(), SHARES[:, None] * turn.as_rotvec(), atol=1e-9)
 
 
 def test_nothing_asked_for_is_nothing_given(model):
-    assert between(model, model.neutral(), model.neutral(), np.zeros(0)).shape == (0, len(model.value_names))
+    assert interpolate_pose(model, model.neutral(), model.neutral(), np.zeros(0)).shape == (0, len(model.value_names))

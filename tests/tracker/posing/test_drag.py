@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from staging import camera_at, cameras_around, shaken
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.fitting.gauss_newton import solve
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
@@ -239,7 +239,7 @@ def held_place(hand, values):
 @pytest.mark.parametrize("part", ["left_forearm", "left_upper_arm", "right_thigh", "right_calf"])
 def test_a_part_follows_by_the_place_that_was_touched(gavrila, pose, part):
     index = gavrila.part_index[part]
-    outline = next(o for o in part_outlines([Body(gavrila, pose)], [SIDE])[0] if o.part == index)
+    outline = next(o for o in part_outlines([PosedBody(gavrila, pose)], [SIDE])[0] if o.part == index)
     start = outline.polygon_px.mean(axis=0) + 2.0
     hand = grab_part(gavrila, pose, SIDE, index, start)
     np.testing.assert_allclose(held_place(hand, pose), start, atol=0.1)

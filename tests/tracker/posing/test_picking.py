@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from staging import camera_at, in_posture
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.geometry import rigid
 from tracker.posing.picking import part_outlines, place_on_part
 
@@ -12,7 +12,7 @@ SIDE = camera_at("side", (3.0, 2.5, 1.0))
 
 @pytest.fixture(scope="module")
 def body(gavrila):
-    return Body(gavrila, in_posture(gavrila))
+    return PosedBody(gavrila, in_posture(gavrila))
 
 
 def test_outlines_hold_the_images_of_their_parts(body):

@@ -5,14 +5,14 @@ import pytest
 from bodies import ARM
 from staging import cameras_around, own_evidence, posed, seen, shaken
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
-from tracker.geometry.triangulation import ViewPin
+from tracker.geometry.triangulation import PointObservation
 from tracker.posing.pinned_fit import fit_frame
 from tracker.session.session import load_session
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -24,7 +24,7 @@ SETTINGS = TrackSettings()
 
 def off_px(model, values, pins, cameras=CAMERAS):
     places = dict(zip(model.point_names, model.points_world(values), strict=True))
-    return [np.linalg.norm(cameras[p.camera].pinhole.project(places[p.point]) - p.place_px) for p in pins]
+    return [np.linalg.norm(cameras[p.camera].pinhole.project(places[p.point]) - p.position_px) for p in pins]
 
 
 def off_m(model, values, truth):
@@ -44,7 +44,7 @@ def test_without_edges_pins_are_met(model):
 def test_one_pin_moves_its_limb_and_leaves_the_others():
     truth = posed(GAVRILA, 1)
     (place,) = seen(GAVRILA, truth, ["left_wrist"], CAMERAS[:1])
-    pin = place._replace(place_px=(place.place_px[0] + 25, place.place_px[1]))
+    pin = place._replace(position_px=(place.position_px[0] + 25, place.position_px[1]))
     found = fit_frame([GAVRILA], [truth], [[pin]], CAMERAS, None, SETTINGS, [0])
     assert off_px(GAVRILA, found.poses[0], [pin])[0] < 0.5
     moved = dict(zip(GAVRILA.point_names, off_m(GAVRILA, found.poses[0], truth), strict=True))
@@ -66,7 +66,7 @@ def two_people():
     left[1] -= 0.5
     right[1] += 0.5
     rng = np.random.default_rng(5)
-    views = own_evidence([Body(GAVRILA, left), Body(GAVRILA, right)], CAMERAS)
+    views = own_evidence([PosedBody(GAVRILA, left), PosedBody(GAVRILA, right)], CAMERAS)
     return [left, right], views, [shaken(GAVRILA, v, rng, 0.12, 0.04) for v in (left, right)]
 
 
@@ -134,7 +134,7 @@ def test_pins_and_edges_of_real_footage_come_below_45_mm(sample_folder):
         rng = np.random.default_rng(k)
         start = shaken(model, fit_to_points(model, true).values, rng, 0.15, 0.03)
         pins = [
-            ViewPin(name, i, tuple(cameras[i].pinhole.project(true[name]) + rng.normal(0, 3, 2)))
+            PointObservation(name, i, tuple(cameras[i].pinhole.project(true[name]) + rng.normal(0, 3, 2)))
             for name in ("left_wrist", "right_wrist", "left_ankle", "right_ankle")
             for i in (0, 1)
         ]

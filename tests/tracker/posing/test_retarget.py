@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from staging import cameras_around, posed
 
-from tracker.body.dimensions import PartSizes, sizes_of, with_sizes
+from tracker.body.dimensions import PartDimensions, sizes_of, with_sizes
 from tracker.formats.model_toml import load_model
-from tracker.geometry.triangulation import ViewPin
+from tracker.geometry.triangulation import PointObservation
 from tracker.posing.retarget import rebodied
 
 
@@ -16,7 +16,8 @@ def bodies():
     model = load_model("gavrila34")
     sizes = sizes_of(model)
     parts = {
-        n: PartSizes(p.length_m + 0.015 * n.endswith(("forearm", "thigh")), p.girths_m) for n, p in sizes.parts.items()
+        n: PartDimensions(p.length_m + 0.015 * n.endswith(("forearm", "thigh")), p.girths_m)
+        for n, p in sizes.parts.items()
     }
     return model, with_sizes(model, sizes._replace(parts=parts))
 
@@ -58,7 +59,7 @@ def test_pins_draw_a_joint_away_from_where_it_was(bodies):
     values, cameras = posed(was, 2), cameras_around(3)
     wrist = was.point_names.index("left_wrist")
     place = was.points_world(values)[wrist] + (0.0, 0.0, 0.03)
-    pins = [ViewPin("left_wrist", i, tuple(c.project(place))) for i, c in enumerate(cameras)]
+    pins = [PointObservation("left_wrist", i, tuple(c.project(place))) for i, c in enumerate(cameras)]
     without, with_pins = (rebodied(values, was, becomes, p, cameras) for p in ((), pins))
     far = [np.linalg.norm(becomes.points_world(v)[wrist] - place) for v in (without, with_pins)]
     assert far[1] < far[0] - 0.01

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from staging import at, cameras_around, own_evidence, shaken, solid
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch
 from tracker.fitting.gauss_newton import StayNear, solve
 from tracker.formats.model_toml import load_model
@@ -48,7 +48,7 @@ def truth(gavrila):
 
 @pytest.fixture(scope="module")
 def views(gavrila, truth):
-    return own_evidence([Body(gavrila, truth)], cameras_around())
+    return own_evidence([PosedBody(gavrila, truth)], cameras_around())
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def start(gavrila, truth):
 @pytest.fixture(scope="module")
 def steps(gavrila, views, start):
     """Every step of a whole search with the default settings."""
-    return list(search(ChamferCost(views, [Body(gavrila, start)]), [start]))
+    return list(search(ChamferCost(views, [PosedBody(gavrila, start)]), [start]))
 
 
 def test_the_search_goes_stage_by_stage(gavrila, steps):
@@ -74,7 +74,7 @@ def test_the_search_goes_stage_by_stage(gavrila, steps):
 
 
 def test_the_best_never_gets_worse(gavrila, views, start, steps):
-    cost = ChamferCost(views, [Body(gavrila, start)])
+    cost = ChamferCost(views, [PosedBody(gavrila, start)])
     before = cost([start]).total_px
     for step in steps:
         assert step.best_px <= before
@@ -85,7 +85,7 @@ def test_the_best_never_gets_worse(gavrila, views, start, steps):
 
 def test_a_step_tells_the_truth(gavrila, views, start, steps):
     """Whoever stops the search anywhere holds poses that cost what the step says."""
-    cost = ChamferCost(views, [Body(gavrila, start)])
+    cost = ChamferCost(views, [PosedBody(gavrila, start)])
     for step in steps[::7]:
         found = cost(step.best)
         assert found.total_px == pytest.approx(step.best_px, rel=1e-9)
@@ -94,7 +94,7 @@ def test_a_step_tells_the_truth(gavrila, views, start, steps):
 
 
 def test_stopping_early_changes_nothing_of_what_was_found(gavrila, views, start, steps):
-    running = search(ChamferCost(views, [Body(gavrila, start)]), [start])
+    running = search(ChamferCost(views, [PosedBody(gavrila, start)]), [start])
     for expected in steps[:10]:
         step = next(running)
         assert step.best_px == expected.best_px
@@ -119,7 +119,7 @@ def test_limits_hold(gavrila, views, truth):
     """Elbows and knees as straight as they can be: the lattice's nodes beyond are put back."""
     straight = np.where([n.endswith("extension") for n in gavrila.value_names], 0.02, truth)
     seen = set()
-    for step in search(ChamferCost(views, [Body(gavrila, straight)]), [straight], COARSE):
+    for step in search(ChamferCost(views, [PosedBody(gavrila, straight)]), [straight], COARSE):
         bends = step.candidate[0][
             [gavrila.value_names.index(n) for n in ("left_elbow.extension", "left_knee.extension")]
         ]
@@ -135,13 +135,13 @@ def test_limits_hold(gavrila, views, truth):
             asked.extend(candidates)
             return super().of_person(person, candidates, poses)
 
-    list(search(Recording(ChamferCost(views, [Body(gavrila, straight)])), [straight], COARSE))
+    list(search(Recording(ChamferCost(views, [PosedBody(gavrila, straight)])), [straight], COARSE))
     for candidate in asked:
         np.testing.assert_array_equal(gavrila.clip(candidate), candidate)
 
 
 def test_evaluations_are_counted(gavrila, views, start, steps):
-    counted = Counted(ChamferCost(views, [Body(gavrila, start)]))
+    counted = Counted(ChamferCost(views, [PosedBody(gavrila, start)]))
     seen = 0
     for step in search(counted, [start], COARSE):
         assert seen < step.evaluations == counted.asked
@@ -158,7 +158,7 @@ def test_nothing_is_scored_twice_within_a_stage(gavrila, views, start):
             return super().of_person(person, candidates, poses)
 
     scored = set()
-    cost = Remembering(ChamferCost(views, [Body(gavrila, start)]))
+    cost = Remembering(ChamferCost(views, [PosedBody(gavrila, start)]))
     for step in search(cost, [start], COARSE):
         if step.stage_done:
             scored.clear()
@@ -175,14 +175,14 @@ def test_nothing_is_scored_twice_within_a_stage(gavrila, views, start):
 )
 def test_finds_a_pose_that_lies_on_the_lattice_exactly(gavrila, truth, views, steps):
     start = displaced(gavrila, truth, **steps)
-    *_, last = search(ChamferCost(views, [Body(gavrila, start)]), [start], COARSE)
+    *_, last = search(ChamferCost(views, [PosedBody(gavrila, start)]), [start], COARSE)
     np.testing.assert_allclose(last.best[0], truth, atol=1e-9)
 
 
 def test_bounds_and_steps_of_single_dofs(gavrila, views, start):
     settings = SearchSettings(bounds={"torso.x": 0.0}, steps={"torso.y": 0.02, "torso.abduction": 0.01}, passes=(1.0,))
     xs, ys, angles = set(), set(), set()
-    for step in search(ChamferCost(views, [Body(gavrila, start)]), [start], settings):
+    for step in search(ChamferCost(views, [PosedBody(gavrila, start)]), [start], settings):
         change = gavrila.difference(step.candidate[0], start)
         xs.add(change[0])
         ys.add(round(change[1] / 0.02, 6))
@@ -196,7 +196,7 @@ def test_bounds_and_steps_of_single_dofs(gavrila, views, start):
 
 
 def test_patience_and_the_largest_number_of_expansions(gavrila, views, truth):
-    cost = ChamferCost(views, [Body(gavrila, truth)])
+    cost = ChamferCost(views, [PosedBody(gavrila, truth)])
     # At the truth nothing is better: each stage ends when patience does.
     found = list(search(cost, [truth], SearchSettings(passes=(1.0,), patience=2)))
     assert [s.stage_done for s in found] == [False, True] * 3
@@ -206,7 +206,7 @@ def test_patience_and_the_largest_number_of_expansions(gavrila, views, truth):
 
 
 def test_a_stage_without_room_still_yields_one_step(gavrila, views, truth):
-    cost = ChamferCost(views, [Body(gavrila, truth)])
+    cost = ChamferCost(views, [PosedBody(gavrila, truth)])
     found = list(search(cost, [truth], SearchSettings(bound_rad=0, bound_m=0, passes=(1.0,))))
     assert [s.stage_done for s in found] == [True] * 3
     assert found[-1].evaluations == 1
@@ -216,9 +216,9 @@ def test_a_stage_without_room_still_yields_one_step(gavrila, views, truth):
 def test_people_one_after_the_other(gavrila, truth):
     other = gavrila.with_height(1.6)
     truths = [displaced(gavrila, truth, torso__y=-0.6), displaced(other, truth, torso__y=0.6)]
-    views = own_evidence([Body(gavrila, truths[0]), Body(other, truths[1])], cameras_around())
+    views = own_evidence([PosedBody(gavrila, truths[0]), PosedBody(other, truths[1])], cameras_around())
     starts = [displaced(gavrila, truths[0], torso__x=0.05), displaced(other, truths[1], torso__z=-0.05)]
-    cost = ChamferCost(views, [Body(gavrila, starts[0]), Body(other, starts[1])])
+    cost = ChamferCost(views, [PosedBody(gavrila, starts[0]), PosedBody(other, starts[1])])
     order = [(s.person, s.group.name) for s in stages(cost.models, COARSE)]
     names = ["torso and head", "arms", "legs"]
     assert order == [(p, n) for p in (0, 1) for n in names]
@@ -251,7 +251,7 @@ def test_the_papers_settings(gavrila, views, truth, start):
     paper = SearchSettings(passes=(1.0,))
     assert (paper.bound_rad, paper.step_rad) == pytest.approx((np.radians(15), np.radians(5)))
     assert (paper.bound_m, paper.step_m) == (0.10, 0.05)
-    cost = ChamferCost(views, [Body(gavrila, start)], outliers="paper")
+    cost = ChamferCost(views, [PosedBody(gavrila, start)], outliers="paper")
     found = list(search(cost, [start], paper))
     assert {s.stage.factor for s in found} == {1.0}
     assert found[-1].best_px < cost([start]).total_px
@@ -284,11 +284,11 @@ def test_a_refinement_makes_up_for_a_short_search(gavrila, views, truth):
     """From 8 degrees and 5 cm off in every degree of freedom, where a refinement alone goes astray."""
 
     def found(start, settings):
-        *_, last = search(ChamferCost(views, [Body(gavrila, start)]), [start], settings)
+        *_, last = search(ChamferCost(views, [PosedBody(gavrila, start)]), [start], settings)
         return last.best[0], last.evaluations
 
     def refines(pose):
-        blocks = [ContourMatch(views, [Body(gavrila, pose)]), StayNear(pose, np.ones(gavrila.n_dofs))]
+        blocks = [ContourMatch(views, [PosedBody(gavrila, pose)]), StayNear(pose, np.ones(gavrila.n_dofs))]
         values = solve(gavrila, pose, blocks, max_iterations=15, tolerance=1e-3, gain=WORTH_A_STEP).values
         return np.linalg.norm(gavrila.points_world(values) - gavrila.points_world(truth), axis=1).max() < 0.02
 

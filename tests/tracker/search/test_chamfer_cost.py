@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 from staging import at, camera_at, cameras_around, own_evidence, shaken, solid
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence, default_theta_px, view_evidence
 from tracker.formats.model_toml import load_model
@@ -113,7 +113,7 @@ def test_outside_the_image_the_way_to_the_border_counts():
 
 
 def test_own_contours_cost_next_to_nothing(gavrila):
-    bodies = [Body(gavrila, gavrila.neutral())]
+    bodies = [PosedBody(gavrila, gavrila.neutral())]
     cost = ChamferCost(own_evidence(bodies, cameras_around()), bodies)([bodies[0].values])
     # Edges lie at whole pixels: a quarter of a pixel off on average.
     assert cost.total_px < 0.4
@@ -122,11 +122,11 @@ def test_own_contours_cost_next_to_nothing(gavrila):
 def test_view_without_edges_has_no_say(gavrila):
     values = gavrila.neutral()
     cameras = cameras_around(3)
-    views = own_evidence([Body(gavrila, values)], cameras)
+    views = own_evidence([PosedBody(gavrila, values)], cameras)
     blind = view_evidence(cameras[1], 1.0, np.zeros((480, 640), dtype=bool))
     moved = shaken(gavrila, values, np.random.default_rng(0), 0.2, 0.05)
-    all_three = ChamferCost(views, [Body(gavrila, values)])([moved])
-    two = ChamferCost([views[0], blind, views[2]], [Body(gavrila, values)])
+    all_three = ChamferCost(views, [PosedBody(gavrila, values)])([moved])
+    two = ChamferCost([views[0], blind, views[2]], [PosedBody(gavrila, values)])
     cost = two([moved])
     assert np.isnan(cost.views_px).tolist() == [False, True, False]
     assert cost.views_px[[0, 2]].tolist() == all_three.views_px[[0, 2]].tolist()
@@ -134,7 +134,7 @@ def test_view_without_edges_has_no_say(gavrila):
     total, by_view = two.of_person(0, moved[None], [moved])
     assert total[0] == pytest.approx(cost.total_px, rel=ROUNDING)
     np.testing.assert_allclose(by_view[0], cost.views_px, rtol=ROUNDING)
-    none = ChamferCost([blind], [Body(gavrila, values)], THETA)
+    none = ChamferCost([blind], [PosedBody(gavrila, values)], THETA)
     assert none([moved]).total_px == THETA
     assert none.of_person(0, moved[None], [moved])[0].tolist() == [THETA]
 
@@ -144,7 +144,7 @@ def test_many_candidates_cost_the_same_as_one_by_one(gavrila, outliers):
     rng = np.random.default_rng(3)
     other = gavrila.with_height(1.6)
     poses = [gavrila.neutral(), other.retract(other.neutral(), np.eye(other.n_dofs)[1] * 0.5)]
-    bodies = [Body(gavrila, poses[0]), Body(other, poses[1])]
+    bodies = [PosedBody(gavrila, poses[0]), PosedBody(other, poses[1])]
     cost = ChamferCost(own_evidence(bodies, cameras_around()), bodies, outliers=outliers)
     for person, model in enumerate((gavrila, other)):
         candidates = np.stack([shaken(model, poses[person], rng, 0.2, 0.05) for _ in range(10)])
@@ -161,12 +161,12 @@ def test_costs_are_in_pixels_of_the_footage(gavrila):
     values = gavrila.neutral()
     cameras = cameras_around()
     moved = shaken(gavrila, values, np.random.default_rng(1), 0.1, 0.04)
-    whole = ChamferCost(own_evidence([Body(gavrila, values)], cameras), [Body(gavrila, values)])([moved])
+    whole = ChamferCost(own_evidence([PosedBody(gavrila, values)], cameras), [PosedBody(gavrila, values)])([moved])
     half = tuple(
         ViewEvidence(v.camera, 0.5, v.points_px, v.distance)
-        for v in own_evidence([Body(gavrila, values)], [c.scaled(0.5) for c in cameras])
+        for v in own_evidence([PosedBody(gavrila, values)], [c.scaled(0.5) for c in cameras])
     )
-    small = ChamferCost(half, [Body(gavrila, values)])([moved])
+    small = ChamferCost(half, [PosedBody(gavrila, values)])([moved])
     assert small.total_px == pytest.approx(whole.total_px, rel=0.05)
 
 
@@ -182,8 +182,8 @@ def away(cameras):
 def test_moving_off_the_evidence_never_lowers_the_cost(real_frame, outliers, evidence):
     model, values, views = real_frame
     if evidence == "own contours":
-        views = own_evidence([Body(model, values)], [v.camera for v in views])
-    cost = ChamferCost(views, [Body(model, values)], outliers=outliers)
+        views = own_evidence([PosedBody(model, values)], [v.camera for v in views])
+    cost = ChamferCost(views, [PosedBody(model, values)], outliers=outliers)
     here = cost([values]).total_px
     theta = default_theta_px(views[0].camera)
     for move in away([v.camera for v in views]):
@@ -194,19 +194,21 @@ def test_moving_off_the_evidence_never_lowers_the_cost(real_frame, outliers, evi
 @both_modes
 def test_wholly_off_costs_theta(real_frame, outliers):
     model, values, views = real_frame
-    own = own_evidence([Body(model, values)], [v.camera for v in views])
-    cost = ChamferCost(own, [Body(model, values)], 12.0, outliers)
+    own = own_evidence([PosedBody(model, values)], [v.camera for v in views])
+    cost = ChamferCost(own, [PosedBody(model, values)], 12.0, outliers)
     far = moved_by(model, values, (0.0, 0.0, 100.0))  # above every image
     assert cost([far]).views_px.tolist() == [12.0] * 4
     # Predicted there, nothing of the scene is near: a direction without points costs theta too.
-    predicted = ChamferCost(own, [Body(model, far)], 12.0, outliers)
+    predicted = ChamferCost(own, [PosedBody(model, far)], 12.0, outliers)
     assert predicted([far]).views_px.tolist() == [12.0] * 4
     # Behind one camera it is gone from that view.
     behind = cost([moved_by(model, values, 2 * (views[2].camera.center_world - values[:3]))])
     assert behind.views_px[2] == 12.0
     # Into a part of the images where there is nothing: the model's contour is seen whole, and explains nothing.
     left_of_all = [ViewEvidence(v.camera, 1.0, v.points_px - (300, 0), np.full_like(v.distance, 30.0)) for v in own]
-    assert ChamferCost(left_of_all, [Body(model, values)], 12.0, outliers)([values]).forward_px.tolist() == [12.0] * 4
+    assert (
+        ChamferCost(left_of_all, [PosedBody(model, values)], 12.0, outliers)([values]).forward_px.tolist() == [12.0] * 4
+    )
 
 
 def moved_by(model, values, step_m):
@@ -217,8 +219,8 @@ def moved_by(model, values, step_m):
 def test_a_limb_off_the_evidence_costs(real_frame, outliers):
     """One limb after the other leaves its own contour: the rest explains the scene less well each time."""
     model, values, views = real_frame
-    own = own_evidence([Body(model, values)], [v.camera for v in views])
-    cost = ChamferCost(own, [Body(model, values)], outliers=outliers)
+    own = own_evidence([PosedBody(model, values)], [v.camera for v in views])
+    cost = ChamferCost(own, [PosedBody(model, values)], outliers=outliers)
     here = cost([values]).total_px
     for dof in ("left_shoulder.abduction", "right_shoulder.abduction", "left_hip.elevation", "right_hip.abduction"):
         for angle in (0.3, 0.6):
@@ -236,7 +238,7 @@ def test_fast_cost_against_the_oracle(real_frame):
     left out or a direction mistaken moves it by much more. Measured: 0.02 px on average, at most 0.05 px and 0.6%.
     """
     model, values, views = real_frame
-    cost = ChamferCost(views, [Body(model, values)])
+    cost = ChamferCost(views, [PosedBody(model, values)])
     theta = default_theta_px(views[0].camera)
     scene = [near_contour(v, oracle.visible_contour(model, values, v.camera)[0], theta) for v in views]
     rng = np.random.default_rng(25)
@@ -255,7 +257,7 @@ def test_samples_twice_as_dense_say_the_same(real_frame, preset):
     """At 4 px between samples the cost is within 1% of that at 2 px, and the best candidate is the same."""
     _, values, views = real_frame
     model = load_model(preset, real_frame.model.height_m)
-    cost = ChamferCost(views, [Body(model, values)])
+    cost = ChamferCost(views, [PosedBody(model, values)])
     rng = np.random.default_rng(8)
     candidates = np.stack([shaken(model, values, rng, np.radians(10), 0.05) for _ in range(300)])
     coarse = cost.of_person(0, candidates, [values])[0]
@@ -272,7 +274,7 @@ def by_hand(cost, views, model, values, piece_px):
     total = []
     for view in range(len(views)):
         v, theta = views[view], default_theta_px(views[view].camera)
-        contour = occluding_contours.trace([Body(model, values)], v.camera, piece_px)
+        contour = occluding_contours.trace([PosedBody(model, values)], v.camera, piece_px)
         pieces = contour.pieces_px[~contour.hidden]
         middles, lengths = (pieces[:, :2] + pieces[:, 2:]) / 2, np.linalg.norm(pieces[:, 2:] - pieces[:, :2], axis=1)
         inside = np.clip(middles, 0, np.array(v.camera.size) - 1)

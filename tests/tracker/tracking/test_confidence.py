@@ -9,7 +9,7 @@ from staging import SUIT, cameras_around, dressed, own_evidence, posed
 
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import limbs
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.fitting.contour_residuals import ContourMatch
 from tracker.fitting.gauss_newton import StayNear, solve
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
@@ -128,16 +128,16 @@ def test_what_is_said_against_a_pose(found, words):
 
 def judged(model, truth, values, colors=False):
     """Quality of a pose before the evidence of another one."""
-    bodies = [Body(model, truth)]
+    bodies = [PosedBody(model, truth)]
     views = dressed(bodies, cameras_around(), SUIT) if colors else own_evidence(bodies, cameras_around())
-    match = ContourMatch(views, [Body(model, values)])
+    match = ContourMatch(views, [PosedBody(model, values)])
     fit = solve(model, values, [match, StayNear(values, np.full(model.n_dofs, 5.0))], max_iterations=0)
     thetas = np.array([v.theta_px for v in views])
     score = None
     if colors:
         known = Colors(views, bodies).learn()
-        score = Colors(views, [Body(model, values)]).score(values, known), known
-    return quality(Body(model, values), fit, match.part_costs(values), thetas, np.zeros(len(views)), 100.0, score)
+        score = Colors(views, [PosedBody(model, values)]).score(values, known), known
+    return quality(PosedBody(model, values), fit, match.part_costs(values), thetas, np.zeros(len(views)), 100.0, score)
 
 
 @pytest.mark.parametrize("colors", [False, True])

@@ -8,7 +8,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.geometry import rigid
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.simulate.motion.postures import Posture, ramp, stance, standing_height
 
 ARM_DOFS = ("shoulder.abduction", "shoulder.elevation", "shoulder.twist", "elbow.extension")

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from tracker.body.model import BodyModel, IntArray
+from tracker.body.model import BodyModel
 from tracker.geometry import rigid
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.simulate.people.anatomy import ANKLE_HEIGHT
 from tracker.simulate.people.builds import MAN, Build
 from tracker.simulate.people.outfit import Outfit
@@ -65,7 +65,7 @@ class Posture:
     """Where the `left` and the `right` arm reach to, where they do."""
 
 
-def perform(role: Role, model: BodyModel, n_frames: int, fps: float) -> Array:
+def solve_posture(role: Role, model: BodyModel, n_frames: int, fps: float) -> Array:
     """Poses of a role played by a body, (n_frames, n_values)."""
     R_world_place = rigid.so3_exp(np.array([0.0, 0.0, HEADING_RAD]))
     at_twist = model.value_names.index("torso.twist")

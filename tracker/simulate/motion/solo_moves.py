@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.simulate.motion.choreography import SIDES, Choreography, Track, glide
 from tracker.simulate.motion.postures import ramp
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.geometry import rigid
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.simulate.people.skeleton import Factors
 
 Point = tuple[float, float, float]

@@ -5,13 +5,13 @@ from functools import cached_property
 
 import numpy as np
 
-from tracker.body.model import BodyModel, IntArray
+from tracker.body.model import BodyModel
 from tracker.geometry import rigid
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 
 
 @dataclass(frozen=True, eq=False)
-class PartsFigure:
+class ModelFigure:
     """A body model drawn with the shapes and colours of its own parts."""
 
     model: BodyModel

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.simulate.people.textures import value_noise
 
 Color = tuple[float, float, float]

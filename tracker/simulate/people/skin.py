@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from tracker.body.model import BodyModel, IntArray
+from tracker.body.model import BodyModel
 from tracker.geometry import rigid
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.simulate.people.anatomy import Lobe, bone_names, bone_poses
 from tracker.simulate.people.builds import MAN, Build
 from tracker.simulate.people.outfit import Outfit

@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.model import IntArray
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 
 _CORNERS = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 _EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(_CORNERS[a] - _CORNERS[b]).sum() == 1]

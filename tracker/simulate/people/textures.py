@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import ndimage
 
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 
 _LATTICE = np.random.default_rng(7).random((32, 32, 32)).astype(np.float32)
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from tracker.errors import TrackerError
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
 from tracker.simulate.stage.furniture import HALF_WIDTH_M
 
 CORNER_NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")

@@ -6,12 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.model import IntArray
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, Image, IntArray
 from tracker.simulate.stage.rasterizer import Figure, cast, lit, pixel_means, vertex_normals
 from tracker.simulate.stage.room import LAMP_WORLD, Backdrop, floor_shadow
-
-Image = NDArray[np.uint8]
 
 READ_NOISE = 1.6
 """Standard deviation of a dark pixel, gray levels."""

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from tracker.geometry import rigid
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.simulate.people.textures import value_noise
 
 Vector = tuple[float, float, float]

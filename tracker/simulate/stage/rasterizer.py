@@ -6,9 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.model import IntArray
+from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
 
 SAMPLES = 2
 """Samples per pixel along each axis. The colour of a pixel is the mean over its area, which is centred at integers."""

@@ -8,9 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.model import IntArray
+from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import Array
 from tracker.simulate.stage.furniture import HALF_WIDTH_M, furnished
 from tracker.simulate.stage.rasterizer import DIRECT, SAMPLES, covered, lit, pixel_means
 

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import Colors, PartColors
-from tracker.body.model import Body, BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import ContourMatch
 from tracker.fitting.gauss_newton import held
 from tracker.fitting.interpenetration import KeepBodiesApart
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.tracking.chamfer.frame_estimator import Scene
 from tracker.tracking.chamfer.pose_paths import ROUNDS, Candidates, Sight, carry, cheapest_way
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -225,10 +225,10 @@ class _Choice:
                 out.append(self._in_place_of(i, self._judged(i, taken), "carried over from frames around it"))
         return tuple(out)
 
-    def _bodies(self, i: int, values: Array) -> list[Body]:
+    def _bodies(self, i: int, values: Array) -> list[PosedBody]:
         """Everybody on a frame of the stretch, the person in a pose, (n_values,)."""
         poses = [values if p == self._person else v for p, v in enumerate(self._found[i].poses)]
-        return [Body(m, p) for m, p in zip(self._models, poses, strict=True)]
+        return [PosedBody(m, p) for m, p in zip(self._models, poses, strict=True)]
 
     def _look(self, i: int) -> Sight:
         person, settings = self._person, self._settings
@@ -264,8 +264,8 @@ class _Choice:
         return estimate._replace(statuses=tuple(statuses), remarks=tuple(remarks))
 
 
-def _bodies(models: Sequence[BodyModel], poses: Sequence[Array]) -> list[Body]:
-    return [Body(m, p) for m, p in zip(models, poses, strict=True)]
+def _bodies(models: Sequence[BodyModel], poses: Sequence[Array]) -> list[PosedBody]:
+    return [PosedBody(m, p) for m, p in zip(models, poses, strict=True)]
 
 
 def _colors(observer: Observer, models: Sequence[BodyModel], where: Tracked, person: int) -> Colors:

@@ -14,15 +14,15 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.appearance.part_colors import Colors
-from tracker.body.limbs import Limb
-from tracker.body.model import Body
+from tracker.body.limbs import Limb, limb_display_name
+from tracker.body.model import PosedBody
 from tracker.compute.threads import side_by_side
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch, PartCosts
 from tracker.fitting.gauss_newton import Block, Fit, covariance, held
 from tracker.fitting.gauss_newton_compiled import solve
 from tracker.fitting.interpenetration import KeepBodiesApart
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.images.static_edges import Scenery
 from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings
 from tracker.tracking import confidence
@@ -106,7 +106,7 @@ class Scene:
         self._views, self._settings = views, settings
         self._memories, self._models, self._predicted = memories, [m.model for m in memories], tuple(poses)
         self._sharing, self._shares = Sharing(views), list[Shares]()
-        self._placed: dict[tuple[int, int], Body] = {}  # poses are kept: no other gets their number
+        self._placed: dict[tuple[int, int], PosedBody] = {}  # poses are kept: no other gets their number
         self._thetas = np.array([v.outlier_px(settings.theta_px) for v in views])
 
     def teach(self, scenery: Sequence[Scenery]) -> None:
@@ -246,7 +246,7 @@ class Scene:
         for limb in due:
             memory.searched(limb, found, turned[limb.dofs].max() > _MOVED_RAD)
             if turned[limb.dofs].max() > _ANEW_RAD:
-                remarks.append(f"{confidence.spoken(limb.name)} searched anew")
+                remarks.append(f"{limb_display_name(limb.name)} searched anew")
         return _Seen(match, poses, better, suspects, None, evaluations, tuple(remarks), tuple(r.values for r in rivals))
 
     def _judged(self, person: int, seen: _Seen) -> Found:
@@ -260,7 +260,7 @@ class Scene:
             return out
         model = self._models[person]
         turned = np.abs([model.difference(rival, seen.fit.values) for rival in seen.rivals]).max(axis=0)
-        names = [confidence.spoken(x.name) for x in confidence.limbs(model) if turned[x.dofs].max() > _ANEW_RAD]
+        names = [limb_display_name(x.name) for x in confidence.limbs(model) if turned[x.dofs].max() > _ANEW_RAD]
         remark = f"{' and '.join(names) or 'body'} may be elsewhere"
         return _in_doubt(out, remark, [self._with(person, rival) for rival in seen.rivals])
 
@@ -378,18 +378,18 @@ class Scene:
         self._shares.append(Shares(self._sharing, bodies))
         return [self._shares[-1].own(p, everywhere) for p in people]
 
-    def _around(self, person: int) -> tuple[list[Body], int]:
+    def _around(self, person: int) -> tuple[list[PosedBody], int]:
         """Who is in the scene for a person, and their index there."""
         bodies = self._bodies()
         return (bodies, person) if self._settings.occlusion else ([bodies[person]], 0)
 
-    def _bodies(self) -> list[Body]:
+    def _bodies(self) -> list[PosedBody]:
         """Everybody where they stand so far."""
         return [self._body(i, pose) for i, pose in enumerate(self.poses)]
 
-    def _body(self, person: int, values: Array) -> Body:
+    def _body(self, person: int, values: Array) -> PosedBody:
         """A person in a pose, (n_values,); each is asked for many times."""
         key = person, id(values)  # people who are exchanged take each other's poses
         if key not in self._placed:
-            self._placed[key] = Body(self._models[person], values)
+            self._placed[key] = PosedBody(self._models[person], values)
         return self._placed[key]

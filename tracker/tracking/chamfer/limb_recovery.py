@@ -16,14 +16,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import Colors, PartColors
-from tracker.body.kinematics import IntArray, chain_poses
+from tracker.body.kinematics import chain_poses
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
 from tracker.compute.threads import N_HELPERS, dealt_out, helpers
 from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch
 from tracker.fitting.gauss_newton import Block, Fit
 from tracker.fitting.gauss_newton_compiled import solve
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array, IntArray
 
 T = TypeVar("T")
 

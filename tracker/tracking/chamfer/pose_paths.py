@@ -19,7 +19,7 @@ from tracker.compute.threads import N_HELPERS, dealt_out
 from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch
 from tracker.fitting.gauss_newton import Block
 from tracker.fitting.gauss_newton_compiled import solve
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.tracking.chamfer.limb_recovery import APART_M, LEAST_GAIN
 from tracker.tracking.chamfer.settings import TrackSettings, prior_blocks
 

@@ -7,12 +7,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.model import Body, BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MatchSettings
 from tracker.fitting.gauss_newton import Block, StayNear
 from tracker.fitting.interpenetration import KeepApart
-from tracker.geometry.rigid import Array
+from tracker.geometry.arrays import Array
 from tracker.motion.prediction import PredictSettings
 from tracker.search.best_first import SearchSettings, SearchStep, search
 from tracker.search.chamfer_cost import ChamferCost, Outliers
@@ -61,7 +61,7 @@ def pose_cost(
     views: Sequence[ViewEvidence], models: Sequence[BodyModel], poses: Sequence[Array], settings: TrackSettings
 ) -> ChamferCost:
     """Make the cost function around given poses: what a search from them minimizes."""
-    bodies = [Body(m, p) for m, p in zip(models, poses, strict=True)]
+    bodies = [PosedBody(m, p) for m, p in zip(models, poses, strict=True)]
     return ChamferCost(views, bodies, settings.theta_px, settings.outliers)
 
 

@@ -5,12 +5,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.model import Body, BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.threads import side_by_side
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Region
-from tracker.geometry.rigid import Array
 from tracker.images.static_edges import Scenery
 from tracker.motion.prediction import PredictSettings
 from tracker.tracking.chamfer.frame_estimator import Found, Scene
@@ -54,14 +54,14 @@ def track_chamfer(
     scenery = [Scenery(c.size) for c in observer.matched_cameras] if settings.segments else None
     cameras, ahead = observer.matched_cameras, list[Region | None]()
 
-    def placed(frame: int, expected: Callable[[Memory, PredictSettings], Array]) -> list[Body]:
+    def placed(frame: int, expected: Callable[[Memory, PredictSettings], Array]) -> list[PosedBody]:
         """Everybody on a frame, where they are given or expected."""
         given = (fixed or {}).get(frame, {})
         poses = [
             given.get(p, expected(m, settings.predict) if p in everybody else m.past[-1])
             for p, m in enumerate(memories)
         ]
-        return [Body(m, v) for m, v in zip(models, poses, strict=True)]
+        return [PosedBody(m, v) for m, v in zip(models, poses, strict=True)]
 
     for i, frame in enumerate(frames):
         if i == 0:  # who goes on from known poses looks where who never stopped would have

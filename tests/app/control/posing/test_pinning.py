@@ -12,10 +12,10 @@ from tracker.store.annotation_store import AnnotationStore
 RIGHT, BACK = 1, 2
 
 
-def pin(controller, point, place_px, camera=FRONT, live=False, to_px=None):
+def pin(controller, point, position_px, camera=FRONT, live=False, to_px=None):
     """Click, or press, drag and let go."""
-    controller.pinning.begin(PAGE, controller.state.frame, camera, 0, point, tuple(place_px), live)
-    for place in () if to_px is None else np.linspace(place_px, to_px, 4):
+    controller.pinning.begin(PAGE, controller.state.frame, camera, 0, point, tuple(position_px), live)
+    for place in () if to_px is None else np.linspace(position_px, to_px, 4):
         controller.pinning.move(PAGE, tuple(place))
     controller.pinning.end(PAGE)
 
@@ -29,7 +29,7 @@ def stored_pins(session, frame=0):
 
 def pins_of(controller):
     """Places of the pins, px, as exactly as they come back through the lens distortion."""
-    return {(p.point, p.camera): tuple(np.round(p.place_px, 6).tolist()) for p in controller.state.pins[0]}
+    return {(p.point, p.camera): tuple(np.round(p.position_px, 6).tolist()) for p in controller.state.pins[0]}
 
 
 def test_a_pin_is_one_entry_and_leaves_the_pose_alone(opened, session):

@@ -6,7 +6,7 @@ from gestures import drag, wait_for
 
 from app.control.tracking import ranges
 from tracker.errors import TrackerError
-from tracker.motion.interpolation import between
+from tracker.motion.interpolation import interpolate_pose
 from tracker.store.annotation_store import AnnotationStore
 
 
@@ -41,7 +41,7 @@ def test_interpolating_fills_between_the_ends_as_one_entry(two_keys, session):
     assert cells(two_keys) == {
         f: ("manual", True, True) if f in (2, 12) else ("interpolated", False, False) for f in range(2, 13)
     }
-    truth = between(model, ends[0].values, ends[1].values, np.array([0.3]))[0]
+    truth = interpolate_pose(model, ends[0].values, ends[1].values, np.array([0.3]))[0]
     np.testing.assert_allclose(stored(session, 5).values, truth)
     assert stored(session, 5).settings == {"method": "interpolate", "between": [2, 12]}
     two_keys.undo()
@@ -58,7 +58,7 @@ def test_keyframes_within_are_passed_through_and_stay(two_keys, session):
     np.testing.assert_array_equal(stored(session, 6).values, before.values)
     assert cells(two_keys)[6] == ("manual", True, True)
     model = two_keys.models[0]
-    truth = between(model, before.values, stored(session, 12).values, np.array([0.5]))[0]
+    truth = interpolate_pose(model, before.values, stored(session, 12).values, np.array([0.5]))[0]
     np.testing.assert_allclose(stored(session, 9).values, truth)
 
 

@@ -8,7 +8,7 @@ from app.page import intentions
 from app.page.messages import state as state_message
 from tracker.errors import TrackerError
 from tracker.geometry import rigid
-from tracker.geometry.ground_plane import UP_ROTATIONS, Floor, nearest_axis, up_rotation
+from tracker.geometry.ground_plane import UP_ROTATIONS, GroundPlane, nearest_axis, up_rotation
 from tracker.session.session import load_session
 
 TILT = rigid.so3_exp(np.array([0.05, -0.03, 0.0]))
@@ -158,10 +158,10 @@ def test_the_views_show_lines_of_sight_and_the_plane(opened):
 @pytest.mark.parametrize("up", list(UP_ROTATIONS))
 def test_the_least_turn_lets_up_point_up(up, opened):
     normal = rigid.so3_exp(np.array([0.1, -0.2, 0.15])) @ UP_ROTATIONS[up][:, 2]
-    R = up_rotation(up, Floor(normal, 0.0))
+    R = up_rotation(up, GroundPlane(normal, 0.0))
     assert R[:, 2] == pytest.approx(normal)
     assert pytest.approx(np.eye(3)) == R @ R.T
     assert nearest_axis(normal) == up
-    turned = up_rotation(up, Floor(-UP_ROTATIONS[up][:, 2], 0.0))
+    turned = up_rotation(up, GroundPlane(-UP_ROTATIONS[up][:, 2], 0.0))
     assert turned[:, 2] == pytest.approx(-UP_ROTATIONS[up][:, 2])
     assert np.linalg.det(turned) == pytest.approx(1.0)

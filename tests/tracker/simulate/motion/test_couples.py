@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from tracker.formats.model_toml import load_model
-from tracker.simulate.motion.postures import perform
+from tracker.simulate.motion.postures import solve_posture
 from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.people.anatomy import bone_names
 from tracker.simulate.people.skeleton import altered_model
@@ -27,7 +27,7 @@ def skins():
 def posed(scene, skins, frames):
     """Vertices of both at some frames."""
     cast = cast_of(scene)
-    poses = [perform(role, skin.model, max(frames) + 1, 25.0) for role, skin in zip(cast, skins, strict=True)]
+    poses = [solve_posture(role, skin.model, max(frames) + 1, 25.0) for role, skin in zip(cast, skins, strict=True)]
     return [[skin.posed(own[k]) for skin, own in zip(skins, poses, strict=True)] for k in frames]
 
 

@@ -4,7 +4,7 @@ import pytest
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import load_model
 from tracker.simulate.motion.couples import COUPLE_APART_M, TANGO_APART_M
-from tracker.simulate.motion.postures import HEADING_RAD, perform
+from tracker.simulate.motion.postures import HEADING_RAD, solve_posture
 from tracker.simulate.motion.scenes import CROWD_APART_M, SCENES, cast_of
 from tracker.simulate.people.skeleton import altered_model
 
@@ -30,7 +30,7 @@ VARIED = ("exercise", "dance", "reach_and_cross", "leaving")
 
 @pytest.fixture(scope="module")
 def performances(true_model):
-    return {(scene, seed): perform(cast_of(scene, seed)[0], true_model, 120, FPS) for scene, seed in PERFORMED}
+    return {(scene, seed): solve_posture(cast_of(scene, seed)[0], true_model, 120, FPS) for scene, seed in PERFORMED}
 
 
 @pytest.mark.parametrize("performed", PERFORMED, ids=lambda p: f"{p[0]}-{p[1]}")
@@ -47,7 +47,7 @@ def test_poses_keep_the_limits_and_move_smoothly(performed, performances, true_m
 def test_people_together_keep_the_limits_and_their_distance_and_move_smoothly(scene):
     cast = cast_of(scene, 3)
     models = [altered_model(load_model("gavrila22", role.height_m), role.build.bone_factors) for role in cast]
-    poses = [perform(role, model, 50, FPS) for role, model in zip(cast, models, strict=True)]
+    poses = [solve_posture(role, model, 50, FPS) for role, model in zip(cast, models, strict=True)]
     for model, own in zip(models, poses, strict=True):
         assert all(np.allclose(values, model.clip(values)) for values in own)
         assert np.abs(np.diff(own[:, 3:], axis=0)).max() < np.radians(30)
@@ -64,7 +64,8 @@ def test_the_tango_turns_once_in_sixty_frames_face_to_face():
     cast = cast_of("tango")
     models = [altered_model(load_model("gavrila22", role.height_m), role.build.bone_factors) for role in cast]
     twists = [
-        degrees(model, perform(role, model, 61, FPS), "torso.twist") for role, model in zip(cast, models, strict=True)
+        degrees(model, solve_posture(role, model, 61, FPS), "torso.twist")
+        for role, model in zip(cast, models, strict=True)
     ]
     assert [round(np.ptp(twist)) for twist in twists] == [360, 360]
     assert np.allclose((twists[0] - twists[1]) % 360, 180, atol=3)
@@ -138,7 +139,7 @@ def test_arms_cross_the_trunk_and_rest_against_it_without_passing_through(perfor
 def test_leaving_goes_to_a_corner_and_comes_back(true_model):
     corners = set()
     for seed in range(4):
-        place = perform(cast_of("leaving", seed)[0], true_model, 150, FPS)[:, :2]
+        place = solve_posture(cast_of("leaving", seed)[0], true_model, 150, FPS)[:, :2]
         far = np.linalg.norm(place, axis=1)
         assert 1.8 < far.max() < 2.35
         assert far[-1] < 0.5 * far.max()
@@ -156,12 +157,12 @@ def test_a_seed_changes_what_is_done(performances):
 @pytest.mark.parametrize("scene", VARIED)
 def test_any_seed_can_be_performed_for_long(scene, true_model):
     for seed in (101, 102, 103):
-        poses = perform(cast_of(scene, seed)[0], true_model, 250, 10.0)
+        poses = solve_posture(cast_of(scene, seed)[0], true_model, 250, 10.0)
         assert len(poses) == 250
 
 
 def test_elbow_rotation_raises_the_arms_then_turns_the_elbows_forward(true_model):
-    poses = perform(cast_of("elbow_rotation")[0], true_model, 50, FPS)
+    poses = solve_posture(cast_of("elbow_rotation")[0], true_model, 50, FPS)
     points = points_of(true_model, poses)
     for side, left in (("left", 1.0), ("right", -1.0)):
         abduction = degrees(true_model, poses, f"{side}_shoulder.abduction")
@@ -182,7 +183,7 @@ def test_elbow_rotation_raises_the_arms_then_turns_the_elbows_forward(true_model
 
 
 def test_standing_feet_stay_where_they_are(true_model):
-    points = points_of(true_model, perform(cast_of("elbow_rotation")[0], true_model, 50, FPS))
+    points = points_of(true_model, solve_posture(cast_of("elbow_rotation")[0], true_model, 50, FPS))
     for ankle in ("left_ankle", "right_ankle"):
         assert np.abs(points[ankle] - points[ankle][0]).max() < 1e-3
     # Side by side under the trunk, whichever way the person faces.
@@ -191,7 +192,7 @@ def test_standing_feet_stay_where_they_are(true_model):
 
 
 def test_walking_lifts_the_knees_in_turn_and_swings_the_arms(true_model):
-    poses = perform(cast_of("walk_in_place")[0], true_model, 100, FPS)
+    poses = solve_posture(cast_of("walk_in_place")[0], true_model, 100, FPS)
     points = points_of(true_model, poses)
     left, right = (points[f"{side}_ankle"][:, 2] - points[f"{side}_ankle"][0, 2] for side in ("left", "right"))
     assert left.max() > 0.1

@@ -2,7 +2,7 @@ import numpy as np
 import trimesh
 
 from tracker.geometry import rigid
-from tracker.simulate.motion.postures import perform
+from tracker.simulate.motion.postures import solve_posture
 from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.people.anatomy import ANKLE_HEIGHT, bone_names
 from tracker.simulate.people.skin import rest_values
@@ -46,7 +46,7 @@ def test_weights_sum_to_one_and_do_not_leak_from_limb_to_limb(skin):
 
 def test_joints_stay_within_the_skin_and_its_volume_within_a_tenth(skin):
     rest = trimesh.Trimesh(skin.vertices_rest, skin.faces, process=False).volume
-    poses = perform(cast_of("elbow_rotation")[0], skin.model, 50, 25.0)
+    poses = solve_posture(cast_of("elbow_rotation")[0], skin.model, 50, 25.0)
     for values in (poses[0], poses[24], poses[49]):
         mesh = trimesh.Trimesh(skin.posed(values), skin.faces, process=False)
         assert abs(mesh.volume / rest - 1.0) < 0.1
@@ -55,7 +55,7 @@ def test_joints_stay_within_the_skin_and_its_volume_within_a_tenth(skin):
 
 
 def test_the_soles_stand_on_the_floor(skin):
-    values = perform(cast_of("elbow_rotation")[0], skin.model, 1, 25.0)[0]
+    values = solve_posture(cast_of("elbow_rotation")[0], skin.model, 1, 25.0)[0]
     height = skin.model.height_m
     lowest = skin.posed(values)[:, 2].min()
     assert abs(lowest) < 0.12 * ANKLE_HEIGHT * height

@@ -3,9 +3,9 @@ import numpy as np
 import pytest
 
 from tracker.formats.model_toml import load_model
-from tracker.simulate.motion.postures import perform
+from tracker.simulate.motion.postures import solve_posture
 from tracker.simulate.motion.scenes import cast_of
-from tracker.simulate.people.model_figure import PartsFigure
+from tracker.simulate.people.model_figure import ModelFigure
 from tracker.simulate.stage.camera_rig import make_cameras
 from tracker.simulate.stage.film import exposed, film, freeze
 from tracker.simulate.stage.rasterizer import cast, pixel_means
@@ -20,7 +20,7 @@ def backdrops():
 
 
 def standing(model, x=0.0, y=0.0):
-    values = perform(cast_of("elbow_rotation")[0], model, 1, 25.0)[0]
+    values = solve_posture(cast_of("elbow_rotation")[0], model, 1, 25.0)[0]
     values[:2] += (x, y)
     return values
 
@@ -48,7 +48,7 @@ def test_the_floor_darkens_beside_the_feet(backdrops, skin):
 
 
 def test_masks_tell_people_apart_and_the_nearer_hides_the_other(backdrops):
-    figure = PartsFigure(load_model("gavrila22", 1.7))
+    figure = ModelFigure(load_model("gavrila22", 1.7))
     camera = backdrops[0].camera
     away = camera.center_world[:2] / np.linalg.norm(camera.center_world[:2])
     near, far = standing(figure.model, *(0.4 * away)), standing(figure.model, *(-0.4 * away))
@@ -63,7 +63,7 @@ def test_masks_tell_people_apart_and_the_nearer_hides_the_other(backdrops):
 def test_the_fitted_bodys_mask_is_that_of_its_inside_test(backdrops):
     model = load_model("gavrila22", 1.7)
     values = standing(model)
-    _, mask = film(backdrops[0], freeze([PartsFigure(model)], [values]))
+    _, mask = film(backdrops[0], freeze([ModelFigure(model)], [values]))
     camera = backdrops[0].camera
     v, u = np.indices(mask.shape).reshape(2, -1)[:, ::7]
     rays = camera.rays(np.stack([u, v], axis=1).astype(float))

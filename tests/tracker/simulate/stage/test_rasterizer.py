@@ -5,7 +5,7 @@ import trimesh
 
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
-from tracker.simulate.motion.postures import perform
+from tracker.simulate.motion.postures import solve_posture
 from tracker.simulate.motion.scenes import cast_of
 from tracker.simulate.stage.camera_rig import make_cameras
 from tracker.simulate.stage.rasterizer import SAMPLES, cast, pixel_means, vertex_normals
@@ -41,7 +41,7 @@ def test_a_ball_appears_where_it_projects(center):
 
 
 def test_the_skins_edges_lie_where_its_vertices_project(skin):
-    values = perform(cast_of("elbow_rotation")[0], skin.model, 30, 25.0)[-1]
+    values = solve_posture(cast_of("elbow_rotation")[0], skin.model, 30, 25.0)[-1]
     vertices = skin.posed(values)
     for camera in make_cameras(4, (640, 480), 0):
         image = coverage(camera, vertices, skin.faces)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from staging import SUIT, Shown, cameras_around, dressed, posed
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.tracking.chamfer.backward_pass import Followed, Tracked, follow_back, stretches
 from tracker.tracking.chamfer.pose_paths import ROUNDS
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -23,7 +23,7 @@ def scene(gavrila):
     truth = [posed(gavrila, 1)]
     for _ in range(N - 1):
         truth.append(gavrila.clip(gavrila.retract(truth[-1], step)))
-    views = [dressed([Body(gavrila, v)], cameras_around(4), SUIT) for v in truth]
+    views = [dressed([PosedBody(gavrila, v)], cameras_around(4), SUIT) for v in truth]
     first = np.array(truth)
     first[LOST, swing] -= np.radians(70)
     return gavrila, np.array(truth), views, first
@@ -109,7 +109,8 @@ def test_the_others_stay_as_they_were_found(scene):
     other = truth.copy()
     other[:, 0] += 1.2
     views = [
-        dressed([Body(model, a), Body(model, b)], cameras_around(4), SUIT) for a, b in zip(truth, other, strict=True)
+        dressed([PosedBody(model, a), PosedBody(model, b)], cameras_around(4), SUIT)
+        for a, b in zip(truth, other, strict=True)
     ]
     odd = other + 0.03  # not where the evidence is, yet it stays
     found = [Tracked(k, (odd[k], first[k]), ("doubtful", "lost" if k in LOST else "good")) for k in range(N)]

@@ -7,7 +7,7 @@ from staging import SUIT, cameras_around, dressed, own_evidence, posed
 
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import limbs
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.fitting.contour_residuals import ContourMatch
 from tracker.fitting.gauss_newton import StayNear, solve
 from tracker.formats.model_toml import load_model
@@ -31,13 +31,13 @@ class Staged:
     """A frame that shows a body in its clothes, and the body in another pose before it."""
 
     def __init__(self, model, truth, wrong, colors=True):
-        bodies = [Body(model, truth)]
+        bodies = [PosedBody(model, truth)]
         views = dressed(bodies, cameras_around(4), SUIT)
         self.model, self.truth = model, truth
-        match = ContourMatch(views, [Body(model, wrong)])
+        match = ContourMatch(views, [PosedBody(model, wrong)])
         priors = [StayNear(wrong, np.full(model.n_dofs, 1.0))]
         known = Colors(views, bodies).learn() if colors else None
-        self.judge = Judge(match, priors, Colors(views, [Body(model, wrong)]), known, RecoverSettings())
+        self.judge = Judge(match, priors, Colors(views, [PosedBody(model, wrong)]), known, RecoverSettings())
         self.blocks = [match, *priors]
         # As a tracker would bring it: refined from there, which does not lead out.
         self.here = solve(model, wrong, self.blocks, max_iterations=15, tolerance=1e-3)
@@ -207,8 +207,8 @@ def test_two_places_that_are_about_as_good_are_both_told(gavrila):
     """The edges show the arm twice, and no colours tell which is meant: the other place is kept."""
     here, there = (turned(gavrila, posed(gavrila, 1), left_shoulder__abduction=a) for a in (80, 120))
     arm, cameras = limb_of(gavrila, "left_forearm"), cameras_around(4)
-    views = both_shown(*(own_evidence([Body(gavrila, v)], cameras) for v in (here, there)))
-    body = [Body(gavrila, here)]
+    views = both_shown(*(own_evidence([PosedBody(gavrila, v)], cameras) for v in (here, there)))
+    body = [PosedBody(gavrila, here)]
     judge = Judge(ContourMatch(views, body, everywhere=True), [], Colors(views, body), None, RecoverSettings())
     fit = solve(gavrila, here, [judge.match], max_iterations=15, tolerance=1e-3)
     found = search_limbs(gavrila, [arm], fit, (), judge, 15)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_evidence, posed, shaken, solid
 
-from tracker.body.model import Body
+from tracker.body.model import PosedBody
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
@@ -104,7 +104,7 @@ def test_frames_are_read_one_at_a_time(balls):
 def test_settings_reach_the_cost(balls):
     model, values, views = balls
     far = values[0] + (0, 0, 5.0, 0, 0, 0)
-    bodies = [Body(model, v) for v in values[0]]
+    bodies = [PosedBody(model, v) for v in values[0]]
     for theta in (7.0, 31.0):
         cost = pose_cost(views[0], [model, model], values[0], TrackSettings(theta_px=theta))
         assert cost(far).total_px == pytest.approx(theta)
@@ -135,7 +135,7 @@ def off_m(model, values, truth):
 def test_refinement_follows_by_itself(gavrila):
     """Nobody is lost, so nothing is searched; the estimates say all there is to know."""
     truth = dancing(gavrila, 5)
-    views = [dressed([Body(gavrila, v)], cameras_around(), SUIT) for v in truth]
+    views = [dressed([PosedBody(gavrila, v)], cameras_around(), SUIT) for v in truth]
     found = list(track_chamfer(Shown(views), [gavrila], truth[:1], range(5), TrackSettings()))
     for estimate, values in zip(found, truth, strict=True):
         assert off_m(gavrila, estimate.poses[0], values).max() < 0.01
@@ -153,7 +153,7 @@ def test_refinement_follows_by_itself(gavrila):
 
 def test_an_arm_that_jumps_is_searched_and_the_frame_says_so(gavrila):
     truth = dancing(gavrila, 5, jump_at=3)
-    views = [dressed([Body(gavrila, v)], cameras_around(4), SUIT) for v in truth]
+    views = [dressed([PosedBody(gavrila, v)], cameras_around(4), SUIT) for v in truth]
     found = list(track_chamfer(Shown(views), [gavrila], truth[:1], range(5), TrackSettings()))
     assert [f.remarks[0] for f in found[:3]] == ["", "", ""]
     assert "left arm searched anew" in found[3].remarks[0]
@@ -194,7 +194,7 @@ def test_two_people_who_might_as_well_be_each_other_are_in_doubt():
 def test_what_is_locked_is_neither_refined_nor_searched(gavrila, monkeypatch):
     """The arm that jumps is locked: it stays to the last bit, is not searched, and everything else is followed."""
     truth = dancing(gavrila, 4, jump_at=2)
-    views = [dressed([Body(gavrila, v)], cameras_around(4), SUIT) for v in truth]
+    views = [dressed([PosedBody(gavrila, v)], cameras_around(4), SUIT) for v in truth]
     searched = []
     monkeypatch.setattr(
         "tracker.tracking.chamfer.frame_estimator.search_limbs",
@@ -236,7 +236,7 @@ def test_what_the_prediction_refused_is_looked_at_again(gavrila):
     """The prediction accepts no edge of an arm that jumps: it is found among all edges."""
     truth = dancing(gavrila, 5, jump_at=3)
     found = list(
-        track_chamfer(filmed([[Body(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(5), TrackSettings())
+        track_chamfer(filmed([[PosedBody(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(5), TrackSettings())
     )
     assert found[3].remarks == ("left arm searched anew",)
     for estimate, values in zip(found, truth, strict=True):
@@ -247,7 +247,7 @@ def test_a_body_that_is_elsewhere_is_searched(gavrila):
     truth = dancing(gavrila, 3)
     truth[2, 1] += 0.6
     *_, last = track_chamfer(
-        filmed([[Body(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(3), TrackSettings()
+        filmed([[PosedBody(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(3), TrackSettings()
     )
     assert "body searched anew" in last.remarks[0]
     assert last.evaluations > 100
@@ -257,7 +257,7 @@ def test_a_body_that_is_elsewhere_is_searched(gavrila):
 
 def test_a_pose_that_is_given_is_certain(gavrila):
     truth = dancing(gavrila, 4)
-    views = [dressed([Body(gavrila, v)], cameras_around(), SUIT) for v in truth]
+    views = [dressed([PosedBody(gavrila, v)], cameras_around(), SUIT) for v in truth]
     keyframe = gavrila.retract(truth[2], np.full(gavrila.n_dofs, 0.02))
     found = list(track_chamfer(Shown(views), [gavrila], truth[:1], range(4), TrackSettings(), {2: {0: keyframe}}))
     given = found[2]
@@ -272,7 +272,7 @@ def test_the_prediction_stands_while_nothing_is_seen(gavrila):
     """Without edges in any view the prediction stands, and the covariance says how far it is trusted."""
     truth = dancing(gavrila, 4)
     cameras = cameras_around()
-    views = [dressed([Body(gavrila, v)], cameras, SUIT) for v in truth]
+    views = [dressed([PosedBody(gavrila, v)], cameras, SUIT) for v in truth]
     views[3] = tuple(view_evidence(c, 1.0, np.zeros((480, 640), dtype=bool)) for c in cameras)
     settings = TrackSettings(trust_rad=0.1, trust_m=0.03)
     *_, last = track_chamfer(Shown(views), [gavrila], truth[:1], range(4), settings)
