@@ -1,7 +1,8 @@
 """What is drawn over the views: contours, candidates, part edges, joints, epipolar lines, segments of edges."""
 
 from collections.abc import Collection, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -33,20 +34,23 @@ _EDGE_STRIDE = 3
 """Every so many pixels of an edge are drawn: more would be seen only far in, and cost the browser much."""
 
 
+PathKind = Literal["model", "hidden", "candidate", "ghost", "part_edge", "epipolar", "accepted", "rejected", "floor"]
+
+
 class Path(NamedTuple):
     """Line segments of one kind in one view."""
 
     camera: int
     person: int
-    kind: str
-    """`model`, `hidden`, `candidate`, `ghost`, `part_edge`, `epipolar`, `accepted` or `rejected`."""
+    kind: PathKind
     color: str
     segments_px: FloatArray
     """x0, y0, x1, y1, (N, 4), undistorted px."""
 
 
-class Handle(NamedTuple):
-    """A joint in one view."""
+@dataclass(frozen=True)
+class Handle:
+    """A joint in one view; a joint behind the camera has none."""
 
     camera: int
     person: int
@@ -54,7 +58,7 @@ class Handle(NamedTuple):
     u: float
     v: float
     visible: bool
-    """Whether nothing hides it."""
+    """False for an occluded joint."""
 
 
 def bones(model: BodyModel) -> list[tuple[str, str]]:
@@ -139,7 +143,11 @@ def _model(session: Session, bodies: Sequence[PosedBody], camera: Camera, index:
     """The contours of the poses shown: what one sees of them, and what parts hide."""
     contour = _traced(bodies, camera)
     out = []
-    for layer, kind, those in (("hidden", "hidden", contour.hidden), ("contours", "model", ~contour.hidden)):
+    kinds: tuple[tuple[str, PathKind, Mask], ...] = (
+        ("hidden", "hidden", contour.hidden),
+        ("contours", "model", ~contour.hidden),
+    )
+    for layer, kind, those in kinds:
         if layer in view.layers and view.by_part:
             out += _by_part(session, bodies, contour, those, index, kind)
         elif layer in view.layers:
@@ -148,7 +156,7 @@ def _model(session: Session, bodies: Sequence[PosedBody], camera: Camera, index:
 
 
 def _outlined(
-    session: Session, poses: Sequence[Array], camera: Camera, index: int, kind: str, color: str
+    session: Session, poses: Sequence[Array], camera: Camera, index: int, kind: PathKind, color: str
 ) -> list[Path]:
     """What one would see of other poses of everybody, all in one colour."""
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, poses, strict=True)]
@@ -180,7 +188,7 @@ def _ghosts(chosen: Collection[int], people: Sequence[PosedBody], camera: Camera
 
 
 def _by_person(
-    bodies: Sequence[PosedBody], contour: Contour, those: Mask, index: int, kind: str, colors: Sequence[str]
+    bodies: Sequence[PosedBody], contour: Contour, those: Mask, index: int, kind: PathKind, colors: Sequence[str]
 ) -> list[Path]:
     """Those pieces of a contour, one path for each person."""
     people = occluding_contours.surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
@@ -191,7 +199,7 @@ def _by_person(
 
 
 def _by_part(
-    session: Session, bodies: Sequence[PosedBody], contour: Contour, those: Mask, index: int, kind: str
+    session: Session, bodies: Sequence[PosedBody], contour: Contour, those: Mask, index: int, kind: PathKind
 ) -> list[Path]:
     """Those pieces of a contour, one path for each part that has any."""
     people, colors = occluding_contours.surfaces_of(tuple(b.model for b in bodies)).people, part_colors(session.people)

@@ -12,7 +12,7 @@ from tracker.posing import picking
 from tracker.session.session import Session
 
 
-class Outline(NamedTuple):
+class PartHull(NamedTuple):
     """Where a view shows a part, to be pointed at."""
 
     camera: int
@@ -24,7 +24,7 @@ class Outline(NamedTuple):
     """The closed convex outline as x0, y0, x1, y1, (N, 4), undistorted px."""
 
 
-def outlines(session: Session, state: State, view: View) -> list[Outline]:
+def part_hulls(session: Session, state: State, view: View) -> list[PartHull]:
     """The parts that a pointer can take in the views that a page shows: all of everybody who is shown.
 
     There are none while a hand holds a point, and of a part that is held by its surface there is that one alone: what
@@ -42,7 +42,7 @@ def outlines(session: Session, state: State, view: View) -> list[Outline]:
             if one.body in state.cast.hidden:
                 continue
             if drag is None or (one.body, one.part) == (drag.person, drag.part):
-                out.append(Outline(index, one.body, one.part, one.depth_m, _closed(one.polygon_px)))
+                out.append(PartHull(index, one.body, one.part, one.depth_m, _closed(one.polygon_px)))
     return out
 
 

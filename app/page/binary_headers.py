@@ -13,7 +13,7 @@ from app.page.server_messages import Message, Part, Status
 from app.state.page_view import PictureLayer
 
 
-class ImageHeader(Message, tag="image"):
+class ImageHeader(Message, frozen=True, tag="image"):
     """One picture of a set, covering the whole undistorted image. Payload: JPEG or PNG."""
 
     layer: PictureLayer
@@ -27,7 +27,7 @@ class ImageHeader(Message, tag="image"):
     """Distance at which the distance image is darkest, image pixels; null for other layers."""
 
 
-class Path(Part):
+class Path(Part, frozen=True):
     """Line segments of one kind: `first` to `first + count` of the payload."""
 
     camera: int
@@ -38,7 +38,7 @@ class Path(Part):
     count: int
 
 
-class Outline(Part):
+class Outline(Part, frozen=True):
     """Convex closed outline of a part that can be dragged by its surface; segments as in a path."""
 
     camera: int
@@ -50,7 +50,7 @@ class Outline(Part):
     count: int
 
 
-class OverlayHeader(Message, tag="overlay"):
+class OverlayHeader(Message, frozen=True, tag="overlay"):
     """All vectors over the views; replaces the previous overlay. Payload: float32 `x0, y0, x1, y1` per segment."""
 
     frame: int
@@ -66,7 +66,7 @@ class OverlayHeader(Message, tag="overlay"):
     """Of the pins of the joint worked on."""
 
 
-class CellsHeader(Message, tag="cells"):
+class CellsHeader(Message, frozen=True, tag="cells"):
     """More than 2,000 cells of the timeline, as columns.
 
     Payload, `count` values each: uint32 frames, ascending; float32 costs, NaN for null; uint8 indices into `sources`
@@ -82,7 +82,7 @@ class CellsHeader(Message, tag="cells"):
     """By frame."""
 
 
-class Plot(Part):
+class Plot(Part, frozen=True):
     """Curves that share an axis."""
 
     title: str
@@ -91,7 +91,7 @@ class Plot(Part):
     """Names of the curves."""
 
 
-class CurvesHeader(Message, tag="curves"):
+class CurvesHeader(Message, frozen=True, tag="curves"):
     """A group of curves: whole at first, then the frames that changed; only for subscribed pages.
 
     Payload: `count` uint32 frames, ascending; then `count` float32 per curve, plot by plot, NaN where there is no pose.
@@ -106,7 +106,7 @@ class CurvesHeader(Message, tag="curves"):
     plots: tuple[Plot, ...]
 
 
-class SearchStepsHeader(Message, tag="search_steps"):
+class SearchStepsHeader(Message, frozen=True, tag="search_steps"):
     """Recorded steps of a run from `first` on, replacing those known from there.
 
     Payload, `count` float32 each: evaluations, cost of the candidate, least cost, index of the stage.
@@ -117,7 +117,7 @@ class SearchStepsHeader(Message, tag="search_steps"):
     count: int
 
 
-class SearchCandidatesHeader(Message, tag="search_candidates"):
+class SearchCandidatesHeader(Message, frozen=True, tag="search_candidates"):
     """Best poses of a run as points in all views.
 
     Payload: float32 `u, v` by candidate, view and point of all people; NaN behind a camera.
@@ -131,7 +131,7 @@ class SearchCandidatesHeader(Message, tag="search_candidates"):
     """The view in which the candidates differ most."""
 
 
-class LandscapeHeader(Message, tag="landscape"):
+class LandscapeHeader(Message, frozen=True, tag="landscape"):
     """The cost along one degree of freedom.
 
     Payload, `count` float32 each: values, mean costs, then the costs of each view.

@@ -1,7 +1,8 @@
 """Messages from the page to the program: the one declaration of their types, fields and limits.
 
-`message_parsing` checks messages against these declarations. `protocol_docs` writes the page's types and docs/protocol.md from
-them. Positions are in undistorted pixels, frames count from 0, cameras and people are indices into the session's lists.
+`message_parsing` checks messages against these declarations, `protocol_docs` writes the page's types and
+docs/protocol.md from them. Positions are in undistorted pixels, frames count from 0, cameras and people are indices
+into the session's lists.
 """
 
 from typing import Annotated, Literal, TypeAlias, Union, get_args
@@ -25,6 +26,7 @@ DragMode: TypeAlias = Literal["move", "turn", "push"]
 RangeAction: TypeAlias = Literal[
     "track_forward", "track_backward", "interpolate", "clear", "keyframe", "reviewed", "unreviewed", "none"
 ]
+Tab: TypeAlias = Literal["search", "landscape"]
 OutlierMode: TypeAlias = Literal["truncated", "paper"]
 
 
@@ -35,13 +37,13 @@ class Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field
 # --- looking -------------------------------------------------------------------------------------------------------
 
 
-class Seek(Message, tag="seek"):
+class Seek(Message, frozen=True, tag="seek"):
     """Show a frame. Playback is a series of these, paced by the arrival of the pictures."""
 
     frame: Frame
 
 
-class Select(Message, tag="select"):
+class Select(Message, frozen=True, tag="select"):
     """Choose the person and the point that the panels show."""
 
     person: Index
@@ -49,7 +51,7 @@ class Select(Message, tag="select"):
     """The point last touched."""
 
 
-class SetView(Message, tag="view"):
+class SetView(Message, frozen=True, tag="view"):
     """Choose what this page shows. Nothing is drawn for a page before its first `view`."""
 
     layers: Annotated[list[Layer], Meta(max_length=64)]
@@ -59,7 +61,7 @@ class SetView(Message, tag="view"):
     """Whether contours have the colours of the parts instead of those of the people."""
 
 
-class ShowPerson(Message, tag="people"):
+class ShowPerson(Message, frozen=True, tag="people"):
     """Show or hide a person in all views and in the 3-D view. No pose changes."""
 
     action: Literal["show"]
@@ -67,39 +69,39 @@ class ShowPerson(Message, tag="people"):
     shown: bool
 
 
-class Solo(Message, tag="people"):
+class Solo(Message, frozen=True, tag="people"):
     """Dim everybody but the person worked on, or stop dimming."""
 
     action: Literal["solo"]
     on: bool
 
 
-class ShowCurves(Message, tag="curves"):
+class ShowCurves(Message, frozen=True, tag="curves"):
     """Subscribe to a group of curves of the person worked on; null unsubscribes."""
 
     group: CurveGroup | None
 
 
-class WatchTab(Message, tag="watch"):
+class WatchTab(Message, frozen=True, tag="watch"):
     """Subscribe to what a tab of the drawer shows; null unsubscribes."""
 
-    tab: Literal["search", "landscape"] | None
+    tab: Tab | None
 
 
-class ShowHistory(Message, tag="history"):
+class ShowHistory(Message, frozen=True, tag="history"):
     """Subscribe to the history."""
 
     limit: Index
     """Entries to list in each direction, at most 2,000; 0 unsubscribes."""
 
 
-class LookThrough(Message, tag="snap"):
+class LookThrough(Message, frozen=True, tag="snap"):
     """Look through a camera in the 3-D view, its image behind the bodies; null releases the view."""
 
     camera: Index | None
 
 
-class Pause3d(Message, tag="pause_3d"):
+class Pause3d(Message, frozen=True, tag="pause_3d"):
     """Pause the 3-D view during drags. A page sends it on connecting if its browser renders WebGL in software."""
 
     pause: bool
@@ -108,7 +110,7 @@ class Pause3d(Message, tag="pause_3d"):
 # --- posing --------------------------------------------------------------------------------------------------------
 
 
-class Drag(Message, tag="drag"):
+class Drag(Message, frozen=True, tag="drag"):
     """Drag a point, or a part by its surface."""
 
     phase: GesturePhase
@@ -127,14 +129,14 @@ class Drag(Message, tag="drag"):
     mode: DragMode = "move"
 
 
-class _PoseEdit(Message, tag="pose"):
+class _PoseEdit(Message, frozen=True, tag="pose"):
     """An edit of one pose."""
 
     frame: Frame
     person: Index
 
 
-class SetDof(_PoseEdit, tag="pose"):
+class SetDof(_PoseEdit, frozen=True, tag="pose"):
     """Set a degree of freedom, clamped to its limits."""
 
     action: Literal["set"]
@@ -143,7 +145,7 @@ class SetDof(_PoseEdit, tag="pose"):
     """Degrees or centimetres."""
 
 
-class TurnDof(_PoseEdit, tag="pose"):
+class TurnDof(_PoseEdit, frozen=True, tag="pose"):
     """Step a degree of freedom."""
 
     action: Literal["turn"]
@@ -152,7 +154,7 @@ class TurnDof(_PoseEdit, tag="pose"):
     """Degrees or centimetres."""
 
 
-class Nudge(_PoseEdit, tag="pose"):
+class Nudge(_PoseEdit, frozen=True, tag="pose"):
     """Move a point parallel to the image of a view."""
 
     action: Literal["nudge"]
@@ -165,13 +167,13 @@ class Nudge(_PoseEdit, tag="pose"):
     """Null moves the body."""
 
 
-class Mirror(_PoseEdit, tag="pose"):
+class Mirror(_PoseEdit, frozen=True, tag="pose"):
     """Exchange left and right; the root stays."""
 
     action: Literal["mirror"]
 
 
-class CopyFrame(_PoseEdit, tag="pose", rename={"source": "from"}):
+class CopyFrame(_PoseEdit, frozen=True, tag="pose", rename={"source": "from"}):
     """Copy the stored pose of another frame."""
 
     action: Literal["copy"]
@@ -179,7 +181,7 @@ class CopyFrame(_PoseEdit, tag="pose", rename={"source": "from"}):
     """Frame to copy from."""
 
 
-class CopyPerson(_PoseEdit, tag="pose", rename={"source": "from"}):
+class CopyPerson(_PoseEdit, frozen=True, tag="pose", rename={"source": "from"}):
     """Copy the joints that another person has by the same names on this frame; position and heading stay."""
 
     action: Literal["copy_person"]
@@ -187,7 +189,7 @@ class CopyPerson(_PoseEdit, tag="pose", rename={"source": "from"}):
     """Person to copy from."""
 
 
-class TakeAlternative(_PoseEdit, tag="pose"):
+class TakeAlternative(_PoseEdit, frozen=True, tag="pose"):
     """Replace a tracked pose by its alternative, as a keyframe; repeated, go back.
 
     People who may have been confused are exchanged together.
@@ -196,7 +198,7 @@ class TakeAlternative(_PoseEdit, tag="pose"):
     action: Literal["alternative"]
 
 
-class ResetLimb(_PoseEdit, tag="pose"):
+class ResetLimb(_PoseEdit, frozen=True, tag="pose"):
     """Reset the limb of a point to the neutral pose."""
 
     action: Literal["reset"]
@@ -204,7 +206,7 @@ class ResetLimb(_PoseEdit, tag="pose"):
     """Null, or the root, resets everything but the root."""
 
 
-class LockDofs(_PoseEdit, tag="pose"):
+class LockDofs(_PoseEdit, frozen=True, tag="pose"):
     """Lock or unlock degrees of freedom. Locks are stored with the session and are no entry of the history."""
 
     action: Literal["lock"]
@@ -217,7 +219,7 @@ PoseEdit: TypeAlias = Union[  # noqa: UP007
 ]
 
 
-class DragPin(Message, tag="pin"):
+class DragPin(Message, frozen=True, tag="pin"):
     """Set or drag a pin: the position of a joint in a view."""
 
     phase: GesturePhase
@@ -231,7 +233,7 @@ class DragPin(Message, tag="pin"):
     """Whether the body follows the pin."""
 
 
-class RemovePins(Message, tag="unpin"):
+class RemovePins(Message, frozen=True, tag="unpin"):
     """Remove pins of a person on a frame."""
 
     frame: Frame
@@ -242,7 +244,7 @@ class RemovePins(Message, tag="unpin"):
     """Null for all views."""
 
 
-class FitPose(Message, tag="fit"):
+class FitPose(Message, frozen=True, tag="fit"):
     """Fit to pins and edges together."""
 
     frame: Frame
@@ -253,7 +255,7 @@ class FitPose(Message, tag="fit"):
 # --- searching -----------------------------------------------------------------------------------------------------
 
 
-class RunSearch(Message, tag="search"):
+class RunSearch(Message, frozen=True, tag="search"):
     """Search the shown frame: one expansion, to the end of the stage, or the whole frame; or stop.
 
     A search of other people than the current one starts from the beginning.
@@ -264,7 +266,7 @@ class RunSearch(Message, tag="search"):
     """The only person to search; null for everybody."""
 
 
-class RepeatSearch(Message, tag="search"):
+class RepeatSearch(Message, frozen=True, tag="search"):
     """Search again from the start of a run of this frame, with the present settings."""
 
     action: Literal["again"]
@@ -274,7 +276,7 @@ class RepeatSearch(Message, tag="search"):
     """The only person to search; null for everybody."""
 
 
-class SetSearchSpeed(Message, tag="search_speed"):
+class SetSearchSpeed(Message, frozen=True, tag="search_speed"):
     """Limit the speed of a search that is watched, effective at once."""
 
     per_second: Number | None
@@ -286,16 +288,16 @@ class LeafChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     person: Index
     name: Name
-    bound_rad: Number | None | UnsetType = UNSET
-    bound_m: Number | None | UnsetType = UNSET
-    step_rad: Number | None | UnsetType = UNSET
-    step_m: Number | None | UnsetType = UNSET
+    bound_rad: Number | UnsetType | None = UNSET
+    bound_m: Number | UnsetType | None = UNSET
+    step_rad: Number | UnsetType | None = UNSET
+    step_m: Number | UnsetType | None = UNSET
 
 
 class SearchChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Settings of the search to change; what is left out stays."""
 
-    theta_px: Number | None | UnsetType = UNSET
+    theta_px: Number | UnsetType | None = UNSET
     """Null for the default."""
     outliers: OutlierMode | UnsetType = UNSET
     passes: Annotated[list[Number], Meta(max_length=100)] | UnsetType = UNSET
@@ -312,13 +314,13 @@ class SearchChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     leaf: LeafChanges | UnsetType = UNSET
 
 
-class SetSearchSettings(Message, tag="search_settings"):
+class SetSearchSettings(Message, frozen=True, tag="search_settings"):
     """Change settings of the search."""
 
     changes: SearchChanges
 
 
-class ReplayStep(Message, tag="replay"):
+class ReplayStep(Message, frozen=True, tag="replay"):
     """Show a recorded step of a search in place of the stored poses."""
 
     run: Index | None
@@ -327,33 +329,33 @@ class ReplayStep(Message, tag="replay"):
     """Index of the step; -1 for the start."""
 
 
-class CompareRun(Message, tag="compare"):
+class CompareRun(Message, frozen=True, tag="compare"):
     """Draw the result of a run over the views; null draws none."""
 
     run: Index | None
 
 
-class PreviewCandidate(Message, tag="preview"):
+class PreviewCandidate(Message, frozen=True, tag="preview"):
     """Draw a candidate of a run over the views; null draws none."""
 
     run: Index
     candidate: Index | None
 
 
-class TakeCandidate(Message, tag="take"):
+class TakeCandidate(Message, frozen=True, tag="take"):
     """Take over a candidate of a run as an edit; null for the run's result."""
 
     run: Index
     candidate: Index | None
 
 
-class ShowLandscape(Message, tag="landscape"):
+class ShowLandscape(Message, frozen=True, tag="landscape"):
     """Choose the degree of freedom of the person worked on whose cost landscape is shown."""
 
     dof: Name
 
 
-class SetLandscapeDof(Message, tag="landscape_set"):
+class SetLandscapeDof(Message, frozen=True, tag="landscape_set"):
     """Set a degree of freedom to a value of its landscape, as an edit."""
 
     person: Index
@@ -365,7 +367,7 @@ class SetLandscapeDof(Message, tag="landscape_set"):
 # --- tracking and ranges -------------------------------------------------------------------------------------------
 
 
-class StartTracking(Message, tag="track"):
+class StartTracking(Message, frozen=True, tag="track"):
     """Track from the shown frame."""
 
     action: Literal["forward", "backward"]
@@ -373,13 +375,13 @@ class StartTracking(Message, tag="track"):
     """Last frame; null for the end of the recording."""
 
 
-class ControlTracking(Message, tag="track"):
+class ControlTracking(Message, frozen=True, tag="track"):
     """Pause, resume or end a tracking run; tracked frames stay."""
 
     action: Literal["pause", "resume", "stop"]
 
 
-class EditRange(Message, tag="range"):
+class EditRange(Message, frozen=True, tag="range"):
     """Track, interpolate, clear or mark a range of frames."""
 
     action: RangeAction
@@ -390,17 +392,17 @@ class EditRange(Message, tag="range"):
     """Null for everybody. Tracking always moves everybody who is placed."""
 
 
-class StopRange(Message, tag="stop_range"):
+class StopRange(Message, frozen=True, tag="stop_range"):
     """Stop the work on a range; what is written stays."""
 
 
-class ToggleMark(Message, tag="mark"):
+class ToggleMark(Message, frozen=True, tag="mark"):
     """Mark the shown pose of the person worked on as keyframe or as reviewed, or remove the mark."""
 
     toggle: Literal["keyframe", "reviewed"]
 
 
-class FollowTracking(Message, tag="follow"):
+class FollowTracking(Message, frozen=True, tag="follow"):
     """Show each frame as it is tracked, or stay at the shown frame."""
 
     follow: bool
@@ -409,7 +411,7 @@ class FollowTracking(Message, tag="follow"):
 # --- floor ---------------------------------------------------------------------------------------------------------
 
 
-class EditFloor(Message, tag="floor"):
+class EditFloor(Message, frozen=True, tag="floor"):
     """Set the floor from three points: start, go to the next point, remove the last mark, apply or cancel.
 
     `revert` restores the floor before the last change.
@@ -418,7 +420,7 @@ class EditFloor(Message, tag="floor"):
     action: Literal["begin", "next", "take_back", "apply", "cancel", "revert"]
 
 
-class MarkFloor(Message, tag="floor"):
+class MarkFloor(Message, frozen=True, tag="floor"):
     """Mark the current floor point in a view, replacing its mark there."""
 
     action: Literal["mark"]
@@ -430,21 +432,21 @@ class MarkFloor(Message, tag="floor"):
 # --- history -------------------------------------------------------------------------------------------------------
 
 
-class Undo(Message, tag="undo"):
+class Undo(Message, frozen=True, tag="undo"):
     """Undo one entry of the history."""
 
 
-class Redo(Message, tag="redo"):
+class Redo(Message, frozen=True, tag="redo"):
     """Redo one entry of the history."""
 
 
-class GoTo(Message, tag="go_to"):
+class GoTo(Message, frozen=True, tag="go_to"):
     """Undo or redo until an entry is the last one done; null undoes everything."""
 
     edit: Index | None
 
 
-class Save(Message, tag="save"):
+class Save(Message, frozen=True, tag="save"):
     """Retry writing unsaved edits."""
 
 

@@ -1,7 +1,7 @@
 """Text messages from the program to the page: the one declaration of their types and fields.
 
-`messages` and `search_feed` make them, `protocol_docs` writes the page's types and docs/protocol.md from them. Positions
-are in undistorted pixels, frames count from 0, cameras and people are indices into the session's lists.
+`messages` and `search_feed` make them, `protocol_docs` writes the page's types and docs/protocol.md from them.
+Positions are in undistorted pixels, frames count from 0, cameras and people are indices into the session's lists.
 """
 
 from typing import Literal, TypeAlias, Union, get_args
@@ -12,18 +12,18 @@ Status: TypeAlias = Literal["", "good", "doubtful", "lost"]
 RunState: TypeAlias = Literal["running", "paused", "over"]
 
 
-class Part(msgspec.Struct, frozen=True):
+class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A part of a message."""
 
 
-class Message(msgspec.Struct, frozen=True, tag_field="type"):
+class Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
     """A message to a page, or the header of a binary one."""
 
 
 # --- session -------------------------------------------------------------------------------------------------------
 
 
-class CameraInfo(Part):
+class CameraInfo(Part, frozen=True):
     """A camera."""
 
     name: str
@@ -33,7 +33,7 @@ class CameraInfo(Part):
     """Pixels."""
 
 
-class DofInfo(Part):
+class DofInfo(Part, frozen=True):
     """A degree of freedom."""
 
     joint: str
@@ -46,7 +46,7 @@ class DofInfo(Part):
     """Upper limit; null where there is none."""
 
 
-class Limb(Part):
+class Limb(Part, frozen=True):
     """The limb that a point belongs to."""
 
     name: str
@@ -54,7 +54,7 @@ class Limb(Part):
     """Indices of its degrees of freedom."""
 
 
-class PersonInfo(Part):
+class PersonInfo(Part, frozen=True):
     """A person."""
 
     name: str
@@ -78,7 +78,7 @@ class PersonInfo(Part):
     """By point: its limb."""
 
 
-class SessionMessage(Message, tag="session"):
+class SessionMessage(Message, frozen=True, tag="session"):
     """The session; the first message on each connection."""
 
     name: str
@@ -91,7 +91,7 @@ class SessionMessage(Message, tag="session"):
 # --- state ---------------------------------------------------------------------------------------------------------
 
 
-class PersonState(Part):
+class PersonState(Part, frozen=True):
     """A person on the shown frame."""
 
     source: str | None
@@ -103,7 +103,7 @@ class PersonState(Part):
     """Number of poses that the tracker found about as good."""
 
 
-class Job(Part):
+class Job(Part, frozen=True):
     """The search of the shown frame. A paused search has a `kind` and is not running."""
 
     running: bool
@@ -123,7 +123,7 @@ class Job(Part):
     """Result of the last search, or empty."""
 
 
-class Track(Part):
+class Track(Part, frozen=True):
     """The tracking run. A paused run has a `first` and is not running."""
 
     running: bool
@@ -149,7 +149,7 @@ class Track(Part):
     """Result of the last run, or empty."""
 
 
-class RangeWork(Part):
+class RangeWork(Part, frozen=True):
     """The work on a range of frames."""
 
     running: bool
@@ -163,7 +163,7 @@ class RangeWork(Part):
     """Result of the last work, or empty."""
 
 
-class ReplayedStep(Part):
+class ReplayedStep(Part, frozen=True):
     """The recorded step that is shown in place of the stored poses."""
 
     run: int
@@ -174,7 +174,7 @@ class ReplayedStep(Part):
     stage: str | None
 
 
-class FloorPicking(Part):
+class FloorPicking(Part, frozen=True):
     """Progress of setting the floor."""
 
     point: int
@@ -193,7 +193,7 @@ class FloorPicking(Part):
     """Why there is none."""
 
 
-class FootageProgress(Part):
+class FootageProgress(Part, frozen=True):
     """Progress of the first scan of long videos."""
 
     listed: float | None
@@ -202,7 +202,7 @@ class FootageProgress(Part):
     """What is wrong with a file."""
 
 
-class StateMessage(Message, tag="state"):
+class StateMessage(Message, frozen=True, tag="state"):
     """Texts and figures of the page, whenever any changed; during a drag or a search at most 5 times per second."""
 
     frame: int
@@ -255,7 +255,7 @@ class StateMessage(Message, tag="state"):
 # --- other text messages -------------------------------------------------------------------------------------------
 
 
-class HistoryEntry(Part):
+class HistoryEntry(Part, frozen=True):
     """An edit that undo or redo can reach."""
 
     edit: int
@@ -267,7 +267,7 @@ class HistoryEntry(Part):
     """Whether redo would redo it."""
 
 
-class HistoryMessage(Message, tag="history"):
+class HistoryMessage(Message, frozen=True, tag="history"):
     """The history, whenever it changed; only for subscribed pages."""
 
     entries: tuple[HistoryEntry, ...]
@@ -278,14 +278,14 @@ class HistoryMessage(Message, tag="history"):
     """Whether there are more done entries than requested."""
 
 
-class NoticeMessage(Message, tag="notice"):
+class NoticeMessage(Message, frozen=True, tag="notice"):
     """One sentence for the user."""
 
     level: Literal["error", "info"]
     text: str
 
 
-class Cell(Part):
+class Cell(Part, frozen=True):
     """A frame with a pose."""
 
     source: str
@@ -298,7 +298,7 @@ class Cell(Part):
     """Whether there is an alternative, and nobody has confirmed the pose."""
 
 
-class TimelineMessage(Message, tag="timeline"):
+class TimelineMessage(Message, frozen=True, tag="timeline"):
     """Cells of the timeline that changed, by frame; null removes one. One message for all people, then one for each."""
 
     person: int | None
@@ -308,15 +308,18 @@ class TimelineMessage(Message, tag="timeline"):
     """Whether all other frames have no pose."""
 
 
-class InconsistentMessage(Message, tag="inconsistent"):
+class InconsistentMessage(Message, frozen=True, tag="inconsistent"):
     """Frames whose pose does not agree with the motion around it (`tracker/motion/consistency.py`)."""
 
     frames: tuple[int, ...]
     """All of them, ascending."""
 
 
-class SearchLeaf(Part):
-    """A group of degrees of freedom that is searched together. Null bounds and steps differ within it, or do not apply."""
+class SearchLeaf(Part, frozen=True):
+    """A group of degrees of freedom that is searched together.
+
+    A bound or step is null if it does not apply to the group, or differs within it.
+    """
 
     person: int
     name: str
@@ -333,7 +336,7 @@ class SearchLeaf(Part):
     """Whether any bound or step differs from that of all groups."""
 
 
-class SearchSetupMessage(Message, tag="search_setup"):
+class SearchSetupMessage(Message, frozen=True, tag="search_setup"):
     """Settings of the search and its decomposition, in the order of search; only for pages that watch searches."""
 
     theta_px: float | None
@@ -351,7 +354,7 @@ class SearchSetupMessage(Message, tag="search_setup"):
     leaves: tuple[SearchLeaf, ...]
 
 
-class SearchStage(Part):
+class SearchStage(Part, frozen=True):
     """A stage of a run."""
 
     person: int
@@ -365,7 +368,7 @@ class SearchStage(Part):
     running: bool
 
 
-class SearchRun(Part):
+class SearchRun(Part, frozen=True):
     """A search of the shown frame."""
 
     number: int
@@ -386,7 +389,7 @@ class SearchRun(Part):
     stages: tuple[SearchStage, ...]
 
 
-class Replay(Part):
+class Replay(Part, frozen=True):
     """The recorded step that is shown."""
 
     run: int
@@ -399,7 +402,7 @@ class Replay(Part):
     evaluations: int
 
 
-class SearchRunsMessage(Message, tag="search_runs"):
+class SearchRunsMessage(Message, frozen=True, tag="search_runs"):
     """Runs of the shown frame, oldest first; only for pages that watch searches."""
 
     runs: tuple[SearchRun, ...]

@@ -59,9 +59,14 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
         return response
 
     async def pane_socket(request: web.Request) -> web.StreamResponse:
-        # JPEG does not compress, and small vectors are not worth the delay.
+        # Compression gains nothing on JPEG, and is not worth the delay for small vectors. Text is decoded where it is
+        # parsed: text that is not UTF-8 would close the socket.
         socket = web.WebSocketResponse(
-            heartbeat=_HEARTBEAT_S, timeout=_CLOSE_TIMEOUT_S, compress=False, max_msg_size=_MAX_MESSAGE_BYTES
+            heartbeat=_HEARTBEAT_S,
+            timeout=_CLOSE_TIMEOUT_S,
+            compress=False,
+            max_msg_size=_MAX_MESSAGE_BYTES,
+            decode_text=False,
         )
         await socket.prepare(request)
         request.app[_SOCKETS].add(socket)

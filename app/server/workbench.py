@@ -13,7 +13,7 @@ from typing import Any
 from platformdirs import user_cache_path
 
 from app.control.controller import Controller
-from app.page.socket import Panes
+from app.page.socket import PaneSocket
 from app.scene3d.gizmos import Gizmos
 from app.scene3d.panels import Panels
 from app.scene3d.scene import Scene
@@ -64,7 +64,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
             Scene(viser.server, controller)
             Gizmos(viser.server, controller)
             Panels(viser.server, controller)
-            app = create_app(Panes(controller), viser.socket_path, access, static)
+            app = create_app(PaneSocket(controller), viser.socket_path, access, static)
 
             def ready(address: str) -> None:
                 for name in proxies.stale(session):

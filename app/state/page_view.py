@@ -7,8 +7,8 @@ So it is no part of the `State`; a page says it when it connects and whenever it
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-Picture = Literal["image", "silhouette", "distance", "parts"]
-PICTURES: tuple[Picture, ...] = get_args(Picture)
+PictureLayer = Literal["image", "silhouette", "distance", "parts"]
+PICTURES: tuple[PictureLayer, ...] = get_args(PictureLayer)
 """Layers that are sent as pictures."""
 Layer = Literal[
     "image",
@@ -47,6 +47,6 @@ class View:
         return frozenset(camera for camera, reduction in enumerate(self.reductions) if reduction)
 
     @property
-    def pictures(self) -> tuple[Picture, ...]:
+    def pictures(self) -> tuple[PictureLayer, ...]:
         """The layers shown that are pictures."""
         return tuple(name for name in PICTURES if name in self.layers)
