@@ -16,7 +16,7 @@ from app.control.controller import Controller
 from app.page.socket import PaneSocket
 from app.scene3d.gizmos import Gizmos
 from app.scene3d.panels import Panels
-from app.scene3d.scene import Scene
+from app.scene3d.scene import SceneView
 from app.server.access import access_for
 from app.server.private_viser import PrivateViser
 from app.server.server import create_app, serve_forever, static_folder
@@ -61,7 +61,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
         controller = Controller(session, Saver(session, store, _author()), frames)
         viser = PrivateViser()
         try:
-            Scene(viser.server, controller)
+            SceneView(viser.server, controller)
             Gizmos(viser.server, controller)
             Panels(viser.server, controller)
             app = create_app(PaneSocket(controller), viser.socket_path, access, static)
