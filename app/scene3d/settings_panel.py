@@ -57,7 +57,8 @@ _FOLDERS: dict[str, tuple[_Control, ...]] = {
     ),
     "Search": (
         _Control(
-            "bound_deg", "bound, deg", "Largest change of an angle from the start of the search", bounds=(0.5, 90.0, 0.5)
+            "bound_deg", "bound, deg", "Largest change of an angle from the start of the search",
+            bounds=(0.5, 90.0, 0.5),
         ),
         _Control(
             "bound_cm", "bound, cm", "Largest change of the position from the start of the search",

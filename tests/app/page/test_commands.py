@@ -46,6 +46,6 @@ def test_the_end_of_a_drag_scores_once(placed, scorings):
 )
 def test_what_the_session_does_not_have_is_refused(placed, message):
     before = placed.state
-    with pytest.raises(MessageError, match="^expected "):
+    with pytest.raises(MessageError, match=r"^expected "):
         dispatch(placed, PAGE, message)
     assert placed.state is before
