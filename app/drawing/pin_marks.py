@@ -1,4 +1,4 @@
-"""What is drawn of pins: the pins and how far the model is off, where they meet, and their lines in the other views."""
+"""Draw pins: their distance from the model, their triangulation, and their epipolar lines in the other views."""
 
 from dataclasses import dataclass
 
@@ -54,7 +54,7 @@ class PinTriangulation:
 
 
 def pin_marks(session: Session, state: State) -> list[PinMark]:
-    """All pins of the frame, of everybody who is shown."""
+    """Return all pins of the frame, of visible people."""
     out = []
     for person, (info, pins) in enumerate(zip(session.people, state.pins, strict=True)):
         if not pins or person in state.cast.hidden:
@@ -87,7 +87,7 @@ def pin_triangulation(session: Session, state: State) -> PinTriangulation | None
 
 
 def pin_lines(session: Session, state: State, view: View) -> list[Path]:
-    """The lines of sight of the pins of the joint worked on, as the other views see them."""
+    """Draw the lines of sight of the pins of the joint worked on in the other views."""
     out: list[Path] = []
     if "epipolar" not in view.layers:
         return out
@@ -104,7 +104,7 @@ def pin_lines(session: Session, state: State, view: View) -> list[Path]:
 
 
 def _of_joint(state: State) -> list[PointObservation]:
-    """The pins of the joint worked on; none of a person who is not shown."""
+    """Return the pins of the joint worked on; none of a hidden person."""
     if not state.pins or state.person in state.cast.hidden:
         return []
     return [p for p in state.pins[state.person] if p.point == state.point]

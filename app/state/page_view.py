@@ -1,7 +1,7 @@
-"""What a page shows of the session: its layers, and how large its panes are. Each page has its own view.
+"""What one page shows of the session: its layers and the sizes of its panes.
 
-The choice of layers belongs to whoever looks, not to the session: two windows on one session may show different ones.
-So it is no part of the `State`; a page says it when it connects and whenever it changes (docs/protocol.md).
+Two windows on one session may show different layers, so this is no part of the `State`. A page sends it on connecting
+and whenever it changes (docs/protocol.md).
 """
 
 from dataclasses import dataclass
@@ -37,13 +37,13 @@ class View:
     layers: frozenset[str]
     """Names of the layers shown."""
     reductions: tuple[float, ...]
-    """By camera: how many pixels of the image, along either side, a picture may have for one; 0 for a pane not seen."""
+    """By camera: image pixels per picture pixel along either side; 0 for a pane that is not visible."""
     by_part: bool = False
     """Whether contours have the colours of the parts instead of those of the people."""
 
     @property
     def cameras(self) -> frozenset[int]:
-        """Indices of the cameras whose panes are seen."""
+        """Indices of the cameras whose panes are visible."""
         return frozenset(camera for camera, reduction in enumerate(self.reductions) if reduction)
 
     @property
