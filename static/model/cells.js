@@ -5,7 +5,7 @@
  * @typedef {import("./protocol.js").Status} Status
  */
 
-/** The sources of a pose, in the order of the legend; their colours are in style.css. */
+/** The sources of a pose, in the order of the legend; their colours are in styles/tokens.css. */
 export const SOURCES = [
   "manual",
   "pinned",

@@ -1,11 +1,177 @@
-"""Where compiled kernels live, and whether all of them are compiled."""
+"""The cache of compiled kernels: one folder for all clones of the project, keyed by the kernels' own text.
 
+`use_kernel_cache` registers the cache with numba. The file `compiled_mark()` exists once all kernels are compiled.
+"""
+
+import hashlib
+import json
+import os
 import sys
+import tempfile
+from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numba
+from platformdirs import user_cache_path
+
+from tracker.compute.kernel_keys import KernelKeys, UnknownSourceError
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+_MARK, _KEYS = "compiled-", "keys-"
+_N_STATES = 12
+"""States of the kernels' text (clones, branches) whose compiled kernels stay in the cache."""
+_N_KEY_FILES = 60
+_PRUNE_AGE_S = 86400.0
+"""Kernels compiled more recently are left alone: their program may not have recorded its state yet."""
+
+
+class KernelLocator:
+    """Tells numba where a kernel of this package is cached; the interface of `numba.core.caching._CacheLocator`."""
+
+    def __init__(self, py_file: str, key: str) -> None:
+        self._py_file = py_file  # numba reads it for warnings
+        self._key = key
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., object], py_file: str) -> "KernelLocator | None":
+        """Return the locator of a function, or None to leave it to numba's ordinary cache."""
+        key = kernel_keys().get(f"{py_func.__module__}.{py_func.__qualname__}")
+        if key is None or _PACKAGE not in Path(py_file).resolve().parents:
+            return None
+        locator = cls(py_file, key)
+        try:
+            locator.ensure_cache_path()
+        except OSError:
+            return None
+        return locator
+
+    def ensure_cache_path(self) -> None:
+        """Make the cache folder; raises OSError unless it can be written."""
+        os.makedirs(self.get_cache_path(), exist_ok=True)
+        tempfile.TemporaryFile(dir=self.get_cache_path()).close()
+
+    def get_cache_path(self) -> str:
+        """Return the folder of the cache."""
+        return str(_folder())
+
+    def get_source_stamp(self) -> str:
+        """Return what a cached kernel must have been compiled from to be used."""
+        return self._key
+
+    def get_disambiguator(self) -> str:
+        """Return what distinguishes kernels of the same name in the names of their files."""
+        return self._key
+
+
+def use_kernel_cache() -> None:
+    """Have numba cache this package's kernels by their keys, in the user's cache folder or in NUMBA_CACHE_DIR.
+
+    Must run before the first kernel is decorated. Where numba offers no such hook, or the folder cannot be written, its
+    ordinary cache is used.
+    """
+    if not numba.config.CACHE_DIR:
+        folder = user_cache_path("quadrille", appauthor=False) / "kernels"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            return
+        numba.config.CACHE_DIR = str(folder)
+    try:
+        from numba.core.caching import CacheImpl
+
+        locators: list[Any] = CacheImpl._locator_classes
+    except (ImportError, AttributeError):
+        return
+    if KernelLocator not in locators:
+        locators.insert(0, KernelLocator)
+
+
+@lru_cache(maxsize=1)
+def kernel_keys() -> dict[str, str]:
+    """Return the key of each kernel of the package by its dotted name.
+
+    They are stored beside the kernels, because parsing the sources takes half a second.
+    """
+    config = numba.config
+    environment = repr((numba.__version__, config.OPT, config.BOUNDSCHECK, config.DEBUGINFO_DEFAULT))
+    texts = hashlib.sha256(environment.encode())
+    for path in sorted(_PACKAGE.rglob("*.py")):
+        texts.update(f"{path.relative_to(_PACKAGE)}\n".encode() + path.read_bytes())
+    stored = _folder() / f"{_KEYS}{texts.hexdigest()[:20]}.json"
+    try:
+        keys: dict[str, str] = json.loads(stored.read_text("utf-8"))
+    except (OSError, ValueError):
+        keys = _computed_keys(environment)
+        _write(stored, json.dumps(keys))
+    return keys
+
+
+def _computed_keys(environment: str) -> dict[str, str]:
+    keys: dict[str, str] = {}
+    source = KernelKeys(_PACKAGE, environment)
+    try:
+        for module, name in source.kernels():
+            try:
+                keys[f"{module}.{name}"] = source.key(module, name)
+            except UnknownSourceError:
+                continue
+    except UnknownSourceError:
+        return {}
+    return keys
 
 
 def compiled_mark() -> Path:
-    """The file that says that everything was compiled, by this numba for this Python; beside what was compiled."""
-    return Path(numba.config.CACHE_DIR) / f"compiled-{numba.__version__}-{sys.implementation.cache_tag}"
+    """Return the file that exists once all kernels are compiled, by this numba for this Python."""
+    state = hashlib.sha256(repr(sorted(kernel_keys().items())).encode()).hexdigest()[:20]
+    return _folder() / f"{_MARK}{state}-{numba.__version__}-{sys.implementation.cache_tag}"
+
+
+def record_compiled() -> None:
+    """Mark that all kernels are compiled, and delete kernels of states that have not been used for long."""
+    compiled_mark().write_text("\n".join(kernel_keys().values()), "utf-8")
+    for old in _newest_first(f"{_KEYS}*.json")[_N_KEY_FILES:]:
+        old.unlink(missing_ok=True)
+    marks = _newest_first(f"{_MARK}*")
+    for old in marks[_N_STATES:]:
+        old.unlink(missing_ok=True)
+    used = {key for mark in marks[:_N_STATES] for key in _text(mark).split()}
+    newest = max((m.stat().st_mtime for m in marks[:1]), default=0.0)
+    for kernel in _newest_first("*.nb[ic]"):
+        key = kernel.name.rpartition("-")[2].split(".")[0]
+        if key not in used and kernel.stat().st_mtime < newest - _PRUNE_AGE_S:
+            kernel.unlink(missing_ok=True)
+
+
+def _folder() -> Path:
+    """Folder of the cache; where no other can be written, that of this package's own compiled Python."""
+    return Path(numba.config.CACHE_DIR or _PACKAGE / "__pycache__")
+
+
+def _newest_first(pattern: str) -> list[Path]:
+    aged = []
+    for path in _folder().glob(pattern):
+        try:
+            aged.append((path.stat().st_mtime, path))
+        except OSError:
+            continue  # another program pruned it meanwhile
+    return [path for _, path in sorted(aged, reverse=True)]
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text("utf-8")
+    except OSError:
+        return ""
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file in one step; without it the keys are computed again."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, delete=False) as file:
+            file.write(text)
+        os.replace(file.name, path)
+    except OSError:
+        return
