@@ -30,7 +30,9 @@ from tracker.session.assemble import assemble
 from tracker.session.session import load_session
 from tracker.simulate import simulate
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import track_chamfer
+from tracker.tracking.chamfer.tracker import ChamferTracker
+from tracker.tracking.subjects import Subjects
+from tracker.tracking.tracker import TrackingRun
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
 DEFAULT = TrackSettings()
@@ -101,8 +103,9 @@ def measure(clip: Clip, settings: TrackSettings) -> tuple[float, int, float]:
     start = start_of(clip.model, clip.reference)
     with Recording(clip.cameras) as recording:
         observer = Observer(clip.cameras, recording)
+        subjects = Subjects.of([clip.model], keyframes={0: {0: start}})
         began = time.perf_counter()
-        found = list(track_chamfer(observer, [clip.model], [start], clip.frames, settings, {0: {0: start}}))
+        found = list(ChamferTracker(settings).estimates(TrackingRun(observer, subjects, [start], clip.frames)))
         seconds = time.perf_counter() - began
     joints = joints_of_poses(clip.model, {f.frame: f.poses[0] for f in found}, clip.fps)
     errors = evaluate_joints(joints, clip.reference, clip.frames)
