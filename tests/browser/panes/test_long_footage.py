@@ -80,7 +80,8 @@ async def test_a_hand_that_scrubs_on_is_followed(page, endpoint):
         for wish, stand_in in ((61, 60), (22, 20), (59, 60)):
             await page.evaluate(GO, wish)
             await shows(
-                page, f"quadrille.state.placeholder?.frame === {stand_in} && quadrille.state.placeholder.target === {wish}"
+                page,
+                f"quadrille.state.placeholder?.frame === {stand_in} && quadrille.state.placeholder.target === {wish}",
             )
 
 
