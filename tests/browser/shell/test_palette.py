@@ -104,9 +104,8 @@ async def test_the_list_of_keys_is_searched_and_fits(page):
     assert box["y"] >= 0
     assert box["x"] + box["width"] <= 1280
     assert box["y"] + box["height"] <= 720
-    assert await page.evaluate(
-        "document.querySelector('#key-list .scroller').scrollWidth <= document.querySelector('#key-list .scroller').clientWidth"
-    )
+    scroller = page.locator("#key-list .scroller")
+    assert await scroller.evaluate("(element) => element.scrollWidth <= element.clientWidth")
     assert "More" not in await page.locator("#key-list h3").all_inner_texts()  # every key is about something
     await page.keyboard.type("former doubt")
     assert await page.locator("#key-list dd:visible").all_inner_texts() == ["Former doubtful or lost frame"]
