@@ -1,100 +1,23 @@
-"""Imports run one way: a room imports only rooms below it. One line per room, from the bottom up."""
+"""Imports run one way: a room imports only rooms below it (tests/support/architecture.py lists them)."""
 
 import ast
-import re
-from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).resolve().parents[1]
-
-ROOMS = [
-    "tracker",
-    "tracker.compute",
-    "tracker.geometry",
-    "tracker.body",
-    "tracker.motion",
-    "tracker.formats",
-    "tracker.footage",
-    "tracker.session",
-    "tracker.store",
-    "tracker.images",
-    "tracker.contours",
-    "tracker.evidence",
-    "tracker.fitting",
-    "tracker.appearance",
-    "tracker.search",
-    "tracker.tracking",
-    "tracker.tracking.chamfer",
-    "tracker.acquisition",
-    "tracker.posing",
-    "tracker.evaluation",
-    "tracker.simulate.people",
-    "tracker.simulate.motion",
-    "tracker.simulate.stage",
-    "tracker.simulate",
-    "app",
-    "app.runtime",
-    "app.state",
-    "app.storage",
-    "app.drawing",
-    "app.session",
-    "app.control.session",
-    "app.control.view",
-    "app.control.search",
-    "app.control.posing",
-    "app.control.tracking",
-    "app.control",
-    "app.page",
-    "app.scene3d",
-    "app.server",
-    "app.bench",
-    "app.cli",
-    "app.__main__",
-]
-FLOOR = {room: floor for floor, room in enumerate(ROOMS)}
-
-# What the package does before any kernel is decorated.
-AT_IMPORT = {"tracker": {"tracker.compute.kernel_cache"}}
-
-# What a library without a screen does without.
-OF_THE_SCREEN = {"app", "viser", "aiohttp", "tyro", "webbrowser", "asyncio"}
-
-
-def module_files():
-    """Path of every module of the project by its dotted name."""
-    files = {}
-    for package in ("tracker", "app"):
-        for path in sorted((ROOT / package).rglob("*.py")):
-            files[".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")] = path
-    return files
-
-
-FILES = module_files()
-
-
-def room_of(module):
-    """Name of the room that a module is in."""
-    if module in FLOOR:
-        return module
-    return module.rpartition(".")[0]
-
-
-def imported(tree, known):
-    """Dotted names that a module imports anywhere, within functions too; of the project's own the very modules."""
-    found = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, "imports are absolute"
-            whole = [f"{node.module}.{alias.name}" for alias in node.names]
-            found |= {name if name in known else node.module for name in whole}
-    return found
-
-
-IMPORTS = {name: imported(ast.parse(path.read_text("utf-8")), FILES) for name, path in FILES.items()}
-OWN = {name: sorted(found & FILES.keys()) for name, found in IMPORTS.items()}
+from architecture import (
+    FILES,
+    FLOOR,
+    IMPORTS,
+    OF_THE_SCREEN,
+    OWN,
+    PAGE_FLOOR,
+    ROOT,
+    SCRIPTS,
+    STATIC,
+    imported,
+    page_imports,
+    page_room,
+    room_of,
+)
 
 
 def test_the_walk_sees_imports_of_every_kind():
@@ -107,8 +30,7 @@ def test_the_walk_sees_imports_of_every_kind():
 @pytest.mark.parametrize("module", sorted(FILES))
 def test_imports_run_downwards(module):
     room = room_of(module)
-    needed = [m for m in OWN[module] if m not in AT_IMPORT.get(module, ())]
-    wrong = [m for m in needed if room_of(m) != room and FLOOR[room_of(m)] >= FLOOR[room]]
+    wrong = [m for m in OWN[module] if room_of(m) != room and FLOOR[room_of(m)] >= FLOOR[room]]
     assert wrong == [], f"{module} must not import these"
 
 
@@ -124,24 +46,6 @@ def test_no_circle():
 @pytest.mark.parametrize("module", sorted(m for m in FILES if m.split(".")[0] == "tracker"))
 def test_the_tracker_knows_no_screen(module):
     assert {name.split(".")[0] for name in IMPORTS[module]} & OF_THE_SCREEN == set()
-
-
-PAGE_ROOMS = ["widgets", "model", "panes", "posing", "timeline", "search", "scene", "shell", "."]
-PAGE_FLOOR = {room: floor for floor, room in enumerate(PAGE_ROOMS)}
-STATIC = ROOT / "static"
-PAGE_IMPORT = re.compile(r"""(?:from\s+|import\s*\(\s*|import\s+)["'](\.[^"']+)["']""")
-"""Imports of modules and of types."""
-SCRIPTS = {p.relative_to(STATIC).as_posix(): p.read_text("utf-8") for p in sorted(STATIC.rglob("*.js"))}
-
-
-def page_room(script):
-    return Path(script).parent.as_posix()
-
-
-def page_imports(script):
-    """Scripts that a script imports, by their path below static/."""
-    base = (STATIC / script).parent
-    return {(base / target).resolve().relative_to(STATIC).as_posix() for target in PAGE_IMPORT.findall(SCRIPTS[script])}
 
 
 @pytest.mark.parametrize("script", sorted(SCRIPTS))

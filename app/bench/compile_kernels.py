@@ -21,7 +21,9 @@ from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array
 from tracker.session.lock import SessionLock
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import track_chamfer
+from tracker.tracking.chamfer.tracker import ChamferTracker
+from tracker.tracking.subjects import Subjects
+from tracker.tracking.tracker import TrackingRun
 
 _FRAMES = 3
 """Frames that are tracked: from the second there is a motion, and what was lost."""
@@ -56,7 +58,9 @@ def _track(
     cameras: Sequence[CameraSource], settings: TrackSettings, models: Sequence[BodyModel], start: Sequence[Array]
 ) -> None:
     with Recording(cameras) as recording:
-        for _ in track_chamfer(Observer(cameras, recording), models, start, range(FRAME, FRAME + _FRAMES), settings):
+        frames = range(FRAME, FRAME + _FRAMES)
+        run = TrackingRun(Observer(cameras, recording), Subjects.of(models), start, frames)
+        for _ in ChamferTracker(settings).estimates(run):
             pass
 
 

@@ -25,7 +25,9 @@ from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings, search
 from tracker.search.chamfer_cost import ChamferCost
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import track_chamfer
+from tracker.tracking.chamfer.tracker import ChamferTracker
+from tracker.tracking.subjects import Subjects
+from tracker.tracking.tracker import TrackingRun
 
 _CANDIDATES = 100
 _PIPELINE_FRAMES = range(5, 45)
@@ -271,7 +273,7 @@ def _pipeline(
     def run() -> None:
         with Recording(session.cameras) as recording:
             observer = Observer(session.cameras, recording)
-            tracked = track_chamfer(observer, models, first, wanted, _SETTINGS)
+            tracked = ChamferTracker(_SETTINGS).estimates(TrackingRun(observer, Subjects.of(models), first, wanted))
             next(tracked)  # opening the videos is not part of going on
             start = time.perf_counter()
             for found in islice(tracked, n - 1):

@@ -1,7 +1,7 @@
 """Poses of the screen to the store and back."""
 
 from bisect import bisect_left
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -10,12 +10,12 @@ import numpy as np
 from app.state.state import Shown, State
 from app.storage.retry_queue import Writing
 from app.storage.timeline_cells import Cells
-from app.storage.tracked_changes import keyframes_of, tracked_changes
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, parse_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
+from tracker.pipeline.tracked_changes import keyframes_of
 from tracker.posing.retarget import rebodied
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
@@ -31,8 +31,6 @@ from tracker.store.records import (
     PoseChange,
     PoseRecord,
 )
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimate import PoseEstimate
 
 _BY_HAND = ("manual", "pinned", "fitted")
 """Sources of a person's own edits: a frame that a person's word was fitted to is a keyframe as one set by drags is."""
@@ -231,32 +229,6 @@ class Saver:
                     position_px = (float(u), float(v))
                 changes.append(PinChange(name, state.frame, point, camera.name, position_px))
         return changes
-
-    def save_tracked(
-        self,
-        estimates: Sequence[PoseEstimate],
-        people: Sequence[int],
-        fixed: Mapping[int, Mapping[int, Array]],
-        settings: TrackSettings,
-        label: str,
-        amend: int | None,
-    ) -> int | None:
-        """Write what a tracker has found, but for the keyframes that it was given.
-
-        Args:
-            estimates: poses of frames.
-            people: whom the tracker tracked.
-            fixed: keyframes that the tracker took as they are, by frame and person.
-            settings: what it was told.
-            label: what the history says.
-            amend: the entry of the history to add to; None makes a new one.
-
-        Returns:
-            What later calls add to; None where there was nothing to write. Where writing fails, `error` says why.
-        """
-        names = [p.name for p in self._session.people]
-        changes = tracked_changes(estimates, names, people, self._revisions, fixed, settings)
-        return self.write(label, changes, amend, by_program=True)
 
     def undo(self) -> list[int]:
         """Take back the last entry of the history; returns the frames it is about, ascending."""

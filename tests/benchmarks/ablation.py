@@ -26,11 +26,13 @@ from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.motion.prediction import PredictSettings
 from tracker.search.best_first import SearchSettings
-from tracker.session.assemble import assemble
+from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
 from tracker.simulate import simulate
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import track_chamfer
+from tracker.tracking.chamfer.tracker import ChamferTracker
+from tracker.tracking.subjects import Subjects
+from tracker.tracking.tracker import TrackingRun
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
 DEFAULT = TrackSettings()
@@ -84,11 +86,13 @@ def recorded(data: Path, folder: Path) -> list[Clip]:
     for name, height in (("walk", 1.75), ("balance_real", 1.75), ("fast_arms", 1.55)):
         reference = next((data / name).glob("*.trc"))
         assemble(
-            folder / name,
-            calibration=data / name / "Calib.toml",
-            videos=sorted((data / name).glob("*.mp4")),
-            background=data / name / "background",
-            heights=height,
+            NewSession(
+                folder / name,
+                calibration=data / name / "Calib.toml",
+                videos=sorted((data / name).glob("*.mp4")),
+                background=data / name / "background",
+                heights=height,
+            )
         )
         session = load_session(folder / name)
         joints = read_joints(reference, session.fps)
@@ -101,8 +105,9 @@ def measure(clip: Clip, settings: TrackSettings) -> tuple[float, int, float]:
     start = start_of(clip.model, clip.reference)
     with Recording(clip.cameras) as recording:
         observer = Observer(clip.cameras, recording)
+        subjects = Subjects.of([clip.model], keyframes={0: {0: start}})
         began = time.perf_counter()
-        found = list(track_chamfer(observer, [clip.model], [start], clip.frames, settings, {0: {0: start}}))
+        found = list(ChamferTracker(settings).estimates(TrackingRun(observer, subjects, [start], clip.frames)))
         seconds = time.perf_counter() - began
     joints = joints_of_poses(clip.model, {f.frame: f.poses[0] for f in found}, clip.fps)
     errors = evaluate_joints(joints, clip.reference, clip.frames)

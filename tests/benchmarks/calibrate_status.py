@@ -30,9 +30,11 @@ from tracker.simulate import simulate
 from tracker.simulate.motion.scenes import cast_of
 from tracker.tracking import confidence
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import track_chamfer
+from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import PoseEstimate
+from tracker.tracking.subjects import Subjects
+from tracker.tracking.tracker import TrackingRun
 
 VGA, SMALL = (640, 480), (320, 240)
 
@@ -84,7 +86,8 @@ class Limbs:
         limb_joints = [t.points[:, [t.names.index(n) for n in LIMB_JOINTS]] for t in truths]
         with Recording(session.cameras) as recording:
             observer, frames = Observer(session.cameras, recording), range(session.n_frames)
-            for found in track_chamfer(observer, models, starts, frames, settings, {0: dict(enumerate(starts))}):
+            subjects = Subjects.of(models, keyframes={0: dict(enumerate(starts))})
+            for found in ChamferTracker(settings).estimates(TrackingRun(observer, subjects, starts, frames)):
                 for person, (model, joints) in enumerate(zip(models, limb_joints, strict=True)):
                     self._add_person(person, model, joints[found.frame], found, settings.recover is not None)
 

@@ -26,7 +26,9 @@ from tracker.geometry.arrays import Array
 from tracker.session.session import Session
 from tracker.simulate import simulate
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import track_chamfer
+from tracker.tracking.chamfer.tracker import ChamferTracker
+from tracker.tracking.subjects import Subjects
+from tracker.tracking.tracker import TrackingRun
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
 DEFAULT = TrackSettings()
@@ -94,8 +96,8 @@ def _tracked_from(couple: Couple, starts: Sequence[Array], settings: TrackSettin
     session, frames = couple.session, couple.frames
     with Recording(session.cameras) as recording:
         observer = Observer(session.cameras, recording)
-        given = {0: dict(enumerate(starts))}
-        found = list(track_chamfer(observer, couple.models, starts, frames, settings, given))
+        subjects = Subjects.of(couple.models, keyframes={0: dict(enumerate(starts))})
+        found = list(ChamferTracker(settings).estimates(TrackingRun(observer, subjects, starts, frames)))
     errors, lost, swapped = [], 0, 0
     for i, model in enumerate(couple.models):
         joints = joints_of_poses(model, {f.frame: f.poses[i] for f in found}, session.fps)

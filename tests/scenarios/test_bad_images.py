@@ -6,6 +6,7 @@ from typing import NamedTuple, get_args
 import cv2
 import numpy as np
 import pytest
+from tracking_runs import track
 
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
@@ -14,7 +15,6 @@ from tracker.motion.prediction import predict
 from tracker.session.session import Session
 from tracker.simulate.record import simulate
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import track_chamfer
 from tracker.tracking.confidence import Status
 
 N = 6
@@ -56,7 +56,7 @@ def follow(filmed, frames=None, cameras=None, recording=None, **options):
     """Track all frames from the true pose; estimates, and mean distance of the body's points from the truth, mm."""
     model, cameras = filmed.session.people[0].model, cameras or filmed.session.cameras
     observer = Observer(cameras, recording or Shown(frames or filmed.frames))
-    found = list(track_chamfer(observer, [model], [filmed.truth[0]], range(N), TrackSettings(**options)))
+    found = list(track(observer, [model], [filmed.truth[0]], range(N), TrackSettings(**options)))
     assert [f.frame for f in found] == list(range(N))
     for estimate in found:
         assert set(estimate.statuses) <= set(get_args(Status))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from staging import at, cameras_around, filmed, own_evidence, posed, solid
+from tracking_runs import track
 
 from tracker.body.model import PosedBody
 from tracker.fitting.gauss_newton import solve
@@ -12,7 +13,6 @@ from tracker.motion.prediction import PredictSettings
 from tracker.tracking.chamfer.frame_estimator import Scene
 from tracker.tracking.chamfer.limb_recovery import search_limbs
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import track_chamfer
 from tracker.tracking.person_memory import Memory
 
 N_FRAMES = 3
@@ -37,7 +37,7 @@ def test_people_a_metre_apart_stay_who_they_are(gavrila, n):
     truth = crowd(gavrila, n)
     observer = filmed([[PosedBody(gavrila, poses[k]) for poses in truth] for k in range(N_FRAMES)])
     settings = replace(TrackSettings(), predict=PredictSettings(order=0), rounds=1)
-    found = list(track_chamfer(observer, [gavrila] * n, truth[:, 0], range(N_FRAMES), settings))
+    found = list(track(observer, [gavrila] * n, truth[:, 0], range(N_FRAMES), settings))
     for k, estimate in enumerate(found):
         points = np.array([gavrila.points_world(p) for p in estimate.poses])
         true = np.array([gavrila.points_world(p) for p in truth[:, k]])

@@ -1,4 +1,4 @@
-"""The estimate of one person's pose in one frame: what every tracker returns."""
+"""Results that every tracker returns: the poses of a frame, and the steps of a second pass."""
 
 from typing import NamedTuple
 
@@ -7,35 +7,69 @@ from tracker.tracking.confidence import Quality, Status
 
 
 class OtherPose(NamedTuple):
-    """A pose of a person that the evidence goes as well with."""
+    """A pose of a person that fits the evidence about as well as the estimate."""
 
     values: Array
     """Pose, (n_values,)."""
     cost_px: float
-    """What `PoseEstimate.cost_px` would be, px; where two people may be exchanged, with both exchanged."""
+    """`PoseEstimate.cost_px` with this pose, px; where two people may be swapped, with both swapped."""
 
 
 class PoseEstimate(NamedTuple):
-    """Poses found on one frame."""
+    """The poses of all people on one frame. Tuples are indexed by person."""
 
     frame: int
     poses: tuple[Array, ...]
-    """Pose of each person, (n_values,) each."""
+    """Poses, (n_values,) each."""
     cost_px: float
     """Cost of the poses against all edges near them, px of the footage."""
     views_px: Array
-    """The same for each view, (V,); NaN for a view without edges."""
+    """Cost in each view, (V,), px of the footage; NaN for a view without edges."""
     evaluations: int
-    """Poses that the best-first search scored to find them."""
+    """Number of poses that a search scored."""
     statuses: tuple[Status, ...]
     """How sure the tracker is of each person."""
     remarks: tuple[str, ...]
-    """What was out of the ordinary with each person; empty where nothing was."""
+    """What was unusual about each person; empty where nothing was."""
     parts_px: tuple[Array, ...]
-    """Mean distance of the contour of each person's parts to the edges, (n_parts,) each, px; NaN where hidden."""
+    """Mean distance of the contour of each part to the edges, (n_parts,) each, px; NaN where hidden."""
     covariances: tuple[Array, ...]
-    """Covariance of each pose, (n_dofs, n_dofs) each, rad and metres; of a pose that was given, zero."""
+    """Covariance of each pose, (n_dofs, n_dofs) each, rad and metres; zero for a keyframe."""
     qualities: tuple[Quality | None, ...]
-    """What the statuses were judged by; None for a pose that was given."""
+    """Features from which the statuses follow; None for a keyframe."""
     alternatives: tuple[tuple[OtherPose, ...], ...]
-    """Of each person poses that are about as good, best first; where there are any, the status is at most doubtful."""
+    """Poses that are about as good, best first. A person who has any is at most doubtful."""
+    method: str
+    """Name of the tracking method, such as `chamfer`."""
+
+
+class TrackedFrame(NamedTuple):
+    """What a second pass needs to know of a tracked frame. Tuples are indexed by person."""
+
+    frame: int
+    poses: tuple[Array, ...]
+    """Poses, (n_values,) each."""
+    statuses: tuple[Status, ...]
+    """How sure the tracker is of each person."""
+    others: tuple[tuple[Array, ...], ...] = ()
+    """Poses that are about as good, (n_values,) each; empty where unknown for everybody."""
+
+    @classmethod
+    def of(cls, estimate: PoseEstimate) -> "TrackedFrame":
+        """Return the part of an estimate that a second pass needs; the whole holds much more."""
+        others = tuple(tuple(other.values for other in of_one) for of_one in estimate.alternatives)
+        return cls(estimate.frame, estimate.poses, estimate.statuses, others)
+
+
+class BackwardStep(NamedTuple):
+    """A step of a second pass: one visit to one frame of a lost interval."""
+
+    frame: int
+    person: int
+    done: int
+    """Steps so far."""
+    total: int
+    """Steps in all, over all people and intervals."""
+    better: tuple[PoseEstimate, ...] = ()
+    """At the end of an interval the estimates that replace former ones, in the order of tracking. They differ in this
+    person alone; poses and statuses of the others are unchanged."""

@@ -2,48 +2,51 @@
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 from app.control.session.session_state import Screen
 from app.runtime.jobs import Job
 from app.state.state import Shown, TrackState, finite_or_none
-from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.evidence.observer import Observer
-from tracker.geometry.arrays import Array
+from tracker.pipeline.methods import make_tracker
+from tracker.pipeline.track_session import Step, TrackSession
+from tracker.pipeline.tracked_changes import StoredPerson
+from tracker.store.records import PoseChange
 from tracker.tracking import confidence
-from tracker.tracking.chamfer.backward_pass import Followed, Tracked, follow_back
-from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import track_chamfer
-from tracker.tracking.confidence import Status
-from tracker.tracking.estimate import PoseEstimate
+from tracker.tracking.estimate import BackwardStep, PoseEstimate
+from tracker.tracking.subjects import Subjects
+from tracker.tracking.tracker import TrackingRun
 
 _SAVE_S = 0.5
 """A running tracker is on disk at least this often, and writes no more often of its own accord."""
 
 
-@dataclass(eq=False)
-class _Run:
-    """One run: what it was told, and what is not on disk yet."""
+class _Run(NamedTuple):
+    """A tracking run and the job that drives it in a worker thread."""
 
-    label: str
-    """What the history says."""
-    people: tuple[int, ...]
-    """Whom it tracks."""
-    settings: TrackSettings
-    fixed: Mapping[int, Mapping[int, Array]]
-    """Keyframes on its way, by frame and person."""
-    job: Job[PoseEstimate | Followed] = field(init=False)
-    statuses: dict[int, tuple[Status, ...]] = field(default_factory=dict)
-    """Of each frame that it has tracked, everybody's."""
-    waiting: list[PoseEstimate] = field(default_factory=list)
-    """Found, but not yet on disk."""
-    edit: int | None = None
-    """Its entry of the history; None before the first save."""
+    session: TrackSession
+    job: Job[Step]
+
+    @property
+    def subjects(self) -> Subjects:
+        """The people whom it tracks, and their keyframes."""
+        return self.session.run.subjects
+
+
+class _SaverSink:
+    """Saves the poses of a run through the saver, which retries failed writes."""
+
+    def __init__(self, screen: Screen) -> None:
+        self._screen = screen
+
+    def write(self, label: str, changes: Sequence[PoseChange], edit: int | None) -> int | None:
+        """See `Sink.write`. Where writing fails the state has the reason."""
+        found = self._screen.saver.write(label, changes, edit, by_program=True)
+        self._screen.last_save = time.monotonic()
+        self._screen.refresh_saving()
+        return found
 
 
 class Tracking:
@@ -77,16 +80,27 @@ class Tracking:
             if not people:
                 raise TrackerError("expected a person who has been placed, found none; pose the body here first")
             frames = self._frames(backward, until, people)
-            way, settings, poses = "backward" if backward else "forward", state.settings, screen.present_poses()
-            run = _Run(f"track {way} from frame {frames[0]}", people, settings, saver.keyframes(frames))
-            fixed = {frame: dict(held) for frame, held in run.fixed.items()}
+            way = "backward" if backward else "forward"
             free = [screen.free(person) for person in range(len(models))]
-            run.job = Job(
-                lambda: _both_passes(screen.frames.observer, models, poses, frames, settings, fixed, people, free),
-                lambda found, seconds: self._stepped(run, found, seconds),
+            session = TrackSession(
+                make_tracker(state.settings),
+                TrackingRun(
+                    screen.frames.observer,
+                    Subjects.of(models, people, free, saver.keyframes(frames)),
+                    screen.present_poses(),
+                    frames,
+                ),
+                [StoredPerson(p.name, saver.revision(i)) for i, p in enumerate(screen.session.people)],
+                _SaverSink(screen),
+                f"track {way} from frame {frames[0]}",
+            )
+            job = Job(
+                session.steps,
+                lambda step, seconds: self._stepped(run, step, seconds),
                 lambda error: self._ended(run, error),
                 lambda: self._paused(run),
             )
+            run = _Run(session, job)
             self._run, screen.edit_of = run, None
             track = TrackState(running=True, first=frames[0], last=frames[-1], total=len(frames))
             screen.set(track=track, follow=True)
@@ -123,7 +137,7 @@ class Tracking:
         """Bring on disk what a run has found, so that every frame can be looked at."""
         with self._screen.lock:
             if self._run is not None:
-                self._save(self._run)
+                self._run.session.save()
 
     def follow(self, follow: bool) -> None:
         """Show each frame as it is tracked, from the last one on; or stay where the user looks."""
@@ -149,26 +163,23 @@ class Tracking:
             )
         return frames
 
-    def _stepped(self, run: _Run, found: PoseEstimate | Followed, seconds: float) -> None:
+    def _stepped(self, run: _Run, step: Step, seconds: float) -> None:
         with self._screen.lock:
             if run is self._run:
-                if isinstance(found, Followed):
-                    self._followed(run, found, seconds)
+                run.session.take(step)
+                if isinstance(step, BackwardStep):
+                    self._show_improved(run, step, seconds)
                 else:
-                    self._tracked(run, found, seconds)
+                    self._show_tracked(run, step, seconds)
 
-    def _followed(self, run: _Run, step: Followed, seconds: float) -> None:
-        """Take a step of the second pass; at the end of a stretch what is better takes its place, on disk at once."""
-        screen = self._screen
-        self._save(run)
-        if step.better:
-            self._write(run, step.better, (step.person,))
-        run.statuses |= {found.frame: found.statuses for found in step.better}
+    def _show_improved(self, run: _Run, step: BackwardStep, seconds: float) -> None:
+        """Show the progress of the second pass, and what it improved at the end of an interval."""
+        screen, tracked = self._screen, run.session.tracked
         track = screen.state.track
         if step.better:  # not at every step: there may be many frames
-            worst = Counter(confidence.worst([s[i] for i in run.people]) for s in run.statuses.values())
+            worst = Counter(confidence.worst([f.statuses[i] for i in run.subjects.tracked]) for f in tracked.values())
             track = replace(track, doubtful=worst["doubtful"], lost=worst["lost"])
-        steps = len(run.statuses) + step.done
+        steps = len(tracked) + step.done
         screen.set(track=replace(
             track, running=run.job.running, back=True, done=step.done, total=step.total,
             per_second=steps / max(1e-6, seconds),
@@ -176,11 +187,10 @@ class Tracking:
         if screen.state.frame in {found.frame for found in step.better}:
             screen.show(screen.state.frame, follow=screen.state.follow)
 
-    def _tracked(self, run: _Run, found: PoseEstimate, seconds: float) -> None:
+    def _show_tracked(self, run: _Run, found: PoseEstimate, seconds: float) -> None:
+        """Show the progress of the first pass, and the frame if it is shown or followed."""
         screen = self._screen
-        run.waiting.append(found)
-        run.statuses[found.frame] = found.statuses
-        worst = confidence.worst([found.statuses[i] for i in run.people])
+        worst = confidence.worst([found.statuses[i] for i in run.subjects.tracked])
         track = screen.state.track
         done = track.done + 1
         track = replace(
@@ -192,17 +202,17 @@ class Tracking:
         else:
             screen.set(track=track)
         if time.monotonic() - screen.last_save > _SAVE_S:
-            self._save(run)
+            run.session.save()
 
     def _found(self, run: _Run, found: PoseEstimate) -> dict[str, object]:
-        """The state's fields that show a tracked frame."""
-        held = run.fixed.get(found.frame, {})
+        """Return the fields of the state that show a tracked frame."""
+        keyframes, tracked = run.subjects.keyframes_at(found.frame), run.subjects.tracked
         people = []
         for i, shown in enumerate(self._screen.state.people):
-            stored = self._screen.saver.pose(i, found.frame) if i in held or i not in run.people else None
+            stored = self._screen.saver.pose(i, found.frame) if i in keyframes or i not in tracked else None
             if stored is not None:
                 people.append(stored)
-            elif i not in run.people:
+            elif i not in tracked:
                 people.append(Shown(shown.values, None, revision=self._screen.state.revisions[i]))
             else:
                 parts_px = tuple(finite_or_none(c) for c in found.parts_px[i])
@@ -217,23 +227,10 @@ class Tracking:
             "view_costs_px": tuple(finite_or_none(c) for c in found.views_px),
         }
 
-    def _save(self, run: _Run) -> None:
-        """Write what waits. Where writing fails the state says why, and it is tried again."""
-        if not run.waiting:
-            return
-        self._write(run, run.waiting, run.people)
-        run.waiting.clear()
-
-    def _write(self, run: _Run, found: Sequence[PoseEstimate], people: Sequence[int]) -> None:
-        screen = self._screen
-        run.edit = screen.saver.save_tracked(found, people, run.fixed, run.settings, run.label, run.edit)
-        screen.last_save = time.monotonic()
-        screen.refresh_saving()
-
     def _paused(self, run: _Run) -> None:
         with self._screen.lock:
             if run is self._run:
-                self._save(run)
+                run.session.save()
                 self._screen.set(track=replace(self._screen.state.track, running=False))
                 self._screen.request_evidence()
 
@@ -250,24 +247,10 @@ class Tracking:
             self._screen.request_evidence()
 
     def _end(self, run: _Run, how: str, failed: bool = False) -> None:
-        self._save(run)
+        run.session.save()
         track = self._screen.state.track
         self._run = None
-        self._screen.set(track=TrackState(message=f"{how}: {_summary(len(run.statuses), track)}", failed=failed))
-
-
-def _both_passes(
-    observer: Observer, models: Sequence[BodyModel], start: Sequence[Array], frames: Sequence[int],
-    settings: TrackSettings, fixed: Mapping[int, Mapping[int, Array]], people: Sequence[int],
-    free: Sequence[NDArray[np.bool_]],
-) -> Iterator[PoseEstimate | Followed]:  # fmt: skip
-    """Track frame by frame, then follow back whoever was lost; arguments as of `track_chamfer`."""
-    tracked = []
-    for found in track_chamfer(observer, models, start, frames, settings, fixed, people, free):
-        tracked.append(Tracked.of(found))
-        yield found
-    if settings.second_pass:
-        yield from follow_back(observer, models, tracked, settings, fixed, people, free)
+        self._screen.set(track=TrackState(message=f"{how}: {_summary(len(run.session.tracked), track)}", failed=failed))
 
 
 def _summary(frames: int, track: TrackState) -> str:

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from command_line import SAMPLE, assert_refused, stored
 
-from app.cli import track
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange
-from tracker.tracking.chamfer.backward_pass import Followed
+from tracker.tracking.chamfer.tracker import ChamferTracker
+from tracker.tracking.estimate import BackwardStep
 
 
 def test_new_info_init_track_evaluate(run, tmp_path):
@@ -115,7 +115,7 @@ def test_tracking_leaves_what_is_locked(run, session):
 
 def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
-    original = track.track_chamfer
+    original = ChamferTracker.estimates
 
     def interrupted(*arguments):
         for k, estimate in enumerate(original(*arguments)):
@@ -123,7 +123,7 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
                 raise KeyboardInterrupt
             yield estimate
 
-    monkeypatch.setattr(track, "track_chamfer", interrupted)
+    monkeypatch.setattr(ChamferTracker, "estimates", interrupted)
     status, out, _ = run("track", session, "--frames", "0:6", "--json")
     assert status == 130
     assert (json.loads(out)["frames"], json.loads(out)["stopped_at"]) == (3, 3)
@@ -147,7 +147,7 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
     """What the second pass finds better is in the store at once, in the one entry of the history."""
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
     estimates, offered = {}, []
-    original = track.track_chamfer
+    original = ChamferTracker.estimates
 
     def tracked(*arguments):
         for estimate in original(*arguments):
@@ -159,15 +159,15 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
         remarks = ("followed back from frame 2",)
         return found._replace(poses=(found.poses[0] + 0.01,), remarks=remarks, statuses=("good",))
 
-    def ways_back(observer, models, found, *rest):
+    def ways_back(run, found, settings):
         offered.append(found)
-        yield Followed(1, 0, 1, 2, (elsewhere(1),))
+        yield BackwardStep(1, 0, 1, 2, (elsewhere(1),))
         if len(offered) == 1:
             raise KeyboardInterrupt
-        yield Followed(3, 0, 2, 2, (elsewhere(3),))
+        yield BackwardStep(3, 0, 2, 2, (elsewhere(3),))
 
-    monkeypatch.setattr(track, "track_chamfer", tracked)
-    monkeypatch.setattr(track, "follow_back", ways_back)
+    monkeypatch.setattr(ChamferTracker, "estimates", tracked)
+    monkeypatch.setattr("tracker.tracking.chamfer.tracker.track_lost_backward", ways_back)
     words = ("track", session, "--frames", "0:5", "--json")
     status, out, _ = run(*words)
     told = json.loads(out)
@@ -183,7 +183,7 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
     def never(*_):
         raise AssertionError("the first pass is done")
 
-    monkeypatch.setattr(track, "track_chamfer", never)
+    monkeypatch.setattr(ChamferTracker, "estimates", never)
     told = json.loads(run(*words)[1])  # the same call goes on with the second pass alone
     assert (told["frames"], told["stopped_at"], told["followed_back"]) == (0, None, 2)
     assert [f.frame for f in offered[1]] == [0, 1, 2, 3, 4]
@@ -191,7 +191,7 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
     for k, f in enumerate(offered[1]):
         np.testing.assert_array_equal(f.poses[0], found[k].values)
     np.testing.assert_array_equal(stored(session)[3].values, estimates[3].poses[0] + 0.01)
-    monkeypatch.setattr(track, "track_chamfer", tracked)
+    monkeypatch.setattr(ChamferTracker, "estimates", tracked)
     told = json.loads(run(*words)[1])  # once done it begins anew, all of it one entry
     assert (told["frames"], told["resumed_at"]) == (5, None)
     with closing(AnnotationStore(session / "annotations.sqlite")) as store:

@@ -6,13 +6,13 @@ frames. What both found is carried to the frames around, and which poses are kep
 (`ways`).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.model import BodyModel, PosedBody
@@ -22,13 +22,15 @@ from tracker.fitting.contour_residuals import ContourMatch
 from tracker.fitting.gauss_newton import held
 from tracker.fitting.interpenetration import KeepBodiesApart
 from tracker.geometry.arrays import Array
+from tracker.tracking.chamfer.forward_pass import summed_up, track_forward
 from tracker.tracking.chamfer.frame_estimator import Scene
 from tracker.tracking.chamfer.pose_paths import ROUNDS, Candidates, Sight, carry, cheapest_way
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import summed_up, track_chamfer
 from tracker.tracking.confidence import Status
-from tracker.tracking.estimate import PoseEstimate
+from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
 from tracker.tracking.person_memory import Memory
+from tracker.tracking.subjects import Keyframes
+from tracker.tracking.tracker import TrackingRun
 from tracker.tracking.view_regions import regions, visible_outline
 
 _TRUSTED = 3
@@ -39,38 +41,6 @@ _VISITS = 1 + 2 * ROUNDS
 """How often the second pass comes to each frame."""
 _SEEN_AT_ONCE = 32
 """Frames whose evidence is kept while poses are carried through a stretch: some megabytes each."""
-
-
-class Tracked(NamedTuple):
-    """What the second pass needs to know of a frame that was tracked."""
-
-    frame: int
-    poses: tuple[Array, ...]
-    """Of each person, (n_values,) each."""
-    statuses: tuple[Status, ...]
-    """How sure the tracker is of each person."""
-    others: tuple[tuple[Array, ...], ...] = ()
-    """Of each person poses that are about as good, (n_values,) each; empty where that is not known of anybody."""
-
-    @classmethod
-    def of(cls, estimate: PoseEstimate) -> "Tracked":
-        """What is needed of an estimate, which holds much more."""
-        others = tuple(tuple(other.values for other in of_one) for of_one in estimate.alternatives)
-        return cls(estimate.frame, estimate.poses, estimate.statuses, others)
-
-
-class Followed(NamedTuple):
-    """A step of the second pass: one frame of a stretch, come to once."""
-
-    frame: int
-    person: int
-    done: int
-    """Steps so far."""
-    total: int
-    """All steps, of all people: each frame is followed back once, and come to again as poses are carried through."""
-    better: tuple[PoseEstimate, ...] = ()
-    """At the end of a stretch, in the order of tracking: what takes the place of what was found. It differs in this
-    person alone; the others' poses and statuses are those that were found."""
 
 
 class _Stretch(NamedTuple):
@@ -99,61 +69,49 @@ def stretches(statuses: Sequence[Status], given: Sequence[bool]) -> list[range]:
     return [r for r in out if any(statuses[i] == "lost" for i in r)]
 
 
-def follow_back(
-    observer: Observer,
-    models: Sequence[BodyModel],
-    found: Sequence[Tracked],
-    settings: TrackSettings,
-    fixed: Mapping[int, Mapping[int, Array]] | None = None,
-    people: Sequence[int] | None = None,
-    free: Sequence[NDArray[np.bool_]] | None = None,
-) -> Iterator[Followed]:
-    """Follow people back through the frames in which they were lost, one after the other; the others stay as found.
+def track_lost_backward(
+    run: TrackingRun, tracked: Sequence[TrackedFrame], settings: TrackSettings
+) -> Iterator[BackwardStep]:
+    """Track people back through the frames in which they were lost, one after the other; the others stay as found.
 
-    Where nobody was lost there is nothing to do, and nothing is looked at. Arguments as of `track_chamfer`, but for
+    Where nobody was lost there is nothing to do, and no frame is read.
 
     Args:
-        observer: gives the evidence of a frame.
-        models: the body of each person.
-        found: what was tracked, in the order of tracking.
+        run: gives the observer and the subjects.
+        tracked: all frames, in the order of tracking.
         settings: of the tracker.
-        fixed: poses that stay as they are (keyframes), by frame and person.
-        people: whom to track; everybody by default.
-        free: of each person the degrees of freedom that may move, (n_dofs,); all by default. The others stay as they
-            were found.
 
     Yields:
-        A step for each frame; the last of a stretch with the poses that are better.
+        A step for each visit to a frame; the last of an interval with the estimates that are better.
     """
-    everybody = range(len(models)) if people is None else people
-    known, keyframes = list(found), fixed or {}
-    work = [s for person in everybody for s in _to_follow(known, person, keyframes)]
+    known, subjects = list(tracked), run.subjects
+    work = [s for person in subjects.tracked for s in _to_follow(known, person, subjects.keyframes)]
     work.sort(key=lambda s: s.frames.stop)
     total, done = _VISITS * sum(len(s.frames) for s in work), 0
     for stretch in work:
         person, back, last = stretch.person, list[PoseEstimate](), done + _VISITS * len(stretch.frames)
-        for estimate in _back(observer, models, known, stretch, settings, free):
+        for estimate in _back(run, known, stretch, settings):
             back.append(estimate)
             done += 1
-            yield Followed(estimate.frame, person, done, total)
+            yield BackwardStep(estimate.frame, person, done, total)
         back.reverse()
-        choice = _Choice(observer, models, known, stretch, back, settings, None if free is None else free[person])
+        choice = _Choice(run, known, stretch, back, settings)
         for i in choice.carried():
             done += 1
             if done < last:
-                yield Followed(back[i].frame, person, done, total)
+                yield BackwardStep(back[i].frame, person, done, total)
         better = choice.better()
         at = {f.frame: i for i, f in enumerate(known)}
         for estimate in better:
-            known[at[estimate.frame]] = Tracked.of(estimate)
-        yield Followed(back[0].frame, person, done, total, better)
+            known[at[estimate.frame]] = TrackedFrame.of(estimate)
+        yield BackwardStep(back[0].frame, person, done, total, better)
 
 
-def _to_follow(found: Sequence[Tracked], person: int, fixed: Mapping[int, Mapping[int, Array]]) -> list[_Stretch]:
+def _to_follow(found: Sequence[TrackedFrame], person: int, keyframes: Keyframes) -> list[_Stretch]:
     """The stretches of one person that end where they can be followed back from."""
     statuses = [f.statuses[person] for f in found]
     out = []
-    for frames in stretches(statuses, [person in fixed.get(f.frame, {}) for f in found]):
+    for frames in stretches(statuses, [person in keyframes.get(f.frame, {}) for f in found]):
         end = frames.stop
         if end == len(found):  # nothing after it is trusted: from the last frame that is not lost
             end = max((i for i in frames if statuses[i] != "lost"), default=frames.start)
@@ -163,20 +121,21 @@ def _to_follow(found: Sequence[Tracked], person: int, fixed: Mapping[int, Mappin
 
 
 def _back(
-    observer: Observer, models: Sequence[BodyModel], found: Sequence[Tracked], stretch: _Stretch,
-    settings: TrackSettings, free: Sequence[NDArray[np.bool_]] | None,
-) -> Iterator[PoseEstimate]:  # fmt: skip
+    run: TrackingRun, found: Sequence[TrackedFrame], stretch: _Stretch, settings: TrackSettings
+) -> Iterator[PoseEstimate]:
     """Track one person from the frame after a stretch to its first; the others stay as they were found."""
-    person, (first, end) = stretch.person, (stretch.frames.start, stretch.frames.stop)
+    subjects, person, (first, end) = run.subjects, stretch.person, (stretch.frames.start, stretch.frames.stop)
     after = takewhile(lambda f: f.statuses[person] == "good", found[end + 1 : end + 1 + _MOTION_FRAMES])
     ahead = [*reversed(list(after)), found[end]]
-    start = [[f.poses[p] for f in ahead] for p in range(len(models))]
+    start = [[f.poses[p] for f in ahead] for p in range(len(subjects.models))]
     given = {f.frame: {p: v for p, v in enumerate(f.poses) if p != person} for f in found[first : end + 1]}
     # What is locked goes on from there as it was found in the stretch.
-    locked = None if free is None else free[person]
-    given[found[end].frame][person] = held(models[person], found[end].poses[person], found[first].poses[person], locked)
+    given[found[end].frame][person] = held(
+        subjects.models[person], found[end].poses[person], found[first].poses[person], subjects.active_dofs[person]
+    )
     frames = [f.frame for f in reversed(found[first : end + 1])]
-    tracked = track_chamfer(observer, models, start, frames, settings, given, [person], free)
+    alone = replace(subjects, tracked=(person,), keyframes=given)
+    tracked = track_forward(TrackingRun(run.observer, alone, start, frames), settings)
     next(tracked)  # where the way back begins
     return tracked
 
@@ -185,23 +144,24 @@ class _Choice:
     """The poses that one person may have in a stretch, and which of them are kept."""
 
     def __init__(
-        self, observer: Observer, models: Sequence[BodyModel], found: Sequence[Tracked], stretch: _Stretch,
-        back: Sequence[PoseEstimate], settings: TrackSettings, free: NDArray[np.bool_] | None,
+        self, run: TrackingRun, found: Sequence[TrackedFrame], stretch: _Stretch, back: Sequence[PoseEstimate],
+        settings: TrackSettings,
     ) -> None:  # fmt: skip
         """Begin with what both passes found: `found` on all frames, `back` on those of the stretch, in order."""
-        self._observer, self._models, self._settings, self._free = observer, models, settings, free
+        self._observer, self._models, self._settings = run.observer, run.subjects.models, settings
+        self._free = run.subjects.active_dofs[stretch.person]
         self._person, (first, end) = stretch.person, (stretch.frames.start, stretch.frames.stop)
         self._before, self._after = found[max(0, first - 2) : first], found[end : end + 2]
         self._found, self._back = found[first:end], back
-        self._model = models[self._person]
+        self._model = self._models[self._person]
         self._known: PartColors | None = None
         for good in (*self._before[-1:], self._after[0]):
-            self._known = _colors(observer, models, good, self._person).learn(self._known, 0.5)
-        self._options = [self._options_of(f, Tracked.of(b)) for f, b in zip(self._found, back, strict=True)]
+            self._known = _colors(self._observer, self._models, good, self._person).learn(self._known, 0.5)
+        self._options = [self._options_of(f, TrackedFrame.of(b)) for f, b in zip(self._found, back, strict=True)]
         self._views = lru_cache(_SEEN_AT_ONCE)(self._observed)
         self._sight = lru_cache(_SEEN_AT_ONCE)(self._look)
 
-    def _options_of(self, *passes: Tracked) -> Candidates:
+    def _options_of(self, *passes: TrackedFrame) -> Candidates:
         p = self._person
         others = [v for e in passes if e.others for v in e.others[p]]
         return Candidates(self._model, [e.poses[p] for e in passes], others)
@@ -268,7 +228,7 @@ def _bodies(models: Sequence[BodyModel], poses: Sequence[Array]) -> list[PosedBo
     return [PosedBody(m, p) for m, p in zip(models, poses, strict=True)]
 
 
-def _colors(observer: Observer, models: Sequence[BodyModel], where: Tracked, person: int) -> Colors:
+def _colors(observer: Observer, models: Sequence[BodyModel], where: TrackedFrame, person: int) -> Colors:
     """The colours under a person on a frame on which they were not lost."""
     bodies = _bodies(models, where.poses)
     return Colors(observer.evidence(where.frame, regions(observer.matched_cameras, bodies)), bodies, person)

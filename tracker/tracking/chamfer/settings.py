@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ Estimation = Literal["refine", "search"]
 class TrackSettings:
     """What the chamfer tracker is told."""
 
+    method: ClassVar[str] = "chamfer"
+    """Name of the method, which the store keeps with the settings."""
     estimate: Estimation = "refine"
     """`refine` searches only where refinement does not suffice; `search` is best-first search alone, as in GD96."""
     predict: PredictSettings = field(default_factory=PredictSettings)

@@ -11,7 +11,7 @@ from gestures import FRONT, PAGE, drag, wait_for
 
 from tracker.errors import SessionError, TrackerError
 from tracker.store.annotation_store import AnnotationStore
-from tracker.tracking.chamfer.backward_pass import Followed
+from tracker.tracking.estimate import BackwardStep
 
 
 def at(controller, frame):
@@ -105,8 +105,8 @@ def test_keyframes_are_taken_as_they_are(placed, tracker):
 
 
 def tracker_fixed(controller, tracker):
-    wait_for(lambda: tracker.told)
-    return tracker.told["fixed"]
+    wait_for(lambda: tracker.run)
+    return tracker.run.subjects.keyframes
 
 
 def test_a_run_over_keyframes_alone_is_no_entry(placed, tracker):
@@ -305,7 +305,7 @@ def followed_back(tracker, steps):
             if i == steps - 1:
                 poses = tuple(p + STEP_M * (np.arange(len(p)) == 1) for p in found[4].poses)
                 better = (tracker.last[7]._replace(poses=poses, statuses=("good",), remarks=("followed back",)),)
-            yield Followed(7, 0, i + 1, steps, better)
+            yield BackwardStep(7, 0, i + 1, steps, better)
 
     tracker.back = back
     return offered

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 from staging import SUIT, Shown, cameras_around, dressed, posed
+from tracking_runs import track_back
 
 from tracker.body.model import PosedBody
-from tracker.tracking.chamfer.backward_pass import Followed, Tracked, follow_back, stretches
+from tracker.tracking.chamfer.backward_pass import stretches
 from tracker.tracking.chamfer.pose_paths import ROUNDS
 from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.estimate import BackwardStep, TrackedFrame
 
 N = 9
 LOST = range(2, 5)
@@ -30,7 +32,7 @@ def scene(gavrila):
 
 
 def tracked(first, lost=LOST):
-    return [Tracked(k, (v,), ("lost" if k in lost else "good",)) for k, v in enumerate(first)]
+    return [TrackedFrame(k, (v,), ("lost" if k in lost else "good",)) for k, v in enumerate(first)]
 
 
 def off_m(model, values, truth):
@@ -42,11 +44,11 @@ def test_a_lost_arm_is_followed_back_from_where_it_is_trusted_again(scene, backw
     model, truth, views, first = scene
     assert min(off_m(model, first[k], truth[k]) for k in LOST) > 0.25
     found = tracked(first)[:: -1 if backward else 1]
-    steps = list(follow_back(Shown(views), [model], found, TrackSettings()))
+    steps = list(track_back(Shown(views), [model], found, TrackSettings()))
     way = list(LOST)[:: 1 if backward else -1]
     visits = way + ROUNDS * (way[::-1] + way)
     n = len(visits)
-    assert steps == [Followed(k, 0, i + 1, n, steps[-1].better if i + 1 == n else ()) for i, k in enumerate(visits)]
+    assert steps == [BackwardStep(k, 0, i + 1, n, steps[-1].better if i + 1 == n else ()) for i, k in enumerate(visits)]
     better = steps[-1].better
     assert [e.frame for e in better] == way[::-1]  # in the order of tracking
     for estimate in better:
@@ -60,14 +62,14 @@ def test_where_nobody_is_lost_nothing_is_looked_at(scene):
     observer = Shown(views)
     doubtful = [f._replace(statuses=("doubtful",)) if f.frame in LOST else f for f in tracked(first, ())]
     for found in (tracked(first, ()), doubtful, tracked(first, [])[:1], []):
-        assert list(follow_back(observer, [model], found, TrackSettings())) == []
-    assert list(follow_back(observer, [model], tracked(first), TrackSettings(), people=[])) == []
+        assert list(track_back(observer, [model], found, TrackSettings())) == []
+    assert list(track_back(observer, [model], tracked(first), TrackSettings(), tracked=[])) == []
     assert observer.asked == []
 
 
 def test_a_pose_that_was_right_stays_where_it_was_called_lost(scene):
     model, truth, views, _ = scene
-    steps = list(follow_back(Shown(views), [model], tracked(truth), TrackSettings()))
+    steps = list(track_back(Shown(views), [model], tracked(truth), TrackSettings()))
     assert [s.frame for s in steps[:3]] == [4, 3, 2]
     assert steps[-1].better == ()
 
@@ -78,7 +80,7 @@ def test_what_was_right_on_one_frame_is_carried_to_those_that_both_passes_lost(s
     first[5, model.dof_names.index("left_shoulder.abduction")] -= np.radians(70)  # where the way back begins
     first[3] = truth[3]
     found = [f._replace(statuses=("doubtful",)) if f.frame == 3 else f for f in tracked(first)]
-    better = list(follow_back(Shown(views), [model], found, TrackSettings(recover=None)))[-1].better
+    better = list(track_back(Shown(views), [model], found, TrackSettings(recover=None)))[-1].better
     assert [e.frame for e in better] == [2, 4]
     for estimate in better:
         assert off_m(model, estimate.poses[0], truth[estimate.frame]) < 0.03
@@ -90,15 +92,15 @@ def test_what_was_right_on_one_frame_is_carried_to_those_that_both_passes_lost(s
 
 def test_keyframes_and_locked_degrees_of_freedom_stay(scene):
     model, _, views, first = scene
-    fixed = {3: {0: first[3]}}
-    steps = list(follow_back(Shown(views), [model], tracked(first), TrackSettings(), fixed))
+    keyframes = {3: {0: first[3]}}
+    steps = list(track_back(Shown(views), [model], tracked(first), TrackSettings(), keyframes=keyframes))
     # 2 from the keyframe, 4 from the frame after it
     assert [s.frame for s in steps] == [2] * (1 + 2 * ROUNDS) + [4] * (1 + 2 * ROUNDS)
     assert 3 not in [e.frame for s in steps for e in s.better]
     free = np.array([n != "right_elbow.extension" for n in model.dof_names])
     first = first.copy()
     first[:5, ~free] += 0.2
-    better = list(follow_back(Shown(views), [model], tracked(first), TrackSettings(), free=[free]))[-1].better
+    better = list(track_back(Shown(views), [model], tracked(first), TrackSettings(), active_dofs=[free]))[-1].better
     assert len(better) == 3
     for estimate in better:
         np.testing.assert_array_equal(estimate.poses[0][~free], first[2, ~free])
@@ -113,8 +115,8 @@ def test_the_others_stay_as_they_were_found(scene):
         for a, b in zip(truth, other, strict=True)
     ]
     odd = other + 0.03  # not where the evidence is, yet it stays
-    found = [Tracked(k, (odd[k], first[k]), ("doubtful", "lost" if k in LOST else "good")) for k in range(N)]
-    steps = list(follow_back(Shown(views), [model, model], found, TrackSettings()))
+    found = [TrackedFrame(k, (odd[k], first[k]), ("doubtful", "lost" if k in LOST else "good")) for k in range(N)]
+    steps = list(track_back(Shown(views), [model, model], found, TrackSettings()))
     assert {s.person for s in steps} == {1}
     assert [e.frame for e in steps[-1].better] == list(LOST)
     for estimate in steps[-1].better:
@@ -127,11 +129,11 @@ def test_what_an_end_of_the_run_leaves_open_is_followed_back_from_the_last_frame
     model, _, views, first = scene
     found = [f._replace(statuses=("lost" if f.frame in LOST else "doubtful" if f.frame > 4 else "good",))
              for f in tracked(first)]  # fmt: skip
-    steps = list(follow_back(Shown(views), [model], found, TrackSettings()))
+    steps = list(track_back(Shown(views), [model], found, TrackSettings()))
     assert [s.frame for s in steps[:6]] == [7, 6, 5, 4, 3, 2]
     assert {2, 3, 4} <= {e.frame for e in steps[-1].better}
     hopeless = [f._replace(statuses=("lost" if f.frame > 1 else "good",)) for f in tracked(first)]
-    assert list(follow_back(Shown(views), [model], hopeless, TrackSettings())) == []
+    assert list(track_back(Shown(views), [model], hopeless, TrackSettings())) == []
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_evidence, posed, shaken, solid
+from tracking_runs import track
 
 from tracker.body.model import PosedBody
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
@@ -14,11 +15,10 @@ from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.motion.prediction import PredictSettings
 from tracker.search.best_first import SearchSettings
-from tracker.session.assemble import assemble
+from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
 from tracker.tracking.chamfer.limb_recovery import Searched
 from tracker.tracking.chamfer.settings import TrackSettings, pose_cost, search_frame
-from tracker.tracking.chamfer.tracker import track_chamfer
 
 COARSE = TrackSettings(
     estimate="search", search=SearchSettings(passes=(1.0,)), predict=PredictSettings(order=0), recover=None
@@ -39,7 +39,7 @@ def balls():
 
 def run(balls, frames, start, **options):
     model, _, views = balls
-    return list(track_chamfer(Shown(views), [model, model], start, frames, COARSE, **options))
+    return list(track(Shown(views), [model, model], start, frames, COARSE, **options))
 
 
 def test_two_people_are_followed(balls):
@@ -66,7 +66,7 @@ def test_keyframes_are_taken_as_they_are_and_tracking_goes_on_from_them(balls):
     # wandered out of reach of the search until the keyframe brings it back.
     keyframe = values[2, 0] + (0, 0, 0.013, 0.02, 0, 0)
     lost = values[0] + np.array([[0, -0.6, 0, 0, 0, 0], [0] * 6])
-    found = run(balls, range(5), lost, fixed={2: {0: keyframe}})
+    found = run(balls, range(5), lost, keyframes={2: {0: keyframe}})
     assert np.linalg.norm(found[1].poses[0] - values[1, 0]) > 0.3
     np.testing.assert_array_equal(found[2].poses[0], keyframe)
     for k in (3, 4):
@@ -77,7 +77,7 @@ def test_keyframes_are_taken_as_they_are_and_tracking_goes_on_from_them(balls):
 
 def test_a_frame_of_keyframes_alone_is_not_searched(balls):
     _, values, _ = balls
-    (found,) = run(balls, [2], values[0], fixed={2: dict(enumerate(values[2]))})
+    (found,) = run(balls, [2], values[0], keyframes={2: dict(enumerate(values[2]))})
     np.testing.assert_array_equal(found.poses, values[2])
     assert found.evaluations == 0
     assert found.cost_px < 0.5
@@ -85,7 +85,7 @@ def test_a_frame_of_keyframes_alone_is_not_searched(balls):
 
 def test_whom_to_track(balls):
     _, values, _ = balls
-    found = run(balls, range(1, 4), values[0], people=[1])
+    found = run(balls, range(1, 4), values[0], tracked=[1])
     for k, estimate in enumerate(found, start=1):
         np.testing.assert_array_equal(estimate.poses[0], values[0, 0])  # stands where it was
         np.testing.assert_allclose(estimate.poses[1], values[k, 1], atol=1e-9)
@@ -94,11 +94,11 @@ def test_whom_to_track(balls):
 def test_frames_are_read_one_at_a_time(balls):
     model, values, views = balls
     observer = Shown(views)
-    running = track_chamfer(observer, [model, model], values[0], range(5), COARSE)
+    running = track(observer, [model, model], values[0], range(5), COARSE)
     next(running)
     assert observer.asked == [0]  # whoever stops here has cost no more
     running.close()
-    assert list(track_chamfer(observer, [model, model], values[0], [], COARSE)) == []
+    assert list(track(observer, [model, model], values[0], [], COARSE)) == []
 
 
 def test_settings_reach_the_cost(balls):
@@ -136,7 +136,7 @@ def test_refinement_follows_by_itself(gavrila):
     """Nobody is lost, so nothing is searched; the estimates say all there is to know."""
     truth = dancing(gavrila, 5)
     views = [dressed([PosedBody(gavrila, v)], cameras_around(), SUIT) for v in truth]
-    found = list(track_chamfer(Shown(views), [gavrila], truth[:1], range(5), TrackSettings()))
+    found = list(track(Shown(views), [gavrila], truth[:1], range(5), TrackSettings()))
     for estimate, values in zip(found, truth, strict=True):
         assert off_m(gavrila, estimate.poses[0], values).max() < 0.01
         assert (estimate.statuses, estimate.remarks, estimate.evaluations) == (("good",), ("",), 0)
@@ -154,13 +154,13 @@ def test_refinement_follows_by_itself(gavrila):
 def test_an_arm_that_jumps_is_searched_and_the_frame_says_so(gavrila):
     truth = dancing(gavrila, 5, jump_at=3)
     views = [dressed([PosedBody(gavrila, v)], cameras_around(4), SUIT) for v in truth]
-    found = list(track_chamfer(Shown(views), [gavrila], truth[:1], range(5), TrackSettings()))
+    found = list(track(Shown(views), [gavrila], truth[:1], range(5), TrackSettings()))
     assert [f.remarks[0] for f in found[:3]] == ["", "", ""]
     assert "left arm searched anew" in found[3].remarks[0]
     for estimate, values in zip(found, truth, strict=True):
         assert off_m(gavrila, estimate.poses[0], values).max() < 0.03
     # Left alone it is not found, and not called good.
-    alone = list(track_chamfer(Shown(views), [gavrila], truth[:1], range(5), TrackSettings(recover=None)))
+    alone = list(track(Shown(views), [gavrila], truth[:1], range(5), TrackSettings(recover=None)))
     assert off_m(gavrila, alone[3].poses[0], truth[3]).max() > 0.1
     assert alone[3].statuses[0] != "good"
     assert alone[3].remarks == ("left arm uncertain",)
@@ -173,7 +173,7 @@ def test_two_people_who_might_as_well_be_each_other_are_in_doubt():
     values[:, 1] = -0.035, 0.035
     cameras = cameras_around(4)
     settings = TrackSettings(predict=PredictSettings(order=0), recover=None)
-    (found,) = track_chamfer(Shown([own_evidence([at(rod, *v[:3]) for v in values], cameras)]), [rod, rod], values,
+    (found,) = track(Shown([own_evidence([at(rod, *v[:3]) for v in values], cameras)]), [rod, rod], values,
                              [0], settings)  # fmt: skip
     np.testing.assert_allclose([p[:3] for p in found.poses], values[:, :3], atol=0.01)
     assert "lost" in found.statuses or set(found.statuses) == {"doubtful"}
@@ -186,7 +186,7 @@ def test_two_people_who_might_as_well_be_each_other_are_in_doubt():
         assert other.cost_px == pytest.approx(found.cost_px, abs=0.2)
     # Where each was expected half a metre from the other nobody asks.
     values[:, 1] = -0.25, 0.25
-    (found,) = track_chamfer(Shown([own_evidence([at(rod, *v[:3]) for v in values], cameras)]), [rod, rod], values,
+    (found,) = track(Shown([own_evidence([at(rod, *v[:3]) for v in values], cameras)]), [rod, rod], values,
                              [0], settings)  # fmt: skip
     assert found.alternatives == ((), ())
 
@@ -204,7 +204,7 @@ def test_what_is_locked_is_neither_refined_nor_searched(gavrila, monkeypatch):
     start = truth[0].copy()
     outside = gavrila.dof_names.index("left_elbow.extension")
     start[gavrila.dof_value[outside]] = gavrila.limits[outside, 1] + 0.1  # as an import may bring it
-    found = list(track_chamfer(Shown(views), [gavrila], [start], range(4), TrackSettings(), free=[free]))
+    found = list(track(Shown(views), [gavrila], [start], range(4), TrackSettings(), active_dofs=[free]))
     still, moving = gavrila.dof_value[~free], gavrila.dof_value[free]
     for estimate in found:
         np.testing.assert_array_equal(estimate.poses[0][still], start[still])
@@ -218,7 +218,7 @@ def test_of_two_people_each_has_own_locks(balls, estimate):
     model, values, views = balls
     free = [np.array([True] + [False] * 5), np.ones(6, dtype=bool)]
     settings = replace(COARSE, estimate=estimate)
-    found = list(track_chamfer(Shown(views), [model, model], values[0], range(3), settings, free=free))
+    found = list(track(Shown(views), [model, model], values[0], range(3), settings, active_dofs=free))
     for k, found_ in enumerate(found):
         np.testing.assert_array_equal(found_.poses[0][1:], values[0, 0, 1:])
         np.testing.assert_allclose(found_.poses[1][:3], values[k, 1, :3], atol=0.02)
@@ -228,7 +228,7 @@ def test_a_keyframe_moves_what_is_locked_from_there_on(balls):
     _, values, _ = balls
     keyframe = values[2, 0] + (0, 0, 0.2, 0, 0, 0)
     free = [np.array([True, True, False] + [False] * 3), np.ones(6, dtype=bool)]
-    found = run(balls, range(5), values[0], fixed={2: {0: keyframe}}, free=free)
+    found = run(balls, range(5), values[0], keyframes={2: {0: keyframe}}, active_dofs=free)
     assert [f.poses[0][2] for f in found] == [0, 0, 0.2, 0.2, 0.2]
 
 
@@ -236,7 +236,7 @@ def test_what_the_prediction_refused_is_looked_at_again(gavrila):
     """The prediction accepts no edge of an arm that jumps: it is found among all edges."""
     truth = dancing(gavrila, 5, jump_at=3)
     found = list(
-        track_chamfer(filmed([[PosedBody(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(5), TrackSettings())
+        track(filmed([[PosedBody(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(5), TrackSettings())
     )
     assert found[3].remarks == ("left arm searched anew",)
     for estimate, values in zip(found, truth, strict=True):
@@ -246,9 +246,7 @@ def test_what_the_prediction_refused_is_looked_at_again(gavrila):
 def test_a_body_that_is_elsewhere_is_searched(gavrila):
     truth = dancing(gavrila, 3)
     truth[2, 1] += 0.6
-    *_, last = track_chamfer(
-        filmed([[PosedBody(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(3), TrackSettings()
-    )
+    *_, last = track(filmed([[PosedBody(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(3), TrackSettings())
     assert "body searched anew" in last.remarks[0]
     assert last.evaluations > 100
     if off_m(gavrila, last.poses[0], truth[2]).max() > 0.1:  # so far it is beyond the reach of the search
@@ -259,7 +257,7 @@ def test_a_pose_that_is_given_is_certain(gavrila):
     truth = dancing(gavrila, 4)
     views = [dressed([PosedBody(gavrila, v)], cameras_around(), SUIT) for v in truth]
     keyframe = gavrila.retract(truth[2], np.full(gavrila.n_dofs, 0.02))
-    found = list(track_chamfer(Shown(views), [gavrila], truth[:1], range(4), TrackSettings(), {2: {0: keyframe}}))
+    found = list(track(Shown(views), [gavrila], truth[:1], range(4), TrackSettings(), keyframes={2: {0: keyframe}}))
     given = found[2]
     np.testing.assert_array_equal(given.poses[0], keyframe)
     assert (given.statuses, given.remarks, given.qualities, given.evaluations) == (("good",), ("",), (None,), 0)
@@ -275,7 +273,7 @@ def test_the_prediction_stands_while_nothing_is_seen(gavrila):
     views = [dressed([PosedBody(gavrila, v)], cameras, SUIT) for v in truth]
     views[3] = tuple(view_evidence(c, 1.0, np.zeros((480, 640), dtype=bool)) for c in cameras)
     settings = TrackSettings(trust_rad=0.1, trust_m=0.03)
-    *_, last = track_chamfer(Shown(views), [gavrila], truth[:1], range(4), settings)
+    *_, last = track(Shown(views), [gavrila], truth[:1], range(4), settings)
     assert last.statuses == ("lost",)
     assert np.isnan(last.views_px).all()
     assert off_m(gavrila, last.poses[0], truth[3]).max() < 0.02
@@ -312,7 +310,7 @@ def test_poses_do_not_depend_on_what_was_looked_at_ahead(sample_folder, monkeypa
     def run():
         with Recording(session.cameras) as recording:
             observer = Observer(session.cameras, recording)
-            tracked = track_chamfer(observer, [model] * n_people, starts, frames, TrackSettings(recover=None))
+            tracked = track(observer, [model] * n_people, starts, frames, TrackSettings(recover=None))
             return [(*f.poses, f.cost_px) for f in tracked]
 
     prefetch = Observer.prefetch
@@ -329,10 +327,12 @@ def test_a_real_recording(data_folder, tmp_path):
     """Three frames of a cluttered room from the reference's pose, as `init --method joints` sets it."""
     folder = data_folder("balance_real")
     session = assemble(
-        tmp_path / "s",
-        calibration=folder / "Calib.toml",
-        videos=sorted(folder.glob("*.mp4")),
-        background=folder / "background",
+        NewSession(
+            tmp_path / "s",
+            calibration=folder / "Calib.toml",
+            videos=sorted(folder.glob("*.mp4")),
+            background=folder / "background",
+        )
     )
     model = session.people[0].model
     reference = read_joints(folder / "reference_joints.trc", session.fps)
@@ -340,7 +340,7 @@ def test_a_real_recording(data_folder, tmp_path):
     start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS})
     with Recording(session.cameras) as recording:
         observer = Observer(session.cameras, recording)
-        found = list(track_chamfer(observer, [model], [start.values], range(3), TrackSettings()))
+        found = list(track(observer, [model], [start.values], range(3), TrackSettings()))
     poses = {f.frame: f.poses[0] for f in found}
     errors = evaluate_joints(joints_of_poses(model, poses, session.fps), reference, range(3))
     assert errors.mpjpe_mm < 90
@@ -351,7 +351,7 @@ def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folde
     """Without a background: an arm swings before a patterned picture and along a skirting board."""
     folder = data_folder("walk")
     session = assemble(
-        tmp_path / "s", calibration=folder / "Calib.toml", videos=sorted(folder.glob("*.mp4")), heights=1.75
+        NewSession(tmp_path / "s", calibration=folder / "Calib.toml", videos=sorted(folder.glob("*.mp4")), heights=1.75)
     )
     model, frames = session.people[0].model, range(12)
     reference = read_joints(folder / "ground_truth.trc", session.fps)
@@ -359,7 +359,7 @@ def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folde
     start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).values
     with Recording(session.cameras) as recording:
         observer = Observer(session.cameras, recording)
-        found = list(track_chamfer(observer, [model], [start], frames, TrackSettings(), {0: {0: start}}))
+        found = list(track(observer, [model], [start], frames, TrackSettings(), keyframes={0: {0: start}}))
     poses = {f.frame: f.poses[0] for f in found}
     errors = evaluate_joints(joints_of_poses(model, poses, session.fps), reference, frames)
     assert errors.mpjpe_mm < 42

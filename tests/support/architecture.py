@@ -1,0 +1,114 @@
+"""The rooms of the house from the bottom up, one line each, and what each module imports."""
+
+import ast
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+ROOMS = [
+    "tracker",
+    "tracker.compute",
+    "tracker.geometry",
+    "tracker.body",
+    "tracker.motion",
+    "tracker.formats",
+    "tracker.footage",
+    "tracker.session",
+    "tracker.store",
+    "tracker.images",
+    "tracker.contours",
+    "tracker.evidence",
+    "tracker.fitting",
+    "tracker.appearance",
+    "tracker.search",
+    "tracker.tracking",
+    "tracker.tracking.chamfer",
+    "tracker.acquisition",
+    "tracker.posing",
+    "tracker.evaluation",
+    "tracker.simulate.people",
+    "tracker.simulate.motion",
+    "tracker.simulate.stage",
+    "tracker.simulate",
+    "tracker.pipeline",
+    "app",
+    "app.runtime",
+    "app.state",
+    "app.storage",
+    "app.drawing",
+    "app.session",
+    "app.control.session",
+    "app.control.view",
+    "app.control.search",
+    "app.control.posing",
+    "app.control.tracking",
+    "app.control",
+    "app.page",
+    "app.scene3d",
+    "app.server",
+    "app.bench",
+    "app.cli",
+    "app.__main__",
+]
+FLOOR = {room: floor for floor, room in enumerate(ROOMS)}
+
+# Imports that `tracker` itself makes before any kernel is decorated.
+AT_IMPORT = {"tracker": {"tracker.compute.kernel_cache"}}
+
+# What a library without a screen does without.
+OF_THE_SCREEN = {"app", "viser", "aiohttp", "tyro", "webbrowser", "asyncio"}
+
+
+def module_files():
+    """Path of every module of the project by its dotted name."""
+    files = {}
+    for package in ("tracker", "app"):
+        for path in sorted((ROOT / package).rglob("*.py")):
+            files[".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")] = path
+    return files
+
+
+FILES = module_files()
+
+
+def room_of(module):
+    """Name of the room that a module is in."""
+    if module in FLOOR:
+        return module
+    return module.rpartition(".")[0]
+
+
+def imported(tree, known):
+    """Dotted names that a module imports anywhere, within functions too; of the project's own the very modules."""
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports are absolute"
+            whole = [f"{node.module}.{alias.name}" for alias in node.names]
+            found |= {name if name in known else node.module for name in whole}
+    return found
+
+
+IMPORTS = {name: imported(ast.parse(path.read_text("utf-8")), FILES) for name, path in FILES.items()}
+OWN = {name: sorted(found & FILES.keys() - AT_IMPORT.get(name, set())) for name, found in IMPORTS.items()}
+
+
+PAGE_ROOMS = ["widgets", "model", "panes", "posing", "timeline", "search", "scene", "shell", "."]
+PAGE_FLOOR = {room: floor for floor, room in enumerate(PAGE_ROOMS)}
+STATIC = ROOT / "static"
+PAGE_IMPORT = re.compile(r"""(?:from\s+|import\s*\(\s*|import\s+)["'](\.[^"']+)["']""")
+"""Imports of modules and of types."""
+SCRIPTS = {p.relative_to(STATIC).as_posix(): p.read_text("utf-8") for p in sorted(STATIC.rglob("*.js"))}
+
+
+def page_room(script):
+    return Path(script).parent.as_posix()
+
+
+def page_imports(script):
+    """Scripts that a script imports, by their path below static/."""
+    base = (STATIC / script).parent
+    return {(base / target).resolve().relative_to(STATIC).as_posix() for target in PAGE_IMPORT.findall(SCRIPTS[script])}

@@ -1,0 +1,90 @@
+"""The documents are true: links lead somewhere, commands run, names exist, the picture shows the house."""
+
+import re
+import shlex
+import sys
+
+import pytest
+import rooms_picture
+from architecture import FLOOR, OWN, PAGE_ROOMS, ROOT, SCRIPTS, page_imports, page_room, room_of
+
+from app import __main__
+
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "sample_sessions").glob("*.md")])
+LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)(#[^)]*)?\)")
+FILE = re.compile(r"`((?:app|tracker|static|tests|docs|sample_sessions)/[\w./-]+)`")
+COMMAND = re.compile(r"^ {4}(?:\.venv/bin/)?(quadrille\b(?:[^\\\n]|\\\n)*)", re.MULTILINE)
+MAKE = re.compile(r"`?make ([a-z-]+)`?")
+
+
+def words_of(path):
+    """Every command line of the program in a page, without placeholders."""
+    for line in COMMAND.findall(path.read_text("utf-8")):
+        yield shlex.split(line.replace("\\\n", " "), comments=True)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_links_lead_somewhere(page):
+    missing = [target for target, _ in LINK.findall(page.read_text("utf-8")) if not (page.parent / target).exists()]
+    assert missing == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_files_that_are_named_exist(page):
+    names = [name for name in FILE.findall(page.read_text("utf-8")) if "NAME" not in name]
+    missing = [name for name in names if not (ROOT / name).exists()]
+    assert missing == []
+
+
+def test_targets_of_make_exist():
+    makefile = (ROOT / "Makefile").read_text("utf-8")
+    named = {t for page in PAGES for t in re.findall(r"(?:`| {4})make ([a-z-]+)", page.read_text("utf-8"))}
+    assert {"run", "test", "check"} <= named
+    assert [t for t in sorted(named) if not re.search(rf"^{t}:", makefile, re.MULTILINE)] == []
+
+
+@pytest.mark.parametrize(
+    "words", [w for page in PAGES for w in words_of(page)], ids=lambda w: " ".join(w[1:])[:60] or "quadrille"
+)
+def test_commands_are_understood(words, monkeypatch, capsys):
+    """Each word of a documented command is one that the program knows: its help would list it."""
+    names = [w for w in words[1:] if not w.startswith("-")]
+    commands = {"open", "new", "info", "index", "init", "track", "evaluate", "simulate", "bench"}
+    command = names[0] if names and names[0] in commands else "open"
+    monkeypatch.setattr(sys, "argv", ["quadrille", command, "--help"])
+    with pytest.raises(SystemExit) as end:
+        __main__.main()
+    assert not end.value.code
+    shown = capsys.readouterr().out
+    assert [w for w in words[1:] if w.startswith("--") and w.partition("=")[0] not in shown] == []
+
+
+def drawn():
+    """Floor of each drawn room of Python by its dotted name, and of the page's."""
+    floors = {}
+    for name, rows in rooms_picture.HOUSE.items():
+        package = name.split("/")[0]
+        for floor, row in enumerate(reversed(rows)):
+            for room in row:
+                for part in room.split(", "):
+                    floors[f"{package}/{part}"] = floor
+    return floors
+
+
+def test_the_picture_shows_every_room():
+    floors = drawn()
+    rooms = {r.replace(".", "/") for r in FLOOR} - {"tracker", "app"}
+    rooms = {r for r in rooms if not r.startswith("tracker/simulate/")}  # drawn as one
+    rooms |= {f"static/{r}" for r in PAGE_ROOMS if r != "."}
+    assert rooms - floors.keys() == set()
+    assert (ROOT / "docs/images/rooms.svg").read_text("utf-8") == rooms_picture.drawing()
+
+
+def test_the_floors_of_the_picture_are_those_of_the_imports():
+    floors = drawn()
+    arrows = {(room_of(a), room_of(b)) for a, needs in OWN.items() for b in needs}
+    arrows |= {(f"static.{page_room(a)}", f"static.{page_room(b)}") for a in SCRIPTS for b in page_imports(a)}
+    pairs = {(a.replace(".", "/"), b.replace(".", "/")) for a, b in arrows if a != b}
+    level = {(a, b) for a, b in pairs if a.split("/")[0] == b.split("/")[0] and floors.keys() >= {a, b}}
+    assert len(level) > 50
+    assert {(a, b) for a, b in level if floors[a] <= floors[b]} == set()

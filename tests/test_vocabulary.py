@@ -1,0 +1,88 @@
+"""One word, one meaning: retired names and private words do not come back."""
+
+import io
+import re
+import tokenize
+
+import pytest
+from architecture import FILES, ROOT, SCRIPTS, STATIC
+
+# Identifier today -> what took its place. Whole names, in all of Python, tests included.
+RETIRED = {
+    "LimbLook": "LimbScorer",
+    "Kept": "StaticContours",
+    "told_of": "settings_record",
+    "spoken": "display_name",
+    "_NEAREST_M": "NEAR_PLANE_M, or a name for what it is",
+    "OtherPose": "Alternative",
+    "views_px": "view_costs_px",
+    "parts_px": "part_costs_px",
+    "place_px": "position_px",
+    "FrameNumbers": "FramePose",
+    "StayNear": "PosePrior",
+    "KeepApart": "SelfPenetration",
+    "KeepBodiesApart": "BodyPenetration",
+    "ContourMatch": "ContourResiduals",
+    "nearest_alike": "nearest_oriented_segment",
+    "nearest_alongside": "nearest_parallel_segment",
+    "cheapest_way": "viterbi_path",
+    "follow_back": "track_lost_backward",
+    "Followed": "BackwardStep",
+    "MatchedView": "WorkingView",
+    "Probes": "SampleGrid",
+    "Scenery": "StaticEdgeModel",
+    "BORROW": "NO_REFCOUNT",
+    "dealt_out": "map_chunked",
+    "side_by_side": "map_parallel",
+    "rebodied": "retarget_pose",
+    "embody": "set_body_models",
+    "summed_up": "make_estimate",
+    "Sharing": "EvidencePool",
+    "Screen": "SessionState",
+    "Casting": "PeopleVisibility",
+    "Choosing": "Alternatives",
+    "Flooring": "FloorEditing",
+    "Sizing": "BodySizeEditing",
+    "Listing": "FootageScan",
+    "Recent": "ByteBoundedCache",
+    "ViewPin": "PointObservation",
+    "BodySizes": "BodyDimensions",
+    "write_text_whole": "write_text_atomic",
+}
+# Private words in prose: comments, docstrings, documents, what the page shows.
+WORDS = re.compile(r"\b(anew|in vain|at hand|whoever|whosoever|as it were|so to speak)\b", re.IGNORECASE)
+PYTHON = [*FILES.values(), *sorted((ROOT / "tests").rglob("*.py"))]
+PROSE = [
+    *PYTHON,
+    *sorted(ROOT.glob("*.md")),
+    *sorted((ROOT / "docs").glob("*.md")),
+    *(STATIC / script for script in SCRIPTS),
+    STATIC / "index.html",
+]
+
+
+def names_in(text):
+    return {t.string for t in tokenize.generate_tokens(io.StringIO(text).readline) if t.type == tokenize.NAME}
+
+
+@pytest.mark.parametrize("path", PYTHON, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_retired_names_stay_retired(path):
+    found = names_in(path.read_text("utf-8")) & RETIRED.keys()
+    assert {name: RETIRED[name] for name in found} == {}
+
+
+@pytest.mark.parametrize("path", PROSE, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_prose_keeps_to_plain_words(path):
+    if path.name == "test_vocabulary.py":
+        return
+    lines = enumerate(path.read_text("utf-8").splitlines(), 1)
+    assert [f"{number}: {line.strip()}" for number, line in lines if WORDS.search(line)] == []
+
+
+def test_one_class_has_one_name():
+    """No two classes of the program share a name: whoever reads it would have to ask which."""
+    places = {}
+    for module, path in FILES.items():
+        for name in re.findall(r"^class ([A-Z]\w*)", path.read_text("utf-8"), re.MULTILINE):
+            places.setdefault(name, []).append(module)
+    assert {name: modules for name, modules in places.items() if len(modules) > 1} == {}

@@ -1,0 +1,97 @@
+"""Convert pose estimates to rows of the store, and stored keyframes to input of a tracker."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tracker.geometry.arrays import Array
+from tracker.session.session import Person
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import Alternative, PoseChange, PoseRecord
+from tracker.tracking.estimate import PoseEstimate
+from tracker.tracking.subjects import Keyframes
+from tracker.tracking.tracker import TrackerSettings
+
+_FIRST_METHOD = "chamfer"
+"""The method of settings that name none: they are older than any other method."""
+
+
+class StoredPerson(NamedTuple):
+    """A person as the store knows them."""
+
+    name: str
+    revision: int
+    """The body model of new poses."""
+
+
+def tracked_changes(
+    estimates: Sequence[PoseEstimate],
+    stored: Sequence[StoredPerson],
+    tracked: Sequence[int],
+    keyframes: Keyframes,
+    settings: TrackerSettings,
+) -> list[PoseChange]:
+    """Return the poses to store, without keyframes.
+
+    Args:
+        estimates: of any frames.
+        stored: all people.
+        tracked: indices of the people whose poses are stored.
+        keyframes: poses that the tracker took as they are; they stay in the store.
+        settings: of the tracker.
+    """
+    record = settings_record(settings)
+    return [
+        PoseChange(
+            stored[i].name,
+            found.frame,
+            PoseRecord(
+                found.poses[i],
+                ("tracked",) * len(found.poses[i]),
+                stored[i].revision,
+                status=found.statuses[i],
+                cost_px=_number(found.cost_px),
+                settings=record,
+                views_px=tuple(_number(c) for c in found.views_px),
+                parts_px=tuple(_number(c) for c in found.parts_px[i]),
+                remark=found.remarks[i],
+            ),
+            tuple(Alternative(o.values, stored[i].revision, _number(o.cost_px)) for o in found.alternatives[i]),
+        )
+        for found in estimates
+        for i in tracked
+        if i not in keyframes.get(found.frame, {})
+    ]
+
+
+def keyframes_of(
+    store: AnnotationStore, people: Sequence[Person], frames: Collection[int]
+) -> dict[int, dict[int, Array]]:
+    """Return the poses of the keyframes among some frames, by frame and index of the person.
+
+    Poses of a body with another number of values are left out.
+    """
+    found: dict[int, dict[int, Array]] = {}
+    for index, person in enumerate(people):
+        for row in store.frames(person.name):
+            record = store.pose(person.name, row.frame) if row.keyframe and row.frame in frames else None
+            if record is not None and len(record.values) == len(person.model.value_names):
+                found.setdefault(row.frame, {})[index] = record.values
+    return found
+
+
+def settings_record(settings: TrackerSettings) -> dict[str, Any]:
+    """Return a tracker's settings and method as the store keeps them: values that JSON can hold."""
+    return {"method": settings.method, **asdict(settings)}
+
+
+def recorded_method(record: Mapping[str, Any]) -> str:
+    """Return the method that stored settings name."""
+    return str(record.get("method", _FIRST_METHOD))
+
+
+def _number(value: float) -> float | None:
+    """Return None for NaN and infinity, which JSON cannot hold."""
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,51 @@
+"""The interface of a tracker: settings, a generator of pose estimates, and an optional second pass."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+from tracker.evidence.observer import Observer
+from tracker.geometry.arrays import Array
+from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
+from tracker.tracking.subjects import Subjects
+
+
+class TrackerSettings(Protocol):
+    """The settings of a tracker: a frozen dataclass of values that JSON can hold."""
+
+    method: ClassVar[str]
+    """Name of the method that they belong to, such as `chamfer`."""
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class TrackingRun:
+    """The input of a tracker besides its settings."""
+
+    observer: Observer
+    """Gives the evidence of a frame."""
+    subjects: Subjects
+    start: Sequence[Array | Sequence[Array]]
+    """For each person the pose from which the first frame is predicted, (n_values,), or the poses of the frames before
+    it, the last one last, (n, n_values)."""
+    frames: Sequence[int]
+    """The frames in the order of tracking."""
+
+
+class Tracker(Protocol):
+    """A tracking method with its settings."""
+
+    @property
+    def settings(self) -> TrackerSettings:
+        """The settings, which name the method."""
+
+    def estimates(self, run: TrackingRun) -> Iterator[PoseEstimate]:
+        """Track all frames in order. Yields the poses of each frame as soon as they are found."""
+
+    def second_pass(self, run: TrackingRun, tracked: Sequence[TrackedFrame]) -> Iterator[BackwardStep]:
+        """Improve frames on which people were lost. Yields nothing where there is nothing to improve.
+
+        Args:
+            run: the run whose frames were tracked; `start` and `frames` are not used.
+            tracked: all frames, in the order of tracking, also those of an interrupted run.
+        """
