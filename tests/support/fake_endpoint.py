@@ -463,11 +463,11 @@ class FakeEndpoint:
 
     def picture(self, camera, frame, layer):
         """The image of a room with a bright figure that shows its number; masks and a distance image of even colour."""
-        return encoded(self.sizes[camera % len(self.sizes)], camera, frame if layer == "image" else 0, layer)
+        return jpeg(self.sizes[camera % len(self.sizes)], camera, frame if layer == "image" else 0, layer)
 
 
 @functools.lru_cache(maxsize=2000)
-def encoded(size, camera, frame, layer):
+def jpeg(size, camera, frame, layer):
     """A picture as JPEG."""
     color = {"silhouette": (140, 224, 74), "distance": (164, 255, 252), "parts": (30, 30, 250)}.get(layer)
     image = room(camera, frame) if color is None else np.full((HEIGHT, WIDTH, 3), color, np.uint8)
