@@ -17,7 +17,7 @@ from app.state.state import JobState, ReplayState, State, TrackState
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.posing.drag import minor_points
 from tracker.session.session import Session
-from tracker.store.records import SOURCES, STATUSES, FrameNumbers, HistoryEntry
+from tracker.store.records import SOURCES, STATUSES, FramePose, HistoryEntry
 
 _FEW_CELLS = 2000
 """Cells of the timeline that travel by name; more go as columns, a tenth of the bytes and of the work."""
@@ -211,7 +211,7 @@ def disagreeing(frames: Sequence[int]) -> dict[str, Any]:
 
 
 def curves(
-    session: Session, person: int, group: str, frames: Sequence[int], rows: Sequence[FrameNumbers], replace: bool
+    session: Session, person: int, group: str, frames: Sequence[int], rows: Sequence[FramePose], replace: bool
 ) -> bytes:
     """A group of curves of one person on some frames; NaN where a frame has no pose.
 
