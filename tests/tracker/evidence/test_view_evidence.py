@@ -3,13 +3,13 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from staging import camera_at
+from staging import camera_at, view_evidence
 
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.errors import RecordingError
 from tracker.evidence.observer import FOREGROUND_MARGIN, Observer
-from tracker.evidence.view_evidence import SCENE_SPACING_PX, default_theta_px, view_evidence, with_accepted_segments
+from tracker.evidence.view_evidence import SCENE_SPACING_PX, default_theta_px, with_accepted_segments
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
@@ -107,7 +107,7 @@ def test_scene_points_are_edges_one_to_a_cell():
     camera = camera_at("c", (4, 0, 0), size=(90, 60))
     edges = np.zeros((60, 90), dtype=bool)
     edges[10, 5:80] = edges[20:50, 40] = True
-    view = view_evidence(camera, 1.0, edges)
+    view = view_evidence(camera, edges)
     u, v = view.points_px.astype(int).T
     assert edges[v, u].all()
     cells = set(zip(u // SCENE_SPACING_PX, v // SCENE_SPACING_PX, strict=True))
