@@ -1,20 +1,25 @@
-"""The smallest program that speaks the pane socket (docs/protocol.md): a stick figure, and an ear for the page.
+"""The smallest program that speaks the pane socket (docs/protocol.md): a stick figure.
+
+Messages in both directions are checked against their declarations.
 
 It stands in for the controller in tests of the page alone; `python tests/support/fake_endpoint.py` serves it on a port.
 """
 
 import asyncio
 import contextlib
+import functools
 import itertools
 import json
 import struct
 import sys
-import time
 from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 from aiohttp import WSMsgType, web
+from declared_messages import checked
+
+from app.page.message_parsing import parse
 
 WIDTH, HEIGHT, N_FRAMES = 640, 480, 120
 CAMERA_NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
@@ -63,6 +68,13 @@ PLOTS = {
 REMARK = "left arm searched anew"
 
 
+def encoded(message):
+    """The JSON of a message to the page; fails if the message does not fit its declaration."""
+    text = json.dumps(message)
+    checked(text)
+    return text
+
+
 def status_of(frame):
     """Frames 31 and 32 are doubtful, 50 is lost; there is no pose from 100 on."""
     return "doubtful" if frame in (31, 32) else "lost" if frame == 50 else "good"
@@ -97,8 +109,6 @@ class FakeEndpoint:
     """Every message of every page, but for what each says when it connects."""
     frame_s: float = 0.05
     """How long a run takes for a frame."""
-    seek_times: list = field(default_factory=list)
-    """When each seek came, s."""
     greetings: list = field(default_factory=list)
     """What the pages said when they connected."""
     views: list = field(default_factory=list)
@@ -112,7 +122,6 @@ class FakeEndpoint:
         self.before_drag = None
         self.seq = 0
         self.epipolar_of = None
-        self.jpegs = {}
         self.set_numbers = itertools.count(1)
         self.search_task = None
         self.track_task = None
@@ -148,14 +157,20 @@ class FakeEndpoint:
             await self.send_all(socket)
             async for message in socket:
                 if message.type is WSMsgType.TEXT:
+                    parse(message.data)
                     told = json.loads(message.data)
                     kept = {"pause_3d": self.greetings, "view": self.views}.get(told["type"], self.received)
                     kept.append(told)
-                    if told["type"] == "seek":
-                        self.seek_times.append(time.monotonic())
                     await self.answer(told)
         finally:
             self.sockets.discard(socket)
+
+    async def rest(self):
+        """End what it does by itself."""
+        for task in filter(None, (self.search_task, self.track_task)):
+            task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await task
 
     async def answer(self, message):
         match message["type"]:
@@ -337,11 +352,11 @@ class FakeEndpoint:
             }
             for p in range(self.n_people)
         ]
-        await socket.send_str(json.dumps({
+        await socket.send_str(encoded({
             "type": "session", "name": "elbow_rotation", "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
             "people": people,
         }))  # fmt: skip
-        await socket.send_str(json.dumps(self.state))
+        await socket.send_str(encoded(self.state))
         sources = ["manual", "searched", "searched", "tracked", "tracked", "tracked", "interpolated", "smoothed"]
         cells = {
             k: {
@@ -357,18 +372,19 @@ class FakeEndpoint:
         }
         for person in (None, *(range(self.n_people) if self.n_people > 1 else ())):
             told = {"type": "timeline", "person": person, "cells": cells, "replace": True}
-            await socket.send_str(json.dumps(told))
-        await socket.send_str(json.dumps({"type": "inconsistent", "frames": DISAGREEING}))
+            await socket.send_str(encoded(told))
+        await socket.send_str(encoded({"type": "inconsistent", "frames": DISAGREEING}))
         if self.views:
             await self.send_frame([socket])
 
     async def broadcast(self, message):
+        text = encoded(message)
         for socket in list(self.sockets):
             with contextlib.suppress(ConnectionError):
-                await socket.send_str(json.dumps(message))
+                await socket.send_str(text)
 
     async def send_binary(self, header, payload, sockets=None):
-        text = json.dumps(header).encode()
+        text = encoded(header).encode()
         for socket in list(self.sockets) if sockets is None else sockets:
             with contextlib.suppress(ConnectionError):
                 await socket.send_bytes(struct.pack("<I", len(text)) + text + payload)
@@ -447,13 +463,15 @@ class FakeEndpoint:
 
     def picture(self, camera, frame, layer):
         """The image of a room with a bright figure that shows its number; masks and a distance image of even colour."""
-        size = self.sizes[camera % len(self.sizes)]
-        key = (camera, frame if layer == "image" else 0, layer)
-        if key not in self.jpegs:
-            color = {"silhouette": (140, 224, 74), "distance": (164, 255, 252), "parts": (30, 30, 250)}.get(layer)
-            image = room(camera, frame) if color is None else np.full((HEIGHT, WIDTH, 3), color, np.uint8)
-            self.jpegs[key] = cv2.imencode(".jpg", cv2.resize(image, size))[1].tobytes()
-        return self.jpegs[key]
+        return jpeg(self.sizes[camera % len(self.sizes)], camera, frame if layer == "image" else 0, layer)
+
+
+@functools.lru_cache(maxsize=2000)
+def jpeg(size, camera, frame, layer):
+    """A picture as JPEG."""
+    color = {"silhouette": (140, 224, 74), "distance": (164, 255, 252), "parts": (30, 30, 250)}.get(layer)
+    image = room(camera, frame) if color is None else np.full((HEIGHT, WIDTH, 3), color, np.uint8)
+    return cv2.imencode(".jpg", cv2.resize(image, size))[1].tobytes()
 
 
 def room(camera, frame):

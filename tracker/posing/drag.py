@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
-from tracker.fitting.gauss_newton import Block, Normal, StayNear, normal_of, solve
+from tracker.fitting.gauss_newton import NormalEquations, PosePrior, ResidualBlock, normal_equations, solve
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import Camera
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.posing.orient import orient
 from tracker.posing.picking import place_on_part
 
@@ -31,8 +31,6 @@ _STIFF_WEIGHT = 0.015
 _DEPTH_WEIGHT = 0.1
 """Weight of keeping the point's depth, against 1 for being under the pointer: where the limb's lengths allow only one
 of the two, the point goes where the hand sees it go."""
-_NEAREST_M = 0.05
-"""Depths below this count as this: a point is not dragged through the camera."""
 
 _ON_JOINT_PX = 8.0
 """A point grabbed this near to the joint that it turns about does not go round it."""
@@ -198,38 +196,31 @@ def _take_hold(
 
 @dataclass(frozen=True, eq=False)
 class _UnderPointer:
-    """A `Block` that draws the grabbed point to a line of sight and, more weakly, to a depth."""
+    """A `ResidualBlock` that draws the grabbed point to a line of sight and, more weakly, to a depth."""
 
     hand: Grab
     target_world: Array
     """Where the point should be, (3,), metres: under the pointer, at the depth."""
     depth_weight: float = _DEPTH_WEIGHT
 
-    def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
-        """See `Block`."""
-        hand, (R, t) = self.hand, self._world_to_camera
+    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+        """See `ResidualBlock`."""
+        hand, (target_px, m_per_px, depth_axis) = self.hand, self._image
         point_world = rigid.apply(kinematics.Ts_world_part[hand.part], hand.place_part)
-        x, target = R @ point_world + t, self._target
-        z = max(x[2], _NEAREST_M)
-        # Angles times depth, so that both are in metres.
-        across = hand.depth_m * (x[:2] / z - target[:2] / target[2])
-        r = np.array([across[0], across[1], self.depth_weight * (x[2] - target[2])])
-        by_x = np.zeros((3, 3))  # d(r)/d(x)
-        by_x[0, 0] = by_x[1, 1] = hand.depth_m / z
-        by_x[:2, 2], by_x[2, 2] = -hand.depth_m / z**2 * x[:2], self.depth_weight
+        points_px, px_by_point = hand.camera.project_with_jacobian(point_world[None])
+        r, by_point = np.empty(3), np.empty((3, 3))
+        r[:2], by_point[:2] = m_per_px @ (points_px[0] - target_px), m_per_px @ px_by_point[0]
+        r[2], by_point[2] = depth_axis @ (point_world - self.target_world), depth_axis
         J_world = model.point_jacobian(kinematics, np.array([hand.part]), point_world[None])[0]  # (3, n_dofs)
-        return normal_of(r, by_x @ R @ J_world)
+        return normal_equations(r, by_point @ J_world)
 
     @cached_property
-    def _world_to_camera(self) -> tuple[Array, Array]:
-        T_camera_world = self.hand.camera.T_camera_world
-        return T_camera_world[:3, :3], T_camera_world[:3, 3]
-
-    @cached_property
-    def _target(self) -> Array:
-        """In the camera, (3,)."""
-        R, t = self._world_to_camera
-        return np.asarray(R @ self.target_world + t)
+    def _image(self) -> tuple[Array, Array, Array]:
+        """The target's pixel, (2,), metres at the grab's depth per pixel, (2, 2), and the weighted depth axis, (3,)."""
+        camera = self.hand.camera
+        target_px = camera.project_with_jacobian(self.target_world[None])[0][0]
+        m_per_px = np.asarray(self.hand.depth_m * np.linalg.inv(camera.K[:2, :2]), dtype=np.float64)
+        return target_px, m_per_px, self.depth_weight * camera.T_camera_world[2, :3]
 
 
 def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
@@ -247,27 +238,27 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
     target = hand.camera.back_project(np.asarray(pointer_px) + hand.offset_px, hand.depth_m)
     if hand.moves_body:
         return _moved_body(hand, target)
-    blocks: list[Block] = [
+    blocks: list[ResidualBlock] = [
         _UnderPointer(hand, target),
         _rest(hand),
     ]
     fit = solve(model, values, blocks, free=hand.free, **_QUICK)
     joint, first = model.dof_joint[hand.free][[-1, 0]]
-    if joint == first or _has_reached(hand, fit.values, target) or _is_stretched(hand, fit.values, int(first), target):
-        return fit.values
+    if joint == first or _has_reached(hand, fit.pose, target) or _is_stretched(hand, fit.pose, int(first), target):
+        return fit.pose
     # A straight limb cannot see that bending would bring the point nearer: begin with its joint bent, either way.
     for bend in (_BEND_RAD, -_BEND_RAD):
         start = model.clip(model.retract(values, np.where(hand.free & (model.dof_joint == joint), bend, 0.0)))
         bent = solve(model, start, blocks, free=hand.free, **_BENT)
         if bent.cost < fit.cost:
-            fit = solve(model, bent.values, blocks, free=hand.free, **_QUICK)
-    return fit.values
+            fit = solve(model, bent.pose, blocks, free=hand.free, **_QUICK)
+    return fit.pose
 
 
 def _has_reached(hand: Grab, values: Array, target_world: Array) -> bool:
     """Whether the grabbed point is where it should be, as far as a hand can tell."""
     seen = rigid.apply(hand.camera.T_camera_world, np.stack([hand.place_world(values), target_world]))
-    across = hand.depth_m * np.diff(seen[:, :2] / np.maximum(seen[:, 2:], _NEAREST_M), axis=0)
+    across = hand.depth_m * np.diff(seen[:, :2] / np.maximum(seen[:, 2:], NEAR_PLANE_M), axis=0)
     return bool(np.linalg.norm(across) < _REACHED_M and abs(seen[1, 2] - seen[0, 2]) < _REACHED_DEPTH_M)
 
 
@@ -284,7 +275,7 @@ def _is_stretched(hand: Grab, values: Array, first: int, target_world: Array) ->
     return bool(min(np.linalg.norm(p - places[-1]) for p in (places[0], target_world)) > _STRETCHED * length)
 
 
-def hold_anew(hand: Grab, values: Array, pointer_px: Array) -> Grab:
+def regrab(hand: Grab, values: Array, pointer_px: Array) -> Grab:
     """The same hand on the same place, taken anew in another pose, (n_values,), with the pointer elsewhere, (2,)."""
     place = hand.place_world(values)
     return replace(
@@ -323,7 +314,7 @@ def turn(hand: Grab, pointer_px: Array, values: Array) -> Array:
     if model.joints[part].kind == "ball" or np.count_nonzero(own) >= 3:
         return orient(model, values, part, R_turn @ T_world_part[:3, :3], hand.unlocked)
     target = T_world_part[:3, 3] + R_turn @ (hand.place_world(hand.values) - T_world_part[:3, 3])
-    return solve(model, values, [_UnderPointer(hand, target)], free=own, **_QUICK).values
+    return solve(model, values, [_UnderPointer(hand, target)], free=own, **_QUICK).pose
 
 
 def push(hand: Grab, pointer_px: Array, values: Array) -> Array:
@@ -340,8 +331,8 @@ def push(hand: Grab, pointer_px: Array, values: Array) -> Array:
     target = camera.back_project(hand.pointer_px + hand.offset_px, depth)
     if hand.moves_body:
         return _moved_body(hand, target)
-    blocks: list[Block] = [_UnderPointer(hand, target, _PUSH_DEPTH_WEIGHT), _rest(hand)]
-    return solve(model, values, blocks, free=hand.free, **_QUICK).values
+    blocks: list[ResidualBlock] = [_UnderPointer(hand, target, _PUSH_DEPTH_WEIGHT), _rest(hand)]
+    return solve(model, values, blocks, free=hand.free, **_QUICK).pose
 
 
 def _moved_body(hand: Grab, target_world: Array) -> Array:
@@ -351,6 +342,6 @@ def _moved_body(hand: Grab, target_world: Array) -> Array:
     return hand.model.retract(hand.values, np.where(hand.free, step, 0.0))
 
 
-def _rest(hand: Grab) -> StayNear:
+def _rest(hand: Grab) -> PosePrior:
     """What keeps the chain near its pose at the grab."""
-    return StayNear(hand.values, np.where(np.isfinite(hand.model.spreads), _STIFF_WEIGHT, _REST_WEIGHT))
+    return PosePrior(hand.values, np.where(np.isfinite(hand.model.spreads), _STIFF_WEIGHT, _REST_WEIGHT))

@@ -15,7 +15,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.motion.prediction import PredictSettings
 from tracker.search.best_first import SearchSettings
-from tracker.session.assemble import assemble
+from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
 from tracker.tracking.chamfer.limb_recovery import Searched
 from tracker.tracking.chamfer.settings import TrackSettings, pose_cost, search_frame
@@ -302,7 +302,7 @@ def test_poses_do_not_depend_on_what_was_looked_at_ahead(sample_folder, monkeypa
     session, frames = load_session(sample_folder), range(25, 28)
     joints = read_joints(sample_folder / "truth.trc", session.fps)
     model, ahead = session.people[0].model, []
-    start = fit_to_points(model, dict(zip(joints.names, joints.points[24], strict=True))).values
+    start = fit_to_points(model, dict(zip(joints.names, joints.points[24], strict=True))).pose
     aside = model.neutral() * 0
     aside[0] = 0.8
     starts = [start, start + aside][:n_people]
@@ -327,10 +327,12 @@ def test_a_real_recording(data_folder, tmp_path):
     """Three frames of a cluttered room from the reference's pose, as `init --method joints` sets it."""
     folder = data_folder("balance_real")
     session = assemble(
-        tmp_path / "s",
-        calibration=folder / "Calib.toml",
-        videos=sorted(folder.glob("*.mp4")),
-        background=folder / "background",
+        NewSession(
+            tmp_path / "s",
+            calibration=folder / "Calib.toml",
+            videos=sorted(folder.glob("*.mp4")),
+            background=folder / "background",
+        )
     )
     model = session.people[0].model
     reference = read_joints(folder / "reference_joints.trc", session.fps)
@@ -338,7 +340,7 @@ def test_a_real_recording(data_folder, tmp_path):
     start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS})
     with Recording(session.cameras) as recording:
         observer = Observer(session.cameras, recording)
-        found = list(track(observer, [model], [start.values], range(3), TrackSettings()))
+        found = list(track(observer, [model], [start.pose], range(3), TrackSettings()))
     poses = {f.frame: f.poses[0] for f in found}
     errors = evaluate_joints(joints_of_poses(model, poses, session.fps), reference, range(3))
     assert errors.mpjpe_mm < 90
@@ -349,12 +351,12 @@ def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folde
     """Without a background: an arm swings before a patterned picture and along a skirting board."""
     folder = data_folder("walk")
     session = assemble(
-        tmp_path / "s", calibration=folder / "Calib.toml", videos=sorted(folder.glob("*.mp4")), heights=1.75
+        NewSession(tmp_path / "s", calibration=folder / "Calib.toml", videos=sorted(folder.glob("*.mp4")), heights=1.75)
     )
     model, frames = session.people[0].model, range(12)
     reference = read_joints(folder / "ground_truth.trc", session.fps)
     places = dict(zip(reference.names, reference.points[0], strict=True))
-    start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).values
+    start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).pose
     with Recording(session.cameras) as recording:
         observer = Observer(session.cameras, recording)
         found = list(track(observer, [model], [start], frames, TrackSettings(), keyframes={0: {0: start}}))
