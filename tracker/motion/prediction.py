@@ -30,7 +30,7 @@ class PredictSettings:
         """Check the settings; raise a TrackerError for values that predict nothing."""
         if not 0 <= self.order <= MAX_ORDER or self.window < 1:
             raise TrackerError(
-                f"expected a prediction of order 0 to {MOST_ORDER} over at least 1 past pose, found order "
+                f"expected a prediction of order 0 to {MAX_ORDER} over at least 1 past pose, found order "
                 f"{self.order} over {self.window}"
             )
 
