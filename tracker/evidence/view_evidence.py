@@ -183,22 +183,6 @@ def select_evidence(
     )  # fmt: skip
 
 
-def with_accepted_segments(
-    view: ViewEvidence, predicted_px: FloatArray, threshold_px: float | None = None
-) -> ViewEvidence:
-    """Return a view with only the segments that a prediction explains (GD96 Sect. 4.2, Fig. 6).
-
-    Args:
-        view: evidence with segments.
-        predicted_px: visible pieces of the predicted contours, x0, y0, x1, y1, (M, 4), px of the view's camera.
-        threshold_px: largest mean distance of an accepted segment, px; half of theta by default.
-    """
-    assert view.samples is not None
-    return with_segments(
-        view, accept_segments(view.samples, predicted_px, threshold_px or ACCEPTED_SHARE * view.theta_px)
-    )
-
-
 def with_all_segments(view: ViewEvidence) -> ViewEvidence:
     """Return a view with all edges that are not static, because a wrong prediction may have refused the right ones."""
     if view.segments is None or view.accepted is None or view.accepted.all():

@@ -9,11 +9,11 @@ from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.errors import RecordingError
 from tracker.evidence.observer import FOREGROUND_MARGIN, Observer
-from tracker.evidence.view_evidence import SCENE_SPACING_PX, default_theta_px, with_accepted_segments
+from tracker.evidence.view_evidence import ACCEPTED_SHARE, SCENE_SPACING_PX, default_theta_px, with_segments
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
-from tracker.images.edge_segments import link_edges
+from tracker.images.edge_segments import accept_segments, link_edges
 from tracker.images.static_edges import StaticEdgeModel
 from tracker.images.working_view import WorkingView, region_around, working_scale
 from tracker.session.session import load_session
@@ -316,6 +316,12 @@ def test_what_is_wrong_with_a_frame_read_ahead_is_told_when_it_is_asked_for():
 def visible_contours(real_frame, camera):
     seen = occluding_contours.trace([PosedBody(real_frame.model, real_frame.values)], camera)
     return seen.pieces_px[~seen.occluded]
+
+
+def with_accepted_segments(view, pieces_px, threshold_px=None):
+    """The view with only the segments near pieces of contour, in px of its camera."""
+    threshold_px = threshold_px or ACCEPTED_SHARE * view.theta_px
+    return with_segments(view, accept_segments(view.samples, pieces_px, threshold_px))
 
 
 def test_only_edges_near_the_prediction_are_accepted(sample, real_frame):
