@@ -31,7 +31,11 @@ def outlines(session: Session, state: State, view: View) -> list[Outline]:
     the hand does not need would only make it wait. A step that is replayed is no pose to be taken.
     """
     drag = state.drag
-    if "joints" not in view.layers or state.look.replay is not None or (drag is not None and not drag.by_surface):
+    if (
+        "joints" not in view.layers
+        or state.search_view.replay is not None
+        or (drag is not None and not drag.by_surface)
+    ):
         return []
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
@@ -39,7 +43,7 @@ def outlines(session: Session, state: State, view: View) -> list[Outline]:
     found = picking.part_outlines(bodies, [session.cameras[index].camera.pinhole for index in seen])
     for index, parts in zip(seen, found, strict=True):
         for one in parts:
-            if one.body in state.cast.hidden:
+            if one.body in state.visibility.hidden:
                 continue
             if drag is None or (one.body, one.part) == (drag.person, drag.part):
                 out.append(Outline(index, one.body, one.part, one.depth_m, _closed(one.polygon_px)))

@@ -35,17 +35,17 @@ _MODES = {mode: mode for mode in ("move", "turn", "push")}
 
 
 def _drag(controller: Controller, page: int, message: Message) -> None:
-    hand, phase, pointer_px = controller.hand, message["phase"], _place(message)
+    dragging, phase, pointer_px = controller.dragging, message["phase"], _place(message)
     if phase == "start":
         camera, person, frame = int(message["camera"]), int(message["person"]), int(message["frame"])
         part = None if message.get("part") is None else int(message["part"])
-        hand.begin_drag(page, camera, person, message["point"], pointer_px, frame, part)
+        dragging.begin(page, camera, person, message["point"], pointer_px, frame, part)
     if phase == "cancel":
-        hand.cancel_drag(page)
+        dragging.cancel(page)
     else:
-        hand.move_drag(page, pointer_px, int(message["seq"]), _MODES[message.get("mode", "move")])
+        dragging.move(page, pointer_px, int(message["seq"]), _MODES[message.get("mode", "move")])
     if phase == "end":
-        hand.end_drag(page)
+        dragging.end(page)
 
 
 def _pin(controller: Controller, page: int, message: Message) -> None:
@@ -73,8 +73,8 @@ def _fit(controller: Controller, _: int, message: Message) -> None:
 
 def _people(controller: Controller, _: int, message: Message) -> None:
     actions: dict[str, Callable[[], None]] = {
-        "show": lambda: controller.casting.show(_person(controller, message), bool(message["shown"])),
-        "solo": lambda: controller.casting.solo(bool(message["on"])),
+        "show": lambda: controller.visibility.show(_person(controller, message), bool(message["shown"])),
+        "solo": lambda: controller.visibility.solo(bool(message["on"])),
     }
     actions[message["action"]]()
 
@@ -97,11 +97,11 @@ def _place(message: Message) -> tuple[float, float]:
 def _track(controller: Controller, _: int, message: Message) -> None:
     last = None if message.get("until") is None else int(message["until"])
     actions: dict[str, Callable[[], None]] = {
-        "forward": lambda: controller.track(False, last),
-        "backward": lambda: controller.track(True, last),
-        "pause": controller.pause_tracking,
-        "resume": controller.go_on_tracking,
-        "stop": controller.stop,
+        "forward": lambda: controller.tracking.start(False, last),
+        "backward": lambda: controller.tracking.start(True, last),
+        "pause": controller.tracking.pause,
+        "resume": controller.tracking.resume,
+        "stop": controller.activities.stop,
     }
     actions[message["action"]]()
 
@@ -134,17 +134,17 @@ def _snap(controller: Controller, _: int, message: Message) -> None:
 
 
 def _floor(controller: Controller, _: int, message: Message) -> None:
-    flooring, action = controller.flooring, message["action"]
+    floor, action = controller.floor, message["action"]
     if action == "mark":
-        flooring.mark(int(message["camera"]), _place(message))
+        floor.mark(int(message["camera"]), _place(message))
         return
     actions = {
-        "begin": flooring.begin,
-        "next": flooring.go_on,
-        "take_back": flooring.take_back,
-        "apply": flooring.apply,
-        "cancel": flooring.cancel,
-        "revert": flooring.revert,
+        "begin": floor.begin,
+        "next": floor.next_point,
+        "take_back": floor.take_back,
+        "apply": floor.apply,
+        "cancel": floor.cancel,
+        "revert": floor.revert,
     }
     actions[action]()
 
@@ -154,8 +154,8 @@ def _edit(edit: Any) -> int | None:
 
 
 _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
-    "seek": lambda controller, _, message: controller.seek(int(message["frame"])),
-    "select": lambda controller, _, message: controller.select(int(message["person"]), message.get("point")),
+    "seek": lambda controller, _, message: controller.navigation.seek(int(message["frame"])),
+    "select": lambda controller, _, message: controller.navigation.select(int(message["person"]), message.get("point")),
     "drag": _drag,
     "pose": pose,
     "pin": _pin,
@@ -163,15 +163,15 @@ _INTENTIONS: dict[str, Callable[[Controller, int, Message], None]] = {
     "fit": _fit,
     "people": _people,
     "track": _track,
-    "follow": lambda controller, _, message: controller.follow(bool(message["follow"])),
-    "pause_3d": lambda controller, page, message: controller.hold_3d(page, bool(message["pause"])),
+    "follow": lambda controller, _, message: controller.tracking.follow(bool(message["follow"])),
+    "pause_3d": lambda controller, page, message: controller.view_3d.pause(page, bool(message["pause"])),
     "range": _range,
     "mark": _mark,
-    "stop_range": lambda controller, _, __: controller.ranges.halt(),
+    "stop_range": lambda controller, _, __: controller.ranges.stop(),
     "snap": _snap,
     "floor": _floor,
-    "undo": lambda controller, _, __: controller.undo(),
-    "redo": lambda controller, _, __: controller.redo(),
+    "undo": lambda controller, _, __: controller.history.undo(),
+    "redo": lambda controller, _, __: controller.history.redo(),
     "go_to": lambda controller, _, message: controller.history.go_to(_edit(message["edit"])),
     "save": lambda controller, _, __: controller.history.save(),
     **SEARCHING,

@@ -13,7 +13,9 @@ from app.drawing.curves import plots_of, samples
 from app.drawing.floor_lines import floor_lines
 from app.state.floor_picking import Picking
 from app.state.page_view import View
-from app.state.state import JobState, ReplayState, State, TrackState
+from app.state.progress import TrackState
+from app.state.search import ReplayState, SearchState
+from app.state.state import State
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.posing.drag import minor_points
 from tracker.session.session import Session
@@ -69,10 +71,15 @@ def state(session: Session, state: State) -> dict[str, Any]:
         "person": state.person,
         "point": state.point,
         "people": [
-            {"source": p.source, "status": p.status, "shown": i not in state.cast.hidden, "alternatives": len(p.others)}
+            {
+                "source": p.source,
+                "status": p.status,
+                "shown": i not in state.visibility.hidden,
+                "alternatives": len(p.others),
+            }
             for i, p in enumerate(state.people)
         ],
-        "solo": state.cast.solo,
+        "solo": state.visibility.solo,
         "cost_px": drawn.cost_px,
         "view_costs_px": list(drawn.view_costs_px),
         "source": shown.source,
@@ -82,8 +89,8 @@ def state(session: Session, state: State) -> dict[str, Any]:
         "dofs": dof_labels.shown(session.people[state.person].model, shown.values),
         "locked": sorted(state.locked[state.person]),
         "other_sizes": state.revisions[state.person] != state.present[state.person],
-        "job": _job(state.job),
-        "replay": _replay(state.look.replay),
+        "job": _job(state.search),
+        "replay": _replay(state.search_view.replay),
         "track": _track(state.track),
         "range": asdict(state.ranges),
         "follow": state.follow,
@@ -139,12 +146,12 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         "type": "overlay",
         "frame": state.frame,
         "seq": dict(state.drag_seqs).get(page, 0),
-        "job": state.job.running,
+        "job": state.search.running,
         "paths": rows,
         "outlines": parts,
         # Joints are there to be taken, and a step that is replayed is no pose to be taken.
         "handles": [h._asdict() for h in overlays.handles(session, state, view.cameras)]
-        if state.look.replay is None
+        if state.search_view.replay is None
         else [],
         "pins": [p._asdict() for p in pin_marks.pin_marks(session, state)],
         "triangulation": None if met is None else met._asdict() | {"marks": [m._asdict() for m in met.marks]},
@@ -259,7 +266,7 @@ def _floor(picking: Picking | None) -> dict[str, Any] | None:
     }
 
 
-def _job(job: JobState) -> dict[str, Any]:
+def _job(job: SearchState) -> dict[str, Any]:
     return {
         "running": job.running,
         "kind": job.kind,

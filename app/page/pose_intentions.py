@@ -41,9 +41,9 @@ def pose(controller: Controller, _: int, message: Mapping[str, Any]) -> None:
         "mirror": lambda: edits.mirror(person, frame),
         "copy": lambda: edits.copy_from(person, int(message["from"]), frame),
         "copy_person": lambda: edits.copy_person(person, int(message["from"]), frame),
-        "alternative": lambda: controller.choosing.exchange(person, frame),
+        "alternative": lambda: controller.alternatives.take_alternative(person, frame),
         "reset": lambda: edits.reset(person, point, frame),
-        "lock": lambda: controller.locks.set(person, [int(d) for d in message["dofs"]], bool(message["locked"])),
+        "lock": lambda: controller.dof_locks.set(person, [int(d) for d in message["dofs"]], bool(message["locked"])),
     }
     actions[message["action"]]()
 

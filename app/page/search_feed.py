@@ -7,9 +7,10 @@ import numpy as np
 
 from app.control.controller import Controller
 from app.control.search import search_settings
-from app.control.search.search_runs import Run
+from app.control.search.search_runs import SearchRun
 from app.page.messages import binary
-from app.state.state import Landscape, ReplayState, State, finite_or_none
+from app.state.search import CostLandscape, ReplayState
+from app.state.state import State, finite_or_none
 from tracker.session.session import Session
 
 _COLUMNS = 4
@@ -35,7 +36,7 @@ class SearchFeed:
         self._runs: dict[str, Any] | None = None
         self._steps: dict[int, tuple[int, int]] = {}  # by run: steps sent, times thinned
         self._candidates: dict[int, tuple[object, ...]] = {}
-        self._landscape: Landscape | None = None
+        self._landscape: CostLandscape | None = None
 
     def news(self, controller: Controller, with_figures: bool = True) -> list[dict[str, Any] | bytes]:
         """Messages that bring the page up to date, the text ones as objects.
@@ -53,7 +54,7 @@ class SearchFeed:
         if self._tab != "search":
             return []
         out: list[dict[str, Any] | bytes] = []
-        with controller.locked():
+        with controller.lock:
             found, state = controller.replay.runs(), controller.state  # of the same moment
             told = runs(found, state) if with_figures or self._runs is None else self._runs
             if told != self._runs:
@@ -73,7 +74,7 @@ class SearchFeed:
             self._candidates = {n: sent for n, sent in self._candidates.items() if n in kept}
         return out
 
-    def _steps_of(self, run: Run) -> list[bytes]:
+    def _steps_of(self, run: SearchRun) -> list[bytes]:
         first, thinned = self._steps.get(run.number, (0, run.thinned))
         first = 0 if thinned != run.thinned else first
         if (run.number in self._steps and first == len(run.steps)) and thinned == run.thinned:
@@ -81,7 +82,7 @@ class SearchFeed:
         self._steps[run.number] = (len(run.steps), run.thinned)
         return [steps(run, first)]
 
-    def _candidates_of(self, session: Session, run: Run) -> list[bytes]:
+    def _candidates_of(self, session: Session, run: SearchRun) -> list[bytes]:
         key = tuple(id(c) for c in run.candidates)
         if key == self._candidates.get(run.number, ()):
             return []
@@ -104,33 +105,33 @@ def setup(controller: Controller, state: State) -> dict[str, Any]:
         "bound_m": search.bound_m,
         "step_rad": search.step_rad,
         "step_m": search.step_m,
-        "speed": state.look.speed,
+        "speed": state.search_view.speed,
         "leaves": [
             {**vars(leaf), "dofs": list(leaf.dofs)}
-            for leaf in search_settings.leaves(controller.models, search, controller.free())
+            for leaf in search_settings.leaves(controller.models, search, controller.active_dofs())
         ],
     }
 
 
-def runs(found: Sequence[Run], state: State) -> dict[str, Any]:
+def runs(found: Sequence[SearchRun], state: State) -> dict[str, Any]:
     """The runs of the shown frame with their stages, and what is looked at of them."""
     differing = search_settings.differences([r.settings for r in found])
     return {
         "type": "search_runs",
         "runs": [_run(run, differs, state) for run, differs in zip(found, differing, strict=True)],
-        "replay": _replay(state.look.replay),
-        "compared": state.look.compared_run,
+        "replay": _replay(state.search_view.replay),
+        "compared": state.search_view.compared_run,
     }
 
 
-def steps(run: Run, first: int) -> bytes:
+def steps(run: SearchRun, first: int) -> bytes:
     """The figures of a run's recorded steps from one on."""
     rows = [(s.evaluations, s.candidate_px, s.best_px, s.stage) for s in run.steps[first:]]
     header = {"type": "search_steps", "run": run.number, "first": first, "count": len(rows)}
     return binary(header, np.array(rows, dtype="<f4").reshape(-1, _COLUMNS).T.tobytes())
 
 
-def candidates(session: Session, run: Run) -> bytes:
+def candidates(session: Session, run: SearchRun) -> bytes:
     """The best poses of a run as points in every view; NaN behind a camera."""
     n, cameras = len(run.candidates), [c.camera.pinhole for c in session.cameras]
     people = [len(p.model.point_names) for p in session.people]
@@ -148,7 +149,7 @@ def candidates(session: Session, run: Run) -> bytes:
     return binary(header, points.astype("<f4").tobytes())
 
 
-def landscape(session: Session, found: Landscape) -> bytes:
+def landscape(session: Session, found: CostLandscape) -> bytes:
     """A landscape: its values, the total costs, then the costs of each view."""
     model = session.people[found.person].model
     header = {
@@ -164,12 +165,12 @@ def landscape(session: Session, found: Landscape) -> bytes:
     return binary(header, np.vstack([found.values, found.totals_px, found.views_px.T]).astype("<f4").tobytes())
 
 
-def _run(run: Run, differs: dict[str, str], state: State) -> dict[str, Any]:
-    is_current = state.job.kind is not None and not run.over
+def _run(run: SearchRun, differs: dict[str, str], state: State) -> dict[str, Any]:
+    is_current = state.search.kind is not None and not run.over
     at = max((i for i, c in enumerate(run.counts) if c.expansions), default=-1)
     return {
         "number": run.number,
-        "state": "over" if not is_current else "running" if state.job.running else "paused",
+        "state": "over" if not is_current else "running" if state.search.running else "paused",
         "start_px": finite_or_none(run.start_px),
         "best_px": finite_or_none(run.best_px),
         "evaluations": run.evaluations,

@@ -14,25 +14,25 @@ def _search(controller: Controller, _: int, message: Message) -> None:
     if person is not None and not 0 <= person < len(controller.models):
         raise ValueError(f"there is no person {person}")
     actions: dict[str, Callable[[], None]] = {
-        "step": lambda: controller.search_step(person),
-        "stage": lambda: controller.search_stage(person),
-        "frame": lambda: controller.search_frame(person),
-        "again": lambda: controller.search_again(_number(message.get("run")), person),
-        "stop": controller.stop,
+        "step": lambda: controller.search.step(person),
+        "stage": lambda: controller.search.run_stage(person),
+        "frame": lambda: controller.search.run(person),
+        "again": lambda: controller.search.run_again(_number(message.get("run")), person),
+        "stop": controller.activities.stop,
     }
     actions[message["action"]]()
 
 
 def _pace(controller: Controller, _: int, message: Message) -> None:
     speed = message["per_second"]
-    controller.pace_search(None if speed is None else float(speed))
+    controller.search.set_speed(None if speed is None else float(speed))
 
 
 def _settings(controller: Controller, _: int, message: Message) -> None:
     before = controller.state.settings
     after = search_settings.changed(before, controller.models, dict(message["changes"]))
     if after != before:
-        controller.set_settings(after)
+        controller.search.set_settings(after)
 
 
 def _replay(controller: Controller, _: int, message: Message) -> None:
@@ -51,7 +51,7 @@ def _take(controller: Controller, _: int, message: Message) -> None:
 
 
 def _landscape_set(controller: Controller, _: int, message: Message) -> None:
-    controller.landscape.set_value(int(message["person"]), int(message["dof"]), float(message["value"]))
+    controller.cost_landscape.set_value(int(message["person"]), int(message["dof"]), float(message["value"]))
 
 
 def _number(value: Any) -> int | None:
@@ -66,6 +66,6 @@ SEARCHING: dict[str, Callable[[Controller, int, Message], None]] = {
     "compare": lambda controller, _, message: controller.replay.compare(_number(message["run"])),
     "preview": _preview,
     "take": _take,
-    "landscape": lambda controller, _, message: controller.landscape.choose(str(message["dof"])),
+    "landscape": lambda controller, _, message: controller.cost_landscape.choose(str(message["dof"])),
     "landscape_set": _landscape_set,
 }

@@ -83,10 +83,10 @@ class _Page:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            await asyncio.to_thread(self._controller.hand.end_drag, self._number)
+            await asyncio.to_thread(self._controller.dragging.end, self._number)
             await asyncio.to_thread(self._controller.pinning.end, self._number)
-            await asyncio.to_thread(self._controller.hold_3d, self._number, False)
-            self._controller.landscape.watch(self._number, False)
+            await asyncio.to_thread(self._controller.view_3d.pause, self._number, False)
+            self._controller.cost_landscape.watch(self._number, False)
 
     def _wake(self, _: State) -> None:
         """Let the sender look again; called from any thread."""
@@ -132,7 +132,7 @@ class _Page:
             self._open_curves(message["group"])
         elif message["type"] == "watch":
             self._feed = SearchFeed(message["tab"])
-            self._controller.landscape.watch(self._number, message["tab"] == "landscape")
+            self._controller.cost_landscape.watch(self._number, message["tab"] == "landscape")
             self._wake(self._controller.state)
         elif message["type"] == "history":
             self._history_limit = min(max(0, int(message["limit"])), _MOST_HISTORY)
@@ -177,13 +177,13 @@ class _Page:
                     await self._notice(state.track.message)
             except TrackerError as error:
                 await self._notice(str(error))
-            if state.job.running:
+            if state.search.running:
                 await asyncio.sleep(max(0.0, began + _WATCHABLE_S - self._loop.time()))
 
     def _figures_are_due(self, state: State) -> bool:
         """Whether it is time for figures; if not, this page is woken when it is."""
         sent, now = self._sent_text, self._loop.time()
-        is_busy = state.in_hand or (state.job.running and sent is not None and sent["job"]["running"])
+        is_busy = state.is_dragging or (state.search.running and sent is not None and sent["job"]["running"])
         due = self._sent_text_at + _READABLE_S
         if sent is None or not is_busy or now >= due:
             self._sent_text_at = now
@@ -233,7 +233,7 @@ class _Page:
         """The evidence of the shown frame, if the page shows any of it and it is at hand; it is asked for where not."""
         if view.layers.isdisjoint(page_view.EVIDENCE):
             return None
-        frames, views = self._controller.frames, self._controller.frames.evidence_at_hand(state.frame)
+        frames, views = self._controller.frames, self._controller.frames.cached_evidence(state.frame)
         if views is None:
             frames.request(state.frame, lambda _: self._wake(state))
         return views
@@ -241,7 +241,7 @@ class _Page:
     async def _send_timeline(self, since: int) -> None:
         several = range(len(self._controller.models)) if len(self._controller.models) > 1 else ()
         for person in (None, *several):
-            cells = self._controller.timeline(since, person)
+            cells = self._controller.stored_poses.timeline(since, person)
             message = await asyncio.to_thread(messages.timeline, cells, since == 0, person)
             await (self._socket.send_bytes(message) if isinstance(message, bytes) else self._send(message))
 
@@ -256,7 +256,7 @@ class _Page:
         self._sent_curves = wanted
         since = sent[2] if sent is not None and sent[:2] == wanted[:2] else 0
         group, person = wanted[:2]
-        frames, rows = await asyncio.to_thread(self._controller.numbers, person, since)
+        frames, rows = await asyncio.to_thread(self._controller.stored_poses.rows, person, since)
         message = await asyncio.to_thread(
             messages.curves, self._controller.session, person, group, frames, rows, since == 0
         )
@@ -282,18 +282,18 @@ class _Page:
 def _drawn(state: State) -> tuple[object, ...]:
     """What an overlay depends on, to be compared."""
     poses = tuple(id(p.values) for p in state.people)
-    candidate = None if state.job.candidate is None else tuple(id(c) for c in state.job.candidate)
+    candidate = None if state.search.candidate is None else tuple(id(c) for c in state.search.candidate)
     drawn = (
         state.frame,
         poses,
         state.revisions,
         state.draft,
         candidate,
-        state.job.running,
-        state.look,
+        state.search.running,
+        state.search_view,
         state.drag,
         state.drag_seqs,
-        state.cast.hidden,
+        state.visibility.hidden,
     )
     return (*drawn, _pins(state), state.floor.picking)
 

@@ -26,11 +26,11 @@ class Pace:
         """
         frame = state.frame
         # Who looks through a camera sees the bodies on its image: they go together.
-        if state.holding_3d and state.snapped is None and frame != self._frame:
+        if state.pages_pausing_3d and state.snapped is None and frame != self._frame:
             time.sleep(_REST_S)
             state = self._controller.state
-        seldom = state.spares_3d or state.frame != frame
-        if state.rests_3d or (seldom and time.monotonic() < self._drawn_at + _SELDOM_S):
+        seldom = state.is_3d_throttled or state.frame != frame
+        if state.is_3d_paused or (seldom and time.monotonic() < self._drawn_at + _SELDOM_S):
             return None
         self._frame, self._drawn_at = state.frame, time.monotonic()
         return state

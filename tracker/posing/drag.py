@@ -284,7 +284,7 @@ def _is_stretched(hand: Grab, values: Array, first: int, target_world: Array) ->
     return bool(min(np.linalg.norm(p - places[-1]) for p in (places[0], target_world)) > _STRETCHED * length)
 
 
-def hold_anew(hand: Grab, values: Array, pointer_px: Array) -> Grab:
+def regrab(hand: Grab, values: Array, pointer_px: Array) -> Grab:
     """The same hand on the same place, taken anew in another pose, (n_values,), with the pointer elsewhere, (2,)."""
     place = hand.place_world(values)
     return replace(

@@ -9,7 +9,7 @@ from tracker.fitting.gauss_newton import solve
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
 from tracker.posing import drag as posing
-from tracker.posing.drag import drag, grab, grab_part, hold_anew, minor_points, push, turn
+from tracker.posing.drag import drag, grab, grab_part, minor_points, push, regrab, turn
 from tracker.posing.picking import part_outlines
 
 SIDE = camera_at("side", (3.0, 2.5, 1.0))
@@ -319,5 +319,5 @@ def test_after_a_turn_the_hand_goes_on_where_it_is(gavrila, pose):
     start = SIDE.project(place(gavrila, pose, "left_wrist"))
     hand = grab(gavrila, pose, SIDE, "left_wrist", start)
     turned = turn(hand, start + np.array([0, -12]), pose)
-    again = hold_anew(hand, turned, start + np.array([0, -12]))
+    again = regrab(hand, turned, start + np.array([0, -12]))
     np.testing.assert_allclose(drag(again, start + np.array([0, -12]), turned), turned, atol=5e-3)
