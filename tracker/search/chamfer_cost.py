@@ -134,7 +134,7 @@ class ChamferCost:
         ]
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
         self._scene = _Scene(
-            np.stack([occluding_contours.projection(v.camera) for v in views]),
+            np.stack([v.camera.projection for v in views]),
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
             _distances(tuple(views)),

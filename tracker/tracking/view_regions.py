@@ -10,7 +10,7 @@ from tracker.geometry.arrays import FloatArray
 from tracker.geometry.cameras import Camera, Region
 from tracker.images.matching_view import region_around
 
-_NEAREST_M = 0.3
+_MIN_DEPTH_M = 0.3
 """Bodies nearer to a camera, and those behind it, count as this near."""
 _REGION_MARGIN_M = 0.22
 """What is added around the joints to the region that is looked at: the flesh, and what the prediction may be off."""
@@ -68,4 +68,4 @@ def visible_outline(bodies: Sequence[PosedBody], camera: Camera) -> FloatArray:
 def px_per_m(cameras: Sequence[Camera], body: PosedBody) -> float:
     """Length of a metre where a body stands, in the view that shows it in between the largest and the smallest."""
     middle = body.points_world.mean(axis=0)
-    return float(np.median([c.K[0, 0] / max(c.depths(middle), _NEAREST_M) for c in cameras]))
+    return float(np.median([c.K[0, 0] / max(c.depths(middle), _MIN_DEPTH_M) for c in cameras]))

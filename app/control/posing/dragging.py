@@ -33,6 +33,7 @@ class Dragging:
         self._gesture_grab: posing.Grab | None = None  # at the start of the gesture
         self._mode_grab: posing.Grab | None = None  # at the start of its present mode
         self._page = 0
+        self._scores_moves = False  # whether the dragged pose is still to be scored in the background
         activities.add_gesture(self.finish)
         self._costs = LatestWinsWorker(self._score, "cost of drag", _REST_S)
 
@@ -90,7 +91,9 @@ class Dragging:
             drag = DragState(camera, person, name, pointer_px, grab.part, (x, y, z), part is not None)
             session_state.set(person=person, point=selected, drag=drag)
 
-    def move(self, page: int, pointer_px: tuple[float, float], seq: int, mode: str = "move") -> None:
+    def move(
+        self, page: int, pointer_px: tuple[float, float], seq: int, mode: str = "move", is_last: bool = False
+    ) -> None:
         """Move the grabbed point to the pointer, turn its part, or push it in depth (see `tracker.posing.drag`).
 
         A change of mode grabs the point again at the last pointer position, so that nothing jumps.
@@ -100,6 +103,7 @@ class Dragging:
             pointer_px: undistorted px.
             seq: sequence number of the page's message.
             mode: `move`, `turn` or `push`.
+            is_last: whether the drag ends here. Its pose is not scored now, because `end` scores it.
         """
         modes = {"move": posing.drag, "turn": posing.turn, "push": posing.push}
         session_state = self._session_state
@@ -115,7 +119,9 @@ class Dragging:
             seqs = (*(s for s in session_state.state.drag_seqs if s[0] != page), (page, seq))[-16:]
             people = session_state.people_with_pose(drag.person, values)
             session_state.set(people=people, drag=replace(drag, pointer_px=pointer_px), drag_seqs=seqs)
-            self._costs.offer(session_state.state)
+            self._scores_moves = not is_last
+            if not is_last:
+                self._costs.offer(session_state.state)
             if time.monotonic() - session_state.last_save > _CHECKPOINT_S:
                 session_state.save(f"drag {display_name(drag.point)}", "manual", self._gesture_grab)
 
@@ -139,6 +145,7 @@ class Dragging:
         session_state, grab, drag = self._session_state, self._gesture_grab, self._session_state.state.drag
         if grab is None or drag is None:
             return
+        self._scores_moves = False
         has_moved = not np.array_equal(grab.values, session_state.state.poses[drag.person])
         if has_moved or session_state.open_edit_owner is grab:
             session_state.save(f"drag {display_name(drag.point)}", "manual", grab)
@@ -149,7 +156,7 @@ class Dragging:
         """Score the dragged pose, unless it has changed meanwhile or the drag is over."""
         time.sleep(_HEAD_START_S)
         session_state, scored = self._session_state, self._session_state.state
-        if scored.drag is None:
+        if scored.drag is None or not self._scores_moves:
             return
         costs = session_state.costs(scored.poses)
         with session_state.lock:

@@ -12,7 +12,6 @@ from tracker.contours.occluding_contours import (
     part_poses,
     piece_buffer,
     place,
-    projection,
     surfaces_of,
 )
 from tracker.contours.static_cache import keep_pieces, kept_for, remember, still_stands, trace_moving, trace_standing
@@ -43,7 +42,7 @@ def traced_with_kept(bodies, then, moves):
     surfaces = surfaces_of(tuple(b.model for b in bodies))
     room = contour_room(CAMERAS[0], len(bodies))
     out, kept = piece_buffer(surfaces, room), kept_for(len(CAMERAS), room, 1, moves)
-    views = [(i, projection(c), c.center_world) for i, c in enumerate(CAMERAS)]
+    views = [(i, c.projection, c.center_world) for i, c in enumerate(CAMERAS)]
     place(part_poses(bodies), surfaces, out)
     for i, P, eye in views:
         trace_standing(P, eye, surfaces, PIECE_PX, kept, out)
