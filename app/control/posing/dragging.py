@@ -155,9 +155,11 @@ class Dragging:
     def _score(self, _: State) -> None:
         """Score the dragged pose, unless it has changed meanwhile or the drag is over."""
         time.sleep(_HEAD_START_S)
-        session_state, scored = self._session_state, self._session_state.state
-        if scored.drag is None or not self._scores_moves:
-            return
+        session_state = self._session_state
+        with session_state.lock:
+            scored = session_state.state
+            if scored.drag is None or not self._scores_moves:
+                return
         costs = session_state.costs(scored.poses)
         with session_state.lock:
             if session_state.state.drag is not None and session_state.state.people is scored.people:

@@ -271,7 +271,7 @@ async def test_a_wrong_message_is_one_notice_and_the_socket_stays_open(controlle
 
 
 async def test_a_fault_of_the_program_is_a_notice(controller, monkeypatch):
-    monkeypatch.setattr(controller, "undo", lambda: 1 / 0)
+    monkeypatch.setattr(controller.history, "undo", lambda: 1 / 0)
     async with visiting(controller) as page:
         await page.send("undo")
         assert "ZeroDivisionError" in (await page.hear("notice"))["text"]
