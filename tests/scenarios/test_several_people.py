@@ -8,7 +8,7 @@ from staging import at, cameras_around, filmed, own_evidence, posed, solid
 from tracking_runs import track
 
 from tracker.body.model import PosedBody
-from tracker.fitting.gauss_newton import solve
+from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.motion.prediction import PredictSettings
 from tracker.tracking.chamfer.frame_estimator import Scene
 from tracker.tracking.chamfer.limb_recovery import search_limbs
@@ -58,7 +58,8 @@ def test_people_are_refined_again_only_where_others_moved(monkeypatch, off_m, so
     expected = values.copy()
     expected[1, 0] += off_m
     monkeypatch.setattr(
-        "tracker.tracking.chamfer.frame_estimator.solve", lambda *a, **k: done.append(a) or solve(*a, **k)
+        "tracker.tracking.chamfer.frame_estimator.solve_compiled",
+        lambda *a, **k: done.append(a) or solve_compiled(*a, **k),
     )
     scene = Scene(
         views, [Memory(ball, v, alone=False) for v in expected], expected, TrackSettings(recover=None, rounds=5)

@@ -12,7 +12,7 @@ from app.state.people import SizeDraft
 from tracker.body.dimensions import BodyDimensions, PartDimensions, mirror_part, scaled, sizes_of, with_sizes
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.posing.retarget import rebodied
+from tracker.posing.retarget import retarget_pose
 from tracker.session.session import save_model
 from tracker.store.records import Change, PoseChange
 
@@ -187,11 +187,11 @@ class BodySizeEditing:
             if record is None or record.model_revision == revision or not saver.fits(person, record.model_revision):
                 continue
             was, pins = saver.body(record.model_revision), saver.pins(person, row.frame)
-            values = rebodied(record.values, was, becomes, pins, cameras, session_state.active_dofs(person))
+            values = retarget_pose(record.values, was, becomes, pins, cameras, session_state.active_dofs(person))
             told = {"method": "refit", "model_revision": record.model_revision}
             pose = replace(
                 record, values=values, model_revision=revision, status="", cost_px=None, settings=told,
-                views_px=(), parts_px=(), remark="refitted to other sizes",
+                view_costs_px=(), part_costs_px=(), remark="refitted to other sizes",
             )  # fmt: skip
             changes.append(PoseChange(name, row.frame, pose))
             moved = becomes.points_world(values) - was.points_world(record.values)

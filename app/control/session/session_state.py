@@ -14,12 +14,12 @@ from app.state.people import ShownPose
 from app.state.state import Costs, ShownFrame, State, StateChanges, finite_or_none
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import held
+from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.triangulation import PointObservation
-from tracker.posing.default_pose import standing_pose
-from tracker.posing.retarget import rebodied
+from tracker.posing.default_pose import default_pose
+from tracker.posing.retarget import retarget_pose
 from tracker.session.locked_dofs import free_of
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import pose_cost
@@ -67,7 +67,7 @@ class SessionState:
     def present_poses(self) -> tuple[Array, ...]:
         """Return the shown poses, (n_values,) each, retargeted to the present bodies."""
         bodies = zip(self.state.poses, self.state.models, self.present, strict=True)
-        return tuple(rebodied(values, was, becomes) for values, was, becomes in bodies)
+        return tuple(retarget_pose(values, was, becomes) for values, was, becomes in bodies)
 
     def active_dofs(self, person: int) -> NDArray[np.bool_]:
         """Return which degrees of freedom of a person are not locked, (n_dofs,)."""
@@ -76,7 +76,7 @@ class SessionState:
     def within_locks(self, poses: Sequence[Array]) -> tuple[Array, ...]:
         """Return poses, (n_values,) each, with locked degrees of freedom as in the shown poses."""
         return tuple(
-            held(model, new, now, self.active_dofs(i)) if self.state.locked[i] else new
+            with_locked_dofs(model, new, now, self.active_dofs(i)) if self.state.locked[i] else new
             for i, (model, new, now) in enumerate(zip(self.models, poses, self.state.poses, strict=True))
         )
 
@@ -90,7 +90,7 @@ class SessionState:
         self._R_world_up = R_world_up
         middle = (len(self.present) - 1) / 2
         self._default_poses = tuple(
-            standing_pose(model, cameras, R_world_up, _APART_M * (i - middle)) for i, model in enumerate(self.present)
+            default_pose(model, cameras, R_world_up, _APART_M * (i - middle)) for i, model in enumerate(self.present)
         )
 
     def set_body_models(self, session: Session) -> None:

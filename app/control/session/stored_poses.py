@@ -2,7 +2,7 @@
 
 from app.control.session.session_state import SessionState
 from tracker.geometry.arrays import Array
-from tracker.store.records import FrameNumbers
+from tracker.store.records import FramePose
 
 
 class StoredPoses:
@@ -22,7 +22,7 @@ class StoredPoses:
         with self._session_state.lock:
             return self._session_state.saver.timeline(since, person)
 
-    def rows(self, person: int, since: int = 0) -> tuple[list[int], list[FrameNumbers]]:
+    def rows(self, person: int, since: int = 0) -> tuple[list[int], list[FramePose]]:
         """Return the frames on which a person's poses changed after a version of the timeline, and their present rows.
 
         Args:

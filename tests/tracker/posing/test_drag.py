@@ -10,7 +10,7 @@ from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
 from tracker.posing import drag as posing
 from tracker.posing.drag import drag, grab, grab_part, minor_points, push, regrab, turn
-from tracker.posing.picking import part_outlines
+from tracker.posing.picking import part_hulls
 
 SIDE = camera_at("side", (3.0, 2.5, 1.0))
 
@@ -239,7 +239,7 @@ def held_place(hand, values):
 @pytest.mark.parametrize("part", ["left_forearm", "left_upper_arm", "right_thigh", "right_calf"])
 def test_a_part_follows_by_the_place_that_was_touched(gavrila, pose, part):
     index = gavrila.part_index[part]
-    outline = next(o for o in part_outlines([PosedBody(gavrila, pose)], [SIDE])[0] if o.part == index)
+    outline = next(o for o in part_hulls([PosedBody(gavrila, pose)], [SIDE])[0] if o.part == index)
     start = outline.polygon_px.mean(axis=0) + 2.0
     hand = grab_part(gavrila, pose, SIDE, index, start)
     np.testing.assert_allclose(held_place(hand, pose), start, atol=0.1)

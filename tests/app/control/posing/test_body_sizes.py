@@ -44,7 +44,9 @@ def test_a_draft_is_drawn_and_changes_nothing(posed, session):
     before = posed.models[0]
     lengthen(posed)
     assert length(posed.body_sizes.model(0)) == pytest.approx(length(before) + 0.01)
-    assert length(posed.body_sizes.model(0), "right_forearm") == pytest.approx(length(before) + 0.01)  # both sides alike
+    assert length(posed.body_sizes.model(0), "right_forearm") == pytest.approx(
+        length(before) + 0.01
+    )  # both sides alike
     view = View(frozenset(["contours"]), (1.0,) * 4)
     drawn = messages.overlay(posed.session_of(posed.state), posed.state, PAGE, view, None)
     assert b'"ghost"' in drawn
