@@ -9,7 +9,7 @@ from app.control.search.search_runs import SearchRuns
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.state.people import SizeDraft
-from tracker.body.dimensions import BodyDimensions, PartDimensions, mirror_part, scaled, sizes_of, with_sizes
+from tracker.body.dimensions import BodyDimensions, PartDimensions, dimensions_of, mirror_part, scaled, with_dimensions
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.posing.retarget import retarget_pose
@@ -116,7 +116,9 @@ class BodySizeEditing:
         with self._activities.editing():
             session_state, name = self._session_state, self._session_state.session.people[person].name
             before, model = session_state.saver.revision(person), self.model(person)
-            same = model is session_state.present[person] or sizes_of(model) == sizes_of(session_state.present[person])
+            same = model is session_state.present[person] or dimensions_of(model) == dimensions_of(
+                session_state.present[person]
+            )
             if not same:
                 session_state.set_body_models(save_model(session_state.session, person, model))
             refitted = self._refit(person) if refit else _Refitted([], 0.0)
@@ -163,12 +165,12 @@ class BodySizeEditing:
             session_state.set(draft=None, sizes_message="")
 
     def _sizes(self, person: int) -> BodyDimensions:
-        return sizes_of(self.model(person))
+        return dimensions_of(self.model(person))
 
     def _draft(self, person: int, sizes: BodyDimensions) -> None:
         if sizes == self._sizes(person):
             return
-        model = with_sizes(self._session_state.present[person], sizes)
+        model = with_dimensions(self._session_state.present[person], sizes)
         self._session_state.set(draft=SizeDraft(person, model), sizes_message="")
 
     def _refit(self, person: int) -> _Refitted:
