@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tracker.compute.numba_options import FAST
 from tracker.contours import occluding_contours
+from tracker.contours.pieces import PIECE_PX, Pieces, piece_buffer, place_parts
 from tracker.contours.static_cache import (
     StaticContours,
     copy_poses,
@@ -17,6 +18,7 @@ from tracker.contours.static_cache import (
     trace_moving_parts,
     trace_static,
 )
+from tracker.contours.surfaces import Surfaces
 from tracker.evidence.view_evidence import SCENE_SPACING_PX
 from tracker.fitting.twists import add_twists
 from tracker.geometry.arrays import Array, FloatArray, IntArray
@@ -56,7 +58,7 @@ class ViewArrays(NamedTuple):
 class Scratch(NamedTuple):
     """Room that the kernel works in."""
 
-    traced: occluding_contours.Pieces
+    traced: Pieces
     pieces: FloatArray
     """Visible pieces, part by part: u, v of the middle, length, normal's u, v, and the middle's x, y, z in the unit
     coordinates of its part, (8, room)."""
@@ -80,10 +82,10 @@ class Scratch(NamedTuple):
     """What each edge point's residual weighs, (room,)."""
 
 
-def scratch_buffer(surfaces: occluding_contours.Surfaces, room: int, n_points: int) -> Scratch:
+def scratch_buffer(surfaces: Surfaces, room: int, n_points: int) -> Scratch:
     """Uninitialized room for as many pieces in a view and points in all."""
     return Scratch(
-        occluding_contours.piece_buffer(surfaces, room), np.empty((8, room), np.float32),
+        piece_buffer(surfaces, room), np.empty((8, room), np.float32),
         np.empty(len(surfaces.radii) + 1, np.int64), np.empty((7, room)), np.empty((7, room), np.float32),
         np.empty((3, room), np.int32), np.empty(room, np.bool_), np.empty(n_points, np.float32),
         np.empty(n_points, np.int32), np.empty(n_points, np.float32),
@@ -328,11 +330,11 @@ def _image_to_model(
 
 @njit(**FAST)
 def _store_static(
-    view: int, surfaces: occluding_contours.Surfaces, views: ViewArrays, turn: float, static: StaticContours,
+    view: int, surfaces: Surfaces, views: ViewArrays, turn: float, static: StaticContours,
     scratch: Scratch,
 ) -> None:  # fmt: skip
     """Keep the contours of what stands in a view, and what they are nearest to."""
-    trace_static(views.P[view], views.eyes[view], surfaces, occluding_contours.PIECE_PX, static, scratch.traced)
+    trace_static(views.P[view], views.eyes[view], surfaces, PIECE_PX, static, scratch.traced)
     store_pieces(view, scratch.traced, static)
     n_segments, segment, visible = _pack_visible(static.moves.shape[0], scratch), -1, 0
     at = static.firsts[view, 0]
@@ -358,7 +360,7 @@ class ContourTerm(NamedTuple):
     """Index of the first part that is matched."""
     last: int
     """Index after the last of them; the others hide, and draw the points that are nearer to them."""
-    surfaces: occluding_contours.Surfaces
+    surfaces: Surfaces
     views: ViewArrays
     scale: float
     """See `refine.MatchSettings`."""
@@ -387,16 +389,16 @@ def accumulate_normal_equations(term: ContourTerm, with_jacobian: bool) -> float
     sums.silhouette[:] = 0.0
     pixel, cost, caches = np.int64(0), 0.0, static.best.shape[0] > 0  # a bare 0 is a type of its own to the compiler
     stale = caches and not is_static_unchanged(Ts, static.moves, static.Ts)
-    occluding_contours.place_parts(Ts, surfaces, scratch.traced)
+    place_parts(Ts, surfaces, scratch.traced)
     for view in range(views.P.shape[0]):
         if stale:
             _store_static(view, surfaces, views, turn, static, scratch)
         if views.weights[view, 0] > 0.0 or views.weights[view, 1] > 0.0:
             P, eye, traced = views.P[view], views.eyes[view], scratch.traced
             if caches:
-                trace_moving_parts(view, P, eye, surfaces, occluding_contours.PIECE_PX, static, traced)
+                trace_moving_parts(view, P, eye, surfaces, PIECE_PX, static, traced)
             else:
-                occluding_contours.trace_pieces(P, eye, surfaces, occluding_contours.PIECE_PX, traced)
+                occluding_contours.trace_pieces(P, eye, surfaces, PIECE_PX, traced)
             n_segments = _pack_visible(Ts.shape[0], scratch)
             scratch.pulls[:, : scratch.firsts[-1]] = 0.0
             # The costs of the parts need both directions.

@@ -25,6 +25,7 @@ from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import StaticContours, static_contours_buffer
+from tracker.contours.surfaces import surfaces_of
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_kernels import (
     COST_ONLY,
@@ -134,7 +135,7 @@ class ContourResiduals:
         widest = max((v.camera for v in views), key=lambda camera: camera.width)
         self._max_pieces = occluding_contours.contour_room(widest, len(bodies))
         surfaces, Ts, own = (
-            occluding_contours.surfaces_of(tuple(b.model for b in bodies)),
+            surfaces_of(tuple(b.model for b in bodies)),
             occluding_contours.part_poses(bodies),
             self._own,
         )

@@ -21,6 +21,8 @@ from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.numba_options import FAST
 from tracker.compute.threads import helpers
 from tracker.contours import occluding_contours
+from tracker.contours.pieces import PIECE_PX, Pieces, piece_buffer, place_parts
+from tracker.contours.surfaces import Surfaces, surfaces_of
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.segment_distance import (
@@ -83,7 +85,7 @@ class _ViewArrays(NamedTuple):
 class _Scratch(NamedTuple):
     """Room that the kernels work in."""
 
-    pieces: occluding_contours.Pieces
+    pieces: Pieces
     segments: Segments
     """Visible pieces, joined where they are straight."""
     visible: FloatArray
@@ -125,7 +127,7 @@ class ChamferCost:
         self._threads = min(threads, os.cpu_count() or 1)
         self.models: tuple[BodyModel, ...] = tuple(b.model for b in predicted)
         self.outliers = outliers
-        self._surfaces = occluding_contours.surfaces_of(self.models)
+        self._surfaces = surfaces_of(self.models)
         self._scales = np.array([v.scale for v in views])
         thetas = [v.outlier_px(theta_px) for v in views]
         near = [
@@ -213,7 +215,7 @@ class ChamferCost:
         if scratch is None:
             room = self._room
             scratch = self._own.scratch = _Scratch(
-                occluding_contours.piece_buffer(self._surfaces, room),
+                piece_buffer(self._surfaces, room),
                 segment_buffer(room), np.empty((3, room), np.float32),
                 np.empty(room, np.float32), np.empty(room, np.float32), np.ones(room, np.float32),
             )  # fmt: skip
@@ -307,9 +309,7 @@ def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: fl
 
 
 @njit(**FAST)
-def _take_visible(
-    n: int, pieces: occluding_contours.Pieces, visible: FloatArray, segments: Segments
-) -> tuple[int, int]:
+def _take_visible(n: int, pieces: Pieces, visible: FloatArray, segments: Segments) -> tuple[int, int]:
     """Take the visible ones of n pieces, and join them to segments; the number of both."""
     ends, occluded, edges = pieces.ends, pieces.occluded, pieces.edges
     su, sv, du, dv = segments.u, segments.v, segments.du, segments.dv
@@ -335,7 +335,7 @@ def _take_visible(
 @njit(**FAST)
 def _score(
     Ts: Array,
-    surfaces: occluding_contours.Surfaces,
+    surfaces: Surfaces,
     views: _ViewArrays,
     paper: bool,
     scratch: _Scratch,
@@ -343,12 +343,10 @@ def _score(
 ) -> None:
     """Fill the directed costs of one pose, (V, 2): model to image and image to model, working px."""
     d, pixel = scratch.distances, 0
-    occluding_contours.place_parts(Ts, surfaces, scratch.pieces)
+    place_parts(Ts, surfaces, scratch.pieces)
     for view in range(views.P.shape[0]):
         width, height, theta = views.sizes[view, 0], views.sizes[view, 1], views.thetas[view]
-        n = occluding_contours.trace_pieces(
-            views.P[view], views.eyes[view], surfaces, occluding_contours.PIECE_PX, scratch.pieces
-        )
+        n = occluding_contours.trace_pieces(views.P[view], views.eyes[view], surfaces, PIECE_PX, scratch.pieces)
         n_visible, n_segments = _take_visible(n, scratch.pieces, scratch.visible, scratch.segments)
         image = views.distances[pixel : pixel + width * height]
         if paper:
@@ -365,7 +363,7 @@ def _score(
 @njit(nogil=True, cache=True)
 def _score_candidates(
     candidates: Array, first: int, n_dofs: int, tree: Tree, Ts: Array,
-    surfaces: occluding_contours.Surfaces, views: _ViewArrays, paper: bool, scratch: _Scratch, directed: Array,
+    surfaces: Surfaces, views: _ViewArrays, paper: bool, scratch: _Scratch, directed: Array,
 ) -> None:  # fmt: skip
     """`_score` for many poses of the person whose parts begin at `first`; directed is (C, V, 2)."""
     last = first + tree.parents.shape[0]
