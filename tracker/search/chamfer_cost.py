@@ -1,8 +1,8 @@
-"""How well posed bodies explain the edges of all views: the robust chamfer distance of GD96 Sect. 4.1.
+"""Robust chamfer distance between the contours of posed bodies and the edges of all views (GD96 Sect. 4.1).
 
-The directed distance of the model's visible contour to the image's edges is read from a distance image; that of
-the image's edges to the model's contour is measured point by piece. Both are normalized, averaged (Eq. 1-3), and
-averaged over the views. Costs are in undistorted pixels of the footage; images may be matched at a smaller scale.
+The directed distance from the model's visible contour to the edges is read from a distance image. The distance from
+edges to the contour is measured point by piece. Both are normalized and averaged (Eq. 1-3), then averaged over the
+views. Costs are in undistorted pixels of the footage; the views may have a smaller scale.
 """
 
 import os
@@ -38,19 +38,20 @@ from tracker.images.distance_transform import bilinear
 
 Outliers = Literal["truncated", "paper"]
 
-_ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)  # plain numbers would make it all float64
+_ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)  # Python floats would promote to float64
 _JOINED = 10
-"""Pieces in a row on one straight edge that are matched as one segment: longer ones would reach too many points."""
+"""Largest number of consecutive pieces on one straight edge that are joined to one segment: longer segments would reach
+too many points."""
 
-_WORTH_SHARING = 6
-"""Fewer candidates than this are scored sooner than another thread is awake."""
+_MIN_SHARED_CANDIDATES = 6
+"""Smallest number of candidates that is worth waking another thread."""
 
 
 class Cost(NamedTuple):
     """Undirected normalized chamfer distance (GD96 Eq. 3)."""
 
     total_px: float
-    """Mean over the views that have any edges, px of the footage."""
+    """Mean over the views with edges, px of the footage."""
     views_px: Array
     """Cost of each view, (V,), px of the footage; NaN for a view without edges."""
     forward_px: Array
@@ -60,49 +61,50 @@ class Cost(NamedTuple):
 
 
 class _ViewArrays(NamedTuple):
-    """The evidence of all views as arrays, for the kernels; lengths in working px."""
+    """The evidence of all views as arrays; lengths in working px."""
 
     P: Array
     """Projection matrices, (V, 3, 4)."""
     eyes: Array
     """Camera centres in the world, (V, 3), metres."""
     sizes: NDArray[np.int64]
-    """Image widths and heights, (V, 2)."""
+    """Image widths and heights, (V, 2), px."""
     distances: FloatArray
-    """The distance images, one after the other, row by row."""
+    """Distance images, one after the other, row by row."""
     points: FloatArray
-    """u and v of the edge points near the prediction, one view (see `RowSortedPoints`) after the other, (2, N)."""
+    """u and v of the edge points near the prediction, (2, N), one view (see `segment_distance.RowSortedPoints`) after
+    the other."""
     rows: NDArray[np.int64]
-    """Index of the first point of each strip and row among those of its view, (V, strips, largest height + 1)."""
+    """Index of the first point of each strip and row within its view, (V, strips, largest height + 1)."""
     firsts: NDArray[np.int64]
-    """Index of the first edge point of each view, and the number of all, (V + 1,)."""
+    """Index of the first edge point of each view, then the number of all, (V + 1,)."""
     counts: NDArray[np.int64]
     """Number of edge points of each view, (V,)."""
     thetas: Array
-    """Outlier distances, (V,)."""
+    """Outlier distances, (V,), px."""
 
 
 class _Scratch(NamedTuple):
-    """Room that the kernels work in."""
+    """Buffers of the kernels, used by one thread at a time."""
 
     pieces: Pieces
     segments: Segments
     """Visible pieces, joined where they are straight."""
     visible: FloatArray
-    """Of each visible piece u and v of its middle, px, and its squared length, px^2, (3, room)."""
+    """u and v of the middle of each visible piece, px, and its squared length, px^2, (3, room)."""
     lengths: FloatArray
-    """Length of each visible piece, (room,)."""
+    """Length of each visible piece, (room,), px."""
     distances: FloatArray
-    """Distances, of pieces or of edge points, (room,)."""
+    """Distances of pieces or of edge points, (room,), px."""
     ones: FloatArray
     """Weights of edge points, (room,)."""
 
 
 class ChamferCost:
-    """The cost of poses against fixed evidence; what a search minimizes.
+    """Cost of poses against fixed evidence, which a search minimizes. Thread-safe.
 
-    The image-to-model direction sees only the edge points within theta of the predicted contours: edges elsewhere
-    belong to other things. The selection is made once, so that the cost compares like with like during a search.
+    The image-to-model direction uses only the edge points within theta of the predicted contours, because other edges
+    belong to other things. They are selected once, so that costs are comparable during a search.
     """
 
     def __init__(
@@ -116,13 +118,13 @@ class ChamferCost:
         """Prepare the evidence for the kernels.
 
         Args:
-            views: the evidence of each view.
-            predicted: everybody in the scene, as predicted.
+            views: evidence of each view.
+            predicted: all bodies in the scene, as predicted.
             theta_px: outlier distance, px of the footage; by default that of each view.
-            outliers: "truncated" takes min(d, theta) over all points; "paper" rejects points beyond theta and then
-                beyond mean + 2 standard deviations (GD96 Sect. 4.1), and a direction of which fewer than half is
-                kept costs theta.
-            threads: how many score candidates at a time, where there are as many processors.
+            outliers: "truncated" takes min(d, theta) over all points. "paper" rejects points beyond theta and then
+                beyond mean + 2 standard deviations (GD96 Sect. 4.1); a direction that keeps fewer than half of its
+                points costs theta.
+            threads: number of threads that score candidates, at most the number of processors.
         """
         self._threads = min(threads, os.cpu_count() or 1)
         self.models: tuple[BodyModel, ...] = tuple(b.model for b in predicted)
@@ -151,18 +153,18 @@ class ChamferCost:
         self._own = threading.local()
 
     def __call__(self, poses: Sequence[Array]) -> Cost:
-        """Cost of one pose of everybody; `poses` holds the values of each body."""
+        """Return the cost of one pose of every body, (n_values,) each."""
         directed_px = self._directed(0, poses[0][None], poses)[0] / self._scales[:, None]
         views_px = self._blank_unseen(directed_px.mean(axis=-1))
         return Cost(float(self._mean(views_px)), views_px, directed_px[:, 0], directed_px[:, 1])
 
     def of_person(self, person: int, candidates: Array, poses: Sequence[Array]) -> tuple[Array, Array]:
-        """Costs of many candidate poses of one person, the others held at `poses`.
+        """Return the costs of many candidate poses of one person, with the others fixed at `poses`.
 
         Args:
             person: index of the body that varies.
             candidates: its poses, (C, n_values).
-            poses: the values of each body; that of `person` is not used.
+            poses: pose of each body; that of `person` is not used.
 
         Returns:
             The total costs, (C,), and those of each view, (C, V), px of the footage; NaN for views without edges.
@@ -172,16 +174,16 @@ class ChamferCost:
 
     @property
     def edge_points_px(self) -> tuple[FloatArray, ...]:
-        """The edge points that count, of each view, (n, 2), working px."""
+        """Edge points of each view that count, (n, 2), working px."""
         arrays = self._arrays
         return tuple(
             arrays.points[:, first : first + n].T for first, n in zip(arrays.firsts[:-1], arrays.counts, strict=True)
         )
 
     def _directed(self, person: int, candidates: Array, poses: Sequence[Array]) -> Array:
-        """The directed costs of candidates of a person, see `of_person`, (C, V, 2), working px.
+        """Return the directed costs of candidates of a person, see `of_person`, (C, V, 2), working px.
 
-        One kernel for all who ask: another would take the sums of single precision in another order.
+        All callers use one kernel: another would sum single-precision numbers in another order.
         """
         model = self.models[person]
         first = parts_of(self.models, person).start
@@ -195,7 +197,7 @@ class ChamferCost:
                 self._scratch(), directed[share],
             )  # fmt: skip
 
-        if self._threads > 1 and len(candidates) >= _WORTH_SHARING:
+        if self._threads > 1 and len(candidates) >= _MIN_SHARED_CANDIDATES:
             shares = np.linspace(0, len(candidates), self._threads + 1).astype(int)
             slices = [slice(a, b) for a, b in pairwise(shares)]
             others = [helpers().submit(score, s) for s in slices[1:]]
@@ -210,7 +212,7 @@ class ChamferCost:
         return occluding_contours.part_poses([PosedBody(m, p) for m, p in zip(self.models, poses, strict=True)])
 
     def _scratch(self) -> _Scratch:
-        """Room of the calling thread's own: several threads may score at a time."""
+        """Return the scratch of the calling thread."""
         scratch: _Scratch | None = getattr(self._own, "scratch", None)
         if scratch is None:
             room = self._room
@@ -226,27 +228,27 @@ class ChamferCost:
         return views_px
 
     def _mean(self, views_px: Array) -> Array:
-        """Mean over the views with edges, (..., V) to (...); where there is none, that of the outlier distances."""
+        """Return the mean over the views with edges, (..., V) to (...); without any, that of the outlier distances."""
         if not self._seen.any():
             return np.full(views_px.shape[:-1], np.mean(self._arrays.thetas / self._scales))
         return views_px[..., self._seen].mean(axis=-1)
 
 
-@lru_cache(maxsize=1)  # a hand makes dozens of costs a second from the same views
+@lru_cache(maxsize=1)  # a drag makes dozens of costs a second from the same views
 def _distances(views: tuple[ViewEvidence, ...]) -> FloatArray:
-    """The distance images, one after the other, row by row."""
+    """Return the distance images, one after the other, row by row."""
     return np.concatenate([v.distance.ravel() for v in views])
 
 
 def _near(view: ViewEvidence, contour: occluding_contours.Contour, theta: float) -> RowSortedPoints:
-    """Edge points within theta of the visible model contour."""
+    """Return the edge points within theta of the visible model contour."""
     everything = sort_points(view.points_px, view.camera.size)
     return within_reach(everything, contour.pieces_px, contour.occluded, theta)
 
 
 @njit(**FAST)
 def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool) -> float:
-    """Mean of n distances with weights w, outliers treated as `ChamferCost` says; theta where there are none."""
+    """Return the mean of n distances with weights w and outliers as in `ChamferCost`; theta without any."""
     total, weight = 0.0, 0.0
     if not paper:
         for i in range(n):
@@ -274,7 +276,7 @@ def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool
 
 @njit(**FAST)
 def _distance(image: FloatArray, width: int, height: int, u: np.float32, v: np.float32) -> np.float32:
-    """Distance at a pixel; outside the image, that of the nearest border pixel and the way to it."""
+    """Return the distance at a pixel; outside the image, that of the nearest border pixel plus the distance to it."""
     inside = bilinear(image, width, height, u, v)[0]
     half_u, half_v = _HALF * np.float32(width - 1), _HALF * np.float32(height - 1)
     off_u, off_v = abs(u - half_u) - half_u, abs(v - half_v) - half_v
@@ -284,9 +286,9 @@ def _distance(image: FloatArray, width: int, height: int, u: np.float32, v: np.f
 
 @njit(**FAST)
 def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, visible: FloatArray) -> float:
-    """Mean distance of n visible pieces, see `_Scratch`, cut off at theta; theta where none is visible.
+    """Return the mean distance of n visible pieces, see `_Scratch`, cut off at theta; theta if none is visible.
 
-    It stores nothing, so that it runs on whole vectors of pieces.
+    The loop stores nothing, so that it is vectorized.
     """
     limit = np.float32(theta)
     spared = weight = 0.0
@@ -300,7 +302,7 @@ def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, v
 
 @njit(**FAST)
 def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: float, scratch: _Scratch) -> float:
-    """The same by the paper's robust mean."""
+    """Return the same by the paper's robust mean."""
     visible, lengths, d = scratch.visible, scratch.lengths, scratch.distances
     for i in range(n):
         d[i] = _distance(image, width, height, visible[0, i], visible[1, i])
@@ -310,7 +312,7 @@ def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: fl
 
 @njit(**FAST)
 def _take_visible(n: int, pieces: Pieces, visible: FloatArray, segments: Segments) -> tuple[int, int]:
-    """Take the visible ones of n pieces, and join them to segments; the number of both."""
+    """Pack the visible ones of n pieces and join them to segments; return both numbers."""
     ends, occluded, edges = pieces.ends, pieces.occluded, pieces.edges
     su, sv, du, dv = segments.u, segments.v, segments.du, segments.dv
     joined, edge, k, m = 0, -1, np.uint64(0), np.uint64(0)
@@ -365,7 +367,7 @@ def _score_candidates(
     candidates: Array, first: int, n_dofs: int, tree: Tree, Ts: Array,
     surfaces: Surfaces, views: _ViewArrays, paper: bool, scratch: _Scratch, directed: Array,
 ) -> None:  # fmt: skip
-    """`_score` for many poses of the person whose parts begin at `first`; directed is (C, V, 2)."""
+    """Run `_score` for many poses of the person whose parts begin at `first`; directed is (C, V, 2)."""
     last = first + tree.parents.shape[0]
     own = Ts.copy()
     axes, origins = np.empty((n_dofs, 3)), np.empty((n_dofs, 3))

@@ -90,7 +90,7 @@ class SearchRun:
             free: of each person the degrees of freedom that may move, (n_dofs,); all by default.
         """
         self.number, self.frame, self.start, self.settings = number, frame, start, settings
-        self.stages: list[Stage] = stages(models, settings.search, free=free)
+        self.stages: list[Stage] = stages(models, settings.search, active_dofs=free)
         self.counts = [StageCount(0, 0, 0.0, False) for _ in self.stages]
         self.steps: list[RecordedStep] = []
         self.best, self.best_px = start, start_px

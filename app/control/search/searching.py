@@ -140,7 +140,7 @@ class SearchRunner:
             frame, settings, models = state.frame, state.settings, session_state.models
             poses = state.poses if start is None else session_state.within_locks(start)
             free = [session_state.active_dofs(i) & (person is None or i == person) for i in range(len(models))]
-            if not stages(models, settings.search, free=free):
+            if not stages(models, settings.search, active_dofs=free):
                 raise TrackerError(
                     "expected something that a search may move, found everything locked; unlock some of it"
                 )
