@@ -27,16 +27,16 @@ class PaintedCost:
     """Scores poses of one person against fixed evidence, by painting."""
 
     def __init__(
-        self, views: Sequence[ViewEvidence], model: BodyModel, scene_px: Sequence[NDArray[np.float32]]
+        self, views: Sequence[ViewEvidence], model: BodyModel, edge_points_px: Sequence[NDArray[np.float32]]
     ) -> None:
         """Sample the parts' surfaces.
 
         Args:
             views: the evidence of each view.
             model: the body.
-            scene_px: the edge points that count in each view, (n, 2).
+            edge_points_px: the edge points that count in each view, (n, 2).
         """
-        self._views, self._model, self._scene = tuple(views), model, tuple(scene_px)
+        self._views, self._model, self._scene = tuple(views), model, tuple(edge_points_px)
         grids = [s.grid(_RINGS, _SECTORS)[0].reshape(-1, 3) for s in model.shapes]
         self._surface = np.stack([g + c for g, c in zip(grids, model.centers_part, strict=True)])
 

@@ -15,13 +15,13 @@ from app.bench.sample_frames import BenchCrowd, BenchFrame, pose_at
 from tracker.body.model import BodyModel, PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.observer import Observer
-from tracker.fitting.contour_residuals import ContourMatch
-from tracker.fitting.gauss_newton import Block, Fit, StayNear, damped_step
-from tracker.fitting.gauss_newton_compiled import solve
+from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock, damped_step
+from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
-from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings, search
+from tracker.search.best_first import COARSE_SEARCH, SearchSettings, search
 from tracker.search.chamfer_cost import ChamferCost
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -107,7 +107,7 @@ def candidates(frame: BenchFrame, cones: BenchFrame, yardstick: Yardstick) -> It
         cost, poses = of.cost(threads=1), of.candidates(_CANDIDATES)
         timed = yardstick.beside(partial(cost.of_person, 0, poses, [of.values]), 60, _CANDIDATES)
         yield Row(f"candidate_{name}", f"one candidate pose, {name}, 4 views", *timed, 1 / must, 1 / aim)
-    painted = PaintedCost(frame.views, frame.model, frame.cost().scene_px)
+    painted = PaintedCost(frame.views, frame.model, frame.cost().edge_points_px)
     poses, cost = frame.candidates(20), frame.cost()
     timed = yardstick.beside(lambda: [painted(p) for p in poses], 5, len(poses))
     off = np.mean([abs(painted(p) - cost([p]).total_px) for p in poses])
@@ -133,7 +133,7 @@ def searches(frame: BenchFrame, cones: BenchFrame, yardstick: Yardstick) -> Iter
     """Best-first search and refinement from a bad prediction; refinement alone from a good one."""
     for name, of in (("cones", cones), ("superquadrics", frame)):
         start = of.hard_prediction()
-        steps = list(search(of.cost(start), [start], BEFORE_REFINEMENT))
+        steps = list(search(of.cost(start), [start], COARSE_SEARCH))
         fit = _refined(of, steps[-1].best[0], start)
         timed = yardstick.beside(partial(_searched_and_refined, of, start), 9)
         note = f"{steps[-1].evaluations} poses scored; {_apart(of, start, fit)}"
@@ -151,22 +151,22 @@ def _searched(frame: BenchFrame, start: Array, settings: SearchSettings = _SEARC
 
 
 def _searched_and_refined(frame: BenchFrame, start: Array) -> Fit:
-    return _refined(frame, _searched(frame, start, BEFORE_REFINEMENT), start)
+    return _refined(frame, _searched(frame, start, COARSE_SEARCH), start)
 
 
 def _refined(frame: BenchFrame, start: Array, predicted: Array) -> Fit:
     """Refine as the tracker does; see `tracker.tracking.chamfer.frame_estimator`."""
     model = frame.model
-    match = ContourMatch(frame.views, [PosedBody(model, start)])
+    match = ContourResiduals(frame.views, [PosedBody(model, start)])
     sigma = np.where(model.dof_is_length, _SETTINGS.trust_m, _SETTINGS.trust_rad)
-    blocks: list[Block] = [match, StayNear(predicted, 1 / sigma)]
-    return solve(model, start, blocks, max_iterations=15, tolerance=1e-3)
+    blocks: list[ResidualBlock] = [match, PosePrior(predicted, 1 / sigma)]
+    return solve_compiled(model, start, blocks, max_iterations=15, tolerance=1e-3)
 
 
 def _apart(frame: BenchFrame, start: Array, fit: Fit) -> str:
     """How far the body's points are from where the true joints put them, at the start and fitted."""
     true = frame.model.points_world(frame.values)
-    off = [np.linalg.norm(frame.model.points_world(v) - true, axis=1).mean() for v in (start, fit.values)]
+    off = [np.linalg.norm(frame.model.points_world(v) - true, axis=1).mean() for v in (start, fit.pose)]
     return f"{1000 * off[0]:.0f} mm off, then {1000 * off[1]:.0f}"
 
 
@@ -174,7 +174,7 @@ def iterations(cones: BenchFrame, six: BenchFrame, yardstick: Yardstick) -> Iter
     """One iteration of the symmetric Gauss-Newton: as the tracker runs it, step by step, and by a numeric Jacobian."""
     for name, of, must, aim in (("4", cones, 12, 18), ("6", six, 8, 12)):
         start = of.near_prediction()
-        match = ContourMatch(of.views, [PosedBody(of.model, start)])
+        match = ContourResiduals(of.views, [PosedBody(of.model, start)])
         steps = np.random.default_rng(3).normal(scale=0.005, size=(50, of.model.n_dofs))
         poses = [of.model.retract(start, step) for step in steps]
         # What a descent takes besides its iterations drops out of the difference between long ones and short ones.
@@ -183,7 +183,7 @@ def iterations(cones: BenchFrame, six: BenchFrame, yardstick: Yardstick) -> Iter
         timed = timed._replace(work_us=timed.work_us / n)
         yield Row(f"iteration_{name}_views", f"Gauss-Newton iteration, cones, {name} views", *timed, 1 / must, 1 / aim)
         timed = yardstick.beside(partial(_stepped, of.model, match, poses), 30, len(poses))
-        yield Row(f"iteration_{name}_views_readable", "the same as `fit.solve` takes it", *timed)
+        yield Row(f"iteration_{name}_views_readable", "the same as `gauss_newton.solve` takes it", *timed)
     start, cost = cones.near_prediction(), cones.cost(cones.near_prediction())
 
     def residuals(values: Array) -> Array:
@@ -193,24 +193,24 @@ def iterations(cones: BenchFrame, six: BenchFrame, yardstick: Yardstick) -> Iter
     yield Row("iteration_scipy", "the same by scipy's least_squares with numeric Jacobian, edges to contour", *timed)
 
 
-def _descended(model: BodyModel, match: ContourMatch, poses: Sequence[Array], most: int) -> int:
+def _descended(model: BodyModel, match: ContourResiduals, poses: Sequence[Array], most: int) -> int:
     """Descend from some poses, (n_values,) each, for so many iterations at most; how many there were."""
-    return sum(solve(model, pose, [match], max_iterations=most, tolerance=0.0).iterations for pose in poses)
+    return sum(solve_compiled(model, pose, [match], max_iterations=most, tolerance=0.0).iterations for pose in poses)
 
 
-def _stepped(model: BodyModel, match: ContourMatch, poses: Sequence[Array]) -> None:
+def _stepped(model: BodyModel, match: ContourResiduals, poses: Sequence[Array]) -> None:
     """Linearize at some poses, (n_values,) each, and find the step from there."""
     for values in poses:
-        normal = match.normal(model, values, model.kinematics(values))
+        normal = match.linearize(model, values, model.kinematics(values))
         damped_step(normal.hessian, normal.gradient, 1e-3 * np.diag(normal.hessian) + 1e-9)
 
 
 def _edge_distances(cost: ChamferCost, frame: BenchFrame, values: Array) -> list[Array]:
     """Distance of each edge point to the nearest visible piece of contour, cut off, (n,) for each view, px."""
     out: list[Array] = []
-    for view, scene in zip(frame.views, cost.scene_px, strict=True):
+    for view, scene in zip(frame.views, cost.edge_points_px, strict=True):
         contour = occluding_contours.trace([PosedBody(frame.model, values)], view.camera)
-        pieces = contour.pieces_px[~contour.hidden]
+        pieces = contour.pieces_px[~contour.occluded]
         middles = 0.5 * (pieces[:, :2] + pieces[:, 2:])
         squared = np.sum((scene[:, None] - middles) ** 2, axis=-1).min(axis=1)
         out.append(np.minimum(np.sqrt(squared), view.theta_px))
@@ -278,7 +278,7 @@ def _pipeline(
             start = time.perf_counter()
             for found in islice(tracked, n - 1):
                 bodies = [PosedBody(m, p) for m, p in zip(models, found.poses, strict=True)]
-                for camera in observer.matched_cameras:
+                for camera in observer.working_cameras:
                     occluding_contours.trace(bodies, camera)
             spent.append(time.perf_counter() - start)
 

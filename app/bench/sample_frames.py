@@ -122,4 +122,4 @@ def read_frame(folder: Path) -> BenchFrame:
 def pose_at(joints: MarkerTable, model: BodyModel, frame: int, near: Array | None = None) -> Array:
     """The pose fitted to the true joints of a frame, (n_values,)."""
     frame = min(frame, len(joints.points) - 1)
-    return fit_to_points(model, dict(zip(joints.names, joints.points[frame], strict=True)), near).values
+    return fit_to_points(model, dict(zip(joints.names, joints.points[frame], strict=True)), near).pose

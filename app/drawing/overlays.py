@@ -15,8 +15,8 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera, epipolar_segment
 from tracker.images.background_subtraction import Mask
-from tracker.images.edge_segments import accept
-from tracker.posing.retarget import rebodied
+from tracker.images.edge_segments import accept_segments
+from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Person, Session
 
 CANDIDATE_COLOR = "#ffffff"
@@ -113,7 +113,7 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     points = [b.points_world for b in bodies]
     seen = {index: session.cameras[index].camera.pinhole for index in sorted(cameras)}
-    out, hidden_by_view = [], part_edges.points_hidden(bodies, list(seen.values()), np.concatenate(points))
+    out, hidden_by_view = [], part_edges.points_occluded(bodies, list(seen.values()), np.concatenate(points))
     for (index, camera), hidden in zip(seen.items(), hidden_by_view, strict=True):
         first = 0
         for person, body in enumerate(bodies):
@@ -139,7 +139,7 @@ def _model(session: Session, bodies: Sequence[PosedBody], camera: Camera, index:
     """The contours of the poses shown: what one sees of them, and what parts hide."""
     contour = _traced(bodies, camera)
     out = []
-    for layer, kind, those in (("hidden", "hidden", contour.hidden), ("contours", "model", ~contour.hidden)):
+    for layer, kind, those in (("hidden", "hidden", contour.occluded), ("contours", "model", ~contour.occluded)):
         if layer in view.layers and view.by_part:
             out += _by_part(session, bodies, contour, those, index, kind)
         elif layer in view.layers:
@@ -153,7 +153,7 @@ def _outlined(
     """What one would see of other poses of everybody, all in one colour."""
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, poses, strict=True)]
     contour = _traced(bodies, camera)
-    return _by_person(bodies, contour, ~contour.hidden, index, kind, [color] * len(bodies))
+    return _by_person(bodies, contour, ~contour.occluded, index, kind, [color] * len(bodies))
 
 
 def _with_draft(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
@@ -161,7 +161,7 @@ def _with_draft(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
     people, draft = list(bodies), state.draft
     if draft is not None:
         shown = people[draft.person]
-        people[draft.person] = PosedBody(draft.model, rebodied(shown.values, shown.model, draft.model))
+        people[draft.person] = PosedBody(draft.model, retarget_pose(shown.values, shown.model, draft.model))
     return people
 
 
@@ -175,7 +175,7 @@ def _others(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
 def _ghosts(chosen: Collection[int], people: Sequence[PosedBody], camera: Camera, index: int, color: str) -> list[Path]:
     """What one would see of some of the people, given by index, if everybody stood so."""
     contour = _traced(people, camera)
-    found = _by_person(people, contour, ~contour.hidden, index, "ghost", [color] * len(people))
+    found = _by_person(people, contour, ~contour.occluded, index, "ghost", [color] * len(people))
     return [path for path in found if path.person in chosen]
 
 
@@ -209,7 +209,7 @@ def _segments(bodies: Sequence[PosedBody], view: ViewEvidence, index: int, shown
     if segments is None or samples is None or not len(segments.points_px):
         return []
     contour = occluding_contours.trace(bodies, view.camera)
-    chosen = accept(samples, contour.pieces_px[~contour.hidden], ACCEPTED_SHARE * view.theta_px)
+    chosen = accept_segments(samples, contour.pieces_px[~contour.occluded], ACCEPTED_SHARE * view.theta_px)
     lengths = np.diff(segments.firsts)
     owners = np.repeat(np.arange(len(lengths)), lengths)
     places = np.arange(len(owners)) - segments.firsts[owners]

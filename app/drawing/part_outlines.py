@@ -36,7 +36,7 @@ def outlines(session: Session, state: State, view: View) -> list[Outline]:
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
     seen = sorted(view.cameras)
-    found = picking.part_outlines(bodies, [session.cameras[index].camera.pinhole for index in seen])
+    found = picking.part_hulls(bodies, [session.cameras[index].camera.pinhole for index in seen])
     for index, parts in zip(seen, found, strict=True):
         for one in parts:
             if one.body in state.cast.hidden:

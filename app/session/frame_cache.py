@@ -17,7 +17,7 @@ from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.footage.proxy import Proxy
 from tracker.geometry.arrays import Image
-from tracker.images.matching_view import MatchedView
+from tracker.images.working_view import WorkingView
 
 _LOG = logging.getLogger(__name__)
 _IMAGE_BYTES = 16 * 2**20
@@ -146,8 +146,8 @@ class Frames:
         image, way = self._read(frame, camera), self._ways(camera, reduction)
         return pictures.footage(None if image is None else way.image(image, way.whole), way.camera.size)
 
-    def _way(self, camera: int, reduction: float) -> MatchedView:
-        return MatchedView(self.observer.cameras[camera].camera, 1 / reduction, cv2.BORDER_CONSTANT)
+    def _way(self, camera: int, reduction: float) -> WorkingView:
+        return WorkingView(self.observer.cameras[camera].camera, 1 / reduction, cv2.BORDER_CONSTANT)
 
     def _look(self, key: tuple[int, int]) -> Image | None:
         """Undistorted image of a frame and camera."""

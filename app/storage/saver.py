@@ -16,7 +16,7 @@ from tracker.formats.model_toml import format_model, parse_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
 from tracker.pipeline.tracked_changes import keyframes_of
-from tracker.posing.retarget import rebodied
+from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import (
@@ -128,7 +128,7 @@ class Saver:
     def in_present_body(self, person: int, values: Array, revision: int | None) -> Array:
         """A pose of one of a person's bodies, (n_values,), taken over into the present one."""
         present = self._session.people[person].model
-        return values if revision is None else rebodied(values, self.body(revision), present)
+        return values if revision is None else retarget_pose(values, self.body(revision), present)
 
     def pins(self, person: int, frame: int) -> tuple[PointObservation, ...]:
         """The stored pins of a person on a frame, undistorted px; those of other cameras and bodies are passed over."""

@@ -219,7 +219,7 @@ def place(session: Session, near: bool) -> None:
             values = read_pose_table(session.folder / f"first_pose_{person.name}.csv").values_for(model)[0]
         else:
             places = dict(zip(joints.names, joints.points[0], strict=True))
-            values = fit_to_points(model, {n: p for n, p in places.items() if n in model.point_names}).values
+            values = fit_to_points(model, {n: p for n, p in places.items() if n in model.point_names}).pose
         if near:
             values = model.retract(values, np.where(np.arange(model.n_dofs) >= 6, 0.12, 0.02))
             values = model.clip(values)

@@ -68,7 +68,7 @@ def edge_map(bodies, camera):
     seen = occluding_contours.trace(bodies, camera)
     image = np.zeros((camera.height, camera.width), np.uint8)
     # Without the shift cv2.line would round the ends: half a pixel is much for what is measured here.
-    ends = np.round(seen.pieces_px[~seen.hidden] * 16).astype(int)
+    ends = np.round(seen.pieces_px[~seen.occluded] * 16).astype(int)
     for x0, y0, x1, y1 in ends:
         cv2.line(image, (x0, y0), (x1, y1), 255, shift=4)
     return image > 0
@@ -82,7 +82,7 @@ def own_evidence(bodies, cameras):
 def _across(view, bodies):
     """The same view, the normal of each edge point across the piece of contour that it was drawn from."""
     seen = occluding_contours.trace(bodies, view.camera)
-    pieces = seen.pieces_px[~seen.hidden]
+    pieces = seen.pieces_px[~seen.occluded]
     if not len(pieces) or not len(view.points_px):
         return view
     steps = pieces[:, 2:] - pieces[:, :2]
@@ -178,13 +178,13 @@ class Shown:
 
     def __init__(self, views):
         self.views, self.asked = views, []
-        self.matched_cameras = [v.camera for v in views[0]]
+        self.working_cameras = [v.camera for v in views[0]]
 
-    def prefetch(self, k, regions=None, still=False):
+    def prefetch(self, k, regions=None, with_static_edges=False):
         pass
 
-    def evidence(self, k, regions, outlines=None, scenery=None):
-        assert len(regions) == len(self.matched_cameras)
+    def evidence(self, k, regions, outlines=None, static_edges=None):
+        assert len(regions) == len(self.working_cameras)
         self.asked.append(k)
         return self.views[k]
 

@@ -42,4 +42,4 @@ def real_frame(sample_folder):
         views = Observer(session.cameras, recording).evidence(25)
     joints = read_joints(sample_folder / "truth.trc", session.fps)
     model = session.people[0].model
-    return RealFrame(model, fit_to_points(model, dict(zip(joints.names, joints.points[25], strict=True))).values, views)
+    return RealFrame(model, fit_to_points(model, dict(zip(joints.names, joints.points[25], strict=True))).pose, views)

@@ -12,8 +12,8 @@ from tracker.geometry.arrays import FloatArray, Image
 from tracker.geometry.cameras import Region
 from tracker.images import background_subtraction
 from tracker.images.background_subtraction import Changes
-from tracker.images.image_statistics import Probes, Readings
-from tracker.images.matching_view import MatchedView
+from tracker.images.image_statistics import ImageStatistics, SampleGrid
+from tracker.images.working_view import WorkingView
 
 
 class Prepared(NamedTuple):
@@ -35,8 +35,8 @@ class _Empty(NamedTuple):
     """The empty scene of a view."""
 
     smooth: Image
-    """Smoothed, in matched pixels, (H, W, 3)."""
-    readings: Readings
+    """Smoothed, in working pixels, (H, W, 3)."""
+    statistics: ImageStatistics
     """What the probes show of it."""
     usable: NDArray[np.intp]
     """Which of them tell the exposure, (m,)."""
@@ -56,9 +56,9 @@ class Foreground:
         Raises:
             RecordingError: the background is missing, unreadable or of the wrong size.
         """
-        self.view = MatchedView(source.camera)
-        """The way from footage to matched pixels."""
-        self._source, self._probes = source, Probes(source.camera.size, self.view.scale)
+        self.view = WorkingView(source.camera)
+        """The way from footage to working pixels."""
+        self._source, self._grid = source, SampleGrid(source.camera.size, self.view.scale)
         self._empty = executor.submit(self._empty_scene, read_background(source))
 
     def prepare(self, frame: Image, k: int) -> Prepared:
@@ -68,15 +68,17 @@ class Foreground:
             RecordingError: its mask cannot be used.
         """
         empty, mask = self._empty.result(), read_mask(self._source, k)
-        readings = self._probes.read(frame)
+        statistics = self._grid.measure(frame)
         if empty is None:
-            return Prepared(frame, mask, readings.strengths, 0.0, np.ones(3, np.float32))
-        gain = background_subtraction.exposure_gain(readings.colors[empty.usable], empty.readings.colors[empty.usable])
-        differences = np.abs(readings.colors - gain * empty.readings.colors).max(axis=-1)
-        return Prepared(frame, mask, readings.strengths, background_subtraction.change_threshold(differences), gain)
+            return Prepared(frame, mask, statistics.strengths, 0.0, np.ones(3, np.float32))
+        gain = background_subtraction.exposure_gain(
+            statistics.colors[empty.usable], empty.statistics.colors[empty.usable]
+        )
+        differences = np.abs(statistics.colors - gain * empty.statistics.colors).max(axis=-1)
+        return Prepared(frame, mask, statistics.strengths, background_subtraction.change_threshold(differences), gain)
 
     def smoothed(self, prepared: Prepared, box: Region) -> Image:
-        """A region of the frame, smoothed, in matched pixels, (H, W, 3)."""
+        """A region of the frame, smoothed, in working pixels, (H, W, 3)."""
         return background_subtraction.smoothed(self.view.image(prepared.frame, box))
 
     def changes(self, prepared: Prepared, smooth: Image, box: Region) -> Changes | None:
@@ -98,5 +100,5 @@ class Foreground:
         if background is None:
             return None
         smooth = background_subtraction.smoothed(self.view.image(background, self.view.whole))
-        readings = self._probes.read(background)
-        return _Empty(smooth, readings, np.flatnonzero(background_subtraction.tells_exposure(readings.colors)))
+        statistics = self._grid.measure(background)
+        return _Empty(smooth, statistics, np.flatnonzero(background_subtraction.tells_exposure(statistics.colors)))

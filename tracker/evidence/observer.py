@@ -14,16 +14,22 @@ import cv2
 import numpy as np
 
 from tracker.evidence.foreground import Foreground, Prepared
-from tracker.evidence.view_evidence import Look, ViewEvidence, default_theta_px, expecting, silhouette_evidence
+from tracker.evidence.view_evidence import (
+    RegionFeatures,
+    ViewEvidence,
+    default_theta_px,
+    select_evidence,
+    silhouette_evidence,
+)
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import FloatArray
 from tracker.geometry.cameras import Camera, Region
 from tracker.images import background_subtraction
-from tracker.images.edge_segments import link_edges, sampled
+from tracker.images.edge_segments import link_edges, sample_segments
 from tracker.images.edges import detect_edges, levels
-from tracker.images.matching_view import fit_region
-from tracker.images.static_edges import Scenery
+from tracker.images.static_edges import StaticEdgeModel
+from tracker.images.working_view import fit_region
 
 FOREGROUND_MARGIN = 0.012
 """How far around the silhouette edges are kept, as a fraction of the longer side of the image."""
@@ -36,9 +42,9 @@ class _Ahead(NamedTuple):
 
     prepared: Future[list[Prepared | None]]
     """Each view; None where it is damaged."""
-    looks: Future[list[Look]] | None = None
+    features: Future[list[RegionFeatures]] | None = None
     """A region of each view; None where no regions are known."""
-    still: bool = False
+    with_static_edges: bool = False
     """Whether what stands still is going to be known."""
 
 
@@ -64,16 +70,16 @@ class Observer:
             for name in ("observe", "observe ahead")
         )
         self._views = [Foreground(c, self._pool) for c in self.cameras]
-        self._reader, self._looker = (ThreadPoolExecutor(1, name) for name in ("read ahead", "look ahead"))
+        self._reader, self._finder = (ThreadPoolExecutor(1, name) for name in ("read ahead", "find ahead"))
         self._ahead: OrderedDict[int, _Ahead] = OrderedDict()
         self._lock = threading.Lock()
 
     @property
-    def matched_cameras(self) -> tuple[Camera, ...]:
-        """The views as they are matched, whole: without lens distortion, at the scale of matching."""
+    def working_cameras(self) -> tuple[Camera, ...]:
+        """The views as they are matched, whole: without lens distortion, at the working scale."""
         return tuple(v.view.camera for v in self._views)
 
-    def prefetch(self, k: int, regions: Sequence[Region | None] | None = None, still: bool = False) -> None:
+    def prefetch(self, k: int, regions: Sequence[Region | None] | None = None, with_static_edges: bool = False) -> None:
         """Begin to decode frame k, and to do with it what needs no prediction; `evidence` will find it done.
 
         At most two frames are kept so. To be called again when the regions are known. A frame that cannot be read is
@@ -83,13 +89,14 @@ class Observer:
             k: the frame.
             regions: where `evidence` is going to look, if it is known; asked for others it looks anew, so that what it
                 gives does not depend on what was told here.
-            still: whether it will be told what stands still.
+            with_static_edges: whether `evidence` will be given static edges.
         """
         with self._lock:
             ahead = self._ahead.get(k) or _Ahead(self._reader.submit(self._prepare, k))
-            if regions is not None and ahead.looks is None:
+            if regions is not None and ahead.features is None:
                 ahead = ahead._replace(
-                    looks=self._looker.submit(self._look_ahead, ahead.prepared, list(regions), still), still=still
+                    features=self._finder.submit(self._find_ahead, ahead.prepared, list(regions), with_static_edges),
+                    with_static_edges=with_static_edges,
                 )
             self._ahead[k] = ahead
             while len(self._ahead) > _FRAMES_AHEAD:
@@ -100,7 +107,7 @@ class Observer:
         k: int,
         regions: Sequence[Region | None] | None = None,
         predicted_px: Sequence[FloatArray | None] | None = None,
-        scenery: Sequence[Scenery] | None = None,
+        static_edges: Sequence[StaticEdgeModel] | None = None,
     ) -> tuple[ViewEvidence, ...]:
         """The edges of frame k in each view, kept to the foreground where masks or a background tell it.
 
@@ -108,31 +115,35 @@ class Observer:
 
         Args:
             k: the frame.
-            regions: where to look in each view, matched px, see `matched.region_around`; None is the whole image.
-            predicted_px: visible pieces of the predicted contours in each view, (M, 4), px of `matched_cameras`, by
+            regions: where to look in each view, working px, see `working.region_around`; None is the whole image.
+            predicted_px: visible pieces of the predicted contours in each view, (M, 4), px of `working_cameras`, by
                 which segments of edges are accepted; None keeps all edges.
-            scenery: what is known to stand still in each view; asked where neither masks nor a background tell.
+            static_edges: what is known to stand still in each view; asked where neither masks nor a background tell.
         """
         with self._lock:
             ahead = self._ahead.pop(k, None)
         prepared = self._prepare(k) if ahead is None else ahead.prepared.result()
-        everywhere, still, looks = [None] * len(self.cameras), scenery is not None, list[Look]()
-        if ahead is not None and ahead.looks is not None and ahead.still == still:
-            looks = ahead.looks.result()
+        everywhere, with_static_edges, features = (
+            [None] * len(self.cameras),
+            static_edges is not None,
+            list[RegionFeatures](),
+        )
+        if ahead is not None and ahead.features is not None and ahead.with_static_edges == with_static_edges:
+            features = ahead.features.result()
 
         def observe(
-            i: int, region: Region | None, predicted_px: FloatArray | None, room: Scenery | None
+            i: int, region: Region | None, predicted_px: FloatArray | None, model: StaticEdgeModel | None
         ) -> ViewEvidence:
-            known = looks and looks[i].box == self._box(i, region)
-            look = looks[i] if known else self._look(i, prepared[i], region, still)
+            known = features and features[i].box == self._box(i, region)
+            seen = features[i] if known else self._find_features(i, prepared[i], region, with_static_edges)
             if predicted_px is not None:
-                predicted_px = predicted_px - np.array([*look.corner_px, *look.corner_px], np.float32)
-            return expecting(look, predicted_px, room if look.silhouette is None else None)
+                predicted_px = predicted_px - np.array([*seen.corner_px, *seen.corner_px], np.float32)
+            return select_evidence(seen, predicted_px, model if seen.silhouette is None else None)
 
         return tuple(
             self._pool.map(
                 observe, range(len(self.cameras)), regions or everywhere, predicted_px or everywhere,
-                scenery or everywhere,
+                static_edges or everywhere,
             )
         )  # fmt: skip
 
@@ -140,33 +151,41 @@ class Observer:
         frames = self.recording.read(k)
         return [None if f is None else view.prepare(f, k) for view, f in zip(self._views, frames, strict=True)]
 
-    def _look_ahead(
-        self, prepared: Future[list[Prepared | None]], regions: Sequence[Region | None], still: bool
-    ) -> list[Look]:
+    def _find_ahead(
+        self, prepared: Future[list[Prepared | None]], regions: Sequence[Region | None], with_static_edges: bool
+    ) -> list[RegionFeatures]:
         views = range(len(self._views))
-        return list(self._pool_ahead.map(self._look, views, prepared.result(), regions, [still] * len(views)))
+        return list(
+            self._pool_ahead.map(
+                self._find_features, views, prepared.result(), regions, [with_static_edges] * len(views)
+            )
+        )
 
     def _box(self, i: int, region: Region | None) -> Region:
         view = self._views[i].view
         return view.whole if region is None else fit_region(region, view.camera.size)
 
-    def _look(self, i: int, prepared: Prepared | None, region: Region | None, still: bool) -> Look:
+    def _find_features(
+        self, i: int, prepared: Prepared | None, region: Region | None, with_static_edges: bool
+    ) -> RegionFeatures:
         view, box = self._views[i], self._box(i, region)
-        matched = view.view.camera
-        camera, scale = matched.cropped(box), view.view.scale
+        working = view.view.camera
+        camera, scale = working.cropped(box), view.view.scale
         if prepared is None:
             nothing = np.zeros((camera.height, camera.width), np.uint8)
-            return Look(camera, scale, box[:2], matched.size, nothing)
+            return RegionFeatures(camera, scale, box[:2], working.size, nothing)
         smooth = view.smoothed(prepared, box)
         changes = view.changes(prepared, smooth, box)
-        margin_px = FOREGROUND_MARGIN * max(matched.size)
+        margin_px = FOREGROUND_MARGIN * max(working.size)
         foreground = None if changes is None else background_subtraction.grow(changes.anything, margin_px)
         # Texture that stands still need not be kept out by thresholds, which would keep out the weaker edges of bodies.
-        edges = detect_edges(smooth, levels(prepared.strengths, restricted=changes is not None or still), foreground)
+        edges = detect_edges(
+            smooth, levels(prepared.strengths, restricted=changes is not None or with_static_edges), foreground
+        )
         segments = link_edges(edges.found, edges.gradients)
         silhouette = (
-            None if changes is None else silhouette_evidence(changes.inside, edges, 2 * default_theta_px(matched))
+            None if changes is None else silhouette_evidence(changes.inside, edges, 2 * default_theta_px(working))
         )
-        return Look(
-            camera, scale, box[:2], matched.size, edges.found, segments, sampled(segments), smooth, silhouette
+        return RegionFeatures(
+            camera, scale, box[:2], working.size, edges.found, segments, sample_segments(segments), smooth, silhouette
         )  # fmt: skip

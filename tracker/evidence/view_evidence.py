@@ -1,6 +1,6 @@
 """What a frame shows: per view the edges that poses are scored against, and their distance image.
 
-What an image shows does not depend on what is expected there (`Look`); which of its edges are kept does.
+What an image shows does not depend on what is expected there (`RegionFeatures`); which of its edges are kept does.
 """
 
 from dataclasses import dataclass, field, replace
@@ -17,10 +17,10 @@ from tracker.geometry.cameras import Camera, Region
 from tracker.images.background_subtraction import Mask
 from tracker.images.color_histogram import BINS, count_colors
 from tracker.images.distance_transform import distance_image
-from tracker.images.edge_segments import Samples, Segments, accept, link_edges, sampled
+from tracker.images.edge_segments import Samples, Segments, accept_segments, link_edges, sample_segments
 from tracker.images.edges import Edges
-from tracker.images.silhouette_outline import Outline, trace_outline, trust_outline
-from tracker.images.static_edges import Scenery
+from tracker.images.silhouette_contour import SilhouetteContour, contour_trust, trace_silhouette
+from tracker.images.static_edges import StaticEdgeModel
 
 SCENE_SPACING_PX = 4
 """Scene edges are thinned to one point per cell of this many pixels a side."""
@@ -36,21 +36,21 @@ class Silhouette:
     inside: Mask
     """The silhouette, shadows left out, (H, W)."""
     points_px: FloatArray
-    """Points of its contour, thinned, (N, 2), matched px of the region."""
+    """Points of its contour, thinned, (N, 2), working px of the region."""
     normals: FloatArray
     """Unit normals at these, out of the silhouette, (N, 2)."""
     trust: float
-    """How far it can be trusted, 0 to 1; see `silhouette_contour.trust_outline`."""
-    outline: Outline
+    """How far it can be trusted, 0 to 1; see `silhouette_contour.contour_trust`."""
+    contour: SilhouetteContour
     """All pixels of its contour."""
     limit_px: float
-    """Where `distance` is cut off, matched px."""
+    """Where `distance` is cut off, working px."""
 
     @cached_property
     def distance(self) -> FloatArray:
-        """Distance to the contour, (H, W), matched px."""
+        """Distance to the contour, (H, W), working px."""
         on_contour = np.zeros(self.inside.shape, np.uint8)
-        u, v = self.outline.points_px.T.astype(np.intp)
+        u, v = self.contour.points_px.T.astype(np.intp)
         on_contour[v, u] = 1
         return distance_image(on_contour, self.limit_px)
 
@@ -60,17 +60,17 @@ class ViewEvidence:
     """The edges of one view, or of a region of it, as they are matched."""
 
     camera: Camera
-    """The view without lens distortion, at the scale of matching, of the region: pixels count from its corner."""
+    """The view without lens distortion, at the working scale, of the region: pixels count from its corner."""
     scale: float
-    """Matched pixels per pixel of the footage, at most 1."""
+    """Working pixels per pixel of the footage, at most 1."""
     points_px: FloatArray
-    """Edge points for the image-to-model direction, thinned, (N, 2), matched px of the region."""
+    """Edge points for the image-to-model direction, thinned, (N, 2), working px of the region."""
     distance: FloatArray
-    """Distance to the nearest edge, cut off at the limit it was made with, (H, W), matched px."""
+    """Distance to the nearest edge, cut off at the limit it was made with, (H, W), working px."""
     corner_px: tuple[int, int] = (0, 0)
-    """Where the region's first pixel lies in the whole image, matched px."""
+    """Where the region's first pixel lies in the whole image, working px."""
     image_size: tuple[int, int] | None = None
-    """Width and height of the whole image, matched px; None where the region is all of it."""
+    """Width and height of the whole image, working px; None where the region is all of it."""
     normals: FloatArray = field(default_factory=lambda: np.empty((0, 2), np.float32))
     """Unit gradient at each of `points_px`, from dark to light, (N, 2); zero where the edge's direction is unknown."""
     colors: Image | None = None
@@ -79,7 +79,7 @@ class ViewEvidence:
     """All edges found, linked, in px of the region; None where the directions of the edges are unknown."""
     accepted: NDArray[np.bool_] | None = None
     """Which segments the prediction accepts, (S,); `points_px` and `distance` hold only those. None: all of them."""
-    still: NDArray[np.bool_] | None = None
+    is_static: NDArray[np.bool_] | None = None
     """Which segments are edges of the room, (S,), and never accepted; None where nothing is known of it."""
     silhouette: Silhouette | None = None
     """The silhouette in the region; None where neither a mask nor a background tells it."""
@@ -87,7 +87,7 @@ class ViewEvidence:
     @cached_property
     def samples(self) -> Samples | None:
         """Pixels of the segments, to be asked how far they are from contours."""
-        return None if self.segments is None else sampled(self.segments)
+        return None if self.segments is None else sample_segments(self.segments)
 
     @cached_property
     def color_counts(self) -> NDArray[np.int64]:
@@ -99,11 +99,11 @@ class ViewEvidence:
 
     @property
     def theta_px(self) -> float:
-        """Distance beyond which an edge says nothing, matched px; that of the whole image, whatever the region."""
+        """Distance beyond which an edge says nothing, working px; that of the whole image, whatever the region."""
         return _theta_px(self.image_size or self.camera.size)
 
     def outlier_px(self, theta_px: float | None) -> float:
-        """An outlier distance in px of the footage as matched px; `theta_px` of the view for None."""
+        """An outlier distance in px of the footage as working px; `theta_px` of the view for None."""
         return self.theta_px if theta_px is None else theta_px * self.scale
 
 
@@ -125,7 +125,7 @@ def view_evidence(
     gradients: NDArray[np.int16] | None = None,
     colors: Image | None = None,
     predicted_px: FloatArray | None = None,
-    scenery: Scenery | None = None,
+    static_edges: StaticEdgeModel | None = None,
 ) -> ViewEvidence:
     """Make the evidence of a view from its edge map.
 
@@ -138,24 +138,24 @@ def view_evidence(
         gradients: of the image along u and v, (2, H, W); None where the directions of the edges are unknown.
         colors: see `ViewEvidence`.
         predicted_px: see `accepted`; None keeps all edges. Without gradients no edges are refused.
-        scenery: what is known to stand still in the view; such edges are refused.
+        static_edges: what is known to stand still in the view; such edges are refused.
     """
     assert edge_map.shape == (camera.height, camera.width), (edge_map.shape, camera.size)
     found = edge_map.view(np.uint8)
     segments = None if gradients is None else link_edges(found, gradients)
-    look = Look(camera, scale, corner_px, image_size, found, segments, colors=colors)
-    return expecting(look, predicted_px, scenery)
+    features = RegionFeatures(camera, scale, corner_px, image_size, found, segments, colors=colors)
+    return select_evidence(features, predicted_px, static_edges)
 
 
 def silhouette_evidence(inside: Mask, edges: Edges, limit_px: float) -> Silhouette:
-    """A silhouette, (H, W), in a region whose edges are known, with its distance cut off at a limit, matched px."""
-    outline = trace_outline(inside)
-    first = _first_in_cells(outline.points_px, *inside.shape)
-    trust = trust_outline(outline, inside, edges)
-    return Silhouette(inside, outline.points_px[first], outline.normals[first], trust, outline, limit_px)
+    """A silhouette, (H, W), in a region whose edges are known, with its distance cut off at a limit, working px."""
+    contour = trace_silhouette(inside)
+    first = _first_in_cells(contour.points_px, *inside.shape)
+    trust = contour_trust(contour, inside, edges)
+    return Silhouette(inside, contour.points_px[first], contour.normals[first], trust, contour, limit_px)
 
 
-class Look(NamedTuple):
+class RegionFeatures(NamedTuple):
     """What a region of a view shows, whatever is expected there; see `ViewEvidence`."""
 
     camera: Camera
@@ -172,34 +172,40 @@ class Look(NamedTuple):
 
     @property
     def box(self) -> Region:
-        """The region, matched px of the whole image."""
+        """The region, working px of the whole image."""
         (u0, v0), (width, height) = self.corner_px, self.camera.size
         return u0, v0, u0 + width, v0 + height
 
 
-def expecting(look: Look, predicted_px: FloatArray | None, scenery: Scenery | None) -> ViewEvidence:
+def select_evidence(
+    features: RegionFeatures, predicted_px: FloatArray | None, static_edges: StaticEdgeModel | None
+) -> ViewEvidence:
     """What of a region's edges is kept where something is expected and something stands still; see `view_evidence`."""
-    segments, theta = look.segments, _theta_px(look.image_size or look.camera.size)
-    chosen = still = None
+    segments, theta = features.segments, _theta_px(features.image_size or features.camera.size)
+    chosen = is_static = None
     if segments is not None:
         if predicted_px is not None:
-            chosen = accept(look.samples or sampled(segments), predicted_px, ACCEPTED_SHARE * theta)
-        if scenery is not None:
-            still = scenery.holds(segments, look.corner_px)
-            chosen = ~still if chosen is None else chosen & ~still
-    points, normals, found = _matched_edges(segments, chosen, look.found)
+            chosen = accept_segments(
+                features.samples or sample_segments(segments), predicted_px, ACCEPTED_SHARE * theta
+            )
+        if static_edges is not None:
+            is_static = static_edges.contains(segments, features.corner_px)
+            chosen = ~is_static if chosen is None else chosen & ~is_static
+    points, normals, found = _matched_edges(segments, chosen, features.found)
     # Beyond twice theta nothing asks for the distance any more.
     distance = distance_image(found, 2 * theta)
     seen = ViewEvidence(
-        look.camera, look.scale, points, distance, look.corner_px, look.image_size, normals, look.colors, segments,
-        chosen, still, look.silhouette,
+        features.camera, features.scale, points, distance, features.corner_px, features.image_size, normals,
+        features.colors, segments, chosen, is_static, features.silhouette,
     )  # fmt: skip
-    if look.samples is not None:
-        seen.__dict__["samples"] = look.samples  # taken once
+    if features.samples is not None:
+        seen.__dict__["samples"] = features.samples  # taken once
     return seen
 
 
-def accepted(view: ViewEvidence, predicted_px: FloatArray, threshold_px: float | None = None) -> ViewEvidence:
+def with_accepted_segments(
+    view: ViewEvidence, predicted_px: FloatArray, threshold_px: float | None = None
+) -> ViewEvidence:
     """The same view with only the edges that the prediction explains, segment by segment (GD96 Sect. 4.2, Fig. 6).
 
     Args:
@@ -208,20 +214,22 @@ def accepted(view: ViewEvidence, predicted_px: FloatArray, threshold_px: float |
         threshold_px: mean distance of a segment to them up to which it is accepted, px; by default half of theta.
     """
     assert view.samples is not None
-    return with_segments(view, accept(view.samples, predicted_px, threshold_px or ACCEPTED_SHARE * view.theta_px))
+    return with_segments(
+        view, accept_segments(view.samples, predicted_px, threshold_px or ACCEPTED_SHARE * view.theta_px)
+    )
 
 
-def unfiltered(view: ViewEvidence) -> ViewEvidence:
+def with_all_segments(view: ViewEvidence) -> ViewEvidence:
     """The same view with all edges but the room's: a wrong prediction may have refused what it missed."""
     if view.segments is None or view.accepted is None or view.accepted.all():
         return view
-    seen = with_segments(view, findable(view.segments, view.still))
-    return replace(seen, accepted=None) if view.still is None else seen
+    seen = with_segments(view, foreground_segments(view.segments, view.is_static))
+    return replace(seen, accepted=None) if view.is_static is None else seen
 
 
-def findable(segments: Segments, still: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+def foreground_segments(segments: Segments, is_static: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
     """Which segments may be a person's, (S,): all but those that are known to stand `still`, (S,)."""
-    return np.ones(len(segments.firsts) - 1, np.bool_) if still is None else ~still
+    return np.ones(len(segments.firsts) - 1, np.bool_) if is_static is None else ~is_static
 
 
 def with_segments(view: ViewEvidence, chosen: NDArray[np.bool_]) -> ViewEvidence:

@@ -11,7 +11,7 @@ import numpy as np
 
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import Normal, normal_of
+from tracker.fitting.gauss_newton import NormalEquations, normal_equations
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 from tracker.geometry.triangulation import _NEAREST_M, PointObservation, sigma_px
@@ -19,7 +19,7 @@ from tracker.geometry.triangulation import _NEAREST_M, PointObservation, sigma_p
 
 @dataclass(frozen=True, eq=False)
 class PinBlock:
-    """Points of the body drawn to their pins; a block for `fit.solve`.
+    """Points of the body drawn to their pins; a block for `gauss_newton.solve`.
 
     The residual of a pin is the distance in the image, in standard deviations, component by component. No robust
     function bends it: a hand's word counts, and one that is wrong is best seen.
@@ -34,8 +34,8 @@ class PinBlock:
     sigmas_px: Array
     """Standard deviation of each pin, (N,), px."""
 
-    def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
-        """See `fit.Block`."""
+    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+        """See `ResidualBlock`."""
         parts = model.point_parts[self.points]
         points_world = model.points_at(kinematics, self.points)
         Ts_camera_world, K = self._projections
@@ -49,7 +49,7 @@ class PinBlock:
         found_px = np.einsum("nij,nj->ni", K[:, :2, :2], slopes) + K[:, :2, 2]
         r = (found_px - self.positions_px) / self.sigmas_px[:, None]
         rows = K[:, :2, :2] @ J_slopes / self.sigmas_px[:, None, None]
-        return normal_of(r.ravel(), rows.reshape(-1, model.n_dofs))
+        return normal_equations(r.ravel(), rows.reshape(-1, model.n_dofs))
 
     @cached_property
     def _projections(self) -> tuple[Array, Array]:

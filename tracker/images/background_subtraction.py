@@ -21,7 +21,7 @@ MIN_SHADE = 0.5
 MAX_HUE_SHIFT = 7.0
 """How far a channel may be from the darkened background in a shadow, gray levels."""
 _DARK, _BRIGHT = 20.0, 235.0  # beyond, a ratio of colours says little
-_LEAST_PLACES = 50
+_MIN_SAMPLES = 50
 _LEAST_GAIN = 0.01
 _SAME, _SHADOW, _NEW = 0, 1, 2  # what becomes of a pixel
 
@@ -56,7 +56,7 @@ def exposure_gain(colors: NDArray[np.float32], empty_colors: NDArray[np.float32]
         colors: smoothed colours at places spread over the whole frame, (n, 3), of which most show the scene.
         empty_colors: those of the empty scene at the same places, which all tell it (`tells_exposure`), (n, 3).
     """
-    return np.ones(3, np.float32) if len(colors) < _LEAST_PLACES else median(colors / empty_colors).astype(np.float32)
+    return np.ones(3, np.float32) if len(colors) < _MIN_SAMPLES else median(colors / empty_colors).astype(np.float32)
 
 
 def brightened(image: Image, gain: NDArray[np.float32]) -> Image:

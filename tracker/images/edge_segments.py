@@ -61,7 +61,7 @@ def link_edges(found: NDArray[np.uint8], gradients: NDArray[np.int16]) -> Segmen
     return Segments(points, normals, firsts[: count + 1].copy())
 
 
-def accept(samples: "Samples", pieces_px: FloatArray, threshold_px: float) -> NDArray[np.bool_]:
+def accept_segments(samples: "Samples", pieces_px: FloatArray, threshold_px: float) -> NDArray[np.bool_]:
     """Judge each segment by its directed chamfer distance to predicted contours.
 
     A pixel counts with its distance to the nearest piece of contour that runs more or less as the edge does, at most
@@ -91,7 +91,7 @@ class Samples(NamedTuple):
         is longer than the reach."""
         out = np.empty(self.pixels.points.shape[1], np.float32)
         pieces = np.ascontiguousarray(pieces_px, np.float32)
-        nearest_alongside(self.pixels.points, self.pixels.rows, pieces, reach_px, MAX_ANGLE_RAD, out)
+        nearest_parallel_segment(self.pixels.points, self.pixels.rows, pieces, reach_px, MAX_ANGLE_RAD, out)
         return out[: self.pixels.n_points]
 
     def means(self, distances: FloatArray) -> NDArray[np.float64]:
@@ -101,7 +101,7 @@ class Samples(NamedTuple):
         return sums / self.counts
 
 
-def sampled(segments: Segments) -> Samples:
+def sample_segments(segments: Segments) -> Samples:
     """Sample segments, from the first pixel of each on."""
     counts = -(-np.diff(segments.firsts) // _STRIDE)
     points = np.empty((counts.sum(), 5), np.float32)
@@ -220,7 +220,7 @@ def _cut(points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_], fir
 
 
 @njit(**FAST)
-def nearest_alongside(
+def nearest_parallel_segment(
     pixels: FloatArray, rows: IntArray, pieces: FloatArray, reach: float, max_angle: float, out: FloatArray
 ) -> None:
     """Distance of each pixel, (5, N) as in `Samples`, to the nearest piece, (M, 4), that runs its way, up to a reach.

@@ -15,13 +15,13 @@ from tracker.geometry.arrays import FloatArray, Image
 from tracker.images.background_subtraction import SMOOTHING_PX
 
 SPACING_PX = 20
-"""Distance between neighbouring probes, matched px."""
-_LEAST_PLACES = 8  # along each axis, in small images
+"""Distance between neighbouring probes, working px."""
+_MIN_SAMPLES = 8  # along each axis, in small images
 _TAPS = 9
-"""Matched pixels a side that smoothing (7) and a derivative (3) draw on."""
+"""Working pixels a side that smoothing (7) and a derivative (3) draw on."""
 
 
-class Readings(NamedTuple):
+class ImageStatistics(NamedTuple):
     """What the probes of an image show."""
 
     colors: FloatArray
@@ -30,7 +30,7 @@ class Readings(NamedTuple):
     """L1 norm of the gradient of the channel in which it is largest, (n,), as `edges` computes it."""
 
 
-class Probes:
+class SampleGrid:
     """A grid of places in the images of one camera, as filmed."""
 
     def __init__(self, size: tuple[int, int], scale: float) -> None:
@@ -38,23 +38,23 @@ class Probes:
 
         Args:
             size: width and height of the footage, px.
-            scale: matched pixels per pixel of the footage, at most 1.
+            scale: working pixels per pixel of the footage, at most 1.
         """
         self._columns, self._rows = (_taps(length, scale) for length in size)
         self._block = min(int(1 / scale), 2)
         self._kernels = _kernels()
 
-    def read(self, image: Image) -> Readings:
+    def measure(self, image: Image) -> ImageStatistics:
         """Read a frame as filmed, (H, W, 3)."""
         n = len(self._rows) * len(self._columns)
-        out = Readings(np.empty((n, 3), np.float32), np.empty(n, np.float32))
+        out = ImageStatistics(np.empty((n, 3), np.float32), np.empty(n, np.float32))
         _read(image, self._rows, self._columns, self._block, self._kernels, out)
         return out
 
 
 def _taps(length: int, scale: float) -> NDArray[np.int64]:
     """Positions along one axis, (places, taps), px of the footage, within the image."""
-    places = max(_LEAST_PLACES, round(length * scale / SPACING_PX))
+    places = max(_MIN_SAMPLES, round(length * scale / SPACING_PX))
     middles = (np.arange(places) + 0.5) * length / places
     taps = middles[:, None] + (np.arange(_TAPS) - _TAPS // 2) / scale
     return np.clip(np.round(taps), 0, length - 1).astype(np.int64)
@@ -71,7 +71,12 @@ def _kernels() -> FloatArray:
 
 @njit(nogil=True, cache=True, fastmath={"reassoc", "contract"})
 def _read(
-    image: Image, rows: NDArray[np.int64], columns: NDArray[np.int64], block: int, kernels: FloatArray, out: Readings
+    image: Image,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    block: int,
+    kernels: FloatArray,
+    out: ImageStatistics,
 ) -> None:
     """Fill what each place shows by the responses of the kernels, (3, taps^2).
 

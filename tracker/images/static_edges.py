@@ -19,33 +19,33 @@ _KNOWN = 0.5
 """Least share of the time that an edge was there, running the same way, and of a segment that lies on such edges."""
 
 
-class Scenery:
+class StaticEdgeModel:
     """The edges of one view that are not near any body."""
 
     def __init__(self, size: tuple[int, int]) -> None:
         """Begin knowing nothing.
 
         Args:
-            size: width and height of the whole image, matched px.
+            size: width and height of the whole image, working px.
         """
         width, height = size
         # Where an edge flickers or turns, the mean of its unit gradients, 0 where there was none, is short.
         self._gradients = np.zeros((height, width, 2), np.float32)
         self._frames = np.zeros((height, width), np.uint8)
 
-    def holds(self, segments: Segments, corner_px: tuple[int, int]) -> NDArray[np.bool_]:
+    def contains(self, segments: Segments, corner_px: tuple[int, int]) -> NDArray[np.bool_]:
         """Which segments are edges of the room, (S,).
 
         Args:
             segments: of a region.
-            corner_px: where its first pixel lies in the whole image, matched px.
+            corner_px: where its first pixel lies in the whole image, working px.
         """
         known = np.zeros(len(segments.firsts) - 1, np.bool_)
         left, top = corner_px
-        _compare(segments, self._gradients[top:, left:], known)
+        _mark_known(segments, self._gradients[top:, left:], known)
         return known
 
-    def learn(
+    def update(
         self,
         segments: Segments,
         corner_px: tuple[int, int],
@@ -57,19 +57,19 @@ class Scenery:
 
         Args:
             segments: of the region, all of them.
-            corner_px: where its first pixel lies in the whole image, matched px.
+            corner_px: where its first pixel lies in the whole image, working px.
             size: its width and height.
             pieces_px: visible pieces of the contours of all bodies, x0, y0, x1, y1, (M, 4), px of the region.
             reach_px: edges nearer to these may be the bodies' own, px.
         """
         (left, top), (width, height) = corner_px, size
         region = slice(top, top + height), slice(left, left + width)
-        _update(segments, pieces_px, int(np.ceil(reach_px)), self._gradients[region], self._frames[region])
+        _update_means(segments, pieces_px, int(np.ceil(reach_px)), self._gradients[region], self._frames[region])
 
 
 @njit(nogil=True, cache=True)
-def _compare(segments: Segments, gradients: FloatArray, known: NDArray[np.bool_]) -> None:
-    """See `Scenery.holds`; the remembered gradients (h, w, 2) begin at the region's corner."""
+def _mark_known(segments: Segments, gradients: FloatArray, known: NDArray[np.bool_]) -> None:
+    """See `StaticEdgeModel.contains`; the remembered gradients (h, w, 2) begin at the region's corner."""
     points, normals, firsts = segments.points_px, segments.normals, segments.firsts
     for s in range(known.shape[0]):
         there = 0
@@ -81,7 +81,7 @@ def _compare(segments: Segments, gradients: FloatArray, known: NDArray[np.bool_]
 
 
 @njit(nogil=True, cache=True)
-def _update(
+def _update_means(
     segments: Segments, pieces: FloatArray, reach: int, gradients: FloatArray, frames: NDArray[np.uint8]
 ) -> None:
     """Bring the mean gradients (H, W, 2) of the pixels that no piece is near up to date, and their count of frames.

@@ -82,7 +82,7 @@ class SearchSettings:
         return np.array(bounds), np.array(steps)
 
 
-BEFORE_REFINEMENT = SearchSettings(passes=(1.5,), patience=1, limbs_apart=True)
+COARSE_SEARCH = SearchSettings(passes=(1.5,), patience=1, limbs_apart=True)
 """A search that only has to come near, because a refinement follows. Of 90 starts 8 to 12 degrees and 5 to 8 cm off in
 every degree of freedom 70 were refined to the true pose after it, with 145 poses scored; after the defaults it were 76,
 with 1,100; without a search 10."""

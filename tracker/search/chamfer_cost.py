@@ -57,8 +57,8 @@ class Cost(NamedTuple):
     """Image to model, (V,), px of the footage."""
 
 
-class _Scene(NamedTuple):
-    """The evidence of all views as arrays, for the kernels; lengths in matched px."""
+class _ViewArrays(NamedTuple):
+    """The evidence of all views as arrays, for the kernels; lengths in working px."""
 
     P: Array
     """Projection matrices, (V, 3, 4)."""
@@ -133,7 +133,7 @@ class ChamferCost:
             for v, theta in zip(views, thetas, strict=True)
         ]
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
-        self._scene = _Scene(
+        self._arrays = _ViewArrays(
             np.stack([occluding_contours.projection(v.camera) for v in views]),
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
@@ -145,7 +145,7 @@ class ChamferCost:
             np.array(thetas),
         )
         widest = max((v.camera for v in views), key=lambda camera: camera.width)
-        self._room = max(occluding_contours.contour_room(widest, len(self.models)), self._scene.points.shape[1])
+        self._room = max(occluding_contours.contour_room(widest, len(self.models)), self._arrays.points.shape[1])
         self._own = threading.local()
 
     def __call__(self, poses: Sequence[Array]) -> Cost:
@@ -169,15 +169,15 @@ class ChamferCost:
         return self._mean(views_px), views_px
 
     @property
-    def scene_px(self) -> tuple[FloatArray, ...]:
-        """The edge points that count, of each view, (n, 2), matched px."""
-        scene = self._scene
+    def edge_points_px(self) -> tuple[FloatArray, ...]:
+        """The edge points that count, of each view, (n, 2), working px."""
+        arrays = self._arrays
         return tuple(
-            scene.points[:, first : first + n].T for first, n in zip(scene.firsts[:-1], scene.counts, strict=True)
+            arrays.points[:, first : first + n].T for first, n in zip(arrays.firsts[:-1], arrays.counts, strict=True)
         )
 
     def _directed(self, person: int, candidates: Array, poses: Sequence[Array]) -> Array:
-        """The directed costs of candidates of a person, see `of_person`, (C, V, 2), matched px.
+        """The directed costs of candidates of a person, see `of_person`, (C, V, 2), working px.
 
         One kernel for all who ask: another would take the sums of single precision in another order.
         """
@@ -189,7 +189,7 @@ class ChamferCost:
 
         def score(share: slice) -> None:
             _score_candidates(
-                poses_of[share], first, model.n_dofs, model.tree, Ts, self._surfaces, self._scene, paper,
+                poses_of[share], first, model.n_dofs, model.tree, Ts, self._surfaces, self._arrays, paper,
                 self._scratch(), directed[share],
             )  # fmt: skip
 
@@ -226,7 +226,7 @@ class ChamferCost:
     def _mean(self, views_px: Array) -> Array:
         """Mean over the views with edges, (..., V) to (...); where there is none, that of the outlier distances."""
         if not self._seen.any():
-            return np.full(views_px.shape[:-1], np.mean(self._scene.thetas / self._scales))
+            return np.full(views_px.shape[:-1], np.mean(self._arrays.thetas / self._scales))
         return views_px[..., self._seen].mean(axis=-1)
 
 
@@ -239,7 +239,7 @@ def _distances(views: tuple[ViewEvidence, ...]) -> FloatArray:
 def _near(view: ViewEvidence, contour: occluding_contours.Contour, theta: float) -> RowSortedPoints:
     """Edge points within theta of the visible model contour."""
     everything = sort_points(view.points_px, view.camera.size)
-    return within_reach(everything, contour.pieces_px, contour.hidden, theta)
+    return within_reach(everything, contour.pieces_px, contour.occluded, theta)
 
 
 @njit(**FAST)
@@ -311,11 +311,11 @@ def _take_visible(
     n: int, pieces: occluding_contours.Pieces, visible: FloatArray, segments: Segments
 ) -> tuple[int, int]:
     """Take the visible ones of n pieces, and join them to segments; the number of both."""
-    ends, hidden, edges = pieces.ends, pieces.hidden, pieces.edges
+    ends, occluded, edges = pieces.ends, pieces.occluded, pieces.edges
     su, sv, du, dv = segments.u, segments.v, segments.du, segments.dv
     joined, edge, k, m = 0, -1, np.uint64(0), np.uint64(0)
     for i in range(np.uint64(n)):
-        if hidden[i]:
+        if occluded[i]:
             edge = -1
             continue
         x0, y0, x1, y1 = ends[0, i], ends[1, i], ends[2, i], ends[3, i]
@@ -334,33 +334,38 @@ def _take_visible(
 
 @njit(**FAST)
 def _score(
-    Ts: Array, surfaces: occluding_contours.Surfaces, scene: _Scene, paper: bool, scratch: _Scratch, directed: Array
+    Ts: Array,
+    surfaces: occluding_contours.Surfaces,
+    views: _ViewArrays,
+    paper: bool,
+    scratch: _Scratch,
+    directed: Array,
 ) -> None:
-    """Fill the directed costs of one pose, (V, 2): model to image and image to model, matched px."""
+    """Fill the directed costs of one pose, (V, 2): model to image and image to model, working px."""
     d, pixel = scratch.distances, 0
-    occluding_contours.place(Ts, surfaces, scratch.pieces)
-    for view in range(scene.P.shape[0]):
-        width, height, theta = scene.sizes[view, 0], scene.sizes[view, 1], scene.thetas[view]
+    occluding_contours.place_parts(Ts, surfaces, scratch.pieces)
+    for view in range(views.P.shape[0]):
+        width, height, theta = views.sizes[view, 0], views.sizes[view, 1], views.thetas[view]
         n = occluding_contours.trace_pieces(
-            scene.P[view], scene.eyes[view], surfaces, occluding_contours.PIECE_PX, scratch.pieces
+            views.P[view], views.eyes[view], surfaces, occluding_contours.PIECE_PX, scratch.pieces
         )
         n_visible, n_segments = _take_visible(n, scratch.pieces, scratch.visible, scratch.segments)
-        image = scene.distances[pixel : pixel + width * height]
+        image = views.distances[pixel : pixel + width * height]
         if paper:
             directed[view, 0] = _forward_paper(n_visible, image, width, height, theta, scratch)
         else:
             directed[view, 0] = _forward(n_visible, image, width, height, theta, scratch.visible)
-        first, last = scene.firsts[view], scene.firsts[view + 1]
-        u, v = scene.points[0][first:last], scene.points[1][first:last]
-        nearest_segment(u, v, scene.rows[view], scratch.segments, n_segments, theta, d)
-        directed[view, 1] = _robust_mean(d, scratch.ones, scene.counts[view], theta, paper)
+        first, last = views.firsts[view], views.firsts[view + 1]
+        u, v = views.points[0][first:last], views.points[1][first:last]
+        nearest_segment(u, v, views.rows[view], scratch.segments, n_segments, theta, d)
+        directed[view, 1] = _robust_mean(d, scratch.ones, views.counts[view], theta, paper)
         pixel += width * height
 
 
 @njit(nogil=True, cache=True)
 def _score_candidates(
     candidates: Array, first: int, n_dofs: int, tree: Tree, Ts: Array,
-    surfaces: occluding_contours.Surfaces, scene: _Scene, paper: bool, scratch: _Scratch, directed: Array,
+    surfaces: occluding_contours.Surfaces, views: _ViewArrays, paper: bool, scratch: _Scratch, directed: Array,
 ) -> None:  # fmt: skip
     """`_score` for many poses of the person whose parts begin at `first`; directed is (C, V, 2)."""
     last = first + tree.parents.shape[0]
@@ -368,4 +373,4 @@ def _score_candidates(
     axes, origins = np.empty((n_dofs, 3)), np.empty((n_dofs, 3))
     for c in range(candidates.shape[0]):
         forward_kinematics(candidates[c], tree, own[first:last], axes, origins)
-        _score(own, surfaces, scene, paper, scratch, directed[c])
+        _score(own, surfaces, views, paper, scratch, directed[c])

@@ -51,7 +51,7 @@ class LimbFigures(NamedTuple):
     worst_drop: float
     """How much less that is than where the colours were learnt, in the view in which it is most, nats per sample."""
     spread_px: float
-    """Standard deviation of its end, matched px where the body stands."""
+    """Standard deviation of its end, working px where the body stands."""
     forward: float
     """Mean cut-off distance of its visible contour to the edges, in outlier distances; 0 where nothing is visible."""
     shown: float
@@ -134,9 +134,9 @@ def quality(
         body: in the pose that was found.
         fit: that pose, and the normal matrix there.
         costs: of its parts.
-        thetas_px: outlier distance of each view, (V,), matched px.
+        thetas_px: outlier distance of each view, (V,), working px.
         trusts: how far the silhouette of each view is trusted, (V,), 0 to 1; 0 where there is none.
-        px_per_m: length of a metre in the images where the body stands, matched px.
+        px_per_m: length of a metre in the images where the body stands, working px.
         colors: of its parts; None where there are none.
     """
     model, chains = body.model, limbs(body.model)
@@ -152,7 +152,7 @@ def quality(
     return Quality(
         float(far.sum() / max(1e-9, costs.length_px.sum())),
         views,
-        _second_largest(1.0 - costs.outline[trusts > _LEAST_TRUST]),
+        _second_largest(1.0 - costs.silhouette[trusts > _LEAST_TRUST]),
         tuple(
             LimbFigures(
                 c.name, float(color[c.parts].min()), float(worst_drop[c.parts].max()), float(spread),

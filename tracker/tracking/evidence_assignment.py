@@ -19,9 +19,15 @@ from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.contours.occluding_contours import PIECE_PX, Contour, trace_view
 from tracker.contours.surfaces import Surfaces
-from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence, findable, unfiltered, with_segments
+from tracker.evidence.view_evidence import (
+    ACCEPTED_SHARE,
+    ViewEvidence,
+    foreground_segments,
+    with_all_segments,
+    with_segments,
+)
 from tracker.geometry.arrays import Array, FloatArray
-from tracker.images.edge_segments import MAX_ANGLE_RAD, Samples, Segments, nearest_alongside, sampled
+from tracker.images.edge_segments import MAX_ANGLE_RAD, Samples, Segments, nearest_parallel_segment, sample_segments
 
 _CLEARLY = 0.5
 """What is another's is nearer to that body than this share of its distance from one's own."""
@@ -40,7 +46,7 @@ class Sharing:
     @cached_property
     def everything(self) -> tuple[ViewEvidence, ...]:
         """The same with the edges that the predictions refused."""
-        return tuple(map(unfiltered, self.views))
+        return tuple(map(with_all_segments, self.views))
 
     @cached_property
     def samples(self) -> tuple[tuple[Samples | None, Samples | None], ...]:
@@ -99,15 +105,15 @@ class _View:
         """See `Shares.own`."""
         view, seen = self._view, self._view
         if view.segments is None or self._edges is None or not (everywhere or self._theirs.near[person]):
-            return unfiltered(view) if everywhere else view
+            return with_all_segments(view) if everywhere else view
         asked = view.accepted
         if everywhere or asked is None:
-            asked = findable(view.segments, view.still)
+            asked = foreground_segments(view.segments, view.is_static)
         theirs = asked & self._theirs.edges[person]
         if theirs.any():
             seen = with_segments(view, asked & ~theirs)
         elif everywhere:
-            seen = unfiltered(view)
+            seen = with_all_segments(view)
         if view.silhouette is None or self._outline is None:
             return seen
         mine = ~self._theirs.outline[person]
@@ -146,13 +152,13 @@ def _sampled(view: ViewEvidence) -> tuple[Samples | None, Samples | None]:
     if silhouette is None or not len(silhouette.points_px):
         return edges, None
     points = silhouette.points_px
-    return edges, sampled(Segments(points, silhouette.normals, np.arange(len(points) + 1)))
+    return edges, sample_segments(Segments(points, silhouette.normals, np.arange(len(points) + 1)))
 
 
 @lru_cache(maxsize=1)  # not made by the import, which would load a kernel
 def _nothing() -> Samples:
     """Samples of no segments."""
-    return sampled(Segments(np.empty((0, 2), np.float32), np.empty((0, 2), np.float32), np.zeros(1, np.int64)))
+    return sample_segments(Segments(np.empty((0, 2), np.float32), np.empty((0, 2), np.float32), np.zeros(1, np.int64)))
 
 
 # One call for all that is asked of a view: of a dozen calls each hands the interpreter's lock over and waits for it.
@@ -182,8 +188,12 @@ def _tell_apart(
     to_outline = np.empty((n_people, outline.pixels.points.shape[1]), np.float32)
     for person in range(n_people):
         m = _take_own(person, n, contour, surfaces.people, own, boxes[person])
-        nearest_alongside(edges.pixels.points, edges.pixels.rows, own[:m], reach, MAX_ANGLE_RAD, to_edges[person])
-        nearest_alongside(outline.pixels.points, outline.pixels.rows, own[:m], reach, MAX_ANGLE_RAD, to_outline[person])
+        nearest_parallel_segment(
+            edges.pixels.points, edges.pixels.rows, own[:m], reach, MAX_ANGLE_RAD, to_edges[person]
+        )
+        nearest_parallel_segment(
+            outline.pixels.points, outline.pixels.rows, own[:m], reach, MAX_ANGLE_RAD, to_outline[person]
+        )
     for a in range(n_people):
         for b in range(n_people):
             if a != b and _meet(boxes[a], boxes[b], reach):
@@ -199,7 +209,7 @@ def _take_own(person: int, n: int, contour: Contour, people: NDArray[np.int64], 
     box[:2], box[2:] = np.inf, -np.inf
     m = 0
     for i in range(n):
-        if contour.hidden[i] or people[contour.parts[i]] != person:
+        if contour.occluded[i] or people[contour.parts[i]] != person:
             continue
         for k in range(4):
             own[m, k] = contour.pieces_px[i, k]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import held
+from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.motion.prediction import PredictSettings, predict
 from tracker.tracking import confidence
@@ -71,7 +71,7 @@ class Memory:
         return self._expected(settings, [*self.past[:-1], self._expected(settings, self.past[:-1])])
 
     def _expected(self, settings: PredictSettings, past: list[Array]) -> Array:
-        return held(self.model, predict(self.model, past, settings), past[-1], self.free)
+        return with_locked_dofs(self.model, predict(self.model, past, settings), past[-1], self.free)
 
     def suspects(self, found: Quality) -> list[Limb]:
         """Limbs worth a search that may move, likeliest to be lost first."""

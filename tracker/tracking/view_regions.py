@@ -8,7 +8,7 @@ from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.geometry.arrays import FloatArray
 from tracker.geometry.cameras import Camera, Region
-from tracker.images.matching_view import region_around
+from tracker.images.working_view import region_around
 
 _NEAREST_M = 0.3
 """Bodies nearer to a camera, and those behind it, count as this near."""
@@ -62,7 +62,7 @@ def _holds(outer: Region | None, inner: Region | None) -> bool:
 def visible_outline(bodies: Sequence[PosedBody], camera: Camera) -> FloatArray:
     """Visible pieces of the contours, x0, y0, x1, y1, (M, 4), px."""
     contour = occluding_contours.trace(bodies, camera)
-    return contour.pieces_px[~contour.hidden]
+    return contour.pieces_px[~contour.occluded]
 
 
 def px_per_m(cameras: Sequence[Camera], body: PosedBody) -> float:

@@ -13,7 +13,7 @@ from app.state.state import SizeDraft
 from tracker.body.dimensions import BodyDimensions, PartDimensions, mirror_part, scaled, sizes_of, with_sizes
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.posing.retarget import rebodied
+from tracker.posing.retarget import retarget_pose
 from tracker.session.session import save_model
 from tracker.store.records import Change, PoseChange
 
@@ -183,7 +183,7 @@ class Sizing:
             if record is None or record.model_revision == revision or not saver.fits(person, record.model_revision):
                 continue
             was, pins = saver.body(record.model_revision), saver.pins(person, row.frame)
-            values = rebodied(record.values, was, becomes, pins, cameras, screen.free(person))
+            values = retarget_pose(record.values, was, becomes, pins, cameras, screen.free(person))
             told = {"method": "refit", "model_revision": record.model_revision}
             pose = replace(
                 record, values=values, model_revision=revision, status="", cost_px=None, settings=told,

@@ -99,7 +99,7 @@ class Hand:
                 return
             before = self._screen.state.poses[drag.person]
             if mode != drag.mode:
-                self._hold = posing.hold_anew(self._hold, before, np.array(drag.pointer_px))
+                self._hold = posing.regrab(self._hold, before, np.array(drag.pointer_px))
                 drag = replace(drag, mode=mode)
             values = ways[mode](self._hold, np.array(pointer_px), before)
             seqs = (*(s for s in self._screen.state.drag_seqs if s[0] != page), (page, seq))[-16:]

@@ -14,7 +14,7 @@ from tracker.geometry.arrays import Array
 from tracker.posing import drag
 from tracker.posing.edits import bent_alike, limb_of, mirrored, taken_over
 from tracker.posing.orient import orient
-from tracker.posing.retarget import rebodied
+from tracker.posing.retarget import retarget_pose
 
 _SAME_GESTURE_S = 1.0
 """Changes of one slider, or steps of one joint, within this time of each other are one entry of the history."""
@@ -133,7 +133,7 @@ class PoseEdits:
                     f"expected a pose of {name} on frame {other} to copy, found none; choose another frame"
                 )
             assert stored.revision is not None
-            copied = rebodied(stored.values, self._screen.saver.body(stored.revision), model)
+            copied = retarget_pose(stored.values, self._screen.saver.body(stored.revision), model)
             values = taken_over(model, self._screen.state.poses[person], copied, self._screen.free(person))
             self._take(person, values, f"copy frame {other}")
 

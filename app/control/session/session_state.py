@@ -13,12 +13,12 @@ from app.session.frame_cache import Frames
 from app.state.state import Shown, State, finite_or_none
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import held
+from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.triangulation import PointObservation
-from tracker.posing.default_pose import standing_pose
-from tracker.posing.retarget import rebodied
+from tracker.posing.default_pose import default_pose
+from tracker.posing.retarget import retarget_pose
 from tracker.session.locked_dofs import free_of
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import pose_cost
@@ -66,7 +66,7 @@ class Screen:
     def present_poses(self) -> tuple[Array, ...]:
         """The poses shown, taken over into the present bodies where they were made with others, (n_values,) each."""
         bodies = zip(self.state.poses, self.state.models, self.present, strict=True)
-        return tuple(rebodied(values, was, becomes) for values, was, becomes in bodies)
+        return tuple(retarget_pose(values, was, becomes) for values, was, becomes in bodies)
 
     def free(self, person: int) -> NDArray[np.bool_]:
         """The degrees of freedom of a person that may move, (n_dofs,): those that are not locked."""
@@ -75,7 +75,7 @@ class Screen:
     def within_locks(self, poses: Sequence[Array]) -> tuple[Array, ...]:
         """Poses, (n_values,) of each person, with what is locked as it is shown."""
         return tuple(
-            held(model, new, now, self.free(i)) if self.state.locked[i] else new
+            with_locked_dofs(model, new, now, self.free(i)) if self.state.locked[i] else new
             for i, (model, new, now) in enumerate(zip(self.models, poses, self.state.poses, strict=True))
         )
 
@@ -85,7 +85,7 @@ class Screen:
         self._R_world_up = R_world_up
         middle = (len(self.present) - 1) / 2
         self._standing = tuple(
-            standing_pose(model, cameras, R_world_up, _APART_M * (i - middle)) for i, model in enumerate(self.present)
+            default_pose(model, cameras, R_world_up, _APART_M * (i - middle)) for i, model in enumerate(self.present)
         )
 
     def embody(self, session: Session) -> None:

@@ -79,9 +79,9 @@ def test_visible_and_hidden_contours_are_what_the_tracing_says(controller):
     traced = occluding_contours.trace(
         [PosedBody(session.people[0].model, state.poses[0])], session.cameras[1].camera.pinhole
     )
-    assert 0 < traced.hidden.sum() < len(traced.hidden)
+    assert 0 < traced.occluded.sum() < len(traced.occluded)
     paths = drawn(controller, state, view=view_of("contours", "hidden"))
-    for kind, those in (("hidden", traced.hidden), ("model", ~traced.hidden)):
+    for kind, those in (("hidden", traced.occluded), ("model", ~traced.occluded)):
         (path,) = kinds_of(paths, kind, camera=1)
         np.testing.assert_array_equal(path.segments_px, traced.pieces_px[those])
         assert path.color == session.people[0].color

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tracker.contours.occluding_contours import surfaces_of
-from tracker.contours.visibility import LANES, hide
+from tracker.contours.visibility import LANES, mark_occluded
 from tracker.formats.model_toml import parse_model
 
 PARTS = {
@@ -31,13 +31,13 @@ def one_part(text):
 
 
 def blocked(model, points, eye, margin=0.0):
-    """What `hide` says of points in the part's frame."""
+    """What `mark_occluded` says of points in the part's frame."""
     surfaces = surfaces_of((model,))
     axes = surfaces.half_axes[0]
     Q = np.column_stack([np.diag(1 / axes), np.zeros(3), eye / axes]).astype(np.float32)
     out, room = np.zeros(len(points), bool), len(points) + LANES
     middles = np.pad(points.T, ((0, 0), (0, LANES))).astype(np.float32)
-    hide(0, surfaces.solids, Q, margin, middles, 0, len(points), np.empty((2, room), np.float32), out)
+    mark_occluded(0, surfaces.solids, Q, margin, middles, 0, len(points), np.empty((2, room), np.float32), out)
     return out
 
 
@@ -76,7 +76,7 @@ def test_what_is_hidden_stays_hidden():
     surfaces = surfaces_of((model,))
     Q = np.column_stack([np.eye(3), np.zeros(3), (50.0, 0, 0)]).astype(np.float32)
     out = np.array([True, False])
-    hide(
+    mark_occluded(
         0,
         surfaces.solids,
         Q,

@@ -4,14 +4,14 @@ import pytest
 
 from tracker.images.background_subtraction import smoothed
 from tracker.images.edges import Levels, detect_edges, levels
-from tracker.images.image_statistics import Probes
+from tracker.images.image_statistics import SampleGrid
 
 COLUMN = 30
 
 
 def found(image, foreground=None):
     """Edges of a whole image, (H, W) bool, with the thresholds that it calls for itself."""
-    strengths = Probes(image.shape[1::-1], 1.0).read(image).strengths
+    strengths = SampleGrid(image.shape[1::-1], 1.0).measure(image).strengths
     edges = detect_edges(smoothed(image), levels(strengths, restricted=foreground is not None), foreground)
     assert edges.found.dtype == np.uint8
     return edges.found > 0

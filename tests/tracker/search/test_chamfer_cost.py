@@ -275,15 +275,15 @@ def by_hand(cost, views, model, values, piece_px):
     for view in range(len(views)):
         v, theta = views[view], default_theta_px(views[view].camera)
         contour = occluding_contours.trace([PosedBody(model, values)], v.camera, piece_px)
-        pieces = contour.pieces_px[~contour.hidden]
+        pieces = contour.pieces_px[~contour.occluded]
         middles, lengths = (pieces[:, :2] + pieces[:, 2:]) / 2, np.linalg.norm(pieces[:, 2:] - pieces[:, :2], axis=1)
         inside = np.clip(middles, 0, np.array(v.camera.size) - 1)
         sampled = cv2.remap(v.distance, inside[None].astype(np.float32), None, cv2.INTER_LINEAR)[0]
         forward = np.minimum(sampled + np.linalg.norm(middles - inside, axis=1), theta)
         t = np.linspace(0, 1, 9)[:, None, None]
         along = (pieces[:, :2] + t * (pieces[:, 2:] - pieces[:, :2])).reshape(-1, 2)
-        first = cost._scene.firsts[view]
-        scene = cost._scene.points[:, first : first + cost._scene.counts[view]].T
+        first = cost._arrays.firsts[view]
+        scene = cost._arrays.points[:, first : first + cost._arrays.counts[view]].T
         backward = np.minimum(cKDTree(along).query(scene)[0], theta)
         total.append((np.average(forward, weights=lengths) + backward.mean()) / 2)
     return np.mean(total)

@@ -10,8 +10,8 @@ from staging import SUIT, cameras_around, dressed, own_evidence, posed
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
-from tracker.fitting.contour_residuals import ContourMatch
-from tracker.fitting.gauss_newton import StayNear, solve
+from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 from tracker.tracking.confidence import LimbFigures, Quality, judge, quality, reason, worst
 
@@ -130,8 +130,8 @@ def judged(model, truth, values, colors=False):
     """Quality of a pose before the evidence of another one."""
     bodies = [PosedBody(model, truth)]
     views = dressed(bodies, cameras_around(), SUIT) if colors else own_evidence(bodies, cameras_around())
-    match = ContourMatch(views, [PosedBody(model, values)])
-    fit = solve(model, values, [match, StayNear(values, np.full(model.n_dofs, 5.0))], max_iterations=0)
+    match = ContourResiduals(views, [PosedBody(model, values)])
+    fit = solve(model, values, [match, PosePrior(values, np.full(model.n_dofs, 5.0))], max_iterations=0)
     thetas = np.array([v.theta_px for v in views])
     score = None
     if colors:

@@ -7,7 +7,7 @@ from staging import at, camera_at, own_evidence, solid
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import Silhouette, with_segments
 from tracker.images.edge_segments import Segments
-from tracker.images.silhouette_outline import Outline
+from tracker.images.silhouette_contour import SilhouetteContour
 from tracker.tracking.evidence_assignment import Shares, Sharing, _tell_apart
 
 BALL = solid((0.15, 0.15, 0.3))
@@ -19,7 +19,9 @@ def seen(bodies, camera=FRONT):
     (view,) = own_evidence(bodies, [camera])
     each = Segments(view.points_px, view.normals, np.arange(len(view.points_px) + 1))
     inside = np.zeros((camera.height, camera.width), bool)
-    outline = Silhouette(inside, view.points_px, view.normals, 1.0, Outline(view.points_px, view.normals), 40.0)
+    outline = Silhouette(
+        inside, view.points_px, view.normals, 1.0, SilhouetteContour(view.points_px, view.normals), 40.0
+    )
     return replace(view, segments=each, silhouette=outline)
 
 
@@ -48,7 +50,7 @@ def own_segments(view, bodies, person):
     contour, theta = occluding_contours.trace(bodies, view.camera), view.theta_px
     owners = occluding_contours.surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
     own, others = (
-        mean_distances(view.segments, contour.pieces_px[~contour.hidden & of], 2 * theta)
+        mean_distances(view.segments, contour.pieces_px[~contour.occluded & of], 2 * theta)
         for of in (owners == person, owners != person)
     )
     clear = np.minimum(np.abs(others - 0.5 * theta), np.abs(others - 0.5 * own))
@@ -95,7 +97,7 @@ def test_all_edges_are_those_refused_too_but_not_the_rooms():
     view = seen(bodies)
     n = len(view.segments.firsts) - 1
     refused, still = np.arange(n) % 3 == 0, np.arange(n) % 5 == 0
-    filtered = with_segments(replace(view, still=still), ~refused & ~still)
+    filtered = with_segments(replace(view, is_static=still), ~refused & ~still)
     sharing = Sharing([filtered])
     near, everywhere = (Shares(sharing, bodies).own(0, everywhere=e)[0] for e in (False, True))
     whole = Shares(Sharing([view]), bodies).own(0, everywhere=True)[0].accepted
@@ -159,7 +161,7 @@ def test_a_hidden_contour_explains_nothing():
     stripe = seen([far])  # edges as of the hidden one, on the near one
     assert (
         occluding_contours.trace([near, far], FRONT)
-        .hidden[occluding_contours.trace([near, far], FRONT).parts == 1]
+        .occluded[occluding_contours.trace([near, far], FRONT).parts == 1]
         .all()
     )
     (own,) = Shares(Sharing([stripe]), [near, far]).own(0)

@@ -70,7 +70,7 @@ def floor_shadow(vertices_world: Array, faces: IntArray) -> NDArray[np.float32]:
 
 
 def see_room(camera: Camera, seed: int) -> Backdrop:
-    """Look at the empty room, furnished by a random seed."""
+    """RegionFeatures at the empty room, furnished by a random seed."""
     boxes = furnished(seed)
     samples = camera.scaled(SAMPLES)
     u, v = np.meshgrid(np.arange(samples.width), np.arange(samples.height))

@@ -18,9 +18,9 @@ from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.contour_residuals import ContourMatch
-from tracker.fitting.gauss_newton import held
-from tracker.fitting.interpenetration import KeepBodiesApart
+from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.fitting.gauss_newton import with_locked_dofs
+from tracker.fitting.interpenetration import BodyPenetration
 from tracker.geometry.arrays import Array
 from tracker.tracking.chamfer.forward_pass import summed_up, track_forward
 from tracker.tracking.chamfer.frame_estimator import Scene
@@ -130,7 +130,7 @@ def _back(
     start = [[f.poses[p] for f in ahead] for p in range(len(subjects.models))]
     given = {f.frame: {p: v for p, v in enumerate(f.poses) if p != person} for f in found[first : end + 1]}
     # What is locked goes on from there as it was found in the stretch.
-    given[found[end].frame][person] = held(
+    given[found[end].frame][person] = with_locked_dofs(
         subjects.models[person], found[end].poses[person], found[first].poses[person], subjects.active_dofs[person]
     )
     frames = [f.frame for f in reversed(found[first : end + 1])]
@@ -170,7 +170,7 @@ class _Choice:
         """Carry the poses through the stretch; the index of each frame that was come to."""
         locked = self._found[0].poses[self._person]
         ends = [e[i].poses[self._person] if e else None for e, i in ((self._before, -1), (self._after, 0))]
-        ends = [None if e is None else held(self._model, e, locked, self._free) for e in ends]
+        ends = [None if e is None else with_locked_dofs(self._model, e, locked, self._free) for e in ends]
         yield from carry(self._options, self._sight, ends)
 
     def better(self) -> tuple[PoseEstimate, ...]:
@@ -193,13 +193,13 @@ class _Choice:
     def _look(self, i: int) -> Sight:
         person, settings = self._person, self._settings
         bodies, views = self._bodies(i, self._found[i].poses[person]), self._views(i)
-        match = ContourMatch(views, bodies, person, settings.match, settings.theta_px, everywhere=True)
-        apart = [KeepBodiesApart(bodies, person, settings.apart)] if len(bodies) > 1 and settings.apart > 0 else []
+        match = ContourResiduals(views, bodies, person, settings.match, settings.theta_px, everywhere=True)
+        apart = [BodyPenetration(bodies, person, settings.apart)] if len(bodies) > 1 and settings.apart > 0 else []
         return Sight(self._model, match, Colors(views, bodies, person), self._known, apart, settings, self._free)
 
     def _observed(self, i: int) -> tuple[ViewEvidence, ...]:
         """The evidence of a frame around what both passes found there, by which all poses are judged."""
-        cameras = self._observer.matched_cameras
+        cameras = self._observer.working_cameras
         guesses = [self._bodies(i, e.poses[self._person]) for e in (self._found[i], self._back[i])]
         outlines = [np.concatenate([visible_outline(g, c) for g in guesses]) for c in cameras]
         where = regions(cameras, [body for g in guesses for body in g])
@@ -231,4 +231,4 @@ def _bodies(models: Sequence[BodyModel], poses: Sequence[Array]) -> list[PosedBo
 def _colors(observer: Observer, models: Sequence[BodyModel], where: TrackedFrame, person: int) -> Colors:
     """The colours under a person on a frame on which they were not lost."""
     bodies = _bodies(models, where.poses)
-    return Colors(observer.evidence(where.frame, regions(observer.matched_cameras, bodies)), bodies, person)
+    return Colors(observer.evidence(where.frame, regions(observer.working_cameras, bodies)), bodies, person)

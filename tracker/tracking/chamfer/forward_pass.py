@@ -7,7 +7,7 @@ from tracker.compute.threads import side_by_side
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Region
-from tracker.images.static_edges import Scenery
+from tracker.images.static_edges import StaticEdgeModel
 from tracker.motion.prediction import PredictSettings
 from tracker.tracking.chamfer.frame_estimator import Found, Scene
 from tracker.tracking.chamfer.settings import TrackSettings, pose_cost
@@ -29,8 +29,8 @@ def track_forward(run: TrackingRun, settings: TrackSettings) -> Iterator[PoseEst
         Memory(m, start, active, alone=not several)
         for m, start, active in zip(models, run.start, subjects.active_dofs, strict=True)
     ]
-    scenery = [Scenery(c.size) for c in observer.matched_cameras] if settings.segments else None
-    cameras, ahead = observer.matched_cameras, list[Region | None]()
+    static_edges = [StaticEdgeModel(c.size) for c in observer.working_cameras] if settings.segments else None
+    cameras, ahead = observer.working_cameras, list[Region | None]()
 
     def placed(frame: int, expected: Callable[[Memory, PredictSettings], Array]) -> list[PosedBody]:
         """Everybody on a frame, where they are given or expected."""
@@ -45,24 +45,24 @@ def track_forward(run: TrackingRun, settings: TrackSettings) -> Iterator[PoseEst
         if i == 0:  # who goes on from known poses looks where who never stopped would have
             if several and all(len(m.past) > 1 for m in memories):
                 ahead = regions_ahead(cameras, placed(frame, Memory.was_expected))
-            observer.prefetch(frame, ahead or None, still=scenery is not None)
+            observer.prefetch(frame, ahead or None, with_static_edges=static_edges is not None)
         given, bodies = subjects.keyframes_at(frame), placed(frame, Memory.expected)
         sought, poses = [p for p in subjects.tracked if p not in given], [b.values for b in bodies]
         where = confirmed(ahead, cameras, bodies) if ahead else regions(cameras, bodies)
         following = frames[i + 1 : i + 2]
         for k in following if several else ():
             ahead = regions_ahead(cameras, placed(k, Memory.expected_ahead))
-            observer.prefetch(k, ahead, still=scenery is not None)
+            observer.prefetch(k, ahead, with_static_edges=static_edges is not None)
         outlines = [visible_outline(bodies, c) for c in cameras] if settings.segments else None
-        views = observer.evidence(frame, where, outlines, scenery)
+        views = observer.evidence(frame, where, outlines, static_edges)
         for k in () if several else following:  # of one alone no sooner: all cores were busy with this frame
             observer.prefetch(k)
         scene = Scene(views, memories, poses, settings)
         estimates = scene.estimate(sought)
         found = [estimates[p] if p in estimates else scene.held(p) for p in range(len(models))]
         _remember(memories, scene, found, given)
-        if scenery is not None:
-            scene.teach(scenery)
+        if static_edges is not None:
+            scene.teach(static_edges)
         yield summed_up(frame, views, models, scene.poses, found, settings)
 
 

@@ -18,13 +18,13 @@ from tracker.body.limbs import Limb, limb_display_name
 from tracker.body.model import PosedBody
 from tracker.compute.threads import side_by_side
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
-from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch, PartCosts
-from tracker.fitting.gauss_newton import Block, Fit, covariance, held
-from tracker.fitting.gauss_newton_compiled import solve
-from tracker.fitting.interpenetration import KeepBodiesApart
+from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals, PartCosts
+from tracker.fitting.gauss_newton import Fit, ResidualBlock, covariance, with_locked_dofs
+from tracker.fitting.gauss_newton_compiled import solve_compiled
+from tracker.fitting.interpenetration import BodyPenetration
 from tracker.geometry.arrays import Array
-from tracker.images.static_edges import Scenery
-from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings
+from tracker.images.static_edges import StaticEdgeModel
+from tracker.search.best_first import COARSE_SEARCH, SearchSettings
 from tracker.tracking import confidence
 from tracker.tracking.chamfer.limb_recovery import LEAST_GAIN, Judge, for_several, search_limbs
 from tracker.tracking.chamfer.settings import TrackSettings, prior_blocks, search_frame
@@ -70,7 +70,7 @@ def _in_doubt(found: Found, remark: str, others: Sequence[tuple[Array, ...]]) ->
 class _Seen(NamedTuple):
     """One person as far as they are found."""
 
-    match: ContourMatch
+    match: ContourResiduals
     """The evidence that they were fitted to."""
     poses: tuple[Array, ...]
     """Where everybody stood when that was made, (n_values,) each."""
@@ -109,12 +109,12 @@ class Scene:
         self._placed: dict[tuple[int, int], PosedBody] = {}  # poses are kept: no other gets their number
         self._thetas = np.array([v.outlier_px(settings.theta_px) for v in views])
 
-    def teach(self, scenery: Sequence[Scenery]) -> None:
+    def teach(self, static_edges: Sequence[StaticEdgeModel]) -> None:
         """Show what remembers the room the edges away from everybody, of views whose silhouette nothing tells."""
-        for view, room in zip(self._views, scenery, strict=True):
+        for view, room in zip(self._views, static_edges, strict=True):
             if view.segments is not None and view.silhouette is None:
                 pieces = visible_outline(self._bodies(), view.camera)
-                room.learn(view.segments, view.corner_px, view.camera.size, pieces, ACCEPTED_SHARE * view.theta_px)
+                room.update(view.segments, view.corner_px, view.camera.size, pieces, ACCEPTED_SHARE * view.theta_px)
 
     def colors(self, person: int) -> Colors:
         """The colours of this frame under a person."""
@@ -130,7 +130,7 @@ class Scene:
         """Judge a person where they stand, with poses that are about as good, (n_values,) each."""
         match = self._match(person, everywhere=True)
         blocks, free = [match, *self._priors(person)], self._memories[person].free
-        fit = solve(self._models[person], self.poses[person], blocks, free, max_iterations=0)
+        fit = solve_compiled(self._models[person], self.poses[person], blocks, free, max_iterations=0)
         return self._judged(person, _Seen(match, tuple(self.poses), fit, rivals=tuple(rivals)))
 
     def estimate(self, people: Sequence[int]) -> dict[int, Found]:
@@ -154,7 +154,7 @@ class Scene:
         match = self._match(person)
         evaluations, values = self._search(person, self.poses[person], self._settings.search)
         blocks = [match, *self._priors(person)]
-        fit = solve(self._models[person], values, blocks, self._memories[person].free, max_iterations=0)
+        fit = solve_compiled(self._models[person], values, blocks, self._memories[person].free, max_iterations=0)
         self.poses[person] = values
         return _Seen(match, tuple(self.poses), fit, evaluations=evaluations)
 
@@ -164,9 +164,12 @@ class Scene:
         match = self._match(person, everywhere=anew is not None)
         blocks = [match, *self._priors(person, anew or ())]
         model, free = self._models[person], self._memories[person].free
-        gain = WORTH_A_STEP if len(self._models) > 1 else 0.0  # who moves a little is refined again with the others
-        poses, fit = tuple(self.poses), solve(model, self.poses[person], blocks, free, _ITERATIONS, _TOLERANCE, gain)
-        self.poses[person] = fit.values
+        gain = MIN_DECREASE if len(self._models) > 1 else 0.0  # who moves a little is refined again with the others
+        poses, fit = (
+            tuple(self.poses),
+            solve_compiled(model, self.poses[person], blocks, free, _ITERATIONS, _TOLERANCE, gain),
+        )
+        self.poses[person] = fit.pose
         if before is None:
             return _Seen(match, poses, fit)
         return before._replace(match=match, poses=poses, fit=fit, told=None)
@@ -215,7 +218,7 @@ class Scene:
         own = dict(zip(due, self._own([*due], everywhere=True), strict=True))
         anew = side_by_side(lambda p: self._recovered(p, seen[p], due[p], own[p]), [*due])
         for person, recovered in zip(due, anew, strict=True):
-            seen[person], self.poses[person] = recovered, recovered.fit.values
+            seen[person], self.poses[person] = recovered, recovered.fit.pose
 
     def _recovered(self, person: int, seen: _Seen, due: Sequence[Limb], own: Sequence[ViewEvidence]) -> _Seen:
         """Search limbs whose turn it is, and the body if it is lost, among all edges.
@@ -229,7 +232,7 @@ class Scene:
         model, free, suspects = memory.model, memory.free, tuple(memory.suspects(found))
         priors = self._priors(person, suspects)
         match, poses = self._match_on(own, person, everywhere=True), tuple(self.poses)
-        fit = solve(model, seen.fit.values, [match, *priors], free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
+        fit = solve_compiled(model, seen.fit.pose, [match, *priors], free, _ITERATIONS, _TOLERANCE, gain=MIN_DECREASE)
         if not due and not found.body_lost:  # whose turn it is not yet are no longer drawn to what was predicted
             return _Seen(match, poses, fit, suspects)
         colors = Colors(own, *self._around(person))
@@ -242,12 +245,12 @@ class Scene:
             remarks.append("body searched anew")
         others = (memory.past[-1], self._predicted[person])
         better, rivals = search_limbs(model, due, fit, others, judge, _ITERATIONS)
-        turned = np.abs(model.difference(better.values, fit.values))
+        turned = np.abs(model.difference(better.pose, fit.pose))
         for limb in due:
             memory.searched(limb, found, turned[limb.dofs].max() > _MOVED_RAD)
             if turned[limb.dofs].max() > _ANEW_RAD:
                 remarks.append(f"{limb_display_name(limb.name)} searched anew")
-        return _Seen(match, poses, better, suspects, None, evaluations, tuple(remarks), tuple(r.values for r in rivals))
+        return _Seen(match, poses, better, suspects, None, evaluations, tuple(remarks), tuple(r.pose for r in rivals))
 
     def _judged(self, person: int, seen: _Seen) -> Found:
         """What was found of a person, with the judgement of it."""
@@ -259,7 +262,7 @@ class Scene:
         if not seen.rivals:
             return out
         model = self._models[person]
-        turned = np.abs([model.difference(rival, seen.fit.values) for rival in seen.rivals]).max(axis=0)
+        turned = np.abs([model.difference(rival, seen.fit.pose) for rival in seen.rivals]).max(axis=0)
         names = [limb_display_name(x.name) for x in confidence.limbs(model) if turned[x.dofs].max() > _ANEW_RAD]
         remark = f"{' and '.join(names) or 'body'} may be elsewhere"
         return _in_doubt(out, remark, [self._with(person, rival) for rival in seen.rivals])
@@ -289,7 +292,7 @@ class Scene:
         excess = 0.0
         for i, other in ((p, q), (q, p)):
             model, expected = self._models[i], self._priors(i)[0]
-            costs = [expected.normal(model, self.poses[k], model.kinematics(self.poses[k])).cost for k in (other, i)]
+            costs = [expected.linearize(model, self.poses[k], model.kinematics(self.poses[k])).cost for k in (other, i)]
             excess += costs[0] - costs[1]
         return excess < _MOST_EXCESS
 
@@ -302,7 +305,7 @@ class Scene:
         """Where everybody stands, but for one person."""
         return (*self.poses[:person], values, *self.poses[person + 1 :])
 
-    def _priors(self, person: int, suspects: Sequence[Limb] = ()) -> list[Block]:
+    def _priors(self, person: int, suspects: Sequence[Limb] = ()) -> list[ResidualBlock]:
         """What holds a pose besides the image: its prediction, but for limbs that seem lost, how people bend, and the
         others."""
         settings, model = self._settings, self._models[person]
@@ -312,16 +315,20 @@ class Scene:
             sigma[limb.dofs] = settings.recover.trust_rad
         blocks = prior_blocks(model, self._predicted[person], sigma)
         if len(self._models) > 1 and settings.apart > 0:
-            blocks.append(KeepBodiesApart(self._bodies(), person, settings.apart))
+            blocks.append(BodyPenetration(self._bodies(), person, settings.apart))
         return blocks
 
     def _search_body(self, person: int, fit: Fit, judge: Judge) -> tuple[int, Fit]:
         """Best-first search from the prediction and from the last good pose; the best of what refines from there."""
         memory, predicted, best, evaluations = self._memories[person], self._predicted[person], fit, 0
         for start in (predicted, memory.last_good):
-            scored, values = self._search(person, held(memory.model, start, predicted, memory.free), BEFORE_REFINEMENT)
+            scored, values = self._search(
+                person, with_locked_dofs(memory.model, start, predicted, memory.free), COARSE_SEARCH
+            )
             evaluations += scored
-            refined = solve(memory.model, values, judge.blocks, memory.free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
+            refined = solve_compiled(
+                memory.model, values, judge.blocks, memory.free, _ITERATIONS, _TOLERANCE, gain=MIN_DECREASE
+            )
             if judge.cost(refined) < judge.cost(best):
                 best = refined
         return evaluations, best
@@ -335,16 +342,16 @@ class Scene:
         masks = None if free is None else [free] * len(bodies)  # only that of the person counts
         for step in search_frame(self._views, models, poses, replace(self._settings, search=how), [index], masks):
             found, evaluations = step.best[index], step.evaluations
-        return evaluations, held(self._models[person], found, start, free)
+        return evaluations, with_locked_dofs(self._models[person], found, start, free)
 
     def _told(self, person: int, seen: _Seen) -> tuple[Quality, PartCosts]:
         known, colors = self._memories[person].known, None
         if known is not None:
-            colors = self.colors(person).score(seen.fit.values, known), known
+            colors = self.colors(person).score(seen.fit.pose, known), known
         trusts = np.array([0.0 if v.silhouette is None else v.silhouette.trust for v in self._views])
-        body = self._body(person, seen.fit.values)
+        body = self._body(person, seen.fit.pose)
         scale = px_per_m([v.camera for v in self._views], body)
-        costs = seen.match.part_costs(seen.fit.values)
+        costs = seen.match.part_costs(seen.fit.pose)
         return confidence.quality(body, seen.fit, costs, self._thetas, trusts, scale, colors), costs
 
     def _parts_px(self, costs: PartCosts) -> Array:
@@ -354,17 +361,17 @@ class Scene:
         far = np.nansum(costs.forward_px * costs.length_px / scales[:, None] ** 2, axis=0)
         return np.divide(far, length, out=np.full_like(length, np.nan), where=length > 0)
 
-    def _match(self, person: int, everywhere: bool = False) -> ContourMatch:
+    def _match(self, person: int, everywhere: bool = False) -> ContourResiduals:
         """The residuals of a person's contours against evidence of their own, the others where they stand."""
         (own,) = self._own([person], everywhere)
         return self._match_on(own, person, everywhere)
 
-    def _match_on(self, own: Sequence[ViewEvidence], person: int, everywhere: bool) -> ContourMatch:
+    def _match_on(self, own: Sequence[ViewEvidence], person: int, everywhere: bool) -> ContourResiduals:
         bodies, index = self._around(person)
         settings = self._settings
         # Of segments a prediction accepts those near it: to look for what is farther costs more than it saves.
         everywhere = everywhere or settings.segments
-        return ContourMatch(own, bodies, index, settings.match, settings.theta_px, everywhere)
+        return ContourResiduals(own, bodies, index, settings.match, settings.theta_px, everywhere)
 
     def _own(self, people: Sequence[int], everywhere: bool = False) -> list[tuple[ViewEvidence, ...]]:
         """Of each of some people the evidence without what the others explain, as it was shared out when everybody

@@ -20,9 +20,9 @@ from tracker.body.kinematics import chain_poses
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
 from tracker.compute.threads import N_HELPERS, dealt_out, helpers
-from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch
-from tracker.fitting.gauss_newton import Block, Fit
-from tracker.fitting.gauss_newton_compiled import solve
+from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals
+from tracker.fitting.gauss_newton import Fit, ResidualBlock
+from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.geometry.arrays import Array, IntArray
 
 T = TypeVar("T")
@@ -75,8 +75,8 @@ class RecoverSettings:
 class Judge:
     """Compares poses of one person on one frame: contours, colours and priors together."""
 
-    match: ContourMatch
-    priors: Sequence[Block]
+    match: ContourResiduals
+    priors: Sequence[ResidualBlock]
     colors: Colors
     known: PartColors | None
     """Colours of the parts; None where nobody has shown them."""
@@ -85,18 +85,18 @@ class Judge:
     """The degrees of freedom that may move, (n_dofs,); None: all. Limbs are given without the others."""
 
     @property
-    def blocks(self) -> list[Block]:
-        """What `fit.solve` is to minimize."""
+    def blocks(self) -> list[ResidualBlock]:
+        """What `gauss_newton.solve` is to minimize."""
         return [self.match, *self.priors]
 
     @cached_property
     def _for_threads(self) -> list["Judge"]:
-        return [replace(self, match=self.match.twin()) for _ in range(N_HELPERS)]
+        return [replace(self, match=self.match.clone_for_thread()) for _ in range(N_HELPERS)]
 
     def of_limb(self, limb: Limb) -> "Judge":
         """The same, quicker, for poses that differ in a limb alone; not to be used beside this one."""
         out = replace(self)
-        out.__dict__["_for_threads"] = [replace(j, match=j.match.of_parts(limb.parts)) for j in self._for_threads]
+        out.__dict__["_for_threads"] = [replace(j, match=j.match.restricted_to(limb.parts)) for j in self._for_threads]
         return out
 
     def each(self, work: Callable[["Judge", Array], T], poses: Sequence[Array] | Array) -> list[T]:
@@ -106,7 +106,7 @@ class Judge:
 
     def cost(self, fit: Fit) -> float:
         """Cost of a refined pose with its colours."""
-        return fit.cost + float(self._of_colors(fit.values[None])[0])
+        return fit.cost + float(self._of_colors(fit.pose[None])[0])
 
     def costs(self, candidates: Array) -> Array:
         """Costs of poses, (n, n_values), without refinement, (n,); priors are left to the refinement."""
@@ -145,7 +145,7 @@ def for_several(settings: RecoverSettings) -> RecoverSettings:
     best after half of the rounds. How places look is no reason to give up: a leg that stands where the other belongs
     looks best where it is.)
     """
-    return replace(settings, scored=min(32, settings.scored), anew=False, gain=WORTH_A_STEP, finish=10.0)
+    return replace(settings, scored=min(32, settings.scored), anew=False, gain=MIN_DECREASE, finish=10.0)
 
 
 def search_limbs(
@@ -171,7 +171,7 @@ def search_limbs(
         kept = [x for x in kept if x.cost < kept[0].cost + margin]
         enough = kept[0].cost + (finish if limb is suspects[-1] else max(finish, margin))
         away = [p for x in suspects if x is not limb for p in x.parts]
-        poses = [x.fit.values for x in kept]
+        poses = [x.fit.pose for x in kept]
         together = [[pose] for pose in poses] if judge.settings.anew else [poses]
         found = [
             x for some in together for x in _search_limb(model, limb, away, some, others, judge, iterations, enough)
@@ -204,11 +204,13 @@ def _search_limb(
     """
 
     def alone(judge: Judge, pose: Array) -> _Found:
-        fit = solve(model, pose, judge.blocks, limb.dofs, max_iterations=4, tolerance=1e-2, gain=WORTH_A_STEP)
+        fit = solve_compiled(model, pose, judge.blocks, limb.dofs, max_iterations=4, tolerance=1e-2, gain=MIN_DECREASE)
         return _Found(fit, judge.cost(fit))
 
     def whole(judge: Judge, pose: Array) -> _Found:
-        fit = solve(model, pose, judge.blocks, judge.free, iterations, tolerance=1e-3, gain=judge.settings.gain)
+        fit = solve_compiled(
+            model, pose, judge.blocks, judge.free, iterations, tolerance=1e-3, gain=judge.settings.gain
+        )
         return _Found(fit, judge.cost(fit))
 
     of_limb = judge.of_limb(limb)
@@ -217,7 +219,7 @@ def _search_limb(
         poses = np.array([*poses, *(_with_limb(model, k, pose, limb) for k in kept[1:] for pose in poses)])
         poses = poses[np.argsort(of_limb.costs(poses), kind="stable")[: judge.settings.refined]]
     tried = [x for x in of_limb.each(alone, poses) if x.cost < enough]
-    return judge.each(whole, [x.fit.values for x in _distinct(model, tried, judge.settings.finished, _SAME_M)])
+    return judge.each(whole, [x.fit.pose for x in _distinct(model, tried, judge.settings.finished, _SAME_M)])
 
 
 def _candidates(
@@ -225,7 +227,7 @@ def _candidates(
 ) -> Array:
     """The few poses of a limb that are worth a refinement, (n, n_values)."""
     settings = judge.settings
-    look = judge.colors.look(here, limb.parts, judge.known, away)
+    look = judge.colors.limb_scorer(here, limb.parts, judge.known, away)
     proposals = _proposals(model, limb, here, settings)
     looks = np.concatenate(_in_parts(look, proposals))
     best = _best_apart(model, limb, proposals, looks, settings.improved, APART_M)
@@ -265,7 +267,7 @@ def _distinct(model: BodyModel, found: Sequence[_Found], n: int, apart_m: float)
     """The cheapest of several poses, no two of them nearer to each other than that, cheapest first."""
     if not found:
         return []
-    places = np.array([model.points_world(x.fit.values) for x in found])
+    places = np.array([model.points_world(x.fit.pose) for x in found])
     order = np.argsort([x.cost for x in found], kind="stable")
     return [found[i] for i in _apart(places, order, n, apart_m)]
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.model import BodyModel
 from tracker.compute.threads import N_HELPERS, dealt_out
-from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch
-from tracker.fitting.gauss_newton import Block
-from tracker.fitting.gauss_newton_compiled import solve
+from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals
+from tracker.fitting.gauss_newton import ResidualBlock
+from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.geometry.arrays import Array
 from tracker.tracking.chamfer.limb_recovery import APART_M, LEAST_GAIN
 from tracker.tracking.chamfer.settings import TrackSettings, prior_blocks
@@ -42,8 +42,8 @@ class Sight:
     """What one frame shows of one person: the cost of their poses, and its refinement."""
 
     def __init__(
-        self, model: BodyModel, match: ContourMatch, colors: Colors, known: PartColors | None,
-        apart: Sequence[Block], settings: TrackSettings, free: NDArray[np.bool_] | None,
+        self, model: BodyModel, match: ContourResiduals, colors: Colors, known: PartColors | None,
+        apart: Sequence[ResidualBlock], settings: TrackSettings, free: NDArray[np.bool_] | None,
     ) -> None:  # fmt: skip
         """Prepare it.
 
@@ -57,7 +57,7 @@ class Sight:
             free: the degrees of freedom that may move, (n_dofs,); None: all.
         """
         self._model, self._settings, self._free, self._apart = model, settings, free, list(apart)
-        self._matches = [match, *(match.twin() for _ in range(N_HELPERS - 1))]
+        self._matches = [match, *(match.clone_for_thread() for _ in range(N_HELPERS - 1))]
         self._colors, self._known = colors, known
 
     def costs(self, poses: Array) -> Array:
@@ -72,9 +72,9 @@ class Sight:
         model, settings = self._model, self._settings
         sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
 
-        def refine(match: ContourMatch, pose: Array) -> Array:
+        def refine(match: ContourResiduals, pose: Array) -> Array:
             blocks = [match, *prior_blocks(model, pose, sigma), *self._apart]
-            return solve(model, pose, blocks, self._free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP).values
+            return solve_compiled(model, pose, blocks, self._free, _ITERATIONS, _TOLERANCE, gain=MIN_DECREASE).pose
 
         return np.array(dealt_out(refine, self._matches, poses))
 
@@ -82,7 +82,7 @@ class Sight:
         """What a pose costs besides the image."""
         model, kinematics = self._model, self._model.kinematics(values)
         blocks = [*prior_blocks(model, values, np.ones(model.n_dofs)), *self._apart]
-        return sum(b.normal(model, values, kinematics).cost for b in blocks)
+        return sum(b.linearize(model, values, kinematics).cost for b in blocks)
 
 
 class Candidates:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MatchSettings
-from tracker.fitting.gauss_newton import Block, StayNear
-from tracker.fitting.interpenetration import KeepApart
+from tracker.fitting.gauss_newton import PosePrior, ResidualBlock
+from tracker.fitting.interpenetration import SelfPenetration
 from tracker.geometry.arrays import Array
 from tracker.motion.prediction import PredictSettings
 from tracker.search.best_first import SearchSettings, SearchStep, search
@@ -80,7 +80,7 @@ def search_frame(
     return search(cost, predicted, settings.search, people, free)
 
 
-def prior_blocks(model: BodyModel, expected: Array, sigmas: Array) -> list[Block]:
+def prior_blocks(model: BodyModel, expected: Array, sigmas: Array) -> list[ResidualBlock]:
     """What holds a pose besides the image: the one that is expected, how people bend, and that flesh keeps apart.
 
     Args:
@@ -88,4 +88,4 @@ def prior_blocks(model: BodyModel, expected: Array, sigmas: Array) -> list[Block
         expected: the pose, (n_values,).
         sigmas: its standard deviations, (n_dofs,), rad or metres.
     """
-    return [StayNear(expected, 1 / sigmas), StayNear(model.neutral(), 1 / model.spreads), KeepApart()]
+    return [PosePrior(expected, 1 / sigmas), PosePrior(model.neutral(), 1 / model.spreads), SelfPenetration()]

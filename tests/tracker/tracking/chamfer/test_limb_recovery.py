@@ -8,8 +8,8 @@ from staging import SUIT, cameras_around, dressed, own_evidence, posed
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
-from tracker.fitting.contour_residuals import ContourMatch
-from tracker.fitting.gauss_newton import StayNear, solve
+from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.formats.model_toml import load_model
 from tracker.tracking.chamfer import limb_recovery
 from tracker.tracking.chamfer.limb_recovery import Judge, RecoverSettings, for_several, search_limbs
@@ -34,8 +34,8 @@ class Staged:
         bodies = [PosedBody(model, truth)]
         views = dressed(bodies, cameras_around(4), SUIT)
         self.model, self.truth = model, truth
-        match = ContourMatch(views, [PosedBody(model, wrong)])
-        priors = [StayNear(wrong, np.full(model.n_dofs, 1.0))]
+        match = ContourResiduals(views, [PosedBody(model, wrong)])
+        priors = [PosePrior(wrong, np.full(model.n_dofs, 1.0))]
         known = Colors(views, bodies).learn() if colors else None
         self.judge = Judge(match, priors, Colors(views, [PosedBody(model, wrong)]), known, RecoverSettings())
         self.blocks = [match, *priors]
@@ -51,7 +51,7 @@ class Staged:
     def off_m(self, fit, parts):
         """Largest distance of the points of some parts from the truth, metres."""
         points = np.isin(self.model.point_parts, parts)
-        found, true = self.model.points_world(fit.values), self.model.points_world(self.truth)
+        found, true = self.model.points_world(fit.pose), self.model.points_world(self.truth)
         return np.linalg.norm(found - true, axis=1)[points].max()
 
 
@@ -80,7 +80,7 @@ def test_lost_arms_are_found(name, colors, least):
         assert staged.off_m(staged.here, arm.parts) > 0.15
         found = staged.search(arm)
         assert found is staged.here or staged.judge.cost(found) < staged.judge.cost(staged.here)
-        np.testing.assert_allclose(model.clip(found.values), found.values, atol=1e-9)
+        np.testing.assert_allclose(model.clip(found.pose), found.pose, atol=1e-9)
         # The others are where they were, which is where they belong.
         for other in limbs(model):
             if other.name not in (arm.name, "head"):
@@ -209,11 +209,11 @@ def test_two_places_that_are_about_as_good_are_both_told(gavrila):
     arm, cameras = limb_of(gavrila, "left_forearm"), cameras_around(4)
     views = both_shown(*(own_evidence([PosedBody(gavrila, v)], cameras) for v in (here, there)))
     body = [PosedBody(gavrila, here)]
-    judge = Judge(ContourMatch(views, body, everywhere=True), [], Colors(views, body), None, RecoverSettings())
+    judge = Judge(ContourResiduals(views, body, everywhere=True), [], Colors(views, body), None, RecoverSettings())
     fit = solve(gavrila, here, [judge.match], max_iterations=15, tolerance=1e-3)
     found = search_limbs(gavrila, [arm], fit, (), judge, 15)
     wrist = gavrila.point_names.index("left_wrist")
-    ends = np.array([gavrila.points_world(f.values)[wrist] for f in (found.best, *found.others)])
+    ends = np.array([gavrila.points_world(f.pose)[wrist] for f in (found.best, *found.others)])
     wanted = np.array([gavrila.points_world(v)[wrist] for v in (here, there)])
     assert np.linalg.norm(ends[:, None] - wanted, axis=-1).min(axis=0).max() < 0.05  # both are there
     assert all(judge.cost(f) < judge.cost(found.best) + limb_recovery.LEAST_GAIN for f in found.others)
@@ -229,7 +229,7 @@ def test_the_same_every_time(gavrila):
     for _ in range(2):
         limb_recovery._even.cache_clear()  # as in another run of the program
         twice.append(Staged(gavrila, truth, wrong).search(limb_of(gavrila, "left_forearm")))
-    np.testing.assert_array_equal(twice[0].values, twice[1].values)
+    np.testing.assert_array_equal(twice[0].pose, twice[1].pose)
     assert twice[0].cost == twice[1].cost
 
 
@@ -254,7 +254,7 @@ def test_other_poses_are_tried_as_they_are(gavrila):
     staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["inside the trunk"]))
     few = RecoverSettings(proposals=2, reach_rad=1e-3, improved=2, shakes_rad=(1e-3,))
     staged.judge = Judge(staged.judge.match, staged.judge.priors, staged.judge.colors, staged.judge.known, few)
-    assert staged.search(arm, [staged.here.values]) is staged.here
+    assert staged.search(arm, [staged.here.pose]) is staged.here
     before = turned(gavrila, truth, left_knee__extension=100, right_hip__elevation=60)
     found = staged.search(arm, [before])
     assert staged.off_m(found, arm.parts) < 0.03
@@ -269,7 +269,7 @@ def test_colours_tell_limbs_apart_that_edges_do_not(gavrila):
     for staged in (with_colors, without):
         there, here = staged.judge.cost(crossed) - crossed.cost, staged.judge.cost(staged.here) - staged.here.cost
         assert (there > here) if staged is with_colors else (there == here == 0)
-    candidates = np.array([staged.here.values, crossed.values])
+    candidates = np.array([staged.here.pose, crossed.pose])
     np.testing.assert_allclose(
         with_colors.judge.costs(candidates) - without.judge.costs(candidates),
         [-0.2 * with_colors.judge.colors.score(v, with_colors.judge.known).nats for v in candidates],

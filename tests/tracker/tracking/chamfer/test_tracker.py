@@ -302,7 +302,7 @@ def test_poses_do_not_depend_on_what_was_looked_at_ahead(sample_folder, monkeypa
     session, frames = load_session(sample_folder), range(25, 28)
     joints = read_joints(sample_folder / "truth.trc", session.fps)
     model, ahead = session.people[0].model, []
-    start = fit_to_points(model, dict(zip(joints.names, joints.points[24], strict=True))).values
+    start = fit_to_points(model, dict(zip(joints.names, joints.points[24], strict=True))).pose
     aside = model.neutral() * 0
     aside[0] = 0.8
     starts = [start, start + aside][:n_people]
@@ -338,7 +338,7 @@ def test_a_real_recording(data_folder, tmp_path):
     start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS})
     with Recording(session.cameras) as recording:
         observer = Observer(session.cameras, recording)
-        found = list(track(observer, [model], [start.values], range(3), TrackSettings()))
+        found = list(track(observer, [model], [start.pose], range(3), TrackSettings()))
     poses = {f.frame: f.poses[0] for f in found}
     errors = evaluate_joints(joints_of_poses(model, poses, session.fps), reference, range(3))
     assert errors.mpjpe_mm < 90
@@ -354,7 +354,7 @@ def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folde
     model, frames = session.people[0].model, range(12)
     reference = read_joints(folder / "ground_truth.trc", session.fps)
     places = dict(zip(reference.names, reference.points[0], strict=True))
-    start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).values
+    start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).pose
     with Recording(session.cameras) as recording:
         observer = Observer(session.cameras, recording)
         found = list(track(observer, [model], [start], frames, TrackSettings(), keyframes={0: {0: start}}))

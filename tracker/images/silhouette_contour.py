@@ -11,18 +11,18 @@ from tracker.geometry.arrays import FloatArray
 from tracker.images.background_subtraction import Mask
 from tracker.images.edges import Edges
 
-LEAST_LENGTH = 24
+MIN_LENGTH_PX = 24
 """Contours of fewer pixels go around specks and pinholes, and are left out."""
 _NORMAL_WINDOW = (7, 7)
 _NEAR_PX = 2  # an edge this near to the contour, along both axes, is the same
 _ALIGNED = 0.7  # cosine of the angle between the contour's normal and the image's gradient
 _NO_TRUST, _FULL_TRUST = 0.5, 0.9
 """Shares of the outline with an edge of the image along it."""
-_FULL, _TOO_FULL = 0.5, 0.75
+_MAX_PLAUSIBLE_FILL, _MIN_IMPLAUSIBLE_FILL = 0.5, 0.75
 """Shares of the region that a silhouette fills."""
 
 
-class Outline(NamedTuple):
+class SilhouetteContour(NamedTuple):
     """Pixels on the contour of a silhouette."""
 
     points_px: FloatArray
@@ -31,19 +31,19 @@ class Outline(NamedTuple):
     """Unit normals out of the silhouette, (N, 2)."""
 
 
-def trace_outline(silhouette: Mask) -> Outline:
+def trace_silhouette(silhouette: Mask) -> SilhouetteContour:
     """Trace the contours of a silhouette, (H, W), and of the holes in it; where it leaves the image it has none."""
     found, _ = cv2.findContours(silhouette.view(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-    long = [np.asarray(c, np.int32).reshape(-1, 2) for c in found if len(c) >= LEAST_LENGTH]
+    long = [np.asarray(c, np.int32).reshape(-1, 2) for c in found if len(c) >= MIN_LENGTH_PX]
     points = np.concatenate(long) if long else np.empty((0, 2), np.int32)
     soft = np.asarray(cv2.blur(silhouette.view(np.uint8) * np.uint8(255), _NORMAL_WINDOW))
-    outline = Outline(np.empty((len(points), 2), np.float32), np.empty((len(points), 2), np.float32))
-    n = _look_out(points, soft, outline)
-    return Outline(outline.points_px[:n], outline.normals[:n])
+    contour = SilhouetteContour(np.empty((len(points), 2), np.float32), np.empty((len(points), 2), np.float32))
+    n = _trace_normals(points, soft, contour)
+    return SilhouetteContour(contour.points_px[:n], contour.normals[:n])
 
 
 @njit(nogil=True, cache=True)
-def _look_out(points: NDArray[np.int32], soft: NDArray[np.uint8], out: Outline) -> int:
+def _trace_normals(points: NDArray[np.int32], soft: NDArray[np.uint8], out: SilhouetteContour) -> int:
     """Fill the points, (N, 2), that do not lie on the border, and their normals: against the slope of a softened
     silhouette, (H, W), by Sobel's kernel. Returns their number."""
     height, width = soft.shape
@@ -66,7 +66,7 @@ def _look_out(points: NDArray[np.int32], soft: NDArray[np.uint8], out: Outline) 
     return n
 
 
-def trust_outline(outline: Outline, silhouette: Mask, edges: Edges) -> float:
+def contour_trust(contour: SilhouetteContour, silhouette: Mask, edges: Edges) -> float:
     """How far a silhouette can be trusted, 0 to 1, judged from the image alone.
 
     The contour of a person is an edge of the image, running the same way. Where the background is broken or the camera
@@ -77,22 +77,24 @@ def trust_outline(outline: Outline, silhouette: Mask, edges: Edges) -> float:
         silhouette: (H, W) bool.
         edges: of the same image, at least within some pixels of the silhouette.
     """
-    if not len(outline.points_px):
+    if not len(contour.points_px):
         return 0.0
-    along = _count_along(outline, edges.found, edges.gradients) / len(outline.points_px)
+    along = _count_along(contour, edges.found, edges.gradients) / len(contour.points_px)
     seen = (along - _NO_TRUST) / (_FULL_TRUST - _NO_TRUST)
-    plausible = (_TOO_FULL - cv2.countNonZero(silhouette.view(np.uint8)) / silhouette.size) / (_TOO_FULL - _FULL)
+    plausible = (_MIN_IMPLAUSIBLE_FILL - cv2.countNonZero(silhouette.view(np.uint8)) / silhouette.size) / (
+        _MIN_IMPLAUSIBLE_FILL - _MAX_PLAUSIBLE_FILL
+    )
     return min(max(seen, 0.0), 1.0) * min(max(plausible, 0.0), 1.0)
 
 
 @njit(nogil=True, cache=True)
-def _count_along(outline: Outline, found: NDArray[np.uint8], gradients: NDArray[np.int16]) -> int:
+def _count_along(contour: SilhouetteContour, found: NDArray[np.uint8], gradients: NDArray[np.int16]) -> int:
     """Points of an outline with an edge nearby, (H, W), where the image's gradient, (2, H, W), is across it."""
     count = 0
-    for i in range(outline.points_px.shape[0]):
-        u, v = int(outline.points_px[i, 0]), int(outline.points_px[i, 1])
+    for i in range(contour.points_px.shape[0]):
+        u, v = int(contour.points_px[i, 0]), int(contour.points_px[i, 1])
         gu, gv = np.float32(gradients[0, v, u]), np.float32(gradients[1, v, u])
-        across = abs(gu * outline.normals[i, 0] + gv * outline.normals[i, 1])
+        across = abs(gu * contour.normals[i, 0] + gv * contour.normals[i, 1])
         if across <= np.float32(_ALIGNED) * np.sqrt(gu * gu + gv * gv):
             continue
         count += _is_near(found, u, v)

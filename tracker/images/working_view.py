@@ -1,4 +1,4 @@
-"""Footage to matched pixels: without lens distortion, at the scale of matching, and only the region asked for.
+"""Footage to working pixels: without lens distortion, at the working scale, and only the region asked for.
 
 All image work is done in the region around the predicted bodies (GD96 Sect. 4.2); the rest is never computed.
 """
@@ -14,7 +14,7 @@ from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera, Region
 from tracker.images.background_subtraction import Mask
 
-MATCH_AREA_PX = 640 * 480
+WORKING_AREA_PX = 640 * 480
 """Frames are matched at a scale at which they have about this many pixels, and never enlarged."""
 MIN_REGION_PX = 16
 """Regions are at least this wide and high; edges and distances need neighbours."""
@@ -23,9 +23,9 @@ _REGION_STEP_PX = 8
 _MARGIN_PX = 2
 
 
-def match_scale(camera: Camera) -> float:
+def working_scale(camera: Camera) -> float:
     """Scale at which the frames of a camera are matched: 1 up to 640x480, smaller above."""
-    return min(1.0, float(np.sqrt(MATCH_AREA_PX / (camera.width * camera.height))))
+    return min(1.0, float(np.sqrt(WORKING_AREA_PX / (camera.width * camera.height))))
 
 
 def fit_region(region: Region, size: tuple[int, int]) -> Region:
@@ -47,7 +47,7 @@ def region_around(points_px: Array, margin_px: float, size: tuple[int, int]) -> 
     Its borders lie at multiples of 8 px, so that it does not change with every small motion.
 
     Args:
-        points_px: (N, 2), N > 0, matched px; they may lie outside the image.
+        points_px: (N, 2), N > 0, working px; they may lie outside the image.
         margin_px: what to add on each side, px.
         size: image width and height, px.
     """
@@ -60,15 +60,15 @@ def region_around(points_px: Array, margin_px: float, size: tuple[int, int]) -> 
     return fit_region((int(u0), int(v0), int(u1), int(v1)), size)
 
 
-class MatchedView:
-    """One camera's way from footage to matched pixels. Immutable, so safe to use from several threads."""
+class WorkingView:
+    """One camera's way from footage to working pixels. Immutable, so safe to use from several threads."""
 
     source: Camera
     """The camera as calibrated, of the size of the footage."""
     camera: Camera
-    """The same without lens distortion, at the scale of matching."""
+    """The same without lens distortion, at the working scale."""
     scale: float
-    """Matched pixels per pixel of the footage, at most 1."""
+    """Working pixels per pixel of the footage, at most 1."""
 
     def __init__(self, source: Camera, scale: float | None = None, beyond: int = cv2.BORDER_REPLICATE) -> None:
         """Compute the map of all pixels once; a region takes its part of it.
@@ -80,7 +80,7 @@ class MatchedView:
                 frame around the image would have some.
         """
         self.source, self._beyond = source, beyond
-        self.scale = match_scale(source) if scale is None else scale
+        self.scale = working_scale(source) if scale is None else scale
         self.camera = source.pinhole.scaled(self.scale)
         # Larger footage is first reduced by a whole factor, averaging areas, which is fast; the map does the rest.
         self._reduction = int(1 / self.scale)
@@ -92,7 +92,7 @@ class MatchedView:
         self._cells, self._fractions = cv2.convertMaps(u, v, cv2.CV_16SC2)
 
     def _map(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Where each matched pixel lies in the footage, u and v, (H, W) each, px."""
+        """Where each working pixel lies in the footage, u and v, (H, W) each, px."""
         source, camera = self.source, self.camera
         return cv2.initUndistortRectifyMap(  # type: ignore[return-value]
             source.K, source.distortion, np.eye(3), camera.K, camera.size, cv2.CV_32FC1
@@ -109,7 +109,7 @@ class MatchedView:
         return 0, 0, self.camera.width, self.camera.height
 
     def image(self, frame: Image, region: Region) -> Image:
-        """Region of a frame as filmed, `(H, W, 3)`, in matched pixels, (v1 - v0, u1 - u0, 3)."""
+        """Region of a frame as filmed, `(H, W, 3)`, in working pixels, (v1 - v0, u1 - u0, 3)."""
         u0, v0, u1, v1 = region
         if self._plain:
             return frame[v0:v1, u0:u1]
@@ -124,7 +124,7 @@ class MatchedView:
         return np.asarray(out, np.uint8)
 
     def mask(self, mask: NDArray[np.uint8], region: Region) -> Mask:
-        """Region of a mask as filmed, `(H, W)`, in matched pixels, (v1 - v0, u1 - u0); True where it is not 0."""
+        """Region of a mask as filmed, `(H, W)`, in working pixels, (v1 - v0, u1 - u0); True where it is not 0."""
         u0, v0, u1, v1 = region
         if self._plain:
             return mask[v0:v1, u0:u1] > 0
