@@ -54,9 +54,9 @@ def tracked_changes(
                 status=found.statuses[i],
                 cost_px=_number(found.cost_px),
                 settings=record,
-                views_px=tuple(_number(c) for c in found.views_px),
-                parts_px=tuple(_number(c) for c in found.parts_px[i]),
-                remark=found.remarks[i],
+                views_px=tuple(_number(c) for c in found.view_costs_px),
+                parts_px=tuple(_number(c) for c in found.part_costs_px[i]),
+                remark=found.notes[i],
             ),
             tuple(Alternative(o.values, stored[i].revision, _number(o.cost_px)) for o in found.alternatives[i]),
         )

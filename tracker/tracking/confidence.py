@@ -41,7 +41,7 @@ _LOST_FORWARD = 0.6
 """Of a body whose contours are farther than this from all edges, in outlier distances, nothing holds."""
 
 
-class LimbFigures(NamedTuple):
+class LimbFeatures(NamedTuple):
     """What the evidence says of one limb."""
 
     name: str
@@ -60,7 +60,7 @@ class LimbFigures(NamedTuple):
     """Points of edges and silhouette that it explains, for each pixel of its visible contour."""
 
 
-class Quality(NamedTuple):
+class PoseQuality(NamedTuple):
     """What the evidence says of a pose. Distances are in outlier distances."""
 
     forward: float
@@ -69,7 +69,7 @@ class Quality(NamedTuple):
     """Views that see the body."""
     unexplained: float
     """Share of the silhouette's contour that no part explains, in the second worst of the trusted views."""
-    limbs: tuple[LimbFigures, ...]
+    limbs: tuple[LimbFeatures, ...]
     """The same limb by limb."""
 
     @property
@@ -77,7 +77,7 @@ class Quality(NamedTuple):
         """Log odds that each limb is lost, (n_limbs,)."""
         return _log_odds(self)
 
-    def doubted(self, alone: bool) -> tuple[str, ...]:
+    def doubtful_limbs(self, alone: bool) -> tuple[str, ...]:
         """Names of limbs that seem lost themselves, of somebody alone or of one of several."""
         least = _SUSPECT if alone else _SUSPECT_OF_SEVERAL
         return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if odds > least)
@@ -87,19 +87,19 @@ class Quality(NamedTuple):
         """Names of limbs that are likelier lost than found."""
         return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if odds > _LOST)
 
-    def suspects(self, alone: bool) -> tuple[str, ...]:
+    def search_candidates(self, alone: bool) -> tuple[str, ...]:
         """Names of limbs worth a search, likeliest first; all where the image shows what no part explains."""
-        doubted, everyone = self.doubted(alone), self.unexplained > _MOST_UNEXPLAINED
+        doubtful_limbs, everyone = self.doubtful_limbs(alone), self.unexplained > _MOST_UNEXPLAINED
         names = [self.limbs[i].name for i in np.argsort(-self.log_odds)]
-        return tuple(name for name in names if everyone or name in doubted)
+        return tuple(name for name in names if everyone or name in doubtful_limbs)
 
     @property
-    def body_lost(self) -> bool:
+    def is_body_lost(self) -> bool:
         """Whether the body stands elsewhere, not a limb or two of it."""
         return self.views == 0 or self.forward > _LOST_FORWARD or 2 * len(self.lost) > len(self.limbs)
 
 
-def evidence(found: Quality, limb: LimbFigures) -> Array:
+def features(found: PoseQuality, limb: LimbFeatures) -> Array:
     """What the log odds of a limb are made of, (7,)."""
     return np.array([
         np.clip(limb.color, -2, 1),
@@ -113,8 +113,8 @@ def evidence(found: Quality, limb: LimbFigures) -> Array:
 
 
 @lru_cache(maxsize=8)  # asked several times for each frame
-def _log_odds(found: Quality) -> Array:
-    odds = np.array([_WEIGHTS @ [*evidence(found, x), 1.0] for x in found.limbs])
+def _log_odds(found: PoseQuality) -> Array:
+    odds = np.array([_WEIGHTS @ [*features(found, x), 1.0] for x in found.limbs])
     odds.flags.writeable = False
     return odds
 
@@ -127,7 +127,7 @@ def quality(
     trusts: Array,
     px_per_m: float,
     colors: tuple[ColorScore, PartColors] | None,
-) -> Quality:
+) -> PoseQuality:
     """Sum up what speaks for and against a pose.
 
     Args:
@@ -149,12 +149,12 @@ def quality(
         color = np.where(score.samples >= _LEAST_SAMPLES, score.parts, np.inf)
         worst_drop = np.nan_to_num(known.usual - score.views, nan=-np.inf).max(axis=0, initial=-np.inf)
     spreads = px_per_m * _end_spreads(body, fit)
-    return Quality(
+    return PoseQuality(
         float(far.sum() / max(1e-9, costs.length_px.sum())),
         views,
         _second_largest(1.0 - costs.silhouette[trusts > _LEAST_TRUST]),
         tuple(
-            LimbFigures(
+            LimbFeatures(
                 c.name, float(color[c.parts].min()), float(worst_drop[c.parts].max()), float(spread),
                 *_of_contour(costs, far, beside_px, c.parts),
             )
@@ -182,17 +182,17 @@ def _second_largest(shares: Array) -> float:
     return float(np.sort(shares)[-2]) if len(shares) > 1 else 0.0
 
 
-def judge(found: Quality) -> Status:
+def classify(found: PoseQuality) -> Status:
     """Good, doubtful or lost."""
     most = found.log_odds.max(initial=-np.inf)
-    if found.body_lost or most > _LOST:
+    if found.is_body_lost or most > _LOST:
         return "lost"
     return "doubtful" if most > _DOUBTFUL or found.unexplained > _MOST_UNEXPLAINED else "good"
 
 
-def reason(found: Quality) -> str:
+def reason(found: PoseQuality) -> str:
     """What speaks most against a pose, for people; empty where it is good."""
-    if judge(found) == "good":
+    if classify(found) == "good":
         return ""
     if found.views == 0:
         return "no view shows the body"

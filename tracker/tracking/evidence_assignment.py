@@ -29,13 +29,13 @@ from tracker.evidence.view_evidence import (
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.images.edge_segments import MAX_ANGLE_RAD, Samples, Segments, nearest_parallel_segment, sample_segments
 
-_CLEARLY = 0.5
+_OWNERSHIP_RATIO = 0.5
 """What is another's is nearer to that body than this share of its distance from one's own."""
 _REACH = 2.0
 """Up to where distances are told apart, in outlier distances."""
 
 
-class Sharing:
+class EvidencePool:
     """The evidence of one frame, to be shared out for whatever poses."""
 
     def __init__(self, views: Sequence[ViewEvidence]) -> None:
@@ -44,7 +44,7 @@ class Sharing:
         """As they were observed."""
 
     @cached_property
-    def everything(self) -> tuple[ViewEvidence, ...]:
+    def all_edges(self) -> tuple[ViewEvidence, ...]:
         """The same with the edges that the predictions refused."""
         return tuple(map(with_all_segments, self.views))
 
@@ -52,19 +52,18 @@ class Sharing:
     def samples(self) -> tuple[tuple[Samples | None, Samples | None], ...]:
         """What of each view is asked whose it is: its edges, and the points of its silhouette, each by itself; None of
         what there is not."""
-        return tuple(_sampled(v) for v in self.views)
+        return tuple(_samples_of(v) for v in self.views)
 
 
-class Shares:
+class EvidenceAssignment:
     """The evidence of one frame as it is shared out for some poses: distances are measured once for all people."""
 
-    def __init__(self, sharing: Sharing, bodies: Sequence[PosedBody]) -> None:
+    def __init__(self, sharing: EvidencePool, bodies: Sequence[PosedBody]) -> None:
         """Take the evidence, and everybody where they stand as far as is known."""
-        self.poses = tuple(b.values for b in bodies)
-        """Where they stand, (n_values,) each."""
+        self.bodies = tuple(bodies)
+        """All people in the poses for which the evidence is assigned."""
         self._sharing = sharing
         self._own: dict[tuple[int, bool], tuple[ViewEvidence, ...]] = {}
-        self._bodies = list(bodies)
 
     def own(self, person: int, everywhere: bool = False) -> tuple[ViewEvidence, ...]:
         """The evidence of each view without the edges and the silhouette's points that clearly are somebody else's.
@@ -77,8 +76,8 @@ class Shares:
                 refused too; else views in which nobody else is near stay as they are, because nothing there is in
                 reach.
         """
-        if len(self._bodies) == 1:
-            return self._sharing.everything if everywhere else self._sharing.views
+        if len(self.bodies) == 1:
+            return self._sharing.all_edges if everywhere else self._sharing.views
         if (person, everywhere) not in self._own:
             self._own[person, everywhere] = tuple(v.own(person, everywhere) for v in self._views)
         return self._own[person, everywhere]
@@ -86,8 +85,8 @@ class Shares:
     @cached_property
     def _views(self) -> list["_View"]:
         surfaces, Ts = (
-            occluding_contours.surfaces_of(tuple(b.model for b in self._bodies)),
-            occluding_contours.part_poses(self._bodies),
+            occluding_contours.surfaces_of(tuple(b.model for b in self.bodies)),
+            occluding_contours.part_poses(self.bodies),
         )
         sharing = self._sharing
         return [_View(v, *s, surfaces, Ts) for v, s in zip(sharing.views, sharing.samples, strict=True)]
@@ -102,7 +101,7 @@ class _View:
         self._view, self._edges, self._outline, self._surfaces, self._Ts = view, edges, outline, surfaces, Ts
 
     def own(self, person: int, everywhere: bool) -> ViewEvidence:
-        """See `Shares.own`."""
+        """See `EvidenceAssignment.own`."""
         view, seen = self._view, self._view
         if view.segments is None or self._edges is None or not (everywhere or self._theirs.near[person]):
             return with_all_segments(view) if everywhere else view
@@ -121,21 +120,21 @@ class _View:
         return replace(seen, silhouette=replace(view.silhouette, points_px=points, normals=normals))
 
     @cached_property
-    def _theirs(self) -> "_Theirs":
+    def _theirs(self) -> "_Ownership":
         view, n_people = self._view, int(self._surfaces.people[-1]) + 1
         edges, outline = self._edges or _nothing(), self._outline or _nothing()
-        out = _Theirs(
+        out = _Ownership(
             np.empty((n_people, len(edges.counts)), np.bool_), np.empty((n_people, len(outline.counts)), np.bool_),
             np.zeros(n_people, np.bool_),
         )  # fmt: skip
-        _tell_apart(
+        _assign(
             occluding_contours.projection(view.camera), view.camera.center_world, self._Ts, self._surfaces,
             occluding_contours.contour_buffer(view.camera, n_people), edges, outline, view.theta_px, out,
         )  # fmt: skip
         return out
 
 
-class _Theirs(NamedTuple):
+class _Ownership(NamedTuple):
     """Of each person what runs along the contours of the others and clearly not along their own, in one view."""
 
     edges: NDArray[np.bool_]
@@ -146,8 +145,8 @@ class _Theirs(NamedTuple):
     """Whether boxes around the contours of the person and of anybody else come within reach of each other, (K,)."""
 
 
-def _sampled(view: ViewEvidence) -> tuple[Samples | None, Samples | None]:
-    """See `Sharing.samples`."""
+def _samples_of(view: ViewEvidence) -> tuple[Samples | None, Samples | None]:
+    """See `EvidencePool.samples`."""
     silhouette, edges = view.silhouette, view.samples
     if silhouette is None or not len(silhouette.points_px):
         return edges, None
@@ -163,9 +162,9 @@ def _nothing() -> Samples:
 
 # One call for all that is asked of a view: of a dozen calls each hands the interpreter's lock over and waits for it.
 @njit(nogil=True, cache=True)
-def _tell_apart(
+def _assign(
     P: Array, eye: Array, Ts: Array, surfaces: Surfaces, contour: Contour, edges: Samples, outline: Samples,
-    theta_px: float, out: _Theirs,
+    theta_px: float, out: _Ownership,
 ) -> None:  # fmt: skip
     """Tell in one view what is whose.
 
@@ -248,4 +247,4 @@ def _mark_theirs(
         to_others[segment] += nearest
     for s in range(theirs.shape[0]):
         own, others = to_own[s] / samples.counts[s], to_others[s] / samples.counts[s]
-        theirs[s] = others <= ACCEPTED_SHARE * theta_px and others < _CLEARLY * own
+        theirs[s] = others <= ACCEPTED_SHARE * theta_px and others < _OWNERSHIP_RATIO * own

@@ -14,6 +14,7 @@ from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.search.best_first import SearchStep, stages
 from tracker.tracking.chamfer.settings import search_frame
+from tracker.tracking.subjects import Subjects
 
 _SAVE_S = 0.5
 """A running search is on disk at least this often."""
@@ -115,8 +116,9 @@ class Searching:
             start_px = screen.costs(poses)["cost_px"]
             known_px = start_px if isinstance(start_px, float) else np.nan
             run = self._runs.begin(frame, models, poses, known_px, settings, free)
+            subjects = Subjects.of(models, active_dofs=free)
             job: Job[SearchStep] = Job(
-                lambda: search_frame(screen.frames.evidence(frame), models, poses, settings, free=free),
+                lambda: search_frame(screen.frames.evidence(frame), subjects, poses, settings),
                 lambda step, seconds: self._stepped(job, step, seconds),
                 lambda error: self._ended(job, error),
                 lambda: self._paused(job),

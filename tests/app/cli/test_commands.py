@@ -156,8 +156,8 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
 
     def elsewhere(frame):
         found = estimates[frame]
-        remarks = ("followed back from frame 2",)
-        return found._replace(poses=(found.poses[0] + 0.01,), remarks=remarks, statuses=("good",))
+        notes = ("followed back from frame 2",)
+        return found._replace(poses=(found.poses[0] + 0.01,), notes=notes, statuses=("good",))
 
     def ways_back(run, found, settings):
         offered.append(found)

@@ -304,7 +304,7 @@ def followed_back(tracker, steps):
             better = ()
             if i == steps - 1:
                 poses = tuple(p + STEP_M * (np.arange(len(p)) == 1) for p in found[4].poses)
-                better = (tracker.last[7]._replace(poses=poses, statuses=("good",), remarks=("followed back",)),)
+                better = (tracker.last[7]._replace(poses=poses, statuses=("good",), notes=("followed back",)),)
             yield BackwardStep(7, 0, i + 1, steps, better)
 
     tracker.back = back
