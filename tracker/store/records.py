@@ -41,7 +41,7 @@ class PoseRecord:
     parts_px: tuple[float | None, ...] = ()
     """Cost of each part in the order of the body model's, px; None for an unseen part, empty where unknown."""
     remark: str = ""
-    """What the tracker did on the frame, for people to read: `left arm searched anew`."""
+    """What the tracker did on the frame, for people to read: `left arm relocated`."""
     reviewed: bool = False
     """Whether a person has looked at it and left it as it is; a keyframe counts as reviewed besides."""
 

@@ -182,9 +182,9 @@ class _PathSelection:
         out = []
         for i, chosen in enumerate(viterbi_path(points, costs, *ends)):
             if chosen == 1:
-                out.append(self._merged(i, self._backward[i], f"followed back from frame {self._after[0].frame}"))
+                out.append(self._merged(i, self._backward[i], f"tracked back from frame {self._after[0].frame}"))
             elif chosen > 1:
-                out.append(self._merged(i, self._estimate(i, chosen), "carried over from frames around it"))
+                out.append(self._merged(i, self._estimate(i, chosen), "taken over from neighbouring frames"))
         return tuple(out)
 
     def _candidates_of(self, *passes: TrackedFrame) -> Candidates:

@@ -95,7 +95,7 @@ class FrameEstimator:
         estimates = dict(zip(fits, finalized, strict=True))
         for (p, q), poses in identity_swaps(self._problem, self.bodies, fits).items():
             for one, other in ((p, q), (q, p)):
-                estimates[one] = estimates[one].in_doubt(f"may be exchanged with person {other + 1}", [poses])
+                estimates[one] = estimates[one].in_doubt(f"may be swapped with person {other + 1}", [poses])
         return estimates
 
     def _move(self, person: int, found: PersonFit) -> PersonFit:
@@ -185,14 +185,14 @@ class FrameEstimator:
         notes, evaluations = list[str](), 0
         if quality.is_body_lost:
             evaluations, fit = self._search_body(person, fit, scorer)
-            notes.append("body searched anew")
+            notes.append("body searched")
         others = (memory.history[-1], problem.people[person].predicted)
         best, alternatives = search_limbs(model, limbs, fit, others, scorer)
         turned = np.abs(model.difference(best.pose, fit.pose))
         for limb in limbs:
             memory.record_search(limb, quality, turned[limb.dofs].max() > _MOVED_RAD)
             if turned[limb.dofs].max() > ELSEWHERE_RAD:
-                notes.append(f"{limb_display_name(limb.name)} searched anew")
+                notes.append(f"{limb_display_name(limb.name)} relocated")
         return found._replace(
             fit=best, body=PosedBody(model, best.pose), evaluations=evaluations, notes=tuple(notes),
             alternatives=tuple(a.pose for a in alternatives),

@@ -1,4 +1,4 @@
-"""What the chamfer tracker is told, and what follows from it: the cost of poses, their search, what holds them."""
+"""Settings of the chamfer tracker, and the cost function, search and priors that follow from them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -64,7 +64,7 @@ class RecoverSettings:
 
 @dataclass(frozen=True)
 class TrackSettings:
-    """What the chamfer tracker is told."""
+    """Settings of the chamfer tracker."""
 
     method: ClassVar[str] = "chamfer"
     """Name of the method, which the store keeps with the settings."""
@@ -73,31 +73,29 @@ class TrackSettings:
     predict: PredictSettings = field(default_factory=PredictSettings)
     """Motion model."""
     match: MatchSettings = field(default_factory=MatchSettings)
-    """How contours and edges pull in the refinement."""
+    """Weights of the contour residuals."""
     search: SearchSettings = field(default_factory=SearchSettings)
     """Bounds, steps and stopping rule of the best-first search."""
     recover: RecoverSettings | None = field(default_factory=RecoverSettings)
-    """How lost limbs are searched for; None leaves them."""
+    """Recovery of lost limbs; None switches it off."""
     theta_px: float | None = None
     """Outlier distance, px of the footage; None for 3% of the longer side of each image."""
     outliers: Outliers = "truncated"
-    """How the search treats outliers, see `ChamferCost`."""
+    """Treatment of outliers in the search, see `ChamferCost`."""
     segments: bool = True
-    """Whether edges count only in segments that the prediction accepts as wholes (GD96 Sect. 4.2), and never those
-    that stand still away from everybody."""
+    """Whether edges are accepted or refused in whole segments (GD96 Sect. 4.2), and static ones are refused."""
     trust_rad: float = 0.15
     """Standard deviation of the prediction of an angle, rad."""
     trust_m: float = 0.05
     """Standard deviation of the prediction of a position, metres."""
     occlusion: bool = True
-    """Whether people hide each other and share out the edges; else each is tracked as if nobody else were there."""
+    """Whether people occlude each other and edges are assigned; else each is tracked as if alone."""
     rounds: int = 2
-    """Rounds of the joint refinement, in which each person is refined once more with the others where they were found,
-    at most; 0 leaves everybody as they were found one after the other."""
+    """Largest number of rounds in which all people are refined again with the others where they were found."""
     second_pass: bool = True
-    """Whether whoever tracking lost is followed back from the first trusted poses after it, see `second_pass`."""
+    """Whether people are tracked backward through intervals in which they were lost, see `backward_pass`."""
     apart: float = 1.0
-    """Weight of what keeps people from passing through each other; 0 lets them."""
+    """Weight of the term against people passing through each other; 0 leaves it out."""
 
 
 def pose_cost(
@@ -134,12 +132,12 @@ def search_frame(
     return search(cost, predicted, settings.search, subjects.tracked, active)
 
 
-def prior_blocks(model: BodyModel, expected: Array, sigmas: Array) -> list[ResidualBlock]:
-    """What holds a pose besides the image: the one that is expected, how people bend, and that flesh keeps apart.
+def prior_blocks(model: BodyModel, predicted: Array, sigmas: Array) -> list[ResidualBlock]:
+    """Build the prior terms of one body: prediction, joint spread and self-penetration.
 
     Args:
         model: the body.
-        expected: the pose, (n_values,).
+        predicted: the predicted pose, (n_values,).
         sigmas: its standard deviations, (n_dofs,), rad or metres.
     """
-    return [PosePrior(expected, 1 / sigmas), PosePrior(model.neutral(), 1 / model.spreads), SelfPenetration()]
+    return [PosePrior(predicted, 1 / sigmas), PosePrior(model.neutral(), 1 / model.spreads), SelfPenetration()]

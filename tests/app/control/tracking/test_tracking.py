@@ -36,7 +36,7 @@ def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, sess
     wait_for(at(placed, 4))
     shown = placed.state.people[0]
     assert placed.state.frame == 4
-    assert (shown.source, shown.status, shown.remark) == ("tracked", "doubtful", "left arm searched anew")
+    assert (shown.source, shown.status, shown.remark) == ("tracked", "doubtful", "left arm relocated")
     assert shown.parts_px == (0.5,) * 9 + (None,)
     assert (placed.state.cost_px, placed.state.view_costs_px) == (pytest.approx(1.4), (1.0, None, 2.0, 3.0))
     assert x_of(placed) == pytest.approx(start + 2 * STEP_M)
@@ -288,7 +288,7 @@ def test_a_run_survives_a_restart(placed, tracker, opened):
     controller.seek(4)
     assert (controller.state.people[0].status, controller.state.people[0].remark) == (
         "doubtful",
-        "left arm searched anew",
+        "left arm relocated",
     )
     controller.undo()
     assert set(controller.timeline()) == {2}

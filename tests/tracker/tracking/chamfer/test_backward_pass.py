@@ -54,7 +54,7 @@ def test_a_lost_arm_is_followed_back_from_where_it_is_trusted_again(scene, backw
     for estimate in better:
         assert off_m(model, estimate.poses[0], truth[estimate.frame]) < 0.03
         assert estimate.statuses == ("good",)
-        assert estimate.notes == (f"followed back from frame {1 if backward else 5}",)
+        assert estimate.notes == (f"tracked back from frame {1 if backward else 5}",)
 
 
 def test_where_nobody_is_lost_nothing_is_looked_at(scene):
@@ -85,7 +85,7 @@ def test_what_was_right_on_one_frame_is_carried_to_those_that_both_passes_lost(s
     for estimate in better:
         assert off_m(model, estimate.poses[0], truth[estimate.frame]) < 0.03
         assert estimate.statuses == ("good",)
-        assert estimate.notes == ("carried over from frames around it",)
+        assert estimate.notes == ("taken over from neighbouring frames",)
         assert estimate.covariances[0].any()
         assert estimate.qualities[0] is not None
 

@@ -6,6 +6,7 @@ from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_eviden
 from tracking_runs import track
 
 from tracker.body.model import PosedBody
+from tracker.contours import occluding_contours
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
@@ -14,6 +15,7 @@ from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.motion.prediction import PredictSettings
+from tracker.search import chamfer_cost
 from tracker.search.best_first import SearchSettings
 from tracker.session.assemble import assemble
 from tracker.session.session import load_session
@@ -157,7 +159,7 @@ def test_an_arm_that_jumps_is_searched_and_the_frame_says_so(gavrila):
     views = [dressed([PosedBody(gavrila, v)], cameras_around(4), SUIT) for v in truth]
     found = list(track(Shown(views), [gavrila], truth[:1], range(5), TrackSettings()))
     assert [f.notes[0] for f in found[:3]] == ["", "", ""]
-    assert "left arm searched anew" in found[3].notes[0]
+    assert "left arm relocated" in found[3].notes[0]
     for estimate, values in zip(found, truth, strict=True):
         assert off_m(gavrila, estimate.poses[0], values).max() < 0.03
     # Left alone it is not found, and not called good.
@@ -179,7 +181,7 @@ def test_two_people_who_might_as_well_be_each_other_are_in_doubt():
     np.testing.assert_allclose([p[:3] for p in found.poses], values[:, :3], atol=0.01)
     assert "lost" in found.statuses or set(found.statuses) == {"doubtful"}
     assert [r.split(", ")[-1] for r in found.notes] == [
-        "may be exchanged with person 2", "may be exchanged with person 1",
+        "may be swapped with person 2", "may be swapped with person 1",
     ]  # fmt: skip
     for person in (0, 1):
         (other,) = found.alternatives[person]
@@ -239,7 +241,7 @@ def test_what_the_prediction_refused_is_looked_at_again(gavrila):
     found = list(
         track(filmed([[PosedBody(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(5), TrackSettings())
     )
-    assert found[3].notes == ("left arm searched anew",)
+    assert found[3].notes == ("left arm relocated",)
     for estimate, values in zip(found, truth, strict=True):
         assert off_m(gavrila, estimate.poses[0], values).max() < 0.02
 
@@ -248,7 +250,7 @@ def test_a_body_that_is_elsewhere_is_searched(gavrila):
     truth = dancing(gavrila, 3)
     truth[2, 1] += 0.6
     *_, last = track(filmed([[PosedBody(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(3), TrackSettings())
-    assert "body searched anew" in last.notes[0]
+    assert "body searched" in last.notes[0]
     assert last.evaluations > 100
     if off_m(gavrila, last.poses[0], truth[2]).max() > 0.1:  # so far it is beyond the reach of the search
         assert last.statuses[0] != "good"
@@ -365,3 +367,21 @@ def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folde
     errors = evaluate_joints(joints_of_poses(model, poses, session.fps), reference, frames)
     assert errors.mpjpe_mm < 42
     assert (errors.missing_frames, errors.lost_frames) == (0, 0)
+
+
+@pytest.mark.parametrize("segments", [True, False])
+def test_contours_are_traced_once_per_pose(gavrila, monkeypatch, segments):
+    """Those of the prediction and those of the result, in each view; the cost of the result traces nothing."""
+    truth = dancing(gavrila, 3)
+    views = [dressed([PosedBody(gavrila, v)], cameras_around(), SUIT) for v in truth]
+    predicted, found, scored = [], [], []
+    trace, trace_views, score = occluding_contours.trace, chamfer_cost._trace_views, chamfer_cost._score_candidates
+    monkeypatch.setattr(occluding_contours, "trace", lambda *a: predicted.append(a) or trace(*a))
+    monkeypatch.setattr(chamfer_cost, "_trace_views", lambda *a: found.append(a) or trace_views(*a))
+    monkeypatch.setattr(chamfer_cost, "_score_candidates", lambda *a: scored.append(a) or score(*a))
+    for estimate in track(Shown(views), [gavrila], truth[:1], range(3), TrackSettings(segments=segments)):
+        assert estimate.statuses == ("good",)
+        assert (len(predicted), len(found), len(scored)) == (3, 1, 1)  # of three views, at one and all at once
+        assert len(scored[0][8].firsts) == 3 + 1  # it is handed the contours of all views
+        for calls in (predicted, found, scored):
+            calls.clear()
