@@ -15,15 +15,15 @@ import { HistoryList } from "./shell/history_list.js";
 import { Inspector } from "./posing/inspector.js";
 import { JumpMenu } from "./timeline/jump_menu.js";
 import { Jumps } from "./timeline/jumps.js";
-import { KeyMap } from "./shell/key_list.js";
+import { KeyList } from "./shell/key_list.js";
 import * as keys from "./shell/keys.js";
-import { LandscapePanel } from "./search/cost_landscape.js";
+import { CostLandscape } from "./search/cost_landscape.js";
 import { Latency } from "./model/latency.js";
 import { Layers } from "./model/layers.js";
 import { LayersMenu } from "./panes/layers_menu.js";
-import { LookMenu } from "./panes/image_tone_menu.js";
-import { showProgress } from "./shell/progress_marks.js";
-import { Looks } from "./model/image_tone.js";
+import { ImageToneMenu } from "./panes/image_tone_menu.js";
+import { showProgressMarks } from "./shell/progress_marks.js";
+import { ImageTones } from "./model/image_tone.js";
 import { Navigation } from "./model/navigation.js";
 import { Notices, watchConnection } from "./shell/notices.js";
 import { Palette } from "./shell/palette.js";
@@ -34,16 +34,16 @@ import { Pinning } from "./posing/pinning.js";
 import { Posing } from "./posing/posing.js";
 import { Playback } from "./timeline/playback.js";
 import { RangeBar } from "./timeline/range_bar.js";
-import { reasonsOf } from "./model/unavailable_reasons.js";
+import { unavailableReasons } from "./model/unavailable_reasons.js";
 import { RecentImages } from "./model/recent_images.js";
 import { Receiver } from "./model/receiver.js";
 import { SavedMark } from "./shell/saved_mark.js";
-import { SceneRest } from "./scene/pause.js";
-import { followScheme } from "./scene/color_scheme.js";
+import { ScenePause } from "./scene/pause.js";
+import { followColorScheme } from "./scene/color_scheme.js";
 import { SearchPanel } from "./search/search_panel.js";
-import { Snap } from "./scene/camera_view.js";
+import { CameraView } from "./scene/camera_view.js";
 import { makeSplitter } from "./widgets/splitter.js";
-import { StandIns } from "./panes/placeholder_frames.js";
+import { PlaceholderFrames } from "./panes/placeholder_frames.js";
 import { Store } from "./model/store.js";
 import { Timeline } from "./timeline/timeline.js";
 import { TopBar } from "./shell/top_bar.js";
@@ -70,8 +70,8 @@ const gestures = new Gestures(store, send, latency);
 const navigation = new Navigation(store, send);
 const layers = new Layers(store);
 const layersMenu = new LayersMenu(store, layers);
-const lookMenu = new LookMenu(store, new Looks(store));
-const openLook = lookMenu.toggle.bind(lookMenu);
+const toneMenu = new ImageToneMenu(store, new ImageTones(store));
+const openToneMenu = toneMenu.toggle.bind(toneMenu);
 const pinning = new Pinning(store, send, notify);
 // Who watches first has the pointer first: a pin's head may lie over a joint.
 const pointers = {
@@ -80,16 +80,16 @@ const pointers = {
     gestures.watch(pane, camera);
   },
 };
-const grid = new PaneGrid(byId("panes", HTMLElement), store, pointers, latency, openLook);
-new StandIns(store, recentImages);
+const grid = new PaneGrid(byId("panes", HTMLElement), store, pointers, latency, openToneMenu);
+new PlaceholderFrames(store, recentImages);
 new ViewRequest(store, send);
 const posing = new Posing(store, send);
 const inspector = new Inspector(byId("inspector", HTMLElement), store, posing, notify);
 const floor = new Floor(byId("panes", HTMLElement), store, grid, send);
-const snap = new Snap(store, grid, send);
+const cameraView = new CameraView(store, grid, send);
 new TopBar(store, actions);
 const people = new People(store, actions, posing);
-showProgress(store);
+showProgressMarks(store);
 const playback = new Playback(store, navigation);
 const jumps = new Jumps(store, navigation);
 const frameWindow = new FrameWindow(store);
@@ -101,7 +101,7 @@ new FrameCard(store, posing);
 new PinBar(store, pinning);
 const drawer = new Drawer(store);
 new SearchPanel(store, actions, send);
-new LandscapePanel(store, send);
+new CostLandscape(store, send);
 new Curves(store, navigation, actions, frameWindow);
 new Timeline(byId("timeline", HTMLElement), { store, navigation, jumps, frameWindow });
 watchConnection(byId("banner", HTMLElement), store);
@@ -111,17 +111,17 @@ const history = new HistoryList(store, send);
 new SavedMark(store, send);
 new Announcer(byId("announcer", HTMLElement), store);
 const firstSteps = new FirstSteps(store);
-const places = { store, navigation, grid, posing, layers, actions, away: reasonsOf(store).away };
-const palette = new Palette(places, () => table);
+const context = { store, navigation, grid, posing, layers, actions, away: unavailableReasons(store).away };
+const palette = new Palette(context, () => table);
 button("show-palette", () => palette.toggle());
 const showPalette = palette.toggle.bind(palette);
 const showFirstSteps = firstSteps.show.bind(firstSteps);
-const showHelp = () => keyMap.show();
+const showKeyList = () => keyList.show();
 const table = keys.bindings({
   store, actions, navigation, playback, jumps, frameWindow, grid, gestures, drawer, posing, pinning, inspector, layers,
-  layersMenu, people, snap, floor, notices, history, showPalette, showFirstSteps, showHelp,
+  layersMenu, people, cameraView, floor, notices, history, showPalette, showFirstSteps, showKeyList,
 }); // prettier-ignore
-const keyMap = new KeyMap(table);
+const keyList = new KeyList(table);
 watchTyping(document);
 
 const isDragging = () => store.facts.dragging;
@@ -134,9 +134,9 @@ scene.addEventListener("load", () => {
   keys.listen(scene.contentDocument, table, { viser: true, isDragging, say });
 });
 const inSoftware = drawsInSoftware();
-if (inSoftware) new SceneRest(scene, store);
+if (inSoftware) new ScenePause(scene, store);
 // The panes come first: viser's program is large, and would hold their first pictures up.
-store.onceKnown("shown", () => followScheme(scene));
+store.onceKnown("shown", () => followColorScheme(scene));
 
 const connection = new Connection(receiver, inSoftware ? { type: "pause_3d", pause: true } : null);
 
@@ -146,11 +146,11 @@ Object.assign(window, {
     toClient: grid.toClient.bind(grid),
     get state() {
       const { frame, pictures = new Map() } = store.facts.shown ?? {};
-      const standIn = store.facts.standIn && { ...store.facts.standIn, pictures: store.facts.standIn.pictures !== null };
+      const placeholder = store.facts.placeholder && { ...store.facts.placeholder, pictures: store.facts.placeholder.pictures !== null };
       const sizes = [...pictures].map(([key, { bitmap }]) => [key, [bitmap.width, bitmap.height]]);
       const shown = { frame, pictures: Object.fromEntries(sizes) };
       const views = grid.panes.map(({ view }) => ({ zoom: view.zoom, scale: view.scale, origin: view.origin }));
-      return { ...store.facts, timeline: Object.fromEntries(store.facts.timeline), shown, standIn, views };
+      return { ...store.facts, timeline: Object.fromEntries(store.facts.timeline), shown, placeholder, views };
     },
   },
 });

@@ -1,1 +1,5 @@
-"""The command line: one module per command, `__main__` above them."""
+"""The commands of the command line, one module each: its arguments, its action and what it prints.
+
+Imports all rooms of the tracker, and the app's `runtime`, `session`, `server` and `bench`. `app.__main__` registers
+each module's `command`. The modules import other rooms inside functions, so that `--help` starts without them.
+"""

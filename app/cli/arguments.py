@@ -1,14 +1,19 @@
-"""Words of the command line that hold values for several people or views: NAME=VALUE."""
+"""Arguments that several commands share: SESSION, and words of the form NAME=VALUE."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+import tyro
 
 from tracker.errors import TrackerError
 
 T = TypeVar("T")
 
+SessionArg = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION", help="session folder")]
 
-def pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> dict[str, T]:
+
+def parse_pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> dict[str, T]:
     """Parse NAME=VALUE words."""
     out: dict[str, T] = {}
     for word in words:
@@ -22,11 +27,11 @@ def pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> dict[s
     return out
 
 
-def common_or_pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> Mapping[str, T] | T | None:
-    """Parse one value for everybody, or NAME=VALUE words; None where there are none."""
+def parse_common_or_pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> Mapping[str, T] | T | None:
+    """Parse one value for all people, or NAME=VALUE words; None if there are no words."""
     if len(words) == 1 and "=" not in words[0]:
         try:
             return kind(words[0])
         except ValueError:
             raise TrackerError(f"expected {option} as a value or NAME=VALUE, found '{words[0]}'") from None
-    return pairs(words, option, kind) or None
+    return parse_pairs(words, option, kind) or None

@@ -1,28 +1,87 @@
-"""Track people from the command line, with progress; the same command resumes an interrupted run."""
+"""`quadrille track`: track people and store the poses; the same command resumes an interrupted run."""
 
+import sys
 from collections.abc import Sequence
 from contextlib import closing
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
+import tyro
 
-from app.cli.actions import Target
+from app.cli.arguments import SessionArg
+from app.cli.json_output import format_json
+from app.cli.target import Target, load_target, parse_frames
 from app.runtime.progress import Reporter
-from tracker.compute.kernel_cache import compiled_mark
-from tracker.evidence.observer import Observer
-from tracker.footage.recording import Recording
-from tracker.pipeline.stored_run import TrackTask, stored_run
-from tracker.pipeline.track_session import TrackSession
-from tracker.session.lock import SessionLock
-from tracker.store.annotation_store import AnnotationStore
-from tracker.tracking.tracker import TrackerSettings
+
+if TYPE_CHECKING:
+    from tracker.pipeline.track_session import TrackSession
+    from tracker.tracking.chamfer.settings import TrackSettings
+    from tracker.tracking.tracker import TrackerSettings
 
 
-def track(at: Target, frames: Sequence[int], settings: TrackerSettings, progress: Reporter) -> dict[str, Any]:
+@dataclass(frozen=True)
+class TrackArguments:
+    """Arguments of `quadrille track`."""
+
+    session: SessionArg
+    """session folder."""
+    method: Literal["chamfer"] = "chamfer"
+    """chamfer: edges; predicted, refined by Gauss-Newton, and searched if that does not suffice."""
+    frames: str | None = None
+    """A:B, half open; all by default."""
+    person: str | None = None
+    """name of the person to track; all people by default."""
+    backward: bool = False
+    """from the last frame of the range to the first."""
+    theta: float | None = None
+    """outlier distance in pixels; 3% of the longer side of the image by default."""
+    order: int = 1
+    """degree of the motion model: 0 stays, 1 constant velocity, 2 constant acceleration."""
+    window: int = 3
+    """past frames that the motion is estimated from."""
+    paper: bool = False
+    """as Gavrila and Davis 1996: best-first search alone, in one pass, outliers rejected."""
+    second_pass: bool = True
+    """at the end, track lost people backward from the first trusted poses after the loss."""
+    json: bool = False
+    """print one JSON object."""
+
+
+def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> None:
+    """Track people through a range of frames and store the poses.
+
+    Ctrl+C stops it and keeps the poses found so far; run it again to resume.
+    """
+    at = load_target(arguments.session, arguments.person, several=True)
+    frames: Sequence[int] = parse_frames(arguments.frames, at.session)
+    frames = frames[::-1] if arguments.backward else frames
+    found = track(at, frames, _chamfer_settings(arguments), Reporter(silent=arguments.json))
+    print(format_json(found) if arguments.json else _format(found))
+    if found["stopped_at"] is not None:
+        sys.exit(130)
+
+
+def _chamfer_settings(arguments: TrackArguments) -> "TrackSettings":
+    from tracker.motion.prediction import PredictSettings
+    from tracker.search.best_first import SearchSettings
+    from tracker.tracking.chamfer.settings import TrackSettings
+
+    paper = arguments.paper
+    return TrackSettings(
+        estimate="search" if paper else "refine",
+        predict=PredictSettings(arguments.order, arguments.window),
+        search=SearchSettings(passes=(1.0,) if paper else SearchSettings().passes),
+        theta_px=arguments.theta,
+        outliers="paper" if paper else "truncated",
+        second_pass=arguments.second_pass and not paper,
+    )
+
+
+def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progress: Reporter) -> dict[str, Any]:
     """Track people and store their poses as one entry of the history.
 
-    Keyframes and locked degrees of freedom stay as they are. Interrupted, it keeps what is done; the same call again
-    goes on from there.
+    Keyframes and locked degrees of freedom keep their values. An interrupted run keeps its poses; the same call again
+    resumes it.
 
     Args:
         at: the session and whom to track.
@@ -37,6 +96,15 @@ def track(at: Target, frames: Sequence[int], settings: TrackerSettings, progress
     Raises:
         SessionError: a person has no pose at or before the first frame.
     """
+    import numpy as np
+
+    from tracker.compute.kernel_cache import compiled_mark
+    from tracker.evidence.observer import Observer
+    from tracker.footage.recording import Recording
+    from tracker.pipeline.stored_run import TrackTask, stored_run
+    from tracker.session.lock import SessionLock
+    from tracker.store.annotation_store import AnnotationStore
+
     session, stopped = at.session, False
     with (
         SessionLock(session.folder),
@@ -65,7 +133,7 @@ def track(at: Target, frames: Sequence[int], settings: TrackerSettings, progress
     }
 
 
-def _work(run: TrackSession, progress: Reporter) -> None:
+def _work(run: "TrackSession", progress: Reporter) -> None:
     """Do both passes and show the progress of each."""
     if run.run.frames:
         with progress.over(len(run.run.frames), "tracking") as tick:
@@ -83,3 +151,18 @@ def _work(run: TrackSession, progress: Reporter) -> None:
         for step in steps:
             run.take(step)
             tick()
+
+
+def _format(found: dict[str, Any]) -> str:
+    resumed = "" if found["resumed_at"] is None else f", going on from frame {found['resumed_at']}"
+    lines = [f"tracked {', '.join(found['people'])} over {found['frames']} frames{resumed}"]
+    if found["mean_cost_px"] is not None:
+        lines[0] += f", mean cost {found['mean_cost_px']:.2f} px"
+    for name, statuses in found["statuses"].items():
+        counts = [f"{statuses[s]} {s}" for s in ("good", "doubtful", "lost") if statuses.get(s)]
+        lines.append(f"{name}: {', '.join(counts)}")
+    if found["followed_back"]:
+        lines.append(f"{found['followed_back']} poses of frames in which somebody was lost are from the second pass")
+    if found["stopped_at"] is not None:
+        lines.append(f"stopped before frame {found['stopped_at']}; run it again to resume")
+    return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""A camera's image as a viewer sees it that knows no principal point: the optical axis in the middle of the canvas."""
+"""Resample a camera's image for a viewer without a principal point: the optical axis in the middle of the canvas."""
 
 import cv2
 import numpy as np
@@ -7,21 +7,21 @@ from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera
 
 _AROUND = (24, 26, 29)
-"""Colour of the canvas where the image does not reach, RGB."""
+"""Colour of the canvas outside of the image, RGB."""
 
 
 def field_of_view(camera: Camera, aspect: float) -> float:
-    """Vertical angle of a canvas in which all of the undistorted image can be seen, rad.
+    """Return the vertical field of view of a canvas that shows all of the undistorted image, rad.
 
     Args:
-        camera: whose image.
-        aspect: width of the canvas by its height.
+        camera: of the image.
+        aspect: width by height of the canvas.
     """
     return 2 * float(np.arctan(_half_height(camera, aspect)))
 
 
 def aspect_around(camera: Camera) -> float:
-    """Width by height of the smallest canvas that holds all of the image, its optical axis in the middle."""
+    """Return width by height of the smallest canvas that shows all of the image, the optical axis in the middle."""
     x, y = _reach(camera)
     return float(x / y)
 
@@ -34,13 +34,13 @@ def centred(image: Image, camera: Camera, size: tuple[int, int]) -> Image:
 
     Args:
         image: undistorted, (H, W, 3).
-        camera: whose image.
+        camera: of the image.
         size: width and height of the canvas, px.
     """
     width, height = size
     focal_px = height / 2 / _half_height(camera, width / height)
     shrunk = min(1.0, 2 * focal_px / camera.K[1, 1])
-    if shrunk < 1.0:  # else the resampling below would skip pixels
+    if shrunk < 1.0:  # otherwise the resampling below would skip pixels
         camera = camera.scaled(shrunk)
         image = np.asarray(cv2.resize(image, camera.size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     a0, b0 = (width - 1) / 2, (height - 1) / 2
@@ -51,13 +51,13 @@ def centred(image: Image, camera: Camera, size: tuple[int, int]) -> Image:
 
 
 def _half_height(camera: Camera, aspect: float) -> float:
-    """Tangent of half the vertical angle of a canvas that holds the image."""
+    """Return the tangent of half the vertical field of view."""
     x, y = _reach(camera)
     return float(max(y, x / aspect))
 
 
 def _reach(camera: Camera) -> Array:
-    """How far the image reaches from the optical axis, across and up or down, (2,), at distance 1."""
+    """Return the largest distance of the image from the optical axis along x and y, (2,), at depth 1."""
     w, h = camera.size
     corners = np.array([[-0.5, -0.5], [w - 0.5, -0.5], [-0.5, h - 0.5], [w - 0.5, h - 0.5]])
     homogeneous = np.column_stack([corners, np.ones(4)])

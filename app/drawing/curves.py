@@ -1,7 +1,7 @@
-"""Poses and costs as curves against the frame, in the units that people read (GD96 Fig. 8)."""
+"""Plot poses and costs against the frame, in degrees, centimetres and pixels (GD96 Fig. 8)."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -9,9 +9,10 @@ from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.store.records import FrameNumbers
 
-GROUPS = ("arms", "torso", "legs", "cost")
+CurveGroup = Literal["arms", "torso", "legs", "cost"]
+GROUPS: tuple[CurveGroup, ...] = get_args(CurveGroup)
 
-# What the joints of limbs are called; all other joints belong to the trunk.
+# Words in the names of the joints of limbs; all other joints belong to the trunk.
 _LIMBS = {
     "arms": ("clavicle", "shoulder", "elbow", "wrist", "hand"),
     "legs": ("hip", "knee", "ankle", "foot", "toe"),
@@ -19,7 +20,7 @@ _LIMBS = {
 
 
 class Plot(NamedTuple):
-    """Curves that share an axis of values."""
+    """Curves that share a value axis."""
 
     title: str
     unit: str
@@ -54,16 +55,16 @@ def plots_of(model: BodyModel, cameras: Sequence[str], group: str) -> list[Plot]
 
 
 def samples(model: BodyModel, plots: Sequence[Plot], frames: Sequence[int], rows: Sequence[FrameNumbers]) -> FloatArray:
-    """The values of the curves of some plots, one curve after the other.
+    """Sample the curves of some plots, one after the other.
 
     Args:
         model: the body that the poses belong to.
-        plots: of that body.
-        frames: where, ascending.
-        rows: what is stored on those of these frames that have a pose, ascending.
+        plots: of this body.
+        frames: to sample, ascending.
+        rows: the stored poses on these frames, ascending.
 
     Returns:
-        (n_curves, n_frames) in the plots' units; NaN where there is no pose, or one of another body.
+        (n_curves, n_frames) in the plots' units; NaN where there is no pose, or a pose of another body.
     """
     out = np.full((sum(len(p.labels) for p in plots), len(frames)), np.nan, dtype=np.float32)
     known = [row for row in rows if len(row.values) == len(model.value_names)]
@@ -87,7 +88,7 @@ def samples(model: BodyModel, plots: Sequence[Plot], frames: Sequence[int], rows
 
 
 def _dof_values(model: BodyModel, rows: Sequence[FrameNumbers]) -> Array:
-    """Poses in degrees of freedom, (N, n_dofs), rad and metres; ball joints as rotation vectors."""
+    """Return poses in degrees of freedom, (N, n_dofs), rad and metres; ball joints as rotation vectors."""
     values = np.stack([row.values for row in rows])
     if model.value_names == model.dof_names:
         return values
@@ -101,7 +102,7 @@ def _limb(model: BodyModel, dof: int) -> str | None:
 
 
 def _plot(model: BodyModel, title: str, dofs: Sequence[int]) -> Plot:
-    """Name each curve by its axis alone where that is enough within the plot."""
+    """Make a plot. A curve is named by its axis alone if that is unique within the plot."""
     names = [model.dof_names[d].removeprefix("left_").removeprefix("right_") for d in dofs]
     axes = [name.partition(".")[2] for name in names]
     labels = tuple(

@@ -1,4 +1,4 @@
-"""Degrees of freedom as people read and type them: degrees and centimetres."""
+"""Convert degrees of freedom to the units that people read and type: degrees and centimetres."""
 
 from typing import Any
 
@@ -12,20 +12,20 @@ from tracker.posing.edits import joint_of, limb_of
 
 
 def factors(model: BodyModel) -> Array:
-    """What makes degrees and centimetres of radians and metres, (n_dofs,)."""
+    """Return the factors from radians and metres to degrees and centimetres, (n_dofs,)."""
     return np.where(model.dof_is_length, 100.0, np.degrees(1.0))
 
 
 def shown(model: BodyModel, values: Array) -> list[float]:
-    """The degrees of freedom of a pose in degrees and centimetres; angles that may wind come within half a turn."""
+    """Return a pose in degrees and centimetres. Angles without limits are wrapped to [-180, 180)."""
     numbers = model.difference(values, model.neutral())
-    winds = ~model.dof_is_length & np.isinf(model.limits).any(axis=1)
-    numbers = np.where(winds, np.remainder(numbers + np.pi, 2 * np.pi) - np.pi, numbers)
+    is_cyclic = ~model.dof_is_length & np.isinf(model.limits).any(axis=1)
+    numbers = np.where(is_cyclic, np.remainder(numbers + np.pi, 2 * np.pi) - np.pi, numbers)
     return [round(float(n), 3) for n in numbers * factors(model)]
 
 
 def described(model: BodyModel) -> dict[str, Any]:
-    """What a page is told of a person's degrees of freedom, once (docs/protocol.md)."""
+    """Describe the degrees of freedom, with the fields of `PersonInfo` (docs/protocol.md)."""
     limits = model.limits * factors(model)[:, None]
     of_points = {p: model.dof_joint == joint_of(model, p) for p in model.point_names}
     limbs = {p: limb_of(model, p) for p in model.point_names}

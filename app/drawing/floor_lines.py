@@ -1,4 +1,4 @@
-"""What the views show while the floor is being set: the marks, their lines of sight, and the plane as a grid."""
+"""Draw the setting of the floor: the marks, their lines of sight, and the plane as a grid."""
 
 import numpy as np
 
@@ -12,15 +12,15 @@ from tracker.session.session import Session
 
 FLOOR_COLOR = "#7ee08a"
 _MARK_PX = 7.0
-"""Half the size of a mark in an image 640 px wide."""
+"""Half the size of a mark in an image 640 px wide, px."""
 _HALF_WIDTH_M = 2.0
 _STEP_M = 0.5
 _PIECE_M = 0.1
-"""Lines of the grid are drawn in pieces: of one that passes behind a camera the visible part remains."""
+"""Length of the pieces of grid lines. Of a line that passes behind a camera the visible pieces remain."""
 
 
 def floor_lines(session: Session, state: State) -> list[Path]:
-    """The marks, epipolar lines and the previewed plane in all views; nothing while nobody sets the floor."""
+    """Draw the marks, epipolar lines and the previewed plane in all views; nothing unless the floor is being set."""
     picking = state.floor.picking
     if picking is None:
         return []
@@ -33,7 +33,7 @@ def floor_lines(session: Session, state: State) -> list[Path]:
         out.append(Path(index, 0, "floor", FLOOR_COLOR, _marks(picking, index, view)))
         lines = _lines_of_sight(picking, index, views)
         if lines:
-            # Its kind is always drawn, whatever layers are: it says where to click.
+            # Paths of this kind are drawn whatever the layers: they show where to click.
             out.append(Path(index, 0, "ghost", EPIPOLAR_COLOR, np.array(lines, dtype=np.float32).reshape(-1, 4)))
     return out
 
@@ -43,7 +43,7 @@ def _middle(picking: Picking) -> Array:
 
 
 def _grid(plane: GroundPlane, R: Array, middle: Array) -> Array:
-    """Pieces of the lines of a square grid in a plane, (N, 2, 3), metres."""
+    """Return pieces of the lines of a square grid in a plane, (N, 2, 3), metres."""
     along = np.arange(-_HALF_WIDTH_M, _HALF_WIDTH_M + 1e-9, _PIECE_M)
     across = np.arange(-_HALF_WIDTH_M, _HALF_WIDTH_M + 1e-9, _STEP_M)
     x, y = np.meshgrid(along, across)
@@ -54,28 +54,28 @@ def _grid(plane: GroundPlane, R: Array, middle: Array) -> Array:
 
 
 def _seen(view: Camera, pieces: Array) -> np.ndarray:
-    """Pieces of lines as a view sees them, x0, y0, x1, y1, (N, 4), undistorted px."""
+    """Project pieces of lines into a view: x0, y0, x1, y1, (N, 4), undistorted px."""
     ends = view.project(pieces).reshape(-1, 4)
     inside = np.all(np.isfinite(ends) & (np.abs(ends) < 4 * max(view.size)), axis=1)
     return ends[inside].astype(np.float32)
 
 
 def _marks(picking: Picking, index: int, view: Camera) -> np.ndarray:
-    """A cross for each click in a view, and a smaller one where the point is that all views agree on."""
+    """Draw a cross for each mark in a view, and a smaller one at the triangulated point."""
     size, rows = _MARK_PX * max(view.size) / 640, []
     for pick in picking.picks:
-        places = [(m[1], m[2], size) for m in pick.marks if m[0] == index]
+        marks = [(m[1], m[2], size) for m in pick.marks if m[0] == index]
         if pick.point_world is not None:
             u, v = view.project(pick.point_world)
             if np.isfinite(u):
-                places.append((u, v, size / 2))
-        for u, v, s in places:
+                marks.append((u, v, size / 2))
+        for u, v, s in marks:
             rows += [(u - s, v - s, u + s, v + s), (u - s, v + s, u + s, v - s)]
     return np.array(rows, dtype=np.float32).reshape(-1, 4)
 
 
 def _lines_of_sight(picking: Picking, index: int, views: list[Camera]) -> list[Array]:
-    """Where the point at hand must lie in a view in which it has not been clicked."""
+    """Draw the epipolar lines of the current point in a view in which it is not marked."""
     marks = picking.picks[-1].marks
     if any(m[0] == index for m in marks):
         return []

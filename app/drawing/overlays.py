@@ -1,7 +1,8 @@
-"""What is drawn over the views: contours, candidates, part edges, joints, epipolar lines, segments of edges."""
+"""Draw over the views: contours, candidates, part edges, joints, epipolar lines, edge segments."""
 
 from collections.abc import Collection, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -27,10 +28,13 @@ PART_EDGE_COLOR = "#9aa3ad"
 EPIPOLAR_COLOR = "#ffd54a"
 ACCEPTED_COLOR = "#35e0c8"
 REJECTED_COLOR = "#ff4fa3"
-_OF_A_PERSON = ("model", "hidden", "candidate", "ghost")
-"""Kinds of lines that are somebody's, and go where that person is not to be shown."""
-_EDGE_STRIDE = 3
-"""Every so many pixels of an edge are drawn: more would be seen only far in, and cost the browser much."""
+_PERSON_KINDS = ("model", "hidden", "candidate", "ghost")
+"""Kinds of lines that belong to a person, and are left out when the person is hidden."""
+_EDGE_STRIDE_PX = 3
+"""Spacing of the edge pixels drawn. More would show only at high zoom, and cost the browser much."""
+
+
+PathKind = Literal["model", "hidden", "candidate", "ghost", "part_edge", "epipolar", "accepted", "rejected", "floor"]
 
 
 class Path(NamedTuple):
@@ -38,15 +42,15 @@ class Path(NamedTuple):
 
     camera: int
     person: int
-    kind: str
-    """`model`, `hidden`, `candidate`, `ghost`, `part_edge`, `epipolar`, `accepted` or `rejected`."""
+    kind: PathKind
     color: str
     segments_px: FloatArray
     """x0, y0, x1, y1, (N, 4), undistorted px."""
 
 
-class Handle(NamedTuple):
-    """A joint in one view."""
+@dataclass(frozen=True)
+class Handle:
+    """A joint in one view; a joint behind the camera has none."""
 
     camera: int
     person: int
@@ -54,36 +58,36 @@ class Handle(NamedTuple):
     u: float
     v: float
     visible: bool
-    """Whether nothing hides it."""
+    """False for an occluded joint."""
 
 
 def bones(model: BodyModel) -> list[tuple[str, str]]:
-    """Pairs of points that a stick figure joins: each point and the joint of the part that carries it."""
+    """Return the pairs of points that a stick figure connects: each point and the joint that carries its part."""
     pairs = []
     for i, name in enumerate(model.point_names):
         part = int(model.point_parts[i])
         joint = model.joints[part]
         if i != part:
-            pairs.append((joint.name, name))  # a landmark hangs on its part's joint
+            pairs.append((joint.name, name))  # a landmark is connected to its part's joint
         elif joint.parent:
             pairs.append((model.joints[model.part_index[joint.parent]].name, name))
     return pairs
 
 
 def paths(session: Session, state: State, view: View, views: Sequence[ViewEvidence] | None) -> list[Path]:
-    """Everything that the layers of a page call for, in the views that it shows.
+    """Draw the layers of a page in the views that it shows.
 
     Args:
         session: with its cameras and people.
         state: what to draw.
         view: what the page shows.
-        views: the evidence of the shown frame; without it there are no segments of edges to draw.
+        views: the evidence of the shown frame; None draws no edge segments.
     """
     state = state.drawn
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
     tried = state.job.candidate if state.job.running or state.look.replay is not None else None
-    drafted, others = _with_draft(state, bodies), _others(state, bodies)
+    drafted, others = _with_draft(state, bodies), _alternatives(state, bodies)
     ghosts = ((state.look.compared, COMPARED_COLOR), (state.look.preview, PREVIEW_COLOR))
     for index in sorted(view.cameras):
         camera = session.cameras[index].camera.pinhole
@@ -105,11 +109,11 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
             out += [s for s in _segments(bodies, views[index], index, view) if s.kind in view.layers]
     if state.drag is not None and "epipolar" in view.layers:
         out += [line for line in _epipolar_lines(session, state) if line.camera in view.cameras]
-    return [p for p in out if p.kind not in _OF_A_PERSON or p.person not in state.cast.hidden]
+    return [p for p in out if p.kind not in _PERSON_KINDS or p.person not in state.cast.hidden]
 
 
 def handles(session: Session, state: State, cameras: Collection[int]) -> list[Handle]:
-    """The joints of everybody shown, in some views, given by index; those behind a camera are left out."""
+    """Project the joints of all visible people into some views, given by index; joints behind a camera are left out."""
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     points = [b.points_world for b in bodies]
     seen = {index: session.cameras[index].camera.pinhole for index in sorted(cameras)}
@@ -127,7 +131,7 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
 
 
 def part_colors(people: Sequence[Person]) -> list[str]:
-    """Colours of the parts, counted through some people."""
+    """Return the colours of the parts of some people, in order."""
     return [part.color for person in people for part in person.model.parts]
 
 
@@ -136,28 +140,32 @@ def _traced(bodies: Sequence[PosedBody], camera: Camera) -> Contour:
 
 
 def _model(session: Session, bodies: Sequence[PosedBody], camera: Camera, index: int, view: View) -> list[Path]:
-    """The contours of the poses shown: what one sees of them, and what parts hide."""
+    """Draw the visible and the occluded contours of the shown poses."""
     contour = _traced(bodies, camera)
     out = []
-    for layer, kind, those in (("hidden", "hidden", contour.occluded), ("contours", "model", ~contour.occluded)):
+    kinds: tuple[tuple[str, PathKind, Mask], ...] = (
+        ("hidden", "hidden", contour.occluded),
+        ("contours", "model", ~contour.occluded),
+    )
+    for layer, kind, pieces in kinds:
         if layer in view.layers and view.by_part:
-            out += _by_part(session, bodies, contour, those, index, kind)
+            out += _by_part(session, bodies, contour, pieces, index, kind)
         elif layer in view.layers:
-            out += _by_person(bodies, contour, those, index, kind, [p.color for p in session.people])
+            out += _by_person(bodies, contour, pieces, index, kind, [p.color for p in session.people])
     return out
 
 
 def _outlined(
-    session: Session, poses: Sequence[Array], camera: Camera, index: int, kind: str, color: str
+    session: Session, poses: Sequence[Array], camera: Camera, index: int, kind: PathKind, color: str
 ) -> list[Path]:
-    """What one would see of other poses of everybody, all in one colour."""
+    """Draw the visible contours of other poses of all people, in one colour."""
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, poses, strict=True)]
     contour = _traced(bodies, camera)
     return _by_person(bodies, contour, ~contour.occluded, index, kind, [color] * len(bodies))
 
 
 def _with_draft(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
-    """Everybody in the poses shown, the person whose sizes are being edited in the draft's body."""
+    """Return the bodies with the person whose sizes are being edited in the draft's body."""
     people, draft = list(bodies), state.draft
     if draft is not None:
         shown = people[draft.person]
@@ -165,44 +173,44 @@ def _with_draft(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
     return people
 
 
-def _others(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
-    """Everybody in the poses shown, but for those of whom another is about as good: in the best of these."""
+def _alternatives(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
+    """Return the bodies with everybody who has alternatives in the best of these; empty if nobody has any."""
     if not any(shown.others for shown in state.people):
         return []
     return [PosedBody(b.model, s.others[0]) if s.others else b for b, s in zip(bodies, state.people, strict=True)]
 
 
 def _ghosts(chosen: Collection[int], people: Sequence[PosedBody], camera: Camera, index: int, color: str) -> list[Path]:
-    """What one would see of some of the people, given by index, if everybody stood so."""
+    """Draw the visible contours of some people, given by index, among all people."""
     contour = _traced(people, camera)
     found = _by_person(people, contour, ~contour.occluded, index, "ghost", [color] * len(people))
     return [path for path in found if path.person in chosen]
 
 
 def _by_person(
-    bodies: Sequence[PosedBody], contour: Contour, those: Mask, index: int, kind: str, colors: Sequence[str]
+    bodies: Sequence[PosedBody], contour: Contour, chosen: Mask, index: int, kind: PathKind, colors: Sequence[str]
 ) -> list[Path]:
-    """Those pieces of a contour, one path for each person."""
+    """Return some pieces of a contour as one path per person."""
     people = occluding_contours.surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
     return [
-        Path(index, person, kind, colors[person], contour.pieces_px[those & (people == person)])
+        Path(index, person, kind, colors[person], contour.pieces_px[chosen & (people == person)])
         for person in range(len(bodies))
     ]
 
 
 def _by_part(
-    session: Session, bodies: Sequence[PosedBody], contour: Contour, those: Mask, index: int, kind: str
+    session: Session, bodies: Sequence[PosedBody], contour: Contour, chosen: Mask, index: int, kind: PathKind
 ) -> list[Path]:
-    """Those pieces of a contour, one path for each part that has any."""
+    """Return some pieces of a contour as one path per part that has any."""
     people, colors = occluding_contours.surfaces_of(tuple(b.model for b in bodies)).people, part_colors(session.people)
     return [
-        Path(index, int(people[part]), kind, colors[part], contour.pieces_px[those & (contour.parts == part)])
-        for part in np.unique(contour.parts[those])
+        Path(index, int(people[part]), kind, colors[part], contour.pieces_px[chosen & (contour.parts == part)])
+        for part in np.unique(contour.parts[chosen])
     ]
 
 
 def _segments(bodies: Sequence[PosedBody], view: ViewEvidence, index: int, shown: View) -> list[Path]:
-    """The segments of edges that the poses shown explain, and those that they do not (GD96 Fig. 6)."""
+    """Draw the edge segments that the shown poses explain, and the others (GD96 Fig. 6)."""
     if shown.layers.isdisjoint(("accepted", "rejected")):
         return []
     segments, samples = view.segments, view.samples
@@ -212,13 +220,13 @@ def _segments(bodies: Sequence[PosedBody], view: ViewEvidence, index: int, shown
     chosen = accept_segments(samples, contour.pieces_px[~contour.occluded], ACCEPTED_SHARE * view.theta_px)
     lengths = np.diff(segments.firsts)
     owners = np.repeat(np.arange(len(lengths)), lengths)
-    places = np.arange(len(owners)) - segments.firsts[owners]
-    drawn = np.flatnonzero((places % _EDGE_STRIDE == 0) | (places == lengths[owners] - 1))
-    goes_on = owners[drawn[1:]] == owners[drawn[:-1]]
-    # As resized pictures keep the borders of their pixels, not the centres.
+    offsets = np.arange(len(owners)) - segments.firsts[owners]
+    drawn = np.flatnonzero((offsets % _EDGE_STRIDE_PX == 0) | (offsets == lengths[owners] - 1))
+    is_joined = owners[drawn[1:]] == owners[drawn[:-1]]
+    # Resizing keeps the borders of pixels, not their centres.
     points_px = (segments.points_px[drawn] + np.array(view.corner_px, np.float32) + 0.5) / view.scale - 0.5
-    lines = np.hstack([points_px[:-1], points_px[1:]])[goes_on].astype(np.float32)
-    of_accepted = chosen[owners[drawn[:-1][goes_on]]]
+    lines = np.hstack([points_px[:-1], points_px[1:]])[is_joined].astype(np.float32)
+    of_accepted = chosen[owners[drawn[:-1][is_joined]]]
     return [
         Path(index, 0, "rejected", REJECTED_COLOR, lines[~of_accepted]),
         Path(index, 0, "accepted", ACCEPTED_COLOR, lines[of_accepted]),
@@ -226,17 +234,17 @@ def _segments(bodies: Sequence[PosedBody], view: ViewEvidence, index: int, shown
 
 
 def _epipolar_lines(session: Session, state: State) -> list[Path]:
-    """The line of sight of the dragged point, as the other views see it."""
+    """Draw the line of sight of the dragged point in the other views."""
     drag = state.drag
     assert drag is not None
     model = session.people[drag.person].model
     source = session.cameras[drag.camera].camera.pinhole
     T_world_part = model.kinematics(state.poses[drag.person]).Ts_world_part[drag.part]
-    place: Array = rigid.apply(T_world_part, np.array(drag.place_part))
+    point_world: Array = rigid.apply(T_world_part, np.array(drag.place_part))
     out = []
     for index, target in enumerate(session.cameras):
         if index != drag.camera:
-            segment = epipolar_segment(source, target.camera.pinhole, source.project(place))
+            segment = epipolar_segment(source, target.camera.pinhole, source.project(point_world))
             if segment is not None:
                 row = segment.reshape(1, 4).astype(np.float32)
                 out.append(Path(index, drag.person, "epipolar", EPIPOLAR_COLOR, row))

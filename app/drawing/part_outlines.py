@@ -1,4 +1,4 @@
-"""The parts of bodies that a pointer can take by their surface, as outlines in each view."""
+"""Convex hulls of the body parts in each view, for picking parts with the pointer."""
 
 from typing import NamedTuple
 
@@ -12,23 +12,23 @@ from tracker.posing import picking
 from tracker.session.session import Session
 
 
-class Outline(NamedTuple):
-    """Where a view shows a part, to be pointed at."""
+class PartHull(NamedTuple):
+    """The convex hull of a part in a view."""
 
     camera: int
     person: int
     part: int
     depth: float
-    """Distance of the part, metres: of parts that overlap the nearest is meant."""
+    """Distance of the part, metres. Where hulls overlap, the nearest counts."""
     segments_px: FloatArray
-    """The closed convex outline as x0, y0, x1, y1, (N, 4), undistorted px."""
+    """Its closed outline as x0, y0, x1, y1, (N, 4), undistorted px."""
 
 
-def outlines(session: Session, state: State, view: View) -> list[Outline]:
-    """The parts that a pointer can take in the views that a page shows: all of everybody who is shown.
+def part_hulls(session: Session, state: State, view: View) -> list[PartHull]:
+    """Return the hulls of all visible people in the views that a page shows.
 
-    There are none while a hand holds a point, and of a part that is held by its surface there is that one alone: what
-    the hand does not need would only make it wait. A step that is replayed is no pose to be taken.
+    While a point is dragged there are none, and while a part is dragged there is only its own, because they would only
+    delay the drag. A replayed step has none, because it is no stored pose.
     """
     drag = state.drag
     if "joints" not in view.layers or state.look.replay is not None or (drag is not None and not drag.by_surface):
@@ -42,12 +42,12 @@ def outlines(session: Session, state: State, view: View) -> list[Outline]:
             if one.body in state.cast.hidden:
                 continue
             if drag is None or (one.body, one.part) == (drag.person, drag.part):
-                out.append(Outline(index, one.body, one.part, one.depth_m, _closed(one.polygon_px)))
+                out.append(PartHull(index, one.body, one.part, one.depth_m, _closed(one.polygon_px)))
     return out
 
 
 def _closed(polygon_px: FloatArray) -> FloatArray:
-    """The sides of a polygon, (n, 2), as x0, y0, x1, y1, (n, 4)."""
+    """Return the sides of a polygon, (n, 2), as x0, y0, x1, y1, (n, 4)."""
     sides = np.empty((len(polygon_px), 4), np.float32)
     sides[:, :2], sides[:-1, 2:], sides[-1, 2:] = polygon_px, polygon_px[1:], polygon_px[0]
     return sides

@@ -1,4 +1,4 @@
-"""Pictures for the page: footage and evidence as JPEG; masks as PNG that is transparent where there is nothing."""
+"""Encode pictures for the page: footage and evidence as JPEG, masks as PNG, transparent where there is nothing."""
 
 import struct
 import zlib
@@ -18,62 +18,62 @@ from tracker.images.background_subtraction import Mask
 SILHOUETTE_COLOR = "#4ae08c"
 _JPEG_QUALITY = 85
 _FAST = 1
-"""Masks are large even areas: zlib's least effort makes them as small as its best, in a fraction of the time."""
+"""zlib's lowest level: masks are large even areas, for which it compresses as well as the highest."""
 
 
 def footage(image: Image | None, size: tuple[int, int]) -> bytes:
-    """An image of the footage as JPEG.
+    """Encode an image of the footage as JPEG.
 
     Args:
         image: undistorted, (H, W, 3) RGB; None where the frame is damaged.
-        size: width and height of the picture that then stands in, px.
+        size: width and height of the placeholder for a damaged frame, px.
     """
     return _jpeg(_blank(size, "frame damaged") if image is None else image)
 
 
 def distance(view: ViewEvidence) -> bytes:
-    """The distance image of a view as JPEG, bright at the edges, dark where its limit is reached."""
+    """Encode the distance image of a view as JPEG, bright at the edges and dark at its limit."""
     near = 1.0 - view.distance / max(1e-6, 2 * view.theta_px)
     coloured = cv2.applyColorMap((255 * near).astype(np.uint8), cv2.COLORMAP_INFERNO)
     return _jpeg(np.asarray(cv2.cvtColor(coloured, cv2.COLOR_BGR2RGB), dtype=np.uint8))
 
 
 def distance_limit_px(view: ViewEvidence) -> float:
-    """The distance at which the picture of the distance image is darkest, px of the footage."""
+    """Return the distance at which the picture of the distance image is darkest, px of the footage."""
     return 2 * view.theta_px / view.scale
 
 
 def silhouette(view: ViewEvidence) -> bytes:
-    """Everybody's silhouette in a view as PNG of one bit per pixel; empty where nothing tells it."""
+    """Encode the silhouette of all people in a view as PNG of one bit per pixel; empty if unknown."""
     if view.silhouette is None:
         return mask(np.zeros((view.camera.height, view.camera.width), np.bool_), SILHOUETTE_COLOR)
     return mask(view.silhouette.inside, SILHOUETTE_COLOR)
 
 
 def mask(inside: Mask, color: str) -> bytes:
-    """A mask, (H, W), in one colour as PNG of one bit per pixel."""
+    """Encode a mask, (H, W), in one colour as PNG of one bit per pixel."""
     return _png(np.packbits(inside, axis=1), inside.shape[1], 1, [color])
 
 
 def labels(parts: NDArray[np.uint8], colors: Sequence[str]) -> bytes:
-    """Labels, (H, W), as PNG: 0 is transparent, k has the k-th of the colours, counted from 1."""
+    """Encode labels, (H, W), as PNG: 0 is transparent, k has the k-th colour, counted from 1."""
     return _png(parts, parts.shape[1], 8, colors)
 
 
 def parts(bodies: Sequence[PosedBody], camera: Camera, colors: Sequence[str], reduction: float) -> bytes:
-    """What the parts of the bodies cover, each in its colour, as PNG.
+    """Encode the areas of the body parts, each in its colour, as PNG.
 
     Args:
-        bodies: everybody in the scene.
+        bodies: of all people.
         camera: the view, without lens distortion.
-        colors: of the parts, counted through all bodies.
-        reduction: pixels of the image, along either side, for one of the picture.
+        colors: of the parts of all bodies, in order.
+        reduction: image pixels per picture pixel along either side.
     """
     return labels(part_labels(bodies, camera.scaled(1 / reduction)), colors)
 
 
 def _png(rows: NDArray[np.uint8], width: int, depth: int, colors: Sequence[str]) -> bytes:
-    """A PNG with a palette whose first entry is transparent.
+    """Encode a PNG with a palette whose first entry is transparent.
 
     Args:
         rows: bytes of the rows, (H, bytes).
@@ -82,7 +82,7 @@ def _png(rows: NDArray[np.uint8], width: int, depth: int, colors: Sequence[str])
         colors: `#rrggbb` of the entries from the second on.
     """
     height = rows.shape[0]
-    unfiltered = np.zeros((height, rows.shape[1] + 1), np.uint8)  # each row begins with the number of its filter
+    unfiltered = np.zeros((height, rows.shape[1] + 1), np.uint8)  # each row starts with the number of its filter
     unfiltered[:, 1:] = rows
     palette = bytes(3) + b"".join(bytes.fromhex(color[1:]) for color in colors)
     indexed = 3

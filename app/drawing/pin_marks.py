@@ -1,6 +1,6 @@
-"""What is drawn of pins: the pins and how far the model is off, where they meet, and their lines in the other views."""
+"""Draw pins: their distance from the model, their triangulation, and their epipolar lines in the other views."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,8 +12,9 @@ from tracker.geometry.triangulation import PointObservation, triangulate
 from tracker.session.session import Session
 
 
-class PinMark(NamedTuple):
-    """A pin in its view, and where the model has the point."""
+@dataclass(frozen=True)
+class PinMark:
+    """A pin in its view, and the model's point there."""
 
     camera: int
     person: int
@@ -21,36 +22,39 @@ class PinMark(NamedTuple):
     u: float
     v: float
     model_u: float | None
-    """Undistorted px; None for a point behind the camera."""
+    """Null for a point behind the camera, likewise `model_v`."""
     model_v: float | None
 
 
-class MeetingMark(NamedTuple):
-    """Where the point in space on which pins agree lies in a view."""
+@dataclass(frozen=True)
+class TriangulationMark:
+    """The image of a triangulated point in a view."""
 
     camera: int
     u: float
     v: float
     error_px: float | None
-    """Its distance from the pin of this view, px; None where there is no pin."""
+    """Distance from the pin of this view, px; null where there is no pin."""
 
 
-class Meeting(NamedTuple):
-    """Where the pins of the joint worked on meet."""
+@dataclass(frozen=True)
+class PinTriangulation:
+    """The point in space that the pins of the joint worked on determine."""
 
     person: int
     point: str
     pins: int
-    """Number of views that it is pinned in."""
+    """Number of views in which it is pinned."""
     error_px: float | None
-    """Root of the mean squared distance of the pins from the images of the point, px; None where they do not meet."""
+    """Root mean square distance of the pins from the images of the point, px; null where they determine none."""
     why: str
-    """Why they do not; empty where they do."""
-    marks: tuple[MeetingMark, ...]
+    """Why there is no point, and what to do; empty where there is one."""
+    marks: tuple[TriangulationMark, ...]
+    """Images of the point; empty where there is none."""
 
 
 def pin_marks(session: Session, state: State) -> list[PinMark]:
-    """All pins of the frame, of everybody who is shown."""
+    """Return all pins of the frame, of visible people."""
     out = []
     for person, (info, pins) in enumerate(zip(session.people, state.pins, strict=True)):
         if not pins or person in state.cast.hidden:
@@ -63,27 +67,27 @@ def pin_marks(session: Session, state: State) -> list[PinMark]:
     return out
 
 
-def meeting(session: Session, state: State) -> Meeting | None:
-    """Where the pins of the joint worked on meet; None where it has none."""
+def pin_triangulation(session: Session, state: State) -> PinTriangulation | None:
+    """Triangulate the pins of the joint worked on; None where it has none."""
     pins = _of_joint(state)
     if not pins or state.point is None:
         return None
     views = [c.camera.pinhole for c in session.cameras]
     found = triangulate([views[p.camera] for p in pins], np.array([p.position_px for p in pins]))
     if found.point_world is None:
-        return Meeting(state.person, state.point, len(pins), None, found.why, ())
+        return PinTriangulation(state.person, state.point, len(pins), None, found.why, ())
     errors = dict(zip((p.camera for p in pins), found.errors_px.tolist(), strict=True))
     marks = []
     for index, view in enumerate(views):
         u, v = view.project(found.point_world)
         if np.isfinite(u):
-            marks.append(MeetingMark(index, float(u), float(v), errors.get(index)))
+            marks.append(TriangulationMark(index, float(u), float(v), errors.get(index)))
     rms = float(np.sqrt(np.mean(found.errors_px**2)))
-    return Meeting(state.person, state.point, len(pins), rms, "", tuple(marks))
+    return PinTriangulation(state.person, state.point, len(pins), rms, "", tuple(marks))
 
 
 def pin_lines(session: Session, state: State, view: View) -> list[Path]:
-    """The lines of sight of the pins of the joint worked on, as the other views see them."""
+    """Draw the lines of sight of the pins of the joint worked on in the other views."""
     out: list[Path] = []
     if "epipolar" not in view.layers:
         return out
@@ -100,7 +104,7 @@ def pin_lines(session: Session, state: State, view: View) -> list[Path]:
 
 
 def _of_joint(state: State) -> list[PointObservation]:
-    """The pins of the joint worked on; none of a person who is not shown."""
+    """Return the pins of the joint worked on; none of a hidden person."""
     if not state.pins or state.person in state.cast.hidden:
         return []
     return [p for p in state.pins[state.person] if p.point == state.point]

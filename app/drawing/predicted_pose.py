@@ -1,4 +1,4 @@
-"""The pose that the tracker would expect on a frame, from the stored poses around it."""
+"""Predict the pose of a frame as the tracker does, from the stored poses around it."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -9,12 +9,12 @@ from tracker.motion.prediction import PredictSettings, predict
 
 
 class Prediction(NamedTuple):
-    """What the tracker would expect on a frame."""
+    """The tracker's prediction for a frame."""
 
     values: Array | None
-    """The pose, (n_values,); None where nothing can be expected."""
+    """The pose, (n_values,); None if there is none."""
     why: str
-    """From what it was predicted, or why it was not; for people to read."""
+    """The frames that it was predicted from, or why there is none; for people to read."""
 
 
 def prediction(
@@ -24,21 +24,21 @@ def prediction(
     settings: PredictSettings,
     backward: bool,
 ) -> Prediction:
-    """Predict the pose of a frame as the tracker does, from the poses before it.
+    """Predict the pose of a frame from the poses before it.
 
     Args:
         model: the body.
-        poses: gives its stored poses by frame, on those of a range that have one.
-        frame: the shown one.
-        settings: of the prediction.
-        backward: from the poses after it, as a run backward does.
+        poses: returns the stored poses in a range, by frame.
+        frame: to predict.
+        settings: of the motion model.
+        backward: whether to predict from the poses after it, as a run backward does.
     """
     before = "after" if backward else "before"
     window = settings.window
     around = range(frame + 1, frame + 1 + window) if backward else range(max(0, frame - window), frame)
     known = poses(around)
     past: list[int] = []
-    for k in around if backward else reversed(around):  # from the nearest on, as far as they follow one another
+    for k in around if backward else reversed(around):  # from the nearest frame to the first gap
         if k not in known:
             break
         past.append(k)

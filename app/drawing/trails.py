@@ -1,4 +1,4 @@
-"""The ways that points of the bodies take around the shown frame, from stored poses."""
+"""Draw trails: the paths of body points around the shown frame, from stored poses."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
@@ -9,19 +9,19 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
 
-_MOST_GAP = 5
-"""Poses more frames apart are not joined: nobody knows what lies between."""
-_MOST_KEPT = 4000
-"""Frames whose points are remembered."""
+_MAX_GAP = 5
+"""Poses more frames apart are not connected: the motion between them is unknown."""
+_MAX_CACHED = 4000
+"""Number of frames whose points are cached."""
 _BEFORE_RGB = np.array([38.0, 112.0, 233.0])
 _AFTER_RGB = np.array([240.0, 120.0, 20.0])
 _FAR_RGB = np.array([140.0, 140.0, 145.0])
-"""Colours of a trail at the shown frame, from before and from after, and at its ends."""
+"""Colours of a trail: just before the shown frame, just after it, and at both ends."""
 _GAMMA = 2.2
-"""From the colours of a screen to intensities of light."""
+"""Exponent from screen colours to light intensities."""
 
 Poses = Callable[[range], Mapping[int, Array]]
-"""Gives the stored poses of a person by frame, on those of a range that have one."""
+"""Returns the stored poses of a person in a range, by frame."""
 
 
 class Segments(NamedTuple):
@@ -34,25 +34,25 @@ class Segments(NamedTuple):
 
 
 class Trails:
-    """The trails of one person; remembers the points of frames whose poses have not changed."""
+    """The trails of one person. Caches the points of frames until their poses change."""
 
     def __init__(self, model: BodyModel, poses: Poses) -> None:
-        """Draw trails of this body, whose stored poses `poses` gives."""
+        """Draw trails of a body with the stored poses that `poses` returns."""
         self._model, self._poses = model, poses
         self._points: dict[int, Array | None] = {}
 
     def forget(self, frames: Iterable[int]) -> None:
-        """Let go of frames whose poses have changed."""
+        """Drop cached frames whose poses changed."""
         for frame in frames:
             self._points.pop(frame, None)
 
     def segments(self, frame: int, length: int, names: frozenset[str], n_frames: int) -> Segments:
-        """The trails around a frame.
+        """Return the trails around a frame.
 
         Args:
             frame: the shown one.
-            length: frames to either side.
-            names: the points to follow; those that the body does not have are passed over.
+            length: of the trail, frames to either side.
+            names: of the points; those that the body does not have are ignored.
             n_frames: of the recording.
         """
         chosen = [i for i, name in enumerate(self._model.point_names) if name in names]
@@ -63,7 +63,7 @@ class Trails:
             return Segments(np.zeros((0, 2, 3), np.float32), np.zeros((0, 2, 3), np.uint8))
         points = np.stack([found[k] for k in frames])[:, chosen]  # (frames, points, 3)
         colors = np.broadcast_to(_colors(frames - frame, length)[:, None], points.shape)
-        joined = np.diff(frames) <= _MOST_GAP
+        joined = np.diff(frames) <= _MAX_GAP
         pairs = np.stack([points[:-1], points[1:]], axis=2)[joined]  # (joined, points, 2, 3)
         tints = np.stack([colors[:-1], colors[1:]], axis=2)[joined]
         return Segments(pairs.reshape(-1, 2, 3).astype(np.float32), tints.reshape(-1, 2, 3).astype(np.uint8))
@@ -71,7 +71,7 @@ class Trails:
     def _at(self, window: range) -> dict[int, Array]:
         missing = [k for k in window if k not in self._points]
         if missing:
-            if len(self._points) + len(missing) > _MOST_KEPT:
+            if len(self._points) + len(missing) > _MAX_CACHED:
                 self._points = {k: p for k, p in self._points.items() if k in window}
             poses = self._poses(range(missing[0], missing[-1] + 1))
             self._points |= {k: self._model.points_world(poses[k]) if k in poses else None for k in missing}
@@ -79,7 +79,7 @@ class Trails:
 
 
 def _colors(offsets: NDArray[np.int64], length: int) -> Array:
-    """Colours of moments of a trail, (N, 3): blue before the shown frame, orange after, grey far from it.
+    """Return the colours of a trail, (N, 3): blue before the shown frame, orange after it, grey at its ends.
 
     Args:
         offsets: frames from the shown one, (N,).
@@ -87,5 +87,5 @@ def _colors(offsets: NDArray[np.int64], length: int) -> Array:
     """
     near = np.clip(1 - np.abs(offsets) / (length + 1), 0.0, 1.0)[:, None]
     shown = near * np.where(offsets[:, None] < 0, _BEFORE_RGB, _AFTER_RGB) + (1 - near) * _FAR_RGB
-    # viser takes the colours of lines for intensities of light, and would show these much paler.
+    # viser takes the colours of lines for light intensities, and would show these much paler.
     return np.asarray(255 * (shown / 255) ** _GAMMA)

@@ -1,1 +1,5 @@
-"""The pane socket: state to messages, messages to the controller."""
+"""The pane socket: sends the state to the page as messages, and carries out the page's commands.
+
+Imports `app.state`, `app.drawing` and `app.control`. Public: `socket.PaneSocket`, the declared messages in
+`client_messages`, `server_messages` and `binary_headers`, and `message_parsing.parse`.
+"""

@@ -1,36 +1,38 @@
-"""The pictures that a page shows and does not have yet, as sets that it puts on the screen at once."""
+"""Pictures that a page shows and has not received yet, as sets that it shows together."""
 
 import asyncio
 import itertools
 
 from app.control.controller import Controller
 from app.drawing import overlays, pictures
-from app.page import messages
-from app.state.page_view import EVIDENCE, Picture, View
+from app.page.binary_headers import ImageHeader
+from app.page.encoding import encode_binary
+from app.state.identity import Identity
+from app.state.page_view import EVIDENCE, PictureLayer, View
 from app.state.state import State
 from tracker.body.model import PosedBody
 
-Key = tuple[Picture, int]
+Key = tuple[PictureLayer, int]
 """Layer and camera."""
 
 
 class PictureSets:
-    """What one page has been sent."""
+    """Remembers which pictures one page has received."""
 
     def __init__(self, controller: Controller) -> None:
-        """Begin with nothing."""
+        """Begin with nothing sent."""
         self._controller = controller
         self._sent: dict[Key, tuple[object, ...]] = {}
         self._numbers = itertools.count(1)
 
     async def missing(self, state: State, view: View) -> list[bytes]:
-        """Make the pictures that the page lacks; they count as sent.
+        """Make the pictures that the page lacks, and count them as sent.
 
-        Pictures of evidence are among them when it is at hand: those of the footage do not wait for it. None where the
-        page is on another frame by the time that they are made (a tracker always is, and is to be watched), or the
-        frame is not listed yet.
+        Pictures of evidence are included once the evidence is cached, so that footage does not wait for it. Returns
+        nothing if the frame is not listed yet, or if the page has moved to another frame meanwhile. While a tracker
+        runs the page always has, and gets the pictures all the same.
         """
-        wanted = self._at_hand(_wanted(state, view), state)
+        wanted = self._available(_wanted(state, view), state)
         missing = [key for key, content in wanted.items() if self._sent.get(key) != content]
         self._sent = wanted
         made = await asyncio.gather(*(asyncio.to_thread(self._make, key, state, view) for key in missing))
@@ -39,16 +41,15 @@ class PictureSets:
             self._sent = {}
             return []
         number = next(self._numbers)
-        common = {"type": "image", "frame": state.frame, "set": number, "of": len(missing)}
         return [
-            messages.binary(common | {"layer": layer, "camera": camera, "limit_px": limit_px}, data)
+            encode_binary(ImageHeader(layer, camera, state.frame, number, len(missing), limit_px), data)
             for (layer, camera), (data, limit_px) in zip(missing, made, strict=True)
         ]
 
-    def _at_hand(self, wanted: dict[Key, tuple[object, ...]], state: State) -> dict[Key, tuple[object, ...]]:
-        """Those of the pictures that can be made now, or have been sent already.
+    def _available(self, wanted: dict[Key, tuple[object, ...]], state: State) -> dict[Key, tuple[object, ...]]:
+        """Select the pictures that can be made now or have been sent.
 
-        Who follows a tracker sees all of each frame that is shown: none of them rests for long enough.
+        While a tracker runs, evidence is computed for every shown frame: it would never be cached in time.
         """
         if not self._controller.frames.listed(state.frame):
             return {k: c for k, c in wanted.items() if self._sent.get(k) == c}
@@ -57,7 +58,7 @@ class PictureSets:
         return {k: c for k, c in wanted.items() if k[0] not in EVIDENCE or self._sent.get(k) == c}
 
     def _make(self, key: Key, state: State, view: View) -> tuple[bytes, float | None]:
-        """A picture, and what the darkest colour of a distance image means, px."""
+        """Make a picture. Also return the distance that the darkest colour of a distance image stands for, px."""
         layer, camera = key
         reduction, session, frames = (
             view.reductions[camera],
@@ -78,12 +79,12 @@ class PictureSets:
 
 
 def _wanted(state: State, view: View) -> dict[Key, tuple[object, ...]]:
-    """What the page shows, and what each picture depends on."""
+    """Return what each picture that the page shows depends on."""
     wanted: dict[Key, tuple[object, ...]] = {}
     for layer in view.pictures:
         for camera in sorted(view.cameras):
-            # Evidence comes at the scale of matching, whatever the pane.
+            # Evidence has the scale of matching, whatever the size of the pane.
             content = () if layer in EVIDENCE else (view.reductions[camera],)
-            poses = (state.revisions, state.cast.hidden, *map(id, state.drawn.poses)) if layer == "parts" else ()
+            poses = (state.revisions, state.cast.hidden, *map(Identity, state.drawn.poses)) if layer == "parts" else ()
             wanted[layer, camera] = (state.frame, *content, *poses)
     return wanted

@@ -1,14 +1,17 @@
-"""What a page that watches searches is sent: only what it does not know yet (docs/protocol.md)."""
+"""Updates for a page that watches searches: only what changed since the last ones (docs/protocol.md)."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from app.control.controller import Controller
 from app.control.search import search_settings
 from app.control.search.search_runs import Run
-from app.page.messages import binary
+from app.page import server_messages as wire
+from app.page.binary_headers import LandscapeHeader, SearchCandidatesHeader, SearchStepsHeader
+from app.page.client_messages import Tab
+from app.page.encoding import encode_binary
+from app.state.identity import Identity
 from app.state.state import Landscape, ReplayState, State, finite_or_none
 from tracker.session.session import Session
 
@@ -17,32 +20,27 @@ _COLUMNS = 4
 
 
 class SearchFeed:
-    """Remembers what one page has been told of searches and landscapes."""
+    """Remembers which searches and landscapes one page has received."""
 
-    def __init__(self, tab: str | None = None) -> None:
-        """Tell all that a tab of the page's drawer shows from now on.
+    def __init__(self, tab: Tab | None = None) -> None:
+        """Begin with nothing sent.
 
         Args:
-            tab: `search`, `landscape`, or None for neither.
-
-        Raises:
-            ValueError: there is no such tab.
+            tab: the tab of the drawer that the page shows; None for neither.
         """
-        if tab not in ("search", "landscape", None):
-            raise ValueError(f"'{tab}' is no tab that searches are shown in")
         self._tab = tab
-        self._setup: dict[str, Any] | None = None
-        self._runs: dict[str, Any] | None = None
+        self._setup: wire.SearchSetupMessage | None = None
+        self._runs: wire.SearchRunsMessage | None = None
         self._steps: dict[int, tuple[int, int]] = {}  # by run: steps sent, times thinned
-        self._candidates: dict[int, tuple[object, ...]] = {}
+        self._candidates: dict[int, tuple[Identity, ...]] = {}
         self._landscape: Landscape | None = None
 
-    def news(self, controller: Controller, with_figures: bool = True) -> list[dict[str, Any] | bytes]:
-        """Messages that bring the page up to date, the text ones as objects.
+    def updates(self, controller: Controller, with_figures: bool = True) -> list[wire.Message | bytes]:
+        """Return the messages that bring the page up to date; binary ones are encoded.
 
         Args:
             controller: of the session.
-            with_figures: whether to tell of runs and their candidates too, not only of their steps.
+            with_figures: whether to include runs and their candidates, not only steps.
         """
         if self._tab == "landscape":
             shown = controller.state.landscape
@@ -52,25 +50,25 @@ class SearchFeed:
             return [landscape(controller.session, shown)]
         if self._tab != "search":
             return []
-        out: list[dict[str, Any] | bytes] = []
-        with controller.locked():
-            found, state = controller.replay.runs(), controller.state  # of the same moment
-            told = runs(found, state) if with_figures or self._runs is None else self._runs
-            if told != self._runs:
-                self._runs = told
-                out.append(told)
+        out: list[wire.Message | bytes] = []
+        with controller.locked():  # runs and state of the same moment
+            found, state = controller.replay.runs(), controller.state
+            listed = runs(found, state) if with_figures or self._runs is None else self._runs
+            if listed != self._runs:
+                self._runs = listed
+                out.append(listed)
             now = setup(controller, state)
             if now != self._setup:
                 self._setup = now
                 out.append(now)
-            known = {run["number"] for run in told["runs"]}
-            for run in (run for run in found if run.number in known):
+            sent = {run.number for run in listed.runs}
+            for run in (run for run in found if run.number in sent):
                 out += self._steps_of(run)
                 if with_figures:
                     out += self._candidates_of(controller.session, run)
-            kept = {run.number for run in found}
-            self._steps = {n: sent for n, sent in self._steps.items() if n in kept}
-            self._candidates = {n: sent for n, sent in self._candidates.items() if n in kept}
+            stored = {run.number for run in found}
+            self._steps = {n: sent for n, sent in self._steps.items() if n in stored}
+            self._candidates = {n: sent for n, sent in self._candidates.items() if n in stored}
         return out
 
     def _steps_of(self, run: Run) -> list[bytes]:
@@ -82,131 +80,119 @@ class SearchFeed:
         return [steps(run, first)]
 
     def _candidates_of(self, session: Session, run: Run) -> list[bytes]:
-        key = tuple(id(c) for c in run.candidates)
+        key = tuple(map(Identity, run.candidates))
         if key == self._candidates.get(run.number, ()):
             return []
         self._candidates[run.number] = key
         return [candidates(session, run)]
 
 
-def setup(controller: Controller, state: State) -> dict[str, Any]:
-    """The decomposition, and all settings of the search that the page edits."""
+def setup(controller: Controller, state: State) -> wire.SearchSetupMessage:
+    """Describe the decomposition and the settings of the search that the page edits."""
     settings, search = state.settings, state.settings.search
-    return {
-        "type": "search_setup",
-        "theta_px": settings.theta_px,
-        "outliers": settings.outliers,
-        "passes": list(search.passes),
-        "patience": search.patience,
-        "max_expansions": search.max_expansions,
-        "limbs_apart": search.limbs_apart,
-        "bound_rad": search.bound_rad,
-        "bound_m": search.bound_m,
-        "step_rad": search.step_rad,
-        "step_m": search.step_m,
-        "speed": state.look.speed,
-        "leaves": [
-            {**vars(leaf), "dofs": list(leaf.dofs)}
-            for leaf in search_settings.leaves(controller.models, search, controller.free())
-        ],
-    }
+    leaves = search_settings.leaves(controller.models, search, controller.free())
+    return wire.SearchSetupMessage(
+        theta_px=settings.theta_px,
+        outliers=settings.outliers,
+        passes=tuple(search.passes),
+        patience=search.patience,
+        max_expansions=search.max_expansions,
+        limbs_apart=search.limbs_apart,
+        bound_rad=search.bound_rad,
+        bound_m=search.bound_m,
+        step_rad=search.step_rad,
+        step_m=search.step_m,
+        speed=state.look.speed,
+        leaves=tuple(wire.SearchLeaf(**vars(leaf)) for leaf in leaves),
+    )
 
 
-def runs(found: Sequence[Run], state: State) -> dict[str, Any]:
-    """The runs of the shown frame with their stages, and what is looked at of them."""
+def runs(found: Sequence[Run], state: State) -> wire.SearchRunsMessage:
+    """Describe the runs of the shown frame with their stages, and the step that is replayed."""
     differing = search_settings.differences([r.settings for r in found])
-    return {
-        "type": "search_runs",
-        "runs": [_run(run, differs, state) for run, differs in zip(found, differing, strict=True)],
-        "replay": _replay(state.look.replay),
-        "compared": state.look.compared_run,
-    }
+    listed = tuple(_run(run, differs, state) for run, differs in zip(found, differing, strict=True))
+    return wire.SearchRunsMessage(listed, _replay(state.look.replay), state.look.compared_run)
 
 
 def steps(run: Run, first: int) -> bytes:
-    """The figures of a run's recorded steps from one on."""
+    """Encode the figures of a run's recorded steps from one on."""
     rows = [(s.evaluations, s.candidate_px, s.best_px, s.stage) for s in run.steps[first:]]
-    header = {"type": "search_steps", "run": run.number, "first": first, "count": len(rows)}
-    return binary(header, np.array(rows, dtype="<f4").reshape(-1, _COLUMNS).T.tobytes())
+    header = SearchStepsHeader(run.number, first, len(rows))
+    return encode_binary(header, np.array(rows, dtype="<f4").reshape(-1, _COLUMNS).T.tobytes())
 
 
 def candidates(session: Session, run: Run) -> bytes:
-    """The best poses of a run as points in every view; NaN behind a camera."""
+    """Encode the best poses of a run as points in every view; NaN behind a camera."""
     n, cameras = len(run.candidates), [c.camera.pinhole for c in session.cameras]
-    people = [len(p.model.point_names) for p in session.people]
+    people = tuple(len(p.model.point_names) for p in session.people)
     points = np.full((n, len(cameras), sum(people), 2), np.nan)
     for i, candidate in enumerate(run.candidates):
         for c, camera in enumerate(cameras):
             points[i, c] = camera.project(candidate.points_world)
-    header = {
-        "type": "search_candidates",
-        "run": run.number,
-        "costs_px": [finite_or_none(c.px) for c in run.candidates],
-        "points": people,
-        "clearest_view": _clearest_view(points),
-    }
-    return binary(header, points.astype("<f4").tobytes())
+    costs_px = tuple(finite_or_none(c.px) for c in run.candidates)
+    header = SearchCandidatesHeader(run.number, costs_px, people, _clearest_view(points))
+    return encode_binary(header, points.astype("<f4").tobytes())
 
 
 def landscape(session: Session, found: Landscape) -> bytes:
-    """A landscape: its values, the total costs, then the costs of each view."""
+    """Encode a landscape: its values, the mean costs, then the costs of each view."""
     model = session.people[found.person].model
-    header = {
-        "type": "landscape",
-        "person": found.person,
-        "dof": found.dof,
-        "names": list(model.dof_names),
-        "unit": "m" if model.dof_is_length[found.dof] else "rad",
-        "current": found.current,
-        "current_px": finite_or_none(found.current_px),
-        "count": len(found.values),
-    }
-    return binary(header, np.vstack([found.values, found.totals_px, found.views_px.T]).astype("<f4").tobytes())
+    header = LandscapeHeader(
+        person=found.person,
+        dof=found.dof,
+        names=model.dof_names,
+        unit="m" if model.dof_is_length[found.dof] else "rad",
+        current=found.current,
+        current_px=finite_or_none(found.current_px),
+        count=len(found.values),
+    )
+    return encode_binary(header, np.vstack([found.values, found.totals_px, found.views_px.T]).astype("<f4").tobytes())
 
 
-def _run(run: Run, differs: dict[str, str], state: State) -> dict[str, Any]:
+def _run(run: Run, differs: dict[str, str], state: State) -> wire.SearchRun:
     is_current = state.job.kind is not None and not run.over
     at = max((i for i, c in enumerate(run.counts) if c.expansions), default=-1)
-    return {
-        "number": run.number,
-        "state": "over" if not is_current else "running" if state.job.running else "paused",
-        "start_px": finite_or_none(run.start_px),
-        "best_px": finite_or_none(run.best_px),
-        "evaluations": run.evaluations,
-        "seconds": run.seconds,
-        "steps": len(run.steps),
-        "thinned": run.thinned,
-        "differs": differs,
-        "stages": [
-            {
-                "person": stage.person,
-                "name": stage.group.name,
-                "factor": stage.factor,
-                "evaluations": count.evaluations,
-                "gain_px": count.gain_px,
-                "done": count.done,
-                "running": is_current and i == at and not count.done,
-            }
-            for i, (stage, count) in enumerate(zip(run.stages, run.counts, strict=True))
-        ],
-    }
+    stages = tuple(
+        wire.SearchStage(
+            person=stage.person,
+            name=stage.group.name,
+            factor=stage.factor,
+            evaluations=count.evaluations,
+            gain_px=count.gain_px,
+            done=count.done,
+            running=is_current and i == at and not count.done,
+        )
+        for i, (stage, count) in enumerate(zip(run.stages, run.counts, strict=True))
+    )
+    return wire.SearchRun(
+        number=run.number,
+        state="over" if not is_current else "running" if state.job.running else "paused",
+        start_px=finite_or_none(run.start_px),
+        best_px=finite_or_none(run.best_px),
+        evaluations=run.evaluations,
+        seconds=run.seconds,
+        steps=len(run.steps),
+        thinned=run.thinned,
+        differs=differs,
+        stages=stages,
+    )
 
 
-def _replay(replay: ReplayState | None) -> dict[str, Any] | None:
+def _replay(replay: ReplayState | None) -> wire.Replay | None:
     if replay is None:
         return None
-    return {
-        "run": replay.run,
-        "step": replay.step,
-        "stage": replay.stage,
-        "candidate_px": replay.candidate_px,
-        "best_px": replay.best_px,
-        "evaluations": replay.evaluations,
-    }
+    return wire.Replay(
+        run=replay.run,
+        step=replay.step,
+        stage=replay.stage,
+        candidate_px=replay.candidate_px,
+        best_px=replay.best_px,
+        evaluations=replay.evaluations,
+    )
 
 
 def _clearest_view(points: np.ndarray) -> int:
-    """The view in which candidates, (n, V, N, 2) px, differ most."""
+    """Return the view in which candidates, (n, V, N, 2) px, differ most."""
     if len(points) < 2:
         return 0
     spreads = np.nan_to_num(points.std(axis=0)).sum(axis=(1, 2))

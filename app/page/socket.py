@@ -1,8 +1,7 @@
-"""The pane socket: state to messages, events of the panes to the controller (docs/protocol.md)."""
+"""The pane socket: state to messages, messages to the controller (docs/protocol.md)."""
 
 import asyncio
 import itertools
-import json
 import logging
 from collections import deque
 from collections.abc import Coroutine
@@ -12,10 +11,16 @@ import aiohttp
 from aiohttp import web
 
 from app.control.controller import Controller
-from app.drawing import curves
-from app.page import intentions, messages, picture_sets
+from app.drawing.curves import CurveGroup
+from app.page import client_messages as wire
+from app.page import commands, messages, picture_sets
+from app.page.encoding import encode_text
+from app.page.message_parsing import MessageError, parse
 from app.page.search_feed import SearchFeed
+from app.page.server_messages import HistoryMessage, InconsistentMessage, NoticeMessage, StateMessage
+from app.page.server_messages import Message as ServerMessage
 from app.state import page_view
+from app.state.identity import Identity
 from app.state.page_view import View
 from app.state.state import State
 from tracker.errors import TrackerError
@@ -23,19 +28,19 @@ from tracker.evidence.view_evidence import ViewEvidence
 
 _LOG = logging.getLogger(__name__)
 _READABLE_S = 0.2
-"""Time between updates of the page's figures while a hand drags or a search is at work: nobody reads them faster."""
+"""Time between updates of the page's figures during a drag or a search: nobody reads them faster."""
 _WATCHABLE_S = 1 / 60
-"""Time between two looks at a search at work: more nobody sees, and the search needs the processor too."""
-_MOST_HISTORY = 2000
-"""Entries of the history, each way, that a page may ask for."""
+"""Time between two updates of a running search: faster ones are invisible and take time from the search."""
+_MAX_HISTORY = 2000
+"""Largest number of history entries, in each direction, that a page may request."""
 _EDGES = ("accepted", "rejected")
 """Layers of lines that are drawn from the evidence."""
-_COALESCED = ("seek", "view", "replay", "preview", "search_speed")
-"""Of these only the newest that waits is carried out."""
+_COALESCED = (wire.Seek, wire.SetView, wire.ReplayStep, wire.PreviewCandidate, wire.SetSearchSpeed)
+"""Messages of which only the newest in the queue is carried out."""
 
 
-class Panes:
-    """Serves the panes of every page that is open on the session."""
+class PaneSocket:
+    """Serves every page that is open on the session."""
 
     def __init__(self, controller: Controller) -> None:
         """Serve this controller's session."""
@@ -43,41 +48,49 @@ class Panes:
         self._pages = itertools.count(1)
 
     async def serve(self, socket: web.WebSocketResponse) -> None:
-        """Talk to one page until its socket closes."""
-        page = _Page(next(self._pages), self._controller, socket)
+        """Serve one page until its socket closes."""
+        page = PageConnection(next(self._pages), self._controller, socket)
         await page.serve()
 
 
-class _Page:
-    """One page that is connected."""
+class PageConnection:
+    """The connection to one page."""
 
     def __init__(self, number: int, controller: Controller, socket: web.WebSocketResponse) -> None:
+        """Prepare to serve a page.
+
+        Args:
+            number: of the page, unique while the program runs.
+            controller: of the session.
+            socket: to the page.
+        """
         self._number, self._controller, self._socket = number, controller, socket
         self._changed = asyncio.Event()
         self._arrived = asyncio.Event()
-        self._waiting: deque[dict[str, Any]] = deque()
+        self._waiting: deque[wire.ClientMessage] = deque()
         self._sent: State | None = None
-        self._sent_text: dict[str, Any] | None = None
+        self._sent_text: StateMessage | None = None
         self._sent_text_at = 0.0
-        self._reminder: asyncio.TimerHandle | None = None  # that figures are due
+        self._reminder: asyncio.TimerHandle | None = None  # for figures that were held back
         self._sent_overlay: tuple[object, ...] = ()  # what it was drawn from
-        self._view: View | None = None  # nothing is drawn for a page that has not said what it shows
+        self._view: View | None = None  # nothing is drawn before the page's first view
         self._pictures = picture_sets.PictureSets(controller)
-        self._curves: str | None = None
-        self._sent_curves: tuple[str, int, int] | None = None  # group, person, version of the timeline
+        self._curves: CurveGroup | None = None
+        self._sent_curves: tuple[CurveGroup, int, int] | None = None  # group, person, version of the timeline
         self._feed = SearchFeed()
-        self._history_limit = 0  # of entries each way; 0: the page does not show them
-        self._sent_history: dict[str, Any] | None = None
+        self._history_limit = 0  # entries in each direction; 0: not subscribed
+        self._sent_history: HistoryMessage | None = None
         self._loop = asyncio.get_running_loop()
 
     async def serve(self) -> None:
+        """Serve the page until its socket closes; its drags end then."""
         unsubscribe = self._controller.subscribe(self._wake)
         self._changed.set()
         tasks = [asyncio.create_task(self._guarded(t)) for t in (self._send_all(), self._act())]
         try:
             async for message in self._socket:
-                if message.type == aiohttp.WSMsgType.TEXT:
-                    self._receive(json.loads(message.data))
+                if message.type in (aiohttp.WSMsgType.TEXT, aiohttp.WSMsgType.BINARY):
+                    await self._receive(message)
         finally:
             unsubscribe()
             for task in tasks:
@@ -89,28 +102,33 @@ class _Page:
             self._controller.landscape.watch(self._number, False)
 
     def _wake(self, _: State) -> None:
-        """Let the sender look again; called from any thread."""
+        """Wake the sender; called from any thread."""
         self._loop.call_soon_threadsafe(self._changed.set)
 
     async def _guarded(self, work: Coroutine[Any, Any, None]) -> None:
-        """Close the socket where its work fails: the page connects again and is told everything anew."""
+        """Close the socket if its work fails: the page reconnects and receives everything again."""
         try:
             await work
         except ConnectionError:
-            _LOG.debug("a page went away in the middle of a message")
+            _LOG.debug("a page closed its socket during a message")
         except Exception:
             _LOG.exception("a pane socket failed; the page connects again")
             await self._socket.close(code=aiohttp.WSCloseCode.INTERNAL_ERROR)
 
     # --- page to controller ------------------------------------------------------------------------------------
 
-    def _receive(self, message: dict[str, Any]) -> None:
-        """Queue a message; a newer seek, or a newer move of the same drag, takes the place of one that waits."""
+    async def _receive(self, received: aiohttp.WSMessage) -> None:
+        """Parse and queue a message. A newer seek, or a newer move of a drag, replaces one that waits."""
+        try:
+            if received.type is aiohttp.WSMsgType.BINARY:
+                raise MessageError("a text message", f"a binary one of {len(received.data)} bytes")
+            message = parse(received.data)
+        except MessageError as error:
+            await self._notice(str(error))
+            return
         last = self._waiting[-1] if self._waiting else None
-        if last is not None and last["type"] == message.get("type"):
-            moves = message["type"] in ("drag", "pin") and last.get("phase") == message.get("phase") == "move"
-            if moves or message["type"] in _COALESCED:
-                self._waiting.pop()
+        if last is not None and type(last) is type(message) and (_is_move(last, message) or type(last) in _COALESCED):
+            self._waiting.pop()
         self._waiting.append(message)
         self._arrived.set()
 
@@ -124,30 +142,25 @@ class _Page:
                     await asyncio.to_thread(self._carry_out, message)
                 except TrackerError as error:
                     await self._notice(str(error))
-                except (KeyError, TypeError, ValueError) as error:
-                    await self._notice(f"the page sent a message that is not understood ({error}); reload it")
+                except Exception as error:
+                    _LOG.exception("a message of a page failed: %s", message)
+                    await self._notice(f"expected to carry out '{type(message).__name__}', found a fault: {error!r}")
 
-    def _carry_out(self, message: dict[str, Any]) -> None:
-        if message["type"] == "curves":
-            self._open_curves(message["group"])
-        elif message["type"] == "watch":
-            self._feed = SearchFeed(message["tab"])
-            self._controller.landscape.watch(self._number, message["tab"] == "landscape")
-            self._wake(self._controller.state)
-        elif message["type"] == "history":
-            self._history_limit = min(max(0, int(message["limit"])), _MOST_HISTORY)
-            self._sent_history = None
-            self._wake(self._controller.state)
-        elif message["type"] == "view":
-            self._view = page_view.view_of(message, len(self._controller.session.cameras))
-            self._wake(self._controller.state)
-        else:
-            intentions.carry_out(self._controller, self._number, message)
-
-    def _open_curves(self, group: str | None) -> None:
-        if group is not None and group not in curves.GROUPS:
-            raise ValueError(f"'{group}' is no group of curves")
-        self._curves = group
+    def _carry_out(self, message: wire.ClientMessage) -> None:
+        match message:
+            case wire.ShowCurves(group=group):
+                self._curves = group
+            case wire.WatchTab(tab=tab):
+                self._feed = SearchFeed(tab)
+                self._controller.landscape.watch(self._number, tab == "landscape")
+            case wire.ShowHistory(limit=limit):
+                self._history_limit = min(limit, _MAX_HISTORY)
+                self._sent_history = None
+            case wire.SetView():
+                self._view = view_of(message, len(self._controller.session.cameras))
+            case _:
+                commands.dispatch(self._controller, self._number, message)
+                return
         self._wake(self._controller.state)
 
     # --- controller to page ------------------------------------------------------------------------------------
@@ -161,18 +174,18 @@ class _Page:
             self._sent, began = state, self._loop.time()
             with_figures = self._figures_are_due(state)
             try:
-                if with_figures:  # else the vectors go first: they are what the eye follows
+                if with_figures:  # otherwise the vectors go first: the eye follows them
                     await self._send_state(state)
-                if sent is None or sent.timeline_version != state.timeline_version:  # the text may tell of its cells
+                if sent is None or sent.timeline_version != state.timeline_version:  # after the text, which names cells
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
                 if self._view is not None:
                     await self._send_drawn(state, self._view)
                 if sent is None or sent.disagreeing != state.disagreeing:
-                    await self._send(messages.disagreeing(state.disagreeing))
+                    await self._send(InconsistentMessage(state.disagreeing))
                 await self._send_curves(state)
                 await self._send_history()
-                for news in await asyncio.to_thread(self._feed.news, self._controller, with_figures):
-                    await (self._socket.send_bytes(news) if isinstance(news, bytes) else self._send(news))
+                for update in await asyncio.to_thread(self._feed.updates, self._controller, with_figures):
+                    await self._send(update)
                 if state.track.failed and (sent is None or sent.track is not state.track):
                     await self._notice(state.track.message)
             except TrackerError as error:
@@ -181,9 +194,9 @@ class _Page:
                 await asyncio.sleep(max(0.0, began + _WATCHABLE_S - self._loop.time()))
 
     def _figures_are_due(self, state: State) -> bool:
-        """Whether it is time for figures; if not, this page is woken when it is."""
+        """Return whether to send figures now; if not, this page is woken in time."""
         sent, now = self._sent_text, self._loop.time()
-        is_busy = state.in_hand or (state.job.running and sent is not None and sent["job"]["running"])
+        is_busy = state.in_hand or (state.job.running and sent is not None and sent.job.running)
         due = self._sent_text_at + _READABLE_S
         if sent is None or not is_busy or now >= due:
             self._sent_text_at = now
@@ -197,16 +210,16 @@ class _Page:
         self._changed.set()
 
     async def _send_state(self, state: State) -> None:
-        """Send what the page's text shows, if it changed."""
+        """Send the page's texts and figures if they changed."""
         message = messages.state(self._controller.session, state)
         if message != self._sent_text:
             self._sent_text = message
             await self._send(message)
 
     async def _send_drawn(self, state: State, view: View) -> None:
-        """Send what the panes show and the page does not have: vectors, then the pictures made meanwhile.
+        """Send what the panes show and the page lacks: vectors, then the pictures made meanwhile.
 
-        In this order: the vectors wait in the page for the pictures of their frame, never the other way round.
+        The page holds vectors until the pictures of their frame arrive, never pictures until their vectors arrive.
         """
         pictures = asyncio.create_task(self._pictures.missing(state, view))
         try:
@@ -214,7 +227,7 @@ class _Page:
         finally:
             made = await pictures
         for message in made:
-            await self._socket.send_bytes(message)
+            await self._send(message)
 
     async def _send_overlay(self, state: State, view: View) -> None:
         views = self._evidence(state, view)
@@ -227,10 +240,10 @@ class _Page:
         message = await asyncio.to_thread(
             messages.overlay, self._controller.session_of(state), state, self._number, view, views
         )
-        await self._socket.send_bytes(message)
+        await self._send(message)
 
     def _evidence(self, state: State, view: View) -> tuple[ViewEvidence, ...] | None:
-        """The evidence of the shown frame, if the page shows any of it and it is at hand; it is asked for where not."""
+        """Return the cached evidence of the shown frame if the page shows any; request it if it is not cached."""
         if view.layers.isdisjoint(page_view.EVIDENCE):
             return None
         frames, views = self._controller.frames, self._controller.frames.evidence_at_hand(state.frame)
@@ -242,11 +255,10 @@ class _Page:
         several = range(len(self._controller.models)) if len(self._controller.models) > 1 else ()
         for person in (None, *several):
             cells = self._controller.timeline(since, person)
-            message = await asyncio.to_thread(messages.timeline, cells, since == 0, person)
-            await (self._socket.send_bytes(message) if isinstance(message, bytes) else self._send(message))
+            await self._send(await asyncio.to_thread(messages.timeline, cells, since == 0, person))
 
     async def _send_curves(self, state: State) -> None:
-        """Send the open group of curves: whole where it is another than before, else the frames that changed."""
+        """Send the subscribed group of curves: all of a new group, otherwise the frames that changed."""
         if self._curves is None:
             self._sent_curves = None
             return
@@ -260,10 +272,10 @@ class _Page:
         message = await asyncio.to_thread(
             messages.curves, self._controller.session, person, group, frames, rows, since == 0
         )
-        await self._socket.send_bytes(message)
+        await self._send(message)
 
     async def _send_history(self) -> None:
-        """Send the history to a page that shows it, where it has changed."""
+        """Send the history to a subscribed page if it changed."""
         if (limit := self._history_limit) == 0:
             return
         entries = await asyncio.to_thread(self._controller.history.entries, limit + 1)
@@ -273,22 +285,41 @@ class _Page:
             await self._send(message)
 
     async def _notice(self, text: str) -> None:
-        await self._send({"type": "notice", "level": "error", "text": text})
+        await self._send(NoticeMessage("error", text))
 
-    async def _send(self, message: dict[str, Any]) -> None:
-        await self._socket.send_str(json.dumps(message))
+    async def _send(self, message: ServerMessage | bytes) -> None:
+        """Send a text message, or a binary one that is encoded already."""
+        if isinstance(message, bytes):
+            await self._socket.send_bytes(message)
+        else:
+            await self._socket.send_str(encode_text(message))
+
+
+def view_of(message: wire.SetView, n_cameras: int) -> View:
+    """Return what a page shows.
+
+    Raises:
+        MessageError: the message does not fit the session's cameras.
+    """
+    reductions = tuple(message.reductions)
+    if len(reductions) != n_cameras or any(0 < r < 1 for r in reductions):
+        raise MessageError(f"0 or a reduction from 1 to 64 for each of {n_cameras} cameras", str(reductions))
+    return View(frozenset(message.layers), reductions, message.by_part)
+
+
+def _is_move(last: wire.ClientMessage, message: wire.ClientMessage) -> bool:
+    """Return whether two messages of one type are moves of a drag."""
+    return getattr(last, "phase", None) == getattr(message, "phase", None) == "move"
 
 
 def _drawn(state: State) -> tuple[object, ...]:
-    """What an overlay depends on, to be compared."""
-    poses = tuple(id(p.values) for p in state.people)
-    candidate = None if state.job.candidate is None else tuple(id(c) for c in state.job.candidate)
+    """Return what an overlay depends on, for comparison. Poses are compared by identity."""
     drawn = (
         state.frame,
-        poses,
+        tuple(Identity(p.values) for p in state.people),
         state.revisions,
         state.draft,
-        candidate,
+        None if state.job.candidate is None else tuple(map(Identity, state.job.candidate)),
         state.job.running,
         state.look,
         state.drag,
@@ -299,5 +330,5 @@ def _drawn(state: State) -> tuple[object, ...]:
 
 
 def _pins(state: State) -> object:
-    """What the drawing of pins depends on: the joint worked on has lines and a meeting point."""
+    """Return what the drawing of pins depends on: the joint worked on has lines and a triangulated point."""
     return (state.pins, state.person, state.point) if any(state.pins) else None

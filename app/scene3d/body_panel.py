@@ -1,4 +1,4 @@
-"""The sizes of bodies in viser's panel, in centimetres: one folder for each person."""
+"""Panel folders for body sizes in centimetres, one for each person."""
 
 import asyncio
 from collections.abc import Callable
@@ -26,16 +26,16 @@ class _Folder:
     height: viser.GuiInputHandle[float]
     alike: viser.GuiInputHandle[bool]
     parts: dict[str, viser.GuiVector3Handle]
-    """By name of the part: its length and half girths."""
+    """By part: its length and half girths."""
     widths: dict[str, viser.GuiNumberHandle[float]]
     poses: viser.GuiDropdownHandle[str]
     apply: viser.GuiButtonHandle
     discard: viser.GuiButtonHandle
-    told: viser.GuiMarkdownHandle
+    note: viser.GuiMarkdownHandle
 
 
 class BodyPanel:
-    """Shows the sizes being edited, else the present ones; what is entered goes to the controller at once."""
+    """The folders. They show the sizes being edited, otherwise the present ones. Entries go to the controller."""
 
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Build the folders."""
@@ -61,12 +61,12 @@ class BodyPanel:
         for name, number in controls.widths.items():
             _put(number, _cm(sizes.widths_m[name]))
         controls.discard.disabled = not drafted
-        told = "Not applied yet: the blue outline shows it." if drafted else state.sizes_message
-        if not told and state.revisions[person] != state.present[person]:
-            told = "The pose of this frame was made with other sizes, and is shown with them."
-        if controls.told.content != told:
-            controls.told.content = told
-        controls.told.visible = bool(told)
+        note = "Not applied yet: the blue outline shows it." if drafted else state.sizes_message
+        if not note and state.revisions[person] != state.present[person]:
+            note = "The pose of this frame belongs to other sizes and is shown with them."
+        if controls.note.content != note:
+            controls.note.content = note
+        controls.note.visible = bool(note)
 
     def _add(self, person: int) -> _Folder:
         gui, sizes = self._server.gui, sizes_of(self._controller.session.people[person].model)
@@ -93,14 +93,14 @@ class BodyPanel:
             }
             poses = gui.add_dropdown(
                 "stored poses", (_REFIT, _KEEP),
-                hint="Refit keyframes: each is brought to its old joints and pins in the new body, as one undoable "
-                "edit. Keep poses: all stay as they are, in the body that they were made with",
+                hint="Refit keyframes: fit each to its former joints and pins in the new body, as one undoable edit. "
+                "Keep poses: leave all as they are, in the body that they were made with",
             )  # fmt: skip
-            apply = gui.add_button("Apply", hint="Make these the sizes of the body from now on; undo takes it back")
-            discard = gui.add_button("Discard", hint="Back to the sizes that the body has")
-            former = gui.add_button("Previous sizes", hint="Enter the sizes before these; Apply takes them over")
-            told = gui.add_markdown("")
-        controls = _Folder(folder, height, alike, parts, widths, poses, apply, discard, told)
+            apply = gui.add_button("Apply", hint="Make these the sizes of the body from now on; can be undone")
+            discard = gui.add_button("Discard", hint="Return to the present sizes of the body")
+            former = gui.add_button("Previous sizes", hint="Enter the sizes before the present ones; Apply sets them")
+            note = gui.add_markdown("")
+        controls = _Folder(folder, height, alike, parts, widths, poses, apply, discard, note)
         self._listen(person, controls, former)
         return controls
 
@@ -117,7 +117,7 @@ class BodyPanel:
         self._on(former, lambda _: sizing.recall(person))
 
     def _set_part(self, person: int, part: str, row_cm: tuple[float, float, float]) -> None:
-        """Send what was entered; what was not, keeps the digits that the panel does not show."""
+        """Set the sizes of a part. Numbers that were not changed keep the digits that the panel does not show."""
         before = sizes_of(self._sizing.model(person)).parts[part]
         same = zip((before.length_m, *before.girths_m), _row(before), row_cm, strict=True)
         length, first, second = (own if shown == entered else entered / 100 for own, shown, entered in same)
@@ -127,11 +127,11 @@ class BodyPanel:
         self._sizing.set_width(person, name, cm / 100)
 
     def _on(self, control: Any, act: Callable[[Any], None]) -> None:
-        """Carry out what somebody did with a control; what is refused is said, and the control goes back.
+        """Call a function when a person uses a control. A refusal is shown, and the control returns to the state.
 
         Args:
-            control: a control of viser's.
-            act: is given what was entered, which a state from before would overwrite in the control.
+            control: a control of viser.
+            act: receives the value at the time of the event; a later state may overwrite it in the control.
         """
 
         async def done(event: viser.GuiEvent[Any]) -> None:

@@ -1,6 +1,6 @@
-"""The 3-D view seen through a camera: at its calibrated pose, with its undistorted image behind the bodies.
+"""Look through a camera in the 3-D view: from its calibrated pose, its undistorted image behind the bodies.
 
-Every page that is open has a canvas of its own size, so each is told its own field of view and gets its own image.
+Each open page has a canvas of its own size, and so its own field of view and image.
 """
 
 from dataclasses import dataclass
@@ -18,15 +18,15 @@ from tracker.geometry.cameras import Camera, viewed_point
 
 _MOVED_M = 1e-3
 _MOVED_RAD = 1e-3
-"""Whoever turns or moves the view by more than this leaves the camera."""
+"""A turn or a move of the view beyond these leaves the camera."""
 _LEAST_PX = 16
-"""A canvas smaller than this is not seen."""
+"""A smaller canvas counts as invisible."""
 _JPEG_QUALITY = 88
 
 
 @dataclass(frozen=True)
-class _Free:
-    """Where the view was before it was snapped."""
+class _FreeView:
+    """The view of a page before it looked through a camera."""
 
     position: Array
     look_at: Array
@@ -36,7 +36,7 @@ class _Free:
 
 @dataclass(frozen=True, eq=False)
 class _Report:
-    """Where a page says that its view is; each is one of its own, wherever the view is."""
+    """A page's report of its view. Reports are distinct even where they are equal."""
 
     client: int
     position: Array
@@ -44,49 +44,49 @@ class _Report:
 
 
 @dataclass
-class _Eye:
+class _PageView:
     """The view of one page."""
 
     client: viser.ClientHandle
     camera: int | None = None
-    """The camera it was sent to."""
+    """The camera that it was moved to."""
     arrived: bool = False
-    """Whether it has said that it is there: what it says of earlier places on the way counts for nothing."""
+    """Whether it has reported its arrival. Reports from the way there are ignored."""
     shown: tuple[object, ...] = ()
-    """Camera, frame and canvas of the image behind the bodies."""
-    before: _Free | None = None
-    """Where it was before, kept when it has been sent back there."""
+    """Camera, frame and canvas size of the image behind the bodies."""
+    before: _FreeView | None = None
+    """The view before; kept after a return to it."""
     left: int | None = None
-    """The camera that it was sent back from."""
+    """The camera that it returned from."""
     turned_away: bool = False
-    """Whether it left the camera by its user's hand, who wants to go on from there."""
+    """Whether its user turned it away from the camera, and so continues from there."""
 
     def is_back(self, report: _Report) -> bool:
-        """Whether it says that it is where it came from: a slow page says so late, when it has been sent on again."""
+        """Return whether a report is from the view before: a slow page may send it after it was moved on."""
         return self.before is not None and bool(np.linalg.norm(report.position - self.before.position) < _MOVED_M)
 
 
-class SnapView:
-    """Keeps the view of every page at the camera that the state says."""
+class CameraView:
+    """Keeps the view of every page at the camera of the state."""
 
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Follow the controller's state and the pages' canvases."""
         self._controller = controller
         self._cameras = [c.camera for c in controller.session.cameras]
-        self._eyes: dict[int, _Eye] = {}
-        # One thread for states and for what pages report, so that neither overtakes the other.
-        self._latest: Latest[State | _Report] = Latest(self._take, "snap")
+        self._views: dict[int, _PageView] = {}
+        # One thread for states and reports, so that neither overtakes the other.
+        self._latest: Latest[State | _Report] = Latest(self._take, "camera view")
         controller.subscribe(self._latest.offer)
         server.on_client_connect(self._connected)
         server.on_client_disconnect(self._disconnected)
 
     async def _connected(self, client: viser.ClientHandle) -> None:
-        self._eyes[client.client_id] = _Eye(client)
+        self._views[client.client_id] = _PageView(client)
 
         async def moved(_: viser.CameraHandle) -> None:
-            seen = client.camera  # what is read here the page has said: nothing of ours is in between
-            # Each under a key of its own, for each counts: if only the newest did, one who arrives and turns at once
-            # would never have arrived, and never get away from the camera.
+            seen = client.camera  # as the page reported it
+            # Each report has a key of its own. If only the newest counted, a view that is turned right after its
+            # arrival would never arrive, and never leave the camera.
             report = _Report(client.client_id, seen.position, seen.wxyz)
             self._latest.offer(report, report)
 
@@ -94,77 +94,77 @@ class SnapView:
         await moved(client.camera)
 
     async def _disconnected(self, client: viser.ClientHandle) -> None:
-        self._eyes.pop(client.client_id, None)
+        self._views.pop(client.client_id, None)
 
-    def _take(self, told: State | _Report) -> None:
-        if isinstance(told, _Report):
-            eye = self._eyes.get(told.client)
-            if eye is not None:
-                self._moved(eye, told)
-                self._look(eye)
+    def _take(self, update: State | _Report) -> None:
+        if isinstance(update, _Report):
+            view = self._views.get(update.client)
+            if view is not None:
+                self._moved(view, update)
+                self._update(view)
             return
-        for eye in list(self._eyes.values()):
-            self._look(eye)
+        for view in list(self._views.values()):
+            self._update(view)
 
-    def _moved(self, eye: _Eye, report: _Report) -> None:
-        """See whether a view has arrived at its camera, or has left it."""
-        if eye.camera is None:
+    def _moved(self, view: _PageView, report: _Report) -> None:
+        """Note that a view arrived at its camera, or left it."""
+        if view.camera is None:
             return
-        if _is_at(report.position, report.wxyz, self._cameras[eye.camera]):
-            eye.arrived = True
-        elif eye.arrived and not eye.is_back(report) and self._controller.state.snapped == eye.camera:
-            eye.turned_away = True
+        if _is_at(report.position, report.wxyz, self._cameras[view.camera]):
+            view.arrived = True
+        elif view.arrived and not view.is_back(report) and self._controller.state.snapped == view.camera:
+            view.turned_away = True
             self._controller.view_3d.snap(None)
 
-    def _look(self, eye: _Eye) -> None:
-        """Bring a view to where the state says."""
+    def _update(self, view: _PageView) -> None:
+        """Move a view to the camera of the state."""
         state = self._controller.state
         if state.snapped is None:
-            self._release(eye)
+            self._release(view)
             return
-        seen = eye.client.camera
+        seen = view.client.camera
         size = (seen.image_width, seen.image_height)
         wanted = (state.snapped, state.frame, size)
-        if wanted == eye.shown or min(size) < _LEAST_PX or state.rests_3d:
+        if wanted == view.shown or min(size) < _LEAST_PX or state.rests_3d:
             return
         camera = self._cameras[state.snapped]
-        # A slow page may still say that it is at the camera from which it has been sent back: it is on its way then.
-        if eye.camera is None and not (
-            eye.left is not None and _is_at(seen.position, seen.wxyz, self._cameras[eye.left])
+        # A slow page may still report the camera that it is returning from.
+        if view.camera is None and not (
+            view.left is not None and _is_at(seen.position, seen.wxyz, self._cameras[view.left])
         ):
-            eye.before = _Free(seen.position, seen.look_at, seen.up_direction, seen.fov)
+            view.before = _FreeView(seen.position, seen.look_at, seen.up_direction, seen.fov)
         image = self._image(state.frame, state.snapped)
-        with eye.client.atomic():
-            if eye.camera != state.snapped:
-                eye.arrived = _is_at(seen.position, seen.wxyz, camera)
-                self._send_to(seen, camera)
+        with view.client.atomic():
+            if view.camera != state.snapped:
+                view.arrived = _is_at(seen.position, seen.wxyz, camera)
+                self._move_to(seen, camera)
             seen.fov = field_of_view(camera, size[0] / size[1])
-            eye.client.scene.set_background_image(
+            view.client.scene.set_background_image(
                 centred(image, camera.pinhole, size), format="jpeg", jpeg_quality=_JPEG_QUALITY
             )
-        eye.camera, eye.turned_away, eye.shown = state.snapped, False, wanted
+        view.camera, view.turned_away, view.shown = state.snapped, False, wanted
 
-    def _send_to(self, seen: viser.CameraHandle, camera: Camera) -> None:
+    def _move_to(self, seen: viser.CameraHandle, camera: Camera) -> None:
         T = camera.T_world_camera
         seen.position = T[:3, 3]
         seen.wxyz = rigid.quaternion_from_matrix(T[:3, :3])
-        # Whoever turns the view from here turns it about what the cameras look at.
+        # Turning the view from here orbits about what the cameras look at.
         depth = max(0.5, float(camera.depths(viewed_point(self._cameras))))
         seen.look_at = T[:3, 3] + depth * T[:3, 2]
 
-    def _release(self, eye: _Eye) -> None:
-        if eye.camera is None:
+    def _release(self, view: _PageView) -> None:
+        if view.camera is None:
             return
-        seen, before = eye.client.camera, eye.before
-        with eye.client.atomic():
-            eye.client.scene.set_background_image(None)
-            if before is not None and not eye.turned_away:
+        seen, before = view.client.camera, view.before
+        with view.client.atomic():
+            view.client.scene.set_background_image(None)
+            if before is not None and not view.turned_away:
                 seen.position, seen.look_at, seen.up_direction = before.position, before.look_at, before.up
                 seen.fov = before.fov
-                eye.left = eye.camera
+                view.left = view.camera
             else:
-                eye.left = None
-        eye.camera, eye.shown, eye.arrived = None, (), False
+                view.left = None
+        view.camera, view.shown, view.arrived = None, (), False
 
     def _image(self, frame: int, camera: int) -> Image:
         image = self._controller.frames.images(frame)[camera]

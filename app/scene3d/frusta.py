@@ -1,4 +1,4 @@
-"""The cameras in the 3-D view: frusta with small images of the shown frame. A click looks through the camera."""
+"""Draw the cameras in the 3-D view: frusta with small images of the shown frame. A click looks through the camera."""
 
 import time
 from typing import Any
@@ -17,11 +17,11 @@ _COLOR = (120, 130, 140)
 _WIDTH_PX = 192
 _JPEG_QUALITY = 75
 _REST_S = 0.35
-"""A frame has images after it has been shown for so long: they never keep the panes waiting."""
+"""Time from the change of frame to its images, so that the panes go first."""
 
 
 class Frusta:
-    """Draws all cameras of a session."""
+    """The frusta of all cameras of a session."""
 
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Add the frusta and follow the controller's state."""
@@ -34,7 +34,7 @@ class Frusta:
         controller.subscribe(latest.offer)
 
     def show(self, state: State) -> None:
-        """Show or hide the cameras: who looks through one wants to see its image, and nothing before it."""
+        """Show or hide the cameras. Looking through a camera hides them, because they would cover its image."""
         is_shown = state.view_3d.cameras and state.snapped is None
         for handle, label in zip(self._handles, self._labels, strict=True):
             if handle.visible != is_shown:
@@ -66,16 +66,16 @@ class Frusta:
         return handle
 
     def _show_images(self, state: State) -> None:
-        """Once a frame rests, put its images into the frusta."""
+        """Put the images of a frame into the frusta after it has been shown for a moment."""
         wanted = state.frame if state.view_3d.images and state.view_3d.cameras else None
         if wanted == self._shown:
             return
         if wanted is not None:
             time.sleep(_REST_S)
             now = self._controller.state
-            # Without a graphics card the browser has no time for them beside a tracker.
+            # A browser that renders in software has no time for them during a tracking run.
             if now.frame != wanted or now.drag is not None or now.spares_3d:
-                return  # the state that follows asks again
+                return  # the next state asks again
         self._shown = wanted
         images = [None] * len(self._cameras) if wanted is None else self._controller.frames.images(wanted)
         small = []

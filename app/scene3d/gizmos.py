@@ -1,4 +1,4 @@
-"""Gizmos in viser's 3-D view: the root of the person worked on is moved and turned, the selected joint is turned."""
+"""Gizmos in the 3-D view: one moves and turns the root of the person worked on, one turns the selected joint."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -8,7 +8,7 @@ import viser
 
 from app.control.controller import Controller
 from app.runtime.jobs import Latest
-from app.scene3d.pace import Pace
+from app.scene3d.throttle import Throttle
 from app.state.state import State
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
@@ -16,18 +16,18 @@ from tracker.posing.edits import joint_of
 
 _ROOT_SCALE, _JOINT_SCALE = 0.3, 0.2
 _REST_S = 0.1
-"""Time between updates of where the gizmos stand."""
+"""Time between updates of the gizmos' positions."""
 
 _Which = Literal["root", "joint"]
 
 
 @dataclass(frozen=True, eq=False)
 class _Pull:
-    """Where a gizmo was pulled to."""
+    """A move of a gizmo."""
 
     which: _Which
     drag: int
-    """Number of the drag, from press to release."""
+    """Number of the drag that it belongs to."""
     person: int
     part: int
     position_world: Array
@@ -38,7 +38,7 @@ class _Pull:
 
 
 class Gizmos:
-    """Keeps no facts but which gizmo is held: where they stand is the state's, what they are pulled to goes there."""
+    """The gizmos. They follow the state, and their moves go to the controller."""
 
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Add the gizmos and follow the controller's state."""
@@ -53,10 +53,10 @@ class Gizmos:
                 "/gizmos/joint", _JOINT_SCALE, disable_axes=True, disable_sliders=True, depth_test=False, visible=False
             ),
         }
-        self._pulls, self._pace = Latest(self._apply, "gizmos"), Pace(controller)
+        self._pulls, self._throttle = Latest(self._apply, "gizmos"), Throttle(controller)
         for which, handle in self._handles.items():
             self._listen(which, handle)
-        latest = Latest(self._show, "gizmo places", _REST_S)
+        latest = Latest(self._show, "gizmo positions", _REST_S)
         controller.subscribe(latest.offer)
         latest.offer(controller.state)
 
@@ -68,28 +68,28 @@ class Gizmos:
                 return
             R = rigid.matrix_from_quaternion(np.array(event.target.wxyz))
             person, part = self._about[which]
-            place = np.array(event.target.position, dtype=np.float64)
-            # The end has a key of its own: a newer pull must not take its place.
+            position = np.array(event.target.position, dtype=np.float64)
+            # The end has a key of its own, so that no newer pull replaces it.
             ended = event.phase == "end"
-            self._pulls.offer(_Pull(which, self._drags, person, part, place, R, ended), (which, ended))
+            self._pulls.offer(_Pull(which, self._drags, person, part, position, R, ended), (which, ended))
 
     def _apply(self, pull: _Pull) -> None:
         position = pull.position_world if pull.which == "root" else None
         self._controller.pose_edits.place_part(pull.person, pull.part, pull.R_world, position, ("gizmo", pull.drag))
         if pull.ended:
             self._held = None
-            self._show(self._controller.state)  # a joint may not have been able to follow
+            self._show(self._controller.state)  # the joint may be at a limit
 
     def _show(self, state: State) -> None:
-        due = self._pace.due(state)
+        due = self._throttle.due(state)
         if due is None:
             return
         state = due
         model, values = state.models[state.person], state.poses[state.person]
         joint = joint_of(model, state.point)
-        places = model.kinematics(values).Ts_world_part
-        at_work = state.track.running or state.job.running or state.look.replay is not None
-        shown = not at_work and state.person not in state.cast.hidden
+        Ts = model.kinematics(values).Ts_world_part
+        is_busy = state.track.running or state.job.running or state.look.replay is not None
+        shown = not is_busy and state.person not in state.cast.hidden
         with self._server.atomic():
             for which, part in (("root", 0), ("joint", joint)):
                 handle = self._handles[which]  # type: ignore[index]
@@ -99,5 +99,5 @@ class Gizmos:
                 if which == self._held or not visible:
                     continue
                 self._about[which] = state.person, part  # type: ignore[index]
-                handle.position = places[part, :3, 3]
-                handle.wxyz = rigid.quaternion_from_matrix(places[part, :3, :3])
+                handle.position = Ts[part, :3, 3]
+                handle.wxyz = rigid.quaternion_from_matrix(Ts[part, :3, :3])

@@ -1,4 +1,4 @@
-"""State to viser's panels and back: pose sliders; the panels of other modules beside them."""
+"""Panels beside the 3-D view: pose sliders, and the panels of body sizes and settings."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -10,35 +10,35 @@ import viser
 from app.control.controller import Controller
 from app.runtime.jobs import Latest
 from app.scene3d.body_panel import BodyPanel
-from app.scene3d.pace import Pace
 from app.scene3d.settings_panel import SettingsPanel
+from app.scene3d.throttle import Throttle
 from app.state.state import State
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 
 _REACH_M = 6.0
-"""How far from the scene's middle the position sliders go, metres."""
+"""Reach of the position sliders to either side of the initial position, metres."""
 _REST_S = 0.2
-"""Time between updates of the sliders: nobody reads numbers faster, and the panes go first."""
+"""Time between updates of the sliders. Nobody reads numbers faster, and the panes go first."""
 
 
 @dataclass(frozen=True)
 class _Change:
-    """A slider that somebody moved."""
+    """A move of a slider."""
 
     person: int
     dof: int
     value: float
-    """rad or metres."""
+    """Radians or metres."""
 
 
 class Panels:
-    """The panels beside the 3-D view. They keep no facts: what they show is the state, what is done goes there."""
+    """The panels. They show the state, and what is entered goes to the controller."""
 
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Build the panels and follow the controller's state."""
         self._server, self._controller = server, controller
-        self._pace = Pace(controller)
+        self._throttle = Throttle(controller)
         self._edits = Latest(self._apply, "sliders")
         self._sliders: list[list[viser.GuiSliderHandle[float]]] = []
         self._folders: list[viser.GuiFolderHandle] = []
@@ -73,24 +73,24 @@ class Panels:
             low, high = np.degrees(np.clip(model.limits[dof], -np.pi, np.pi))
             unit, step = "deg", 0.5
         low, high = float(np.floor(low)), float(np.ceil(high))
-        value = _in_slider(model, dof, self._controller.state.poses[person])
+        value = _slider_value(model, dof, self._controller.state.poses[person])
         slider = self._server.gui.add_slider(f"{name}, {unit}", low, high, step, min(max(value, low), high))
 
         @slider.on_update
         async def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None:  # else the state set it
+            if event.client is not None:  # otherwise the program set it
                 target = event.target.value / 100 if model.dof_is_length[dof] else float(np.radians(event.target.value))
                 self._edits.offer(_Change(person, dof, target), (person, dof))
 
         return slider
 
     def _apply(self, change: _Change) -> None:
-        with suppress(TrackerError):  # locked: the slider goes back to the state's value
+        with suppress(TrackerError):  # locked: the slider returns to the state's value
             self._controller.pose_edits.set_dof(change.person, change.dof, change.value)
         self._show(self._controller.state)
 
     def _show(self, state: State) -> None:
-        due = self._pace.due(state)
+        due = self._throttle.due(state)
         if due is None:
             return
         state = due
@@ -102,15 +102,15 @@ class Panels:
                 model = self._controller.models[index]
                 plain = [d for d in range(model.n_dofs) if model.joints[model.dof_joint[d]].kind != "ball"]
                 for slider, dof in zip(sliders, plain, strict=True):
-                    value = _in_slider(model, dof, state.poses[index])
+                    value = _slider_value(model, dof, state.poses[index])
                     slider.disabled = dof in state.locked[index]
                     shown = min(max(value, slider.min), slider.max)
                     if abs(slider.value - shown) > 1e-6:
                         slider.value = shown  # type: ignore[misc]
 
 
-def _in_slider(model: BodyModel, dof: int, values: np.ndarray) -> float:
-    """Value of a degree of freedom in degrees or centimetres; angles without limits wrapped to half a turn."""
+def _slider_value(model: BodyModel, dof: int, values: np.ndarray) -> float:
+    """Return a degree of freedom in degrees or centimetres. Angles without limits are wrapped to [-180, 180)."""
     value = float(values[model.dof_value[dof]])
     if model.dof_is_length[dof]:
         return round(100 * value, 2)

@@ -1,6 +1,5 @@
-"""State to viser's 3-D scene: bodies, the ghost of the prediction, trails, floor, cameras."""
+"""Draw the state in viser's 3-D scene: bodies, predicted poses, trails, floor, cameras."""
 
-from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -10,15 +9,16 @@ from app.control.controller import Controller
 from app.drawing.predicted_pose import prediction
 from app.drawing.trails import Trails
 from app.runtime.jobs import Latest
-from app.scene3d.camera_view import SnapView
+from app.scene3d.camera_view import CameraView
 from app.scene3d.frusta import Frusta
-from app.scene3d.pace import Pace
+from app.scene3d.meshes import PeopleMeshes
+from app.scene3d.throttle import Throttle
 from app.scene3d.view_panel import ViewPanel
 from app.state.floor_picking import FloorState
+from app.state.identity import Identity
 from app.state.state import State
 from app.state.view_3d import View3d
-from tracker.body.model import BodyModel, PosedBody
-from tracker.contours.occluding_contours import part_poses
+from tracker.body.model import BodyModel
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera, viewed_point
@@ -26,76 +26,74 @@ from tracker.geometry.ground_plane import up_rotation
 from tracker.session.session import Session
 
 _REST_S = 0.08
-"""Time between updates: drawing the scene costs the browser more than drawing the panes, which go first."""
+"""Time between updates. Drawing the scene costs the browser more than the panes, which go first."""
 _CELL_RGB, _SECTION_RGB = (112, 116, 122), (140, 145, 152)
-"""Lines of the floor, legible before black, white and an image."""
-_GHOST_RGB = (150, 158, 172)
-_GHOST_OPACITY = 0.35
-_DIMMED = 0.2
-"""Opacity of people who are dimmed, as a share of the others'."""
+"""Colours of the floor's lines, legible on black, on white and on an image."""
+_PREDICTED_RGB = (150, 158, 172)
+_PREDICTED_OPACITY = 0.35
 
 
-class Scene:
+class SceneView:
     """The 3-D view of a session."""
 
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Build the scene and follow the controller's state."""
         self._server, self._controller, self._session = server, controller, controller.session
-        self._pace = Pace(controller)
-        self._posed: tuple[object, ...] = ()
-        self._expected: tuple[object, ...] = ()
-        self._trailed: tuple[object, ...] = ()
+        self._throttle = Throttle(controller)
+        self._drawn_poses: tuple[object, ...] = ()
+        self._drawn_prediction: tuple[object, ...] = ()
+        self._drawn_trails: tuple[object, ...] = ()
         self._trails_version = controller.state.timeline_version
-        self._look: tuple[View3d, frozenset[int], frozenset[int]] | None = None
-        self._laid: tuple[object, ...] = ()
+        self._appearance: tuple[View3d, frozenset[int], frozenset[int]] | None = None
+        self._drawn_floor: tuple[object, ...] = ()
         self._panel = ViewPanel(server, controller)
         self._grid = _add_surroundings(server, self._session)
-        self._parts = self._new_people(controller.state)
-        self._shape: tuple[BodyModel, ...] = controller.state.models
-        self._ghost: _Parts | None = None
+        self._people = self._new_people(controller.state)
+        self._models: tuple[BodyModel, ...] = controller.state.models
+        self._predicted: PeopleMeshes | None = None
         self._present = controller.state.present
         self._trails = self._new_trails()
         self._frusta = Frusta(server, controller)
         latest = Latest(self._show, "scene", _REST_S)
         controller.subscribe(latest.offer)
         latest.offer(controller.state)
-        SnapView(server, controller)
+        CameraView(server, controller)
 
     def _show(self, state: State) -> None:
-        due = self._pace.due(state)
+        due = self._throttle.due(state)
         if due is None:
             return
         state = due.drawn
         with self._server.atomic():
             self._frusta.show(state)
             self._show_bodies(state)
-            self._show_look(state)
+            self._show_appearance(state)
             self._show_floor(state.floor)
-            poses = tuple(id(p) for p in state.poses)
-            if poses != self._posed:
-                self._posed = poses
-                self._parts.pose(state.poses)
-            self._show_ghost(state)
+            poses = tuple(map(Identity, state.poses))
+            if poses != self._drawn_poses:
+                self._drawn_poses = poses
+                self._people.pose(state.poses)
+            self._show_prediction(state)
             self._show_trails(state)
 
     def _show_bodies(self, state: State) -> None:
-        """Make the meshes anew where somebody is shown in a body of other sizes than before."""
-        if state.models != self._shape:
-            self._shape = state.models
-            self._parts.remove()
-            self._parts = self._new_people(state)
-            self._posed, self._look = (), None
+        """Rebuild the meshes when the sizes of a body change."""
+        if state.models != self._models:
+            self._models = state.models
+            self._people.remove()
+            self._people = self._new_people(state)
+            self._drawn_poses, self._appearance = (), None
         if state.present != self._present:
             self._present = state.present
-            if self._ghost is not None:
-                self._ghost.remove()
-                self._ghost = None
-            self._expected = ()
-            self._trails, self._trailed = self._new_trails(), ()
+            if self._predicted is not None:
+                self._predicted.remove()
+                self._predicted = None
+            self._drawn_prediction = ()
+            self._trails, self._drawn_trails = self._new_trails(), ()
 
-    def _new_people(self, state: State) -> "_Parts":
-        """The meshes of everybody; a click on one works on that person, and on the joint that moves the part."""
-        parts = _Parts(self._server, "/people", self._controller.session_of(state))
+    def _new_people(self, state: State) -> PeopleMeshes:
+        """Add the meshes of all people. A click selects the person, and the joint that moves the part."""
+        parts = PeopleMeshes(self._server, "/people", self._controller.session_of(state))
         for person, handles in enumerate(parts.handles):
             points = self._controller.models[person].point_names
             for part, handle in enumerate(handles):
@@ -109,40 +107,40 @@ class Scene:
         people = self._controller.session.people
         return [Trails(p.model, partial(self._controller.poses, i)) for i, p in enumerate(people)]
 
-    def _show_look(self, state: State) -> None:
+    def _show_appearance(self, state: State) -> None:
         others = frozenset(range(len(state.people))) - {state.person}
-        look = (state.view_3d, state.cast.hidden, others if state.cast.solo else frozenset())
-        if look == self._look:
+        appearance = (state.view_3d, state.cast.hidden, others if state.cast.solo else frozenset())
+        if appearance == self._appearance:
             return
-        self._look = look
-        self._parts.look(*look)
+        self._appearance = appearance
+        self._people.set_appearance(*appearance)
         self._grid.visible = state.view_3d.floor
 
     def _show_floor(self, floor: FloorState) -> None:
-        """Lay the grid on the floor, or on the plane that is previewed."""
+        """Move the grid to the floor, or to the plane that is previewed."""
         picking = floor.picking
         plane = floor.plane if picking is None or picking.plane is None else picking.plane
-        laid = (floor.up, plane)
-        if laid == self._laid:
+        floor_drawn = (floor.up, plane)
+        if floor_drawn == self._drawn_floor:
             return
         R = up_rotation(floor.up, plane)
-        self._laid = laid
+        self._drawn_floor = floor_drawn
         self._grid.wxyz = rigid.quaternion_from_matrix(R)
         self._grid.position = np.zeros(3) if plane is None else plane.origin_world
-        if picking is None:  # a preview turns nobody's view
+        if picking is None:  # a preview does not turn the view
             self._server.scene.set_up_direction(R[:, 2])
 
-    def _show_ghost(self, state: State) -> None:
+    def _show_prediction(self, state: State) -> None:
         backward = state.track.running and (state.track.last or 0) < (state.track.first or 0)
         hidden = state.cast.hidden
         wanted = (state.view_3d.ghost, state.frame, state.timeline_version, state.settings.predict, backward, hidden)
-        if wanted == self._expected or (not state.view_3d.ghost and self._ghost is None):
+        if wanted == self._drawn_prediction or (not state.view_3d.ghost and self._predicted is None):
             return
-        self._expected = wanted
+        self._drawn_prediction = wanted
         if not state.view_3d.ghost:
-            self._panel.say_of_ghost("")
-            assert self._ghost is not None
-            self._ghost.hide()
+            self._panel.set_prediction_note("")
+            assert self._predicted is not None
+            self._predicted.show_only(frozenset())
             return
         frame, settings = state.frame, state.settings.predict
         found = [
@@ -150,21 +148,23 @@ class Scene:
             for i, p in enumerate(self._controller.session.people)
         ]
         several = len(found) > 1
-        told = [f"{p.name}: {f.why}" if several else f.why for p, f in zip(self._session.people, found, strict=True)]
-        self._panel.say_of_ghost("; ".join(told))
-        if self._ghost is None:
-            self._ghost = _Parts(self._server, "/prediction", self._controller.session, _GHOST_RGB, _GHOST_OPACITY)
-        self._ghost.pose([f.values for f in found])
-        for index, (handles, expected) in enumerate(zip(self._ghost.handles, found, strict=True)):
-            _set_visible(handles, expected.values is not None and index not in hidden)
+        notes = [f"{p.name}: {f.why}" if several else f.why for p, f in zip(self._session.people, found, strict=True)]
+        self._panel.set_prediction_note("; ".join(notes))
+        if self._predicted is None:
+            session = self._controller.session
+            self._predicted = PeopleMeshes(
+                self._server, "/prediction", session, _PREDICTED_RGB, _PREDICTED_OPACITY
+            )  # fmt: skip
+        self._predicted.pose([f.values for f in found])
+        self._predicted.show_only(frozenset(i for i, f in enumerate(found) if f.values is not None) - hidden)
 
     def _show_trails(self, state: State) -> None:
         view, version = state.view_3d, state.timeline_version
         hidden = state.cast.hidden
         wanted = (view.trail_points, view.trail_frames, state.frame, version, hidden)
-        if wanted == self._trailed or (not view.trail_points and not self._trailed):
+        if wanted == self._drawn_trails or (not view.trail_points and not self._drawn_trails):
             return
-        self._trailed = wanted
+        self._drawn_trails = wanted
         if version != self._trails_version:
             changed = self._controller.timeline(self._trails_version)
             self._trails_version = version
@@ -178,86 +178,10 @@ class Scene:
             )
 
 
-class _Parts:
-    """The parts of everybody as meshes."""
-
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        root: str,
-        session: Session,
-        color: tuple[int, int, int] | None = None,
-        opacity: float | None = None,
-    ) -> None:
-        """Add the meshes below a node of the scene.
-
-        Args:
-            server: whose scene.
-            root: name of the node.
-            session: with the people.
-            color: of all of them; by part by default.
-            opacity: of all of them; opaque by default.
-        """
-        self._people = session.people
-        self.handles = [
-            [
-                server.scene.add_mesh_simple(
-                    f"{root}/{person.name}/{part.name}",
-                    shape.triangles().vertices + center,
-                    shape.triangles().faces,
-                    color=color or _rgb(part.color),
-                    opacity=opacity,
-                    cast_shadow=False,
-                    receive_shadow=False,
-                )
-                for part, shape, center in zip(
-                    person.model.parts, person.model.shapes, person.model.centers_part, strict=True
-                )
-            ]
-            for person in self._people
-        ]
-        """Of each person the meshes of the parts."""
-
-    def pose(self, poses: Sequence[Array | None]) -> None:
-        """Put everybody where a pose, (n_values,), says; who has none stays. Nobody is shown or hidden by it."""
-        for person, handles, values in zip(self._people, self.handles, poses, strict=True):
-            if values is not None:
-                Ts = part_poses([PosedBody(person.model, values)])
-                turns = rigid.quaternion_from_matrix(Ts[:, :3, :3])
-                for handle, T, wxyz in zip(handles, Ts, turns, strict=True):
-                    handle.position, handle.wxyz = T[:3, 3], wxyz
-
-    def remove(self) -> None:
-        """Take the meshes out of the scene."""
-        for handles in self.handles:
-            for handle in handles:
-                handle.remove()
-
-    def hide(self) -> None:
-        """Hide everybody."""
-        for handles in self.handles:
-            _set_visible(handles, False)
-
-    def look(self, view: View3d, hidden: frozenset[int], dimmed: frozenset[int]) -> None:
-        """Show, colour and make translucent as a view says; but for people, by index, who are hidden or dimmed."""
-        for index, (person, handles) in enumerate(zip(self._people, self.handles, strict=True)):
-            opacity = _DIMMED * view.opacity if index in dimmed else view.opacity
-            for part, handle in zip(person.model.parts, handles, strict=True):
-                handle.color = _rgb(part.color if view.colors == "parts" else person.color)
-                handle.opacity = None if opacity >= 1 else opacity
-            _set_visible(handles, view.bodies and index not in hidden)
-
-
-def _set_visible(handles: Sequence[viser.MeshHandle], visible: bool) -> None:
-    for handle in handles:
-        if handle.visible != visible:
-            handle.visible = visible
-
-
 def _add_surroundings(server: viser.ViserServer, session: Session) -> viser.GridHandle:
     up = up_rotation(session.up, session.floor)[:, 2]
     server.scene.set_up_direction(up)
-    _place_eye(server, [c.camera for c in session.cameras], up)
+    _place_viewpoint(server, [c.camera for c in session.cameras], up)
     return server.scene.add_grid(
         "/floor",
         width=8.0,
@@ -266,18 +190,14 @@ def _add_surroundings(server: viser.ViserServer, session: Session) -> viser.Grid
         section_size=1.0,
         cell_color=_CELL_RGB,
         section_color=_SECTION_RGB,
-        shadow_opacity=0.0,  # shadows would double the work of a browser without a graphics card
+        shadow_opacity=0.0,  # shadows would double the work of a browser that renders in software
     )
 
 
-def _place_eye(server: viser.ViserServer, cameras: list[Camera], up: Array) -> None:
-    """Look at the middle of what the cameras see, from beside and above the first."""
+def _place_viewpoint(server: viser.ViserServer, cameras: list[Camera], up: Array) -> None:
+    """Look at the middle of what the cameras see, from beside and above the first camera."""
     middle = viewed_point(cameras)
     to_first = rigid.so3_exp(up * np.radians(25)) @ (cameras[0].center_world - middle)
     server.initial_camera.look_at = tuple(middle)
     server.initial_camera.position = tuple(middle + 0.9 * to_first)
     server.initial_camera.up = tuple(up)
-
-
-def _rgb(color: str) -> tuple[int, int, int]:
-    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)

@@ -1,6 +1,6 @@
-"""The settings of searches and trackers in viser's panel."""
+"""Panel folders for the settings of tracker and search."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,17 +17,89 @@ _ORDERS = ("stays", "constant velocity", "constant acceleration")
 assert len(_ORDERS) == MOST_ORDER + 1
 
 
+@dataclass(frozen=True)
+class _Control:
+    """A control of the panel; its kind follows from `options` and `bounds`."""
+
+    name: str
+    label: str
+    hint: str
+    options: tuple[str, ...] = ()
+    """Choices of a dropdown."""
+    bounds: tuple[float, float, float] | None = None
+    """Least value, largest value and step of a number."""
+
+    def add(self, gui: viser.GuiApi, value: Any) -> Any:
+        """Add the control with a value, and return its handle."""
+        if self.options:
+            return gui.add_dropdown(self.label, self.options, initial_value=value, hint=self.hint)
+        if self.bounds is not None:
+            low, high, step = self.bounds
+            return gui.add_number(self.label, value, min=low, max=high, step=step, hint=self.hint)
+        if isinstance(value, bool):
+            return gui.add_checkbox(self.label, value, hint=self.hint)
+        return gui.add_text(self.label, value, hint=self.hint)
+
+
+_FOLDERS: dict[str, tuple[_Control, ...]] = {
+    "Track": (
+        _Control("method", "method", "How the pose of a frame is found from its prediction", tuple(_METHODS.values())),
+        _Control("order", "prediction", "Motion model of the prediction; the paper has constant acceleration", _ORDERS),
+        _Control("window", "past poses", "Number of poses from which the motion is taken", bounds=(1, 8, 1)),
+        _Control(
+            "recover", "search lost limbs", "Search for a limb that is not where the edges and colours are"
+        ),
+        _Control(
+            "second_pass", "second pass",
+            "At the end of a run, track lost people backward from the first trusted poses after the loss",
+        ),
+    ),
+    "Search": (
+        _Control(
+            "bound_deg", "bound, deg", "Largest change of an angle from the start of the search",
+            bounds=(0.5, 90.0, 0.5),
+        ),
+        _Control(
+            "bound_cm", "bound, cm", "Largest change of the position from the start of the search",
+            bounds=(0.5, 100.0, 0.5),
+        ),
+        _Control("step_deg", "step, deg", "Spacing of the poses tried, along an angle", bounds=(0.5, 30.0, 0.5)),
+        _Control("step_cm", "step, cm", "Spacing of the poses tried, along the position", bounds=(0.5, 30.0, 0.5)),
+        _Control(
+            "passes", "passes",
+            "Factors on the steps: all stages are searched once per factor. The paper's mode is 1",
+        ),
+        _Control(
+            "patience", "patience", "A stage ends after this many expansions without improvement", bounds=(1, 100, 1)
+        ),
+        _Control(
+            "theta_px", "theta, px",
+            "Edges farther away than this add nothing to the cost; 0 takes 3% of the longer side of the image",
+            bounds=(0.0, 500.0, 1.0),
+        ),
+        _Control(
+            "outliers", "outliers",
+            "truncated: min(d, theta) over all points; paper: points beyond theta are left out",
+            ("truncated", "paper"),
+        ),
+    ),
+}  # fmt: skip
+
+
 class SettingsPanel:
-    """Two folders of the panel: what the tracker is told, and what a search is told."""
+    """Two folders of the panel: settings of the tracker, and settings of the search."""
 
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
-        """Build the folders; what is entered goes to the controller at once."""
-        self._server, self._controller = server, controller
+        """Build the folders; entries go to the controller at once."""
+        self._controller = controller
         shown = shown_of(controller.state.settings)
-        self._controls = {**self._add_tracking(shown), **self._add_search(shown)}
+        self._controls: dict[str, Any] = {}
+        for folder, controls in _FOLDERS.items():
+            with server.gui.add_folder(folder, expand_by_default=False):
+                self._controls |= {c.name: c.add(server.gui, shown[c.name]) for c in controls}
 
         async def changed(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None:  # else the program set it
+            if event.client is not None:  # otherwise the program set it
                 try:
                     self._controller.set_settings(self.read())
                 except TrackerError as error:
@@ -36,85 +108,21 @@ class SettingsPanel:
         for control in self._controls.values():
             control.on_update(changed)
 
-    def _add_tracking(self, shown: dict[str, Any]) -> dict[str, Any]:
-        gui = self._server.gui
-        with gui.add_folder("Track", expand_by_default=False):
-            return {
-                "method": gui.add_dropdown(
-                    "method", tuple(_METHODS.values()), initial_value=shown["method"],
-                    hint="How the pose of a frame is found from its prediction",
-                ),
-                "order": gui.add_dropdown(
-                    "prediction", _ORDERS, initial_value=shown["order"],
-                    hint="How motion is expected to go on; the paper has constant acceleration",
-                ),
-                "window": gui.add_number(
-                    "past poses", shown["window"], min=1, max=8, step=1,
-                    hint="Number of poses from which the motion is taken",
-                ),
-                "recover": gui.add_checkbox(
-                    "search lost limbs", shown["recover"],
-                    hint="Search anew for a limb that is not where the edges and colours are",
-                ),
-                "second_pass": gui.add_checkbox(
-                    "second pass", shown["second_pass"],
-                    hint="At the end of a run, follow whoever was lost back from the first trusted poses after it",
-                ),
-            }  # fmt: skip
-
-    def _add_search(self, shown: dict[str, Any]) -> dict[str, Any]:
-        gui = self._server.gui
-        with gui.add_folder("Search", expand_by_default=False):
-            return {
-                "bound_deg": gui.add_number(
-                    "bound, deg", shown["bound_deg"], min=0.5, max=90.0, step=0.5,
-                    hint="Largest change of an angle from where the search begins",
-                ),
-                "bound_cm": gui.add_number(
-                    "bound, cm", shown["bound_cm"], min=0.5, max=100.0, step=0.5,
-                    hint="Largest change of the position from where the search begins",
-                ),
-                "step_deg": gui.add_number(
-                    "step, deg", shown["step_deg"], min=0.5, max=30.0, step=0.5,
-                    hint="Spacing of the poses tried, along an angle",
-                ),
-                "step_cm": gui.add_number(
-                    "step, cm", shown["step_cm"], min=0.5, max=30.0, step=0.5,
-                    hint="Spacing of the poses tried, along the position",
-                ),
-                "passes": gui.add_text(
-                    "passes", shown["passes"],
-                    hint="Factors on the steps: all stages are searched once per factor. The paper's mode is 1",
-                ),
-                "patience": gui.add_number(
-                    "patience", shown["patience"], min=1, max=100, step=1,
-                    hint="A stage ends after so many expansions that found nothing better",
-                ),
-                "theta_px": gui.add_number(
-                    "theta, px", shown["theta_px"], min=0.0, max=500.0, step=1.0,
-                    hint="Edges farther away than this say nothing; 0 takes 3% of the longer side of the image",
-                ),
-                "outliers": gui.add_dropdown(
-                    "outliers", ("truncated", "paper"), initial_value=shown["outliers"],
-                    hint="truncated: min(d, theta) over all points; paper: points beyond theta are left out",
-                ),
-            }  # fmt: skip
-
     def show(self, settings: TrackSettings) -> None:
-        """Show settings that were changed elsewhere."""
+        """Show settings that changed elsewhere."""
         for name, value in shown_of(settings).items():
             if self._controls[name].value != value:
                 self._controls[name].value = value
 
     def read(self) -> TrackSettings:
-        """The settings that the panel shows."""
+        """Return the settings that the panel shows."""
         return settings_of(
             {name: control.value for name, control in self._controls.items()}, self._controller.state.settings
         )
 
 
 def shown_of(settings: TrackSettings) -> dict[str, Any]:
-    """What the panel shows of settings, by name of the control; degrees and centimetres. Back: `settings_of`."""
+    """Return the values of the controls, by name, in degrees and centimetres. Inverse of `settings_of`."""
     search, predict = settings.search, settings.predict
     return {
         "method": _METHODS[settings.estimate],
@@ -134,14 +142,14 @@ def shown_of(settings: TrackSettings) -> dict[str, Any]:
 
 
 def settings_of(value: dict[str, Any], before: TrackSettings) -> TrackSettings:
-    """Turn what the panel shows into settings; what it does not show stays as it is.
+    """Return settings with the values of the controls; other settings stay. Inverse of `shown_of`.
 
     Args:
-        value: by name of the control; degrees and centimetres.
-        before: the settings until now.
+        value: by name of the control, in degrees and centimetres.
+        before: the present settings.
 
     Raises:
-        TrackerError: the passes are no factors.
+        TrackerError: the passes are not factors above 0 and up to 1.
     """
     search: SearchSettings = replace(
         before.search,

@@ -1,4 +1,4 @@
-"""The folder "View" of viser's panel: through which camera one looks, and what is drawn."""
+"""Panel folder "View": the camera to look through, and what the 3-D view draws."""
 
 from collections.abc import Callable
 from typing import Any
@@ -20,7 +20,7 @@ _REST_S = 0.1
 
 
 class ViewPanel:
-    """The widgets of the view. They keep no facts: what they show is the state, what is chosen goes there."""
+    """The folder. It shows the state, and what is chosen goes to the controller."""
 
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Build the folder and follow the controller's state."""
@@ -42,13 +42,13 @@ class ViewPanel:
                     hint="Each part, or each person, in a colour of its own",
                 ),
                 "opacity": gui.add_slider(
-                    "opacity", 0.1, 1.0, 0.05, view.opacity, hint="Of the bodies: lower to see what they hide"
+                    "opacity", 0.1, 1.0, 0.05, view.opacity, hint="Lower it to see what the bodies hide"
                 ),
                 "cameras": gui.add_checkbox(
                     "cameras", view.cameras, hint="Draw the cameras; a click on one looks through it"
                 ),
                 "images": gui.add_checkbox(
-                    "camera images", view.images, hint="Show what each camera sees, once a frame rests"
+                    "camera images", view.images, hint="Show the image of each camera, a moment after the frame changes"
                 ),
                 "floor": gui.add_checkbox("floor", view.floor, hint="Draw a grid on the floor, a line every 50 cm"),
                 "gizmos": gui.add_checkbox(
@@ -56,25 +56,25 @@ class ViewPanel:
                 ),
                 "ghost": gui.add_checkbox(
                     "prediction", view.ghost,
-                    hint="Draw in grey the pose that the tracker expects here, from the poses before",
+                    hint="Draw in grey the pose that the tracker predicts here, from the poses before",
                 ),
             }  # fmt: skip
             self._floor = gui.add_markdown("")
             self._set_floor = gui.add_button(
                 "Set the floor", hint="Click three points of the floor in the views (Shift+Y)"
             )
-            self._former_floor = gui.add_button("Former floor", hint="Go back to the floor before the last change")
+            self._previous_floor = gui.add_button("Previous floor", hint="Restore the floor before the last change")
             self._ghost = gui.add_markdown("")
             self._ghost.visible = False
             self._points = self._add_trails()
-        self._told: dict[str, object] = {}  # what the state last said of each control
+        self._shown: dict[str, object] = {}  # the last value of each control in the state
         self._listen()
         latest = Latest(self._show, "view panel", _REST_S)
         controller.subscribe(latest.offer)
         latest.offer(controller.state)
 
-    def say_of_ghost(self, text: str) -> None:
-        """Say from what the prediction was made, or why there is none; empty for nothing to say."""
+    def set_prediction_note(self, text: str) -> None:
+        """Show the frames that the prediction was made from, or why there is none; empty hides the note."""
         self._ghost.content = f"*prediction {text}*" if text else ""
         self._ghost.visible = bool(text)
 
@@ -86,12 +86,12 @@ class ViewPanel:
                 hint="Length of a trail to either side of the shown frame: blue before it, orange after it",
             )  # fmt: skip
             none = gui.add_button("None", hint="No trails")
-            # Of several bodies all points: one box stands for the point of each.
+            # One box per name of a point: it stands for that point of every body.
             models = self._controller.models
             names = list(dict.fromkeys(n for m in models for n in m.point_names if n not in minor_points(m)))
             boxes = {
                 name: gui.add_checkbox(
-                    name.replace("_", " "), name in view.trail_points, hint="Draw the way of this point"
+                    name.replace("_", " "), name in view.trail_points, hint="Draw the trail of this point"
                 )
                 for name in names
             }
@@ -116,7 +116,7 @@ class ViewPanel:
         async def _(event: viser.GuiEvent[Any]) -> None:
             self._offer(event, self._controller.flooring.begin, "floor")
 
-        @self._former_floor.on_click
+        @self._previous_floor.on_click
         async def _(event: viser.GuiEvent[Any]) -> None:
             self._offer(event, self._controller.flooring.revert, "floor")
 
@@ -138,11 +138,11 @@ class ViewPanel:
         self._offer(event, lambda: self._controller.view_3d.choose(trail_points=chosen), "trail_points")
 
     def _offer(self, event: viser.GuiEvent[Any], change: Callable[[], None], key: str) -> None:
-        if event.client is not None:  # else the state set it
+        if event.client is not None:  # otherwise the program set it
             self._choices.offer((change, event.client), key)
 
-    def _choose(self, told: tuple[Callable[[], None], viser.ClientHandle]) -> None:
-        change, client = told
+    def _choose(self, choice: tuple[Callable[[], None], viser.ClientHandle]) -> None:
+        change, client = choice
         try:
             change()
         except TrackerError as error:
@@ -152,26 +152,26 @@ class ViewPanel:
         view = state.view_3d
         with self._server.atomic():
             _set(self._camera, self._camera.options[0 if state.snapped is None else state.snapped + 1])
-            _set_text(self._floor, _described(state.floor))
-            self._former_floor.disabled = not state.floor.former
+            _set_text(self._floor, _describe(state.floor))
+            self._previous_floor.disabled = not state.floor.former
             for field, control in self._controls.items():
                 value = getattr(view, field)
-                self._tell(field, control, _COLORS[value] if field == "colors" else value)
+                self._update(field, control, _COLORS[value] if field == "colors" else value)
             for name, box in self._points.items():
-                self._tell(name, box, name in view.trail_points)
+                self._update(name, box, name in view.trail_points)
 
-    def _tell(self, key: str, control: Any, value: object) -> None:
-        """Set a control where the state says another value than before.
+    def _update(self, key: str, control: Any, value: object) -> None:
+        """Set a control if its value in the state changed.
 
-        What somebody has just chosen, and a state does not know yet that changed for another reason, stays.
+        A choice that the state does not have yet stays, even if the state changes for another reason.
         """
-        if self._told.get(key) != value:
-            self._told[key] = value
+        if self._shown.get(key) != value:
+            self._shown[key] = value
             _set(control, value)
 
 
-def _described(floor: FloorState) -> str:
-    """The floor in words."""
+def _describe(floor: FloorState) -> str:
+    """Describe the floor."""
     if floor.plane is None:
         return f"*floor of the calibration, up is {floor.up}*"
     cosine = np.clip(np.abs(floor.plane.normal).max(), -1, 1)

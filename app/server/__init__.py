@@ -1,1 +1,4 @@
-"""One port: page, socket, viser; who may talk to it."""
+"""The web server: page, pane socket and viser on one port, and the check of every request.
+
+Imports all rooms of `app` below it. Public: `workbench.open_session`; `server` and `access` also serve other endpoints.
+"""

@@ -1,8 +1,8 @@
-"""Who may talk to the page's server.
+"""Check which requests the page's server answers.
 
-A browser lets any page on the internet send requests to this machine, so that listening on loopback alone protects
-nothing. Every request must name the server by an expected name (against DNS rebinding) and, where the browser says from
-which origin it comes, from that same name and port. A server that listens beyond loopback wants a token as well.
+A browser lets any page on the internet send requests to this machine, so listening on loopback alone protects nothing.
+Every request must name the server by an expected name (against DNS rebinding). If it has an Origin, that must have the
+same name and port. A server that listens beyond loopback also requires a token.
 """
 
 import hashlib
@@ -24,23 +24,23 @@ class Access:
     """What a request must show to be answered."""
 
     hosts: frozenset[str] = frozenset()
-    """Names, besides those of loopback, by which the server may be called; lower case, without port."""
+    """Names of the server besides those of loopback; lower case, without port."""
     token: str | None = None
-    """What the page's address and then its cookie must hold; None where nothing but loopback can connect."""
+    """Token required in the page's address or its cookie; None if only loopback can connect."""
 
     @property
     def cookie(self) -> str:
-        """Name of the token's cookie: cookies ignore ports, and several programs may run on one machine."""
+        """Name of the token's cookie. It depends on the token, because programs on other ports share cookies."""
         assert self.token is not None
         return "quadrille_" + hashlib.sha256(self.token.encode()).hexdigest()[:12]
 
     def refusal(self, host: str | None, origin: str | None, tokens: Iterable[str] = ()) -> str | None:
-        """Say why a request is refused, or return None where it may pass.
+        """Return why a request is refused, or None if it may pass.
 
         Args:
             host: the Host header.
-            origin: the Origin header; browsers send it with every WebSocket and every request of a foreign page.
-            tokens: what the request holds in the way of tokens, by address or cookie.
+            origin: the Origin header, which browsers send with every WebSocket and every request of a foreign page.
+            tokens: those in the request's address and cookie.
         """
         called = _HOST.fullmatch(host or "")
         if called is None or not (is_loopback(called["name"]) or called["name"].lower() in self.hosts):
@@ -56,10 +56,10 @@ class Access:
 
 
 def access_for(host: str, allow_hosts: Iterable[str] = ()) -> Access:
-    """Decide what requests must show when the server listens at `host`.
+    """Return the checks for a server that listens at `host`.
 
     Raises:
-        TrackerError: where `host` is not loopback and nobody said by which names it may be called.
+        TrackerError: `host` is not loopback and `allow_hosts` is empty, or a name is malformed.
     """
     names = frozenset(name.strip().lower() for name in allow_hosts)
     malformed = sorted(name for name in names if (match := _HOST.fullmatch(name)) is None or match["port"])
@@ -79,7 +79,7 @@ def access_for(host: str, allow_hosts: Iterable[str] = ()) -> Access:
 
 
 def is_loopback(name: str) -> bool:
-    """Whether a host name or address, without port, is this machine as it calls itself."""
+    """Return whether a host name or address, without port, is loopback."""
     if name.lower() == "localhost":
         return True
     try:
@@ -89,7 +89,7 @@ def is_loopback(name: str) -> bool:
 
 
 def _same(origin: str, called: re.Match[str]) -> bool:
-    """Whether an Origin is the page's own: the same name and port as in the Host header."""
+    """Return whether an Origin has the name and port of the Host header."""
     try:
         parts = urlsplit(origin)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Start viser where only this program can reach it: on a Unix socket in a folder of this user."""
+"""Start viser on a Unix socket that only this user can reach."""
 
 import contextlib
 import io
@@ -20,22 +20,22 @@ _MAX_PATH_BYTES = 100  # the kernel's limit for the path of a Unix socket is 104
 class PrivateViser:
     """A viser server that listens on no port.
 
-    viser answers whoever connects, and a browser lets every website connect to every port of this machine. A Unix
-    socket is out of reach for websites and, by the permissions of its folder, for other users. `ViserProxy` hands on
-    the requests that `Access` let pass.
+    viser answers every connection, and a browser lets every website connect to every port of this machine. A Unix
+    socket is out of reach for websites and, by the permissions of its folder, for other users. `ViserProxy` forwards
+    the requests that pass `Access`.
     """
 
     def __init__(self) -> None:
         """Start the server, without the button that would share it with the internet.
 
-        A later `configure_theme` has to pass `show_share_button=False` again.
+        A later `configure_theme` must pass `show_share_button=False` again.
 
         Raises:
-            TrackerError: viser did not take the socket; nothing listens then.
+            TrackerError: viser did not use the socket; nothing listens then.
         """
         self._folder = _private_folder()
         self.socket_path = self._folder / "viser"
-        """Where it listens; only this user may open it."""
+        """The socket; only this user may open it."""
         try:
             # viser prints its own address even with verbose=False; the page's address is the only one to open.
             with _served_on(self.socket_path), contextlib.redirect_stdout(io.StringIO()):
@@ -59,7 +59,7 @@ class PrivateViser:
 
 
 def _private_folder() -> Path:
-    """Make a folder that only this user may enter, at a path short enough for a socket."""
+    """Make a folder that only this user may enter, with a path short enough for a socket."""
     folder = Path(tempfile.mkdtemp(prefix="quadrille-"))
     if len(bytes(folder / "viser")) <= _MAX_PATH_BYTES:
         return folder
@@ -69,10 +69,10 @@ def _private_folder() -> Path:
 
 @contextlib.contextmanager
 def _served_on(path: Path) -> Iterator[None]:
-    """Let `websockets` serve on a Unix socket at `path`, whatever host and port its caller asks for.
+    """Make `websockets` serve on a Unix socket at `path`, whatever host and port its caller passes.
 
-    viser offers no such choice. It starts the server before its constructor returns, so that nothing else is served
-    in the meantime.
+    viser has no option for it. It starts the server before its constructor returns, so nothing else is served
+    meanwhile.
     """
     original = websockets.asyncio.server.serve
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)

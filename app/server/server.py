@@ -1,7 +1,7 @@
 """The web server: the page, its pane socket, and viser behind `/viser/`.
 
-One port serves everything, so that one SSH tunnel is enough, and every request passes `access` before anything else
-sees it: viser itself has no such check, and listens where only this program can reach it (`private_viser`).
+One port serves everything, so one SSH tunnel is enough. Every request passes `access` first. viser itself has no such
+check, and listens on a private socket (`private_viser`).
 """
 
 import asyncio
@@ -32,19 +32,19 @@ _CLOSE_TIMEOUT_S = 1.0
 
 
 class PaneEndpoint(Protocol):
-    """What answers the pane socket (docs/protocol.md)."""
+    """Answers the pane socket (docs/protocol.md)."""
 
     async def serve(self, socket: web.WebSocketResponse) -> None:
-        """Talk to one page until its socket closes."""
+        """Serve one page until its socket closes."""
 
 
 def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: Path) -> web.Application:
     """Build the web application.
 
     Args:
-        panes: answers the pane sockets, one call for each page that connects.
-        viser_socket: the Unix socket that viser listens on.
-        access: what every request must show.
+        panes: answers the pane sockets, one call per page.
+        viser_socket: the Unix socket of viser.
+        access: the check of every request.
         static: the folder of the page (`static_folder`).
     """
     app = web.Application(middlewares=[_guard(access)])
@@ -54,21 +54,26 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
     async def page(request: web.Request) -> web.StreamResponse:
         response = web.FileResponse(static / "index.html")
         if access.token is not None and "token" in request.query:
-            # Set with the page itself: on a redirect a browser that came from a link would keep back a Strict cookie.
+            # Set with the page itself: after a redirect, a browser that followed a link would not send a Strict cookie.
             response.set_cookie(access.cookie, access.token, httponly=True, samesite="Strict", path="/")
         return response
 
     async def pane_socket(request: web.Request) -> web.StreamResponse:
-        # JPEG does not compress, and small vectors are not worth the delay.
+        # Compression gains nothing on JPEG, and is not worth the delay for small vectors. Text is decoded where it is
+        # parsed: text that is not UTF-8 would close the socket.
         socket = web.WebSocketResponse(
-            heartbeat=_HEARTBEAT_S, timeout=_CLOSE_TIMEOUT_S, compress=False, max_msg_size=_MAX_MESSAGE_BYTES
+            heartbeat=_HEARTBEAT_S,
+            timeout=_CLOSE_TIMEOUT_S,
+            compress=False,
+            max_msg_size=_MAX_MESSAGE_BYTES,
+            decode_text=False,
         )
         await socket.prepare(request)
         request.app[_SOCKETS].add(socket)
         try:
             await panes.serve(socket)
         except ConnectionError:
-            _LOG.debug("a page went away in the middle of a message")
+            _LOG.debug("a page closed its socket during a message")
         except Exception:
             _LOG.exception("a pane socket failed; the page connects again")
             await socket.close(code=aiohttp.WSCloseCode.INTERNAL_ERROR)
@@ -93,17 +98,17 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
 async def serve_forever(
     app: web.Application, access: Access, host: str, port: int, on_ready: Callable[[str], None]
 ) -> None:
-    """Serve until the task is cancelled, then close all sockets and finish.
+    """Serve until the task is cancelled, then close all sockets.
 
     Args:
-        app: what `create_app` returned.
-        access: the same as given to `create_app`; its token goes into the address.
+        app: from `create_app`.
+        access: as given to `create_app`; its token is part of the address.
         host: address to listen at.
-        port: port to listen at; 0 takes a free one.
-        on_ready: called once with the page's address as soon as it answers.
+        port: port to listen at; 0 for a free one.
+        on_ready: called once with the page's address when the server answers.
 
     Raises:
-        TrackerError: where the port is taken or the address is not this machine's.
+        TrackerError: the port is taken, or the address is not this machine's.
     """
     runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=2.0)
     await runner.setup()
@@ -119,7 +124,7 @@ async def serve_forever(
 
 
 def page_address(access: Access, host: str, port: int) -> str:
-    """Return the address under which a person opens the page, with the token where one is needed."""
+    """Return the page's address, with the token if one is required."""
     name = host if is_loopback(host) or not access.hosts else min(access.hosts)
     bracketed = f"[{name}]" if ":" in name and not name.startswith("[") else name
     return f"http://{bracketed}:{port}/" + (f"?token={access.token}" if access.token else "")

@@ -1,4 +1,4 @@
-"""Hand requests under `/viser/` on to viser, which checks nobody."""
+"""Forward requests under `/viser/` to viser, which has no check of its own."""
 
 import asyncio
 from pathlib import Path
@@ -18,7 +18,7 @@ POLICY = (
     "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
 
-# What viser answers that means something to a browser; hop-by-hop headers must not be passed on.
+# Headers of viser that a browser needs; hop-by-hop headers must not be forwarded.
 _PASSED_DOWN = ("Content-Type", "Content-Length", "Content-Encoding")
 _MAX_MESSAGE_BYTES = 256 << 20
 _HEARTBEAT_S = 20.0
@@ -28,7 +28,7 @@ Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
 
 def is_viser(path: str) -> bool:
-    """Whether a request path belongs to viser."""
+    """Return whether a request path belongs to viser."""
     return path == "/viser" or path.startswith("/viser/")
 
 
@@ -40,7 +40,7 @@ class ViserProxy:
         self._session: aiohttp.ClientSession | None = None
 
     async def __aenter__(self) -> Self:
-        # Bodies pass through as compressed as they come.
+        # Bodies are forwarded as compressed as they arrive.
         self._session = aiohttp.ClientSession(
             _ORIGIN, auto_decompress=False, connector=aiohttp.UnixConnector(path=str(self._socket_path), limit=0)
         )
@@ -80,7 +80,7 @@ class ViserProxy:
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         assert self._session is not None
-        # viser tells its clients' versions by the subprotocol: ours is whichever viser chose.
+        # viser recognizes versions of its client by the subprotocol: pass on the one that viser chose.
         offered = [p.strip() for p in request.headers.get("Sec-WebSocket-Protocol", "").split(",") if p.strip()]
         async with self._session.ws_connect(
             "/", protocols=offered, max_msg_size=_MAX_MESSAGE_BYTES, compress=0
@@ -104,9 +104,9 @@ class ViserProxy:
 
 
 async def _pump(source: Socket, target: Socket) -> None:
-    """Pass messages on until the source closes, then close the target for the same reason.
+    """Forward messages until the source closes, then close the target with the same code.
 
-    Sending waits while the target's buffer is full, and so stops reading from the source.
+    Sending waits while the target's buffer is full, which stops reading from the source.
     """
     while True:
         message = await source.receive()
@@ -117,7 +117,7 @@ async def _pump(source: Socket, target: Socket) -> None:
                 await target.send_str(message.data)
             else:
                 code = source.close_code
-                # 1005 and 1006 say that no reason came over the wire, and may not be sent over it.
+                # 1005 and 1006 mean that no code was received, and must not be sent.
                 sendable = code is not None and (1000 <= code <= 1003 or 1007 <= code <= 1014 or code >= 3000)
                 reason = message.extra.encode() if isinstance(message.extra, str) else b""
                 await target.close(code=code if sendable and code else aiohttp.WSCloseCode.GOING_AWAY, message=reason)

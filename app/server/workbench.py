@@ -1,4 +1,4 @@
-"""Opens a session in the page: everything from the lock to the web server, wired together."""
+"""Open a session in the page: lock, store, controller, 3-D view and web server."""
 
 import asyncio
 import getpass
@@ -13,10 +13,10 @@ from typing import Any
 from platformdirs import user_cache_path
 
 from app.control.controller import Controller
-from app.page.socket import Panes
+from app.page.socket import PaneSocket
 from app.scene3d.gizmos import Gizmos
 from app.scene3d.panels import Panels
-from app.scene3d.scene import Scene
+from app.scene3d.scene import SceneView
 from app.server.access import access_for
 from app.server.private_viser import PrivateViser
 from app.server.server import create_app, serve_forever, static_folder
@@ -32,7 +32,7 @@ from tracker.store.annotation_store import AnnotationStore
 
 @dataclass(frozen=True)
 class Serving:
-    """How the page is served."""
+    """Address and access of the page."""
 
     host: str = "127.0.0.1"
     port: int = 8080
@@ -46,7 +46,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
 
     Args:
         folder: the session folder.
-        serving: address and access.
+        serving: address and access of the page.
         say: shows a line to the user.
 
     Raises:
@@ -61,10 +61,10 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
         controller = Controller(session, Saver(session, store, _author()), frames)
         viser = PrivateViser()
         try:
-            Scene(viser.server, controller)
+            SceneView(viser.server, controller)
             Gizmos(viser.server, controller)
             Panels(viser.server, controller)
-            app = create_app(Panes(controller), viser.socket_path, access, static)
+            app = create_app(PaneSocket(controller), viser.socket_path, access, static)
 
             def ready(address: str) -> None:
                 for name in proxies.stale(session):
@@ -84,12 +84,12 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
 
 
 def _indices() -> Path:
-    """Where the lists of frames of videos are kept between openings."""
+    """Return the folder that stores the frame indices of videos between openings."""
     return user_cache_path("quadrille", appauthor=False) / "footage"
 
 
 async def _until_interrupted(serving: Coroutine[Any, Any, None]) -> None:
-    """Run until SIGINT or SIGTERM, then let the server finish."""
+    """Run until SIGINT or SIGTERM, then shut the server down."""
     task = asyncio.ensure_future(serving)
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, task.cancel)
@@ -101,8 +101,8 @@ async def _until_interrupted(serving: Coroutine[Any, Any, None]) -> None:
 
 
 def _author() -> str:
-    """Who edits, for the history: the user of this machine, nobody where it does not say."""
+    """Return the author for the history: the user of this machine, or empty if unknown."""
     try:
         return getpass.getuser()
-    except (KeyError, OSError):  # a container's user may have a number and no name
+    except (KeyError, OSError):  # a container's user may have no name
         return ""

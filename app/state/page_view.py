@@ -1,22 +1,33 @@
-"""What a page shows of the session: its layers, and how large its panes are. Each page has its own view.
+"""What one page shows of the session: its layers and the sizes of its panes.
 
-The choice of layers belongs to whoever looks, not to the session: two windows on one session may show different ones.
-So it is no part of the `State`; a page says it when it connects and whenever it changes (docs/protocol.md).
+Two windows on one session may show different layers, so this is no part of the `State`. A page sends it on connecting
+and whenever it changes (docs/protocol.md).
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
-Picture = Literal["image", "silhouette", "distance", "parts"]
-PICTURES: tuple[Picture, ...] = get_args(Picture)
+PictureLayer = Literal["image", "silhouette", "distance", "parts"]
+PICTURES: tuple[PictureLayer, ...] = get_args(PictureLayer)
 """Layers that are sent as pictures."""
-VECTORS = ("accepted", "rejected", "contours", "hidden", "part_edges", "skeleton", "joints", "epipolar")
-"""Layers that are sent as line segments and joints."""
-LAYERS = (*PICTURES, *VECTORS)
+Layer = Literal[
+    "image",
+    "silhouette",
+    "distance",
+    "parts",
+    "accepted",
+    "rejected",
+    "contours",
+    "hidden",
+    "part_edges",
+    "skeleton",
+    "joints",
+    "epipolar",
+]
+LAYERS: tuple[Layer, ...] = get_args(Layer)
+"""Every layer: pictures, then those that are sent as line segments and joints."""
 EVIDENCE = frozenset(("silhouette", "distance", "accepted", "rejected"))
 """Layers that need the evidence of the frame."""
-_MOST_REDUCED = 64
 
 
 @dataclass(frozen=True)
@@ -26,34 +37,16 @@ class View:
     layers: frozenset[str]
     """Names of the layers shown."""
     reductions: tuple[float, ...]
-    """By camera: how many pixels of the image, along either side, a picture may have for one; 0 for a pane not seen."""
+    """By camera: image pixels per picture pixel along either side; 0 for a pane that is not visible."""
     by_part: bool = False
     """Whether contours have the colours of the parts instead of those of the people."""
 
     @property
     def cameras(self) -> frozenset[int]:
-        """Indices of the cameras whose panes are seen."""
+        """Indices of the cameras whose panes are visible."""
         return frozenset(camera for camera, reduction in enumerate(self.reductions) if reduction)
 
     @property
-    def pictures(self) -> tuple[Picture, ...]:
+    def pictures(self) -> tuple[PictureLayer, ...]:
         """The layers shown that are pictures."""
         return tuple(name for name in PICTURES if name in self.layers)
-
-
-def view_of(message: Mapping[str, Any], n_cameras: int) -> View:
-    """Read a `view` message.
-
-    Args:
-        message: as it came.
-        n_cameras: of the session.
-
-    Raises:
-        KeyError, TypeError, ValueError: the message is not understood.
-    """
-    layers, reductions = frozenset(message["layers"]), tuple(float(r) for r in message["reductions"])
-    if not layers.issubset(LAYERS):
-        raise ValueError(f"no layers are called {', '.join(sorted(map(str, layers.difference(LAYERS))))}")
-    if len(reductions) != n_cameras or not all(r == 0 or 1 <= r <= _MOST_REDUCED for r in reductions):
-        raise ValueError(f"expected 0 or a reduction from 1 to {_MOST_REDUCED} for each of {n_cameras} cameras")
-    return View(layers, reductions, bool(message["by_part"]))

@@ -1,6 +1,6 @@
 /** What a user can want, whichever button or key says it. */
 
-import { whom, hasTrack } from "./selectors.js";
+import { scopePerson, hasTrack } from "./selectors.js";
 
 export class Actions {
   #store;
@@ -25,13 +25,13 @@ export class Actions {
 
   /** @param {"step" | "stage" | "frame" | "stop"} action */
   search(action) {
-    this.#send({ type: "search", action, person: whom(this.#store.facts) });
+    this.#send({ type: "search", action, person: scopePerson(this.#store.facts) });
   }
 
   /** Search again from where the run that is looked at began, by the settings of now. */
   searchAgain() {
     const { facts } = this.#store;
-    this.#send({ type: "search", action: "again", run: facts.searchRun, person: whom(facts) });
+    this.#send({ type: "search", action: "again", run: facts.searchRun, person: scopePerson(facts) });
   }
 
   /** Show the true pose again, where a search is replayed; whether there was something to leave. */
@@ -151,8 +151,8 @@ export class Actions {
   }
 
   /** Let searches and fits move everybody, or the person worked on alone. */
-  toggleWhose() {
-    const { whose, session } = this.#store.facts;
-    if ((session?.people.length ?? 0) > 1) this.#store.set({ whose: whose === "all" ? "one" : "all" });
+  toggleScope() {
+    const { scope, session } = this.#store.facts;
+    if ((session?.people.length ?? 0) > 1) this.#store.set({ scope: scope === "all" ? "one" : "all" });
   }
 }

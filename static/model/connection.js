@@ -3,7 +3,7 @@
 import { decodeBinary } from "./protocol.js";
 
 const FIRST_DELAY_MS = 250;
-const LONGEST_DELAY_MS = 5000;
+const MAX_DELAY_MS = 5000;
 
 /**
  * @typedef {object} Listener
@@ -66,7 +66,7 @@ export class Connection {
     socket.onclose = () => {
       this.#listener.onOpen(false);
       setTimeout(() => this.#connect(), this.#delayMs * (0.75 + 0.5 * Math.random()));
-      this.#delayMs = Math.min(2 * this.#delayMs, LONGEST_DELAY_MS);
+      this.#delayMs = Math.min(2 * this.#delayMs, MAX_DELAY_MS);
     };
     this.#socket = socket;
   }

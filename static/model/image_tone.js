@@ -1,25 +1,25 @@
 /** Brightness, contrast and gamma of each camera's image: in this browser only, kept session by session. */
 
 /**
- * @typedef {{brightness: number, contrast: number, gamma: number}} Look
+ * @typedef {{brightness: number, contrast: number, gamma: number}} ImageTone
  *   brightness and contrast from -100 to 100, gamma from 0.2 to 5
  */
 
-/** @type {Readonly<Look>} */
+/** @type {Readonly<ImageTone>} */
 export const PLAIN = { brightness: 0, contrast: 0, gamma: 1 };
-/** @type {Record<keyof Look, [number, number]>} */
+/** @type {Record<keyof ImageTone, [number, number]>} */
 const BOUNDS = { brightness: [-100, 100], contrast: [-100, 100], gamma: [0.2, 5] };
 const STORED = "quadrille.looks.";
 
-/** @param {Look | undefined} look */
-export function isPlain(look) {
-  return !look || (look.brightness === 0 && look.contrast === 0 && look.gamma === 1);
+/** @param {ImageTone | undefined} tone */
+export function isPlain(tone) {
+  return !tone || (tone.brightness === 0 && tone.contrast === 0 && tone.gamma === 1);
 }
 
 /**
  * The value that each of the 256 gray levels is shown with: gamma first, then contrast about the middle, then brightness.
  *
- * @param {Look} look
+ * @param {ImageTone} tone
  */
 export function toneCurve({ brightness, contrast, gamma }) {
   const gain = contrast >= 0 ? 1 / (1.001 - contrast / 100) : 1 + contrast / 100;
@@ -29,7 +29,7 @@ export function toneCurve({ brightness, contrast, gamma }) {
   });
 }
 
-export class Looks {
+export class ImageTones {
   #store;
   #session = "";
 
@@ -43,24 +43,24 @@ export class Looks {
 
   /**
    * @param {number} camera
-   * @param {Look} look
+   * @param {ImageTone} tone
    */
-  set(camera, look) {
-    const looks = [...this.#store.facts.looks];
-    looks[camera] = look;
-    this.#keep(looks);
+  set(camera, tone) {
+    const imageTones = [...this.#store.facts.imageTones];
+    imageTones[camera] = tone;
+    this.#keep(imageTones);
   }
 
-  /** @param {Look} look for all cameras */
-  setAll(look) {
-    this.#keep((this.#store.facts.session?.cameras ?? []).map(() => look));
+  /** @param {ImageTone} tone for all cameras */
+  setAll(tone) {
+    this.#keep((this.#store.facts.session?.cameras ?? []).map(() => tone));
   }
 
-  /** @param {(Look | undefined)[]} looks by camera */
-  #keep(looks) {
-    this.#store.set({ looks });
+  /** @param {(ImageTone | undefined)[]} imageTones by camera */
+  #keep(imageTones) {
+    this.#store.set({ imageTones });
     const names = (this.#store.facts.session?.cameras ?? []).map(({ name }) => name);
-    const changed = names.map((name, camera) => [name, looks[camera]]).filter(([, look]) => look && look !== PLAIN);
+    const changed = names.map((name, camera) => [name, imageTones[camera]]).filter(([, tone]) => tone && tone !== PLAIN);
     localStorage.setItem(STORED + this.#session, JSON.stringify(Object.fromEntries(changed)));
   }
 
@@ -68,24 +68,24 @@ export class Looks {
     const { session } = this.#store.facts;
     if (!session) return;
     this.#session = session.name;
-    /** @type {Record<string, Partial<Look>>} */
+    /** @type {Record<string, Partial<ImageTone>>} */
     let stored = {};
     try {
       stored = JSON.parse(localStorage.getItem(STORED + session.name) ?? "{}") ?? {};
     } catch {
       // What is not understood is as good as nothing.
     }
-    this.#store.set({ looks: session.cameras.map(({ name }) => known(stored[name])) });
+    this.#store.set({ imageTones: session.cameras.map(({ name }) => known(stored[name])) });
   }
 }
 
-/** @param {Partial<Look> | undefined} stored */
+/** @param {Partial<ImageTone> | undefined} stored */
 function known(stored) {
-  const look = { ...PLAIN };
-  for (const field of /** @type {(keyof Look)[]} */ (Object.keys(BOUNDS))) {
+  const tone = { ...PLAIN };
+  for (const field of /** @type {(keyof ImageTone)[]} */ (Object.keys(BOUNDS))) {
     const value = stored?.[field];
     const [least, most] = BOUNDS[field];
-    if (typeof value === "number" && value >= least && value <= most) look[field] = value;
+    if (typeof value === "number" && value >= least && value <= most) tone[field] = value;
   }
-  return look;
+  return tone;
 }

@@ -7,27 +7,27 @@ export class Latency {
    * @type {number[]} */
   latencies = [];
   /** @type {Map<number, number>} */
-  #underWay = new Map();
+  #pending = new Map();
 
   /**
    * @param {number} seq number of the drag message
    * @param {number} moved when the pointer moved
    */
   sent(seq, moved) {
-    this.#underWay.set(seq, moved);
+    this.#pending.set(seq, moved);
   }
 
   /** Forget what an answer is still awaited for: the connection was lost. */
   forget() {
-    this.#underWay.clear();
+    this.#pending.clear();
   }
 
   /** @param {number} seq the last drag message that all panes show */
   painted(seq) {
     const now = performance.now();
-    for (const [number, moved] of this.#underWay) {
+    for (const [number, moved] of this.#pending) {
       if (number > seq) break;
-      this.#underWay.delete(number);
+      this.#pending.delete(number);
       this.latencies.push(now - moved);
     }
     this.latencies.splice(0, this.latencies.length - KEPT);

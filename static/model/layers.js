@@ -103,7 +103,7 @@ const STORED = "quadrille.layers.";
  * @param {number} people of the session: of several one wants to see who hides whom
  * @returns {LayerChoice}
  */
-export function usualLayers(people = 1) {
+export function defaultLayers(people = 1) {
   const table = (/** @type {"shown" | "opacity"} */ field) => Object.fromEntries(LAYERS.map((l) => [l.id, l[field]]));
   const usual = /** @type {LayerChoice} */ ({ shown: table("shown"), opacity: table("opacity"), colors: "person" });
   if (people > 1) usual.shown.hidden = true;
@@ -151,7 +151,7 @@ export class Layers {
   }
 
   reset() {
-    this.#keep(usualLayers(this.#store.facts.session?.people.length));
+    this.#keep(defaultLayers(this.#store.facts.session?.people.length));
   }
 
   /** @param {LayerChoice} layers */
@@ -175,7 +175,7 @@ export class Layers {
  * @param {number} people of the session
  */
 function known(stored, people) {
-  const layers = usualLayers(people);
+  const layers = defaultLayers(people);
   /** @type {Partial<LayerChoice>} */
   let found;
   try {

@@ -3,13 +3,13 @@
  * scrubs or a clip plays, the program is never more than one frame behind.
  */
 
-const GIVE_UP_MS = 2000;
+const TIMEOUT_MS = 2000;
 
 export class Navigation {
   #store;
   #send;
   /** @type {{frame: number} | null} */
-  #underWay = null;
+  #pending = null;
   /** @type {number | null} */
   #wish = null;
 
@@ -59,8 +59,8 @@ export class Navigation {
   }
 
   /** Whether a frame is on its way. */
-  get isUnderWay() {
-    return this.#underWay !== null;
+  get isWaiting() {
+    return this.#pending !== null;
   }
 
   /**
@@ -71,38 +71,38 @@ export class Navigation {
   request(frame) {
     this.#store.set({ target: frame });
     this.#wish = frame;
-    if (!this.#underWay) this.#sendWish();
+    if (!this.#pending) this.#sendWish();
   }
 
   #sendWish() {
-    this.#underWay = null;
+    this.#pending = null;
     if (this.#wish === null) return;
     const frame = this.#wish;
     this.#wish = null;
     const { shown, state } = this.#store.facts;
     if (shown?.frame === frame && state?.frame === frame) return;
     const request = { frame };
-    this.#underWay = request;
+    this.#pending = request;
     this.#send({ type: "seek", frame });
     // Another tab may have led the program elsewhere before it got there: then those images never come.
     setTimeout(() => {
-      if (this.#underWay !== request) return;
+      if (this.#pending !== request) return;
       this.#sendWish();
       this.#arrived();
-    }, GIVE_UP_MS);
+    }, TIMEOUT_MS);
   }
 
   #arrived() {
     const { shown, state, target } = this.#store.facts;
-    if (this.#underWay && shown?.frame === this.#underWay.frame) this.#sendWish();
+    if (this.#pending && shown?.frame === this.#pending.frame) this.#sendWish();
     // Another tab, an undo or a tracker may have gone elsewhere.
-    if (!this.#underWay && this.#wish === null && state && state.frame !== target) {
+    if (!this.#pending && this.#wish === null && state && state.frame !== target) {
       this.#store.set({ target: state.frame });
     }
   }
 
   #reset() {
-    this.#underWay = null;
+    this.#pending = null;
     this.#wish = null;
     this.pause();
   }

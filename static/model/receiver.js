@@ -6,7 +6,7 @@ import { PictureAssembler, keyOf } from "./pictures.js";
 import { mergeCandidates, mergeSteps, takeLandscape, takeRuns } from "./search_runs.js";
 import { mergeCurves } from "./series.js";
 
-const MOST_EARLY = 8;
+const MAX_EARLY = 8;
 
 export class Receiver {
   #store;
@@ -116,7 +116,7 @@ export class Receiver {
     this.#early.delete(overlay.frame);
     this.#early.set(overlay.frame, overlay);
     // A tracker may be some frames ahead of the decoder. What is older belongs to frames that were skipped.
-    for (const frame of this.#early.keys()) if (this.#early.size > MOST_EARLY) this.#early.delete(frame);
+    for (const frame of this.#early.keys()) if (this.#early.size > MAX_EARLY) this.#early.delete(frame);
   }
 
   /** @param {import("./protocol.js").SessionMessage} session */

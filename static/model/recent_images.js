@@ -6,7 +6,7 @@
 import { keyOf } from "./pictures.js";
 
 /** Of four panes in a window of 1280x720 some hundred frames. */
-const MOST_BYTES = 64 * 2 ** 20;
+const MAX_BYTES = 64 * 2 ** 20;
 const BYTES_PER_PIXEL = 4;
 /** Of the size that they are shown at, along either side: enough to find one's way. */
 const SHARE = 0.6;
@@ -36,7 +36,7 @@ export class RecentImages {
     if (kept.images.size === 0) return;
     this.#touch(frame, kept);
     for (const [oldest, { bytes }] of this.#frames) {
-      if (this.#bytes <= MOST_BYTES || oldest === frame) break;
+      if (this.#bytes <= MAX_BYTES || oldest === frame) break;
       this.#frames.delete(oldest);
       this.#bytes -= bytes;
     }
@@ -67,7 +67,7 @@ export class RecentImages {
    * The images of a frame, which are kept longer than all others from now on.
    *
    * @param {number} frame
-   * @returns {import("./store.js").StandInPictures}
+   * @returns {import("./store.js").PlaceholderPictures}
    */
   of(frame) {
     const kept = this.#frames.get(frame);

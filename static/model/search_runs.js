@@ -42,7 +42,7 @@ function keptOf(known, { runs }) {
  *
  * @param {import("./store.js").Facts} facts
  */
-export function runLookedAt(facts) {
+export function selectedRun(facts) {
   const runs = facts.searchRuns?.runs ?? [];
   return runs.find(({ number }) => number === facts.searchRun) ?? runs.at(-1) ?? null;
 }

@@ -5,8 +5,8 @@
  *
  * @param {import("./store.js").Facts} facts
  */
-export function whom({ whose, state }) {
-  return whose === "one" && state ? state.person : null;
+export function scopePerson({ scope, state }) {
+  return scope === "one" && state ? state.person : null;
 }
 
 /**

@@ -4,14 +4,14 @@
  */
 
 import { Cells } from "./cells.js";
-import { usualLayers } from "./layers.js";
+import { defaultLayers } from "./layers.js";
 
 /**
  * @typedef {{camera: number, person: number, point: string}} Joint
  * @typedef {{frame: number, pictures: import("./pictures.js").Pictures}} Shown
  *
- * @typedef {Map<string, {bitmap: OffscreenCanvas, limitPx: null}>} StandInPictures as `Pictures`, which may have all layers
- * @typedef {{frame: number, target: number, pictures: StandInPictures | null}} StandIn pictures: those of `frame`,
+ * @typedef {Map<string, {bitmap: OffscreenCanvas, limitPx: null}>} PlaceholderPictures as `Pictures`, which may have all layers
+ * @typedef {{frame: number, target: number, pictures: PlaceholderPictures | null}} Placeholder pictures: those of `frame`,
  *   without vectors; null where `frame` is the one shown anyway
  *
  * @typedef {object} Facts
@@ -34,7 +34,7 @@ import { usualLayers } from "./layers.js";
  * @property {import("./protocol.js").HistoryMessage | null} history what the list of the history shows
  * @property {{first: number, last: number} | null} range the frames that the user has marked
  * @property {Shown | null} shown the pictures on the screen
- * @property {StandIn | null} standIn what is shown until the pictures of the frame asked for are there
+ * @property {Placeholder | null} placeholder what is shown until the pictures of the frame asked for are there
  * @property {import("./protocol.js").Overlay | null} overlay the vectors on the screen
  * @property {Joint | null} hover the joint under the pointer
  * @property {{camera: number, person: number, part: number} | null} hoverPart the part under the pointer, where no joint is
@@ -45,7 +45,7 @@ import { usualLayers } from "./layers.js";
  * @property {boolean} livePins whether the body follows while a pin is dragged
  * @property {Joint | null} pinHover the pin under the pointer
  * @property {import("./protocol.js").PinMark | null} heldPin the pin in the hand, or just let go
- * @property {"all" | "one"} whose whom searches and fits move: everybody, or the person worked on alone
+ * @property {"all" | "one"} scope whom searches and fits move: everybody, or the person worked on alone
  * @property {number} target the frame the user asked for last
  * @property {boolean} playing
  * @property {number} rate at which a clip plays, 1 for real time
@@ -53,11 +53,11 @@ import { usualLayers } from "./layers.js";
  * @property {boolean} everyFrame whether playing waits for every frame instead of skipping those that come late
  * @property {number | null} filled the camera whose pane fills the grid
  * @property {import("./layers.js").LayerChoice} layers what is drawn in the panes
- * @property {(import("./image_tone.js").Look | undefined)[]} looks brightness, contrast and gamma of each camera's image
+ * @property {(import("./image_tone.js").ImageTone | undefined)[]} imageTones brightness, contrast and gamma of each camera's image
  * @property {number[]} reductions how many pixels of each camera's image the page can do with one for; 0: it is not seen
  */
 
-const MOST_ROUNDS = 3;
+const MAX_ROUNDS = 3;
 
 export class Store {
   /** @type {Facts} */
@@ -81,7 +81,7 @@ export class Store {
     history: null,
     range: null,
     shown: null,
-    standIn: null,
+    placeholder: null,
     overlay: null,
     hover: null,
     hoverPart: null,
@@ -92,15 +92,15 @@ export class Store {
     livePins: true,
     pinHover: null,
     heldPin: null,
-    whose: "all",
+    scope: "all",
     target: 0,
     playing: false,
     rate: 1,
     loops: false,
     everyFrame: false,
     filled: null,
-    layers: usualLayers(),
-    looks: [],
+    layers: defaultLayers(),
+    imageTones: [],
     reductions: [],
   };
   /** @type {((changed: Set<keyof Facts>) => void)[]} */
@@ -143,7 +143,7 @@ export class Store {
 
   #flush() {
     // What views change meanwhile is shown at once too, not an animation frame later.
-    for (let round = 0; round < MOST_ROUNDS && this.#changed.size > 0; round += 1) {
+    for (let round = 0; round < MAX_ROUNDS && this.#changed.size > 0; round += 1) {
       const changed = this.#changed;
       this.#changed = new Set();
       for (const view of this.#views) view(changed);
@@ -157,8 +157,8 @@ export class Store {
    * that grabs a joint mean what it sees. While a tracker is followed the program is always a little ahead.
    */
   get isSettled() {
-    const { state, shown, standIn, overlay, connected } = this.facts;
-    if (standIn) return false;
+    const { state, shown, placeholder, overlay, connected } = this.facts;
+    if (placeholder) return false;
     const isThere = shown?.frame === state?.frame || (state?.track.running && state.follow);
     return connected && !!state && !!isThere && overlay?.frame === shown?.frame;
   }

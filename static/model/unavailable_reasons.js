@@ -5,7 +5,7 @@ import { hasSearch, hasTrack } from "./selectors.js";
 /** @typedef {() => string | null} Reason */
 
 /** @param {import("./store.js").Store} store */
-export function reasonsOf(store) {
+export function unavailableReasons(store) {
   const facts = () => store.facts;
   const away = () =>
     facts().connected && facts().state ? null : "The program does not answer; the page connects again by itself.";

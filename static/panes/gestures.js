@@ -7,12 +7,12 @@
 
 const DRAG_THRESHOLD = 3;
 /** A mouse may tell its moves a thousand times a second; no more often than this they are told on. */
-const LEAST_INTERVAL_MS = 12;
+const MIN_INTERVAL_MS = 12;
 /** By so much a joint of the person worked on is nearer than it looks: hands that touch are told apart by whose they are. */
-const YIELD_PX = 4;
+const OTHER_PERSON_PENALTY_PX = 4;
 
 import { isDimmed } from "../model/selectors.js";
-import { GRAB_RADIUS } from "./crowding.js";
+import { GRAB_RADIUS } from "./declutter.js";
 import { DragHint, modeOf } from "./drag_hint.js";
 import { partAt } from "./part_hit.js";
 
@@ -67,7 +67,7 @@ export class Gestures {
     // Where the browser tells them; elsewhere the moves of each frame come as one.
     surface.addEventListener("pointerrawupdate", (event) => {
       if (this.#drag?.pointer === /** @type {PointerEvent} */ (event).pointerId && this.#drag.begun) {
-        this.#dragTo(this.#drag, /** @type {PointerEvent} */ (event), LEAST_INTERVAL_MS);
+        this.#dragTo(this.#drag, /** @type {PointerEvent} */ (event), MIN_INTERVAL_MS);
       }
     });
     for (const kind of ["pointerenter", "pointerdown"]) {
@@ -103,7 +103,7 @@ export class Gestures {
     let nearest = null;
     let reach = GRAB_RADIUS;
     for (const placed of pane.graspableHandles()) {
-      const distance = Math.hypot(placed.x - at.x, placed.y - at.y) + (placed.handle.person === state?.person ? 0 : YIELD_PX);
+      const distance = Math.hypot(placed.x - at.x, placed.y - at.y) + (placed.handle.person === state?.person ? 0 : OTHER_PERSON_PENALTY_PX);
       if (distance <= reach) [nearest, reach] = [placed, distance];
     }
     return nearest;

@@ -7,12 +7,12 @@ import { slider, togglePopover } from "../widgets/popovers.js";
 const signed = (/** @type {number} */ value) => (value > 0 ? `+${value}` : String(value));
 /** The slider of gamma runs evenly over its logarithm: as far down as up. */
 const GAMMA_STEPS = 100;
-const MOST_GAMMA = 5;
+const MAX_GAMMA = 5;
 
-export class LookMenu {
+export class ImageToneMenu {
   #store;
-  #looks;
-  #panel = byId("look-menu", HTMLElement);
+  #imageTones;
+  #panel = byId("image-tone-menu", HTMLElement);
   #title = document.createElement("h3");
   #camera = 0;
   #closedAt = -Infinity;
@@ -22,11 +22,11 @@ export class LookMenu {
 
   /**
    * @param {import("../model/store.js").Store} store
-   * @param {import("../model/image_tone.js").Looks} looks
+   * @param {import("../model/image_tone.js").ImageTones} imageTones
    */
-  constructor(store, looks) {
+  constructor(store, imageTones) {
     this.#store = store;
-    this.#looks = looks;
+    this.#imageTones = imageTones;
     this.#panel.append(this.#title);
     this.#row("Brightness", "Added to every gray level", "brightness");
     this.#row("Contrast", "Stretches the gray levels about the middle", "contrast");
@@ -36,7 +36,7 @@ export class LookMenu {
       if (!this.#panel.matches(":popover-open")) this.#closedAt = performance.now();
     });
     store.subscribe((changed) => {
-      if (changed.has("looks")) this.#show.forEach((one) => one());
+      if (changed.has("imageTones")) this.#show.forEach((one) => one());
     });
   }
 
@@ -57,14 +57,14 @@ export class LookMenu {
     togglePopover(this.#panel, button);
   }
 
-  get #look() {
-    return this.#store.facts.looks[this.#camera] ?? PLAIN;
+  get #tone() {
+    return this.#store.facts.imageTones[this.#camera] ?? PLAIN;
   }
 
   /**
    * @param {string} label
    * @param {string} title
-   * @param {keyof import("../model/image_tone.js").Look} field
+   * @param {keyof import("../model/image_tone.js").ImageTone} field
    */
   #row(label, title, field) {
     const isGamma = field === "gamma";
@@ -79,12 +79,12 @@ export class LookMenu {
       step: 2,
       format: (value) => (isGamma ? gammaOf(value).toFixed(2) : signed(value)),
       onInput: (value) =>
-        this.#looks.set(this.#camera, { ...this.#look, [field]: isGamma ? gammaOf(value) : value }),
+        this.#imageTones.set(this.#camera, { ...this.#tone, [field]: isGamma ? gammaOf(value) : value }),
     });
-    control.input.dataset.look = field;
+    control.input.dataset.tone = field;
     this.#show.push(() => {
-      const value = this.#look[field];
-      control.show(isGamma ? Math.round((GAMMA_STEPS * Math.log(value)) / Math.log(MOST_GAMMA)) : value);
+      const value = this.#tone[field];
+      control.show(isGamma ? Math.round((GAMMA_STEPS * Math.log(value)) / Math.log(MAX_GAMMA)) : value);
     });
     this.#panel.append(caption, control.input, control.value);
   }
@@ -96,12 +96,12 @@ export class LookMenu {
     all.type = "button";
     all.textContent = "All cameras";
     all.title = "Give the images of all cameras this look";
-    all.addEventListener("click", () => this.#looks.setAll(this.#look));
+    all.addEventListener("click", () => this.#imageTones.setAll(this.#tone));
     this.#reset.type = "button";
     this.#reset.textContent = "Reset";
     this.#reset.title = "Show this image as it is";
-    this.#reset.addEventListener("click", () => this.#looks.set(this.#camera, PLAIN));
-    this.#show.push(() => (this.#reset.disabled = isPlain(this.#look)));
+    this.#reset.addEventListener("click", () => this.#imageTones.set(this.#camera, PLAIN));
+    this.#show.push(() => (this.#reset.disabled = isPlain(this.#tone)));
     foot.append(all, this.#reset);
     this.#panel.append(foot);
   }
@@ -109,5 +109,5 @@ export class LookMenu {
 
 /** @param {number} step from -100 to 100 */
 function gammaOf(step) {
-  return MOST_GAMMA ** (step / GAMMA_STEPS);
+  return MAX_GAMMA ** (step / GAMMA_STEPS);
 }

@@ -2,7 +2,7 @@
 
 import * as drawing from "./drawing.js";
 import { drawPins } from "./pin_drawing.js";
-import { uncrowded } from "./crowding.js";
+import { decluttered } from "./declutter.js";
 import { isDimmed } from "../model/selectors.js";
 import { PICTURE_LAYERS } from "../model/layers.js";
 import { isPlain } from "../model/image_tone.js";
@@ -32,7 +32,7 @@ export class Pane {
   #image = document.createElement("canvas");
   #overlay = document.createElement("canvas");
   #corner;
-  #toned = new TonedImage();
+  #tonedImage = new TonedImage();
   #onView;
   #size = { width: 0, height: 0 };
   #reduction = 1;
@@ -42,9 +42,9 @@ export class Pane {
    * @param {import("../model/store.js").Store} store
    * @param {number} camera
    * @param {import("../model/protocol.js").CameraInfo} info
-   * @param {{viewChanged: () => void, openLook: (camera: number, button: HTMLElement) => void}} run
+   * @param {{viewChanged: () => void, openToneMenu: (camera: number, button: HTMLElement) => void}} run
    */
-  constructor(store, camera, info, { viewChanged, openLook }) {
+  constructor(store, camera, info, { viewChanged, openToneMenu }) {
     this.#store = store;
     this.#camera = camera;
     this.#info = info;
@@ -55,7 +55,7 @@ export class Pane {
     this.#overlay.className = "pane-overlay";
     this.#corner = new PaneCorner(camera, info.name, {
       reset: () => this.reset(),
-      openLook: (button) => openLook(camera, button),
+      openToneMenu: (button) => openToneMenu(camera, button),
     });
     if (!IN_SOFTWARE) this.element.append(this.#image);
     this.element.append(this.#overlay, ...this.#corner.elements);
@@ -67,8 +67,8 @@ export class Pane {
     return this.#overlay;
   }
 
-  get lookButton() {
-    return this.#corner.lookButton;
+  get toneButton() {
+    return this.#corner.toneButton;
   }
 
   /**
@@ -113,7 +113,7 @@ export class Pane {
   graspableHandles() {
     const { session, hover, dragging, state } = this.#store.facts;
     const placed = this.#placedHandles().filter(({ handle }) => !isDimmed(state, handle.person));
-    return uncrowded(placed, session?.people ?? [], dragging ? hover : null);
+    return decluttered(placed, session?.people ?? [], dragging ? hover : null);
   }
 
   /** All joints of this view, and where they lie in the pane. */
@@ -158,13 +158,13 @@ export class Pane {
    */
   draw(withPictures) {
     const { width, height } = this.#size;
-    const { state, session, overlay, layers, standIn } = this.#store.facts;
+    const { state, session, overlay, layers, placeholder } = this.#store.facts;
     if (width === 0 || height === 0) return;
     if (withPictures) this.#drawPictures();
     const context = drawing.prepare(this.#overlay, width, height, true);
     if (IN_SOFTWARE) context.drawImage(this.#image, 0, 0, width, height);
-    this.#corner.showStandIn(standIn);
-    if (!state || !session || !overlay || standIn?.pictures) return;
+    this.#corner.showPlaceholder(placeholder);
+    if (!state || !session || !overlay || placeholder?.pictures) return;
     drawing.drawPaths(context, this.view, overlay, this.#camera, layers, (person) => isDimmed(state, person));
     this.#drawJoints(context, state, session.people);
     this.#showJoint(state);
@@ -177,8 +177,8 @@ export class Pane {
 
   #drawPictures() {
     const { width, height } = this.#size;
-    const { shown, standIn, layers, looks } = this.#store.facts;
-    const pictures = standIn?.pictures ?? shown?.pictures;
+    const { shown, placeholder, layers, imageTones } = this.#store.facts;
+    const pictures = placeholder?.pictures ?? shown?.pictures;
     const context = drawing.prepare(this.#image, width, height, IN_SOFTWARE);
     drawing.drawBackground(context, this.view);
     /** @type {number | null} */
@@ -186,13 +186,13 @@ export class Pane {
     for (const layer of PICTURE_LAYERS) {
       const picture = layers.shown[layer] ? pictures?.get(keyOf(layer, this.#camera)) : undefined;
       if (!picture) continue;
-      const source = layer === "image" ? this.#toned.of(picture.bitmap, looks[this.#camera]) : picture.bitmap;
+      const source = layer === "image" ? this.#tonedImage.of(picture.bitmap, imageTones[this.#camera]) : picture.bitmap;
       drawing.drawPicture(context, this.view, source, layers.opacity[layer]);
       limitPx ??= picture.limitPx;
     }
     this.#corner.showScale(limitPx, width);
     this.#corner.showZoom(this.view.isReset);
-    this.#corner.showLook(!isPlain(looks[this.#camera]));
+    this.#corner.showTone(!isPlain(imageTones[this.#camera]));
   }
 
   /** @param {import("../model/protocol.js").StateMessage} state */

@@ -23,18 +23,18 @@ export class PaneCorner {
   #joint = document.createElement("output");
   #cost = document.createElement("output");
   #tools = document.createElement("div");
-  #standIn = document.createElement("div");
+  #placeholder = document.createElement("div");
   #scale = document.createElement("div");
   #limit = document.createElement("span");
   #fit;
-  #look;
+  #tone;
 
   /**
    * @param {number} camera
    * @param {string} name
-   * @param {{reset: () => void, openLook: (button: HTMLElement) => void}} run
+   * @param {{reset: () => void, openToneMenu: (button: HTMLElement) => void}} run
    */
-  constructor(camera, name, { reset, openLook }) {
+  constructor(camera, name, { reset, openToneMenu }) {
     this.#label.className = "pane-label";
     const number = document.createElement("kbd");
     number.textContent = String(camera + 1);
@@ -50,9 +50,9 @@ export class PaneCorner {
     this.#cost.className = "pane-cost";
     this.#cost.title = "Chamfer cost of this view, in pixels";
 
-    this.#standIn.className = "pane-stand-in";
-    this.#standIn.title = "The picture of the frame asked for is on its way; until it is here the nearest one at hand is shown";
-    this.#standIn.hidden = true;
+    this.#placeholder.className = "pane-placeholder";
+    this.#placeholder.title = "The picture of the frame requested for is on its way; until it is here the nearest one at hand is shown";
+    this.#placeholder.hidden = true;
 
     this.#scale.className = "pane-scale";
     const bar = document.createElement("i");
@@ -65,19 +65,19 @@ export class PaneCorner {
       this.#fit.blur();
       reset();
     });
-    this.#look = toolButton("◐", "Brightness and contrast (I)", `Brightness and contrast of ${name}`);
-    this.#look.classList.add("pane-look");
-    this.#look.addEventListener("click", () => openLook(this.#look));
+    this.#tone = toolButton("◐", "Brightness and contrast (I)", `Brightness and contrast of ${name}`);
+    this.#tone.classList.add("pane-tone");
+    this.#tone.addEventListener("click", () => openToneMenu(this.#tone));
     this.#tools.className = "pane-tools";
-    this.#tools.append(this.#scale, this.#fit, this.#look);
+    this.#tools.append(this.#scale, this.#fit, this.#tone);
   }
 
   get elements() {
-    return [this.#label, this.#cost, this.#standIn, this.#tools];
+    return [this.#label, this.#cost, this.#placeholder, this.#tools];
   }
 
-  get lookButton() {
-    return this.#look;
+  get toneButton() {
+    return this.#tone;
   }
 
   /** @param {number | null} cost in pixels */
@@ -85,13 +85,13 @@ export class PaneCorner {
     this.#cost.textContent = px(cost);
   }
 
-  /** @param {import("../model/store.js").StandIn | null} standIn which frame is shown in place of which */
-  showStandIn(standIn) {
-    this.#standIn.hidden = standIn === null || standIn.frame === standIn.target;
-    if (!standIn) return;
+  /** @param {import("../model/store.js").Placeholder | null} placeholder which frame is shown in place of which */
+  showPlaceholder(placeholder) {
+    this.#placeholder.hidden = placeholder === null || placeholder.frame === placeholder.target;
+    if (!placeholder) return;
     const word = document.createElement("span"); // there is no room for it in a narrow pane
     word.textContent = "frame ";
-    this.#standIn.replaceChildren(word, `${standIn.frame}, while ${standIn.target} loads`);
+    this.#placeholder.replaceChildren(word, `${placeholder.frame}, while ${placeholder.target} loads`);
   }
 
   /** @param {boolean} isReset whether the whole image is shown already */
@@ -100,8 +100,8 @@ export class PaneCorner {
   }
 
   /** @param {boolean} isChanged whether the image is shown otherwise than it is */
-  showLook(isChanged) {
-    this.#look.classList.toggle("is-changed", isChanged);
+  showTone(isChanged) {
+    this.#tone.classList.toggle("is-changed", isChanged);
   }
 
   /**

@@ -8,7 +8,7 @@ const SECOND_DIGIT_MS = 700;
 /** What is drawn otherwise under the pointer. @type {(keyof import("../model/store.js").Facts)[]} */
 const HOVERED = ["hover", "hoverPart", "pinHover", "heldPin"];
 /** What changes the pictures under the vectors. @type {(keyof import("../model/store.js").Facts)[]} */
-const PICTURED = ["shown", "standIn", "layers", "looks"];
+const PICTURED = ["shown", "placeholder", "layers", "imageTones"];
 
 export class PaneGrid {
   /** @type {Pane[]} */
@@ -16,7 +16,7 @@ export class PaneGrid {
   #store;
   #gestures;
   #latency;
-  #openLook;
+  #openToneMenu;
   #element;
   #digit = { value: 0, at: -Infinity };
   #cameras = "";
@@ -27,10 +27,10 @@ export class PaneGrid {
    * @param {import("../model/store.js").Store} store
    * @param {{watch: (pane: Pane, camera: number) => void}} gestures whoever takes the pointer in a pane
    * @param {import("../model/latency.js").Latency} latency
-   * @param {(camera: number, button: HTMLElement) => void} openLook opens brightness and contrast of a camera
+   * @param {(camera: number, button: HTMLElement) => void} openToneMenu opens brightness and contrast of a camera
    */
-  constructor(element, store, gestures, latency, openLook) {
-    this.#openLook = openLook;
+  constructor(element, store, gestures, latency, openToneMenu) {
+    this.#openToneMenu = openToneMenu;
     this.#element = element;
     this.#store = store;
     this.#gestures = gestures;
@@ -83,10 +83,10 @@ export class PaneGrid {
   }
 
   /** Open brightness and contrast of the pane under the pointer, else of the one worked in. */
-  openLook() {
+  openToneMenu() {
     const under = this.panes.findIndex((pane) => pane.element.matches(":hover"));
     const camera = under >= 0 ? under : (this.#store.facts.filled ?? this.#store.facts.active ?? 0);
-    if (camera < this.panes.length) this.#openLook(camera, this.panes[camera].lookButton);
+    if (camera < this.panes.length) this.#openToneMenu(camera, this.panes[camera].toneButton);
   }
 
   /** Show whole images: in the pane under the pointer, or else in all. */
@@ -145,7 +145,7 @@ export class PaneGrid {
     this.panes = cameras.map((info, camera) => {
       const pane = new Pane(this.#store, camera, info, {
         viewChanged: () => this.#refine(),
-        openLook: this.#openLook,
+        openToneMenu: this.#openToneMenu,
       });
       this.#gestures.watch(pane, camera);
       pane.element.addEventListener("dblclick", (event) => {

@@ -5,8 +5,8 @@
  * screen positions are CSS pixels from the pane's upper left corner.
  */
 
-const LEAST_ZOOM = 0.25;
-const MOST_ZOOM = 40;
+const MIN_ZOOM = 0.25;
+const MAX_ZOOM = 40;
 
 export class PaneView {
   /** 1 shows the whole image as large as the pane allows. */
@@ -88,7 +88,7 @@ export class PaneView {
    */
   zoomAt(x, y, factor) {
     const fixed = this.toImage(x, y);
-    this.zoom = Math.max(LEAST_ZOOM, Math.min(MOST_ZOOM, this.zoom * factor));
+    this.zoom = Math.max(MIN_ZOOM, Math.min(MAX_ZOOM, this.zoom * factor));
     const moved = this.toImage(x, y);
     this.#moveCenter(fixed.u - moved.u, fixed.v - moved.v);
   }

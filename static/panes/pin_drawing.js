@@ -18,7 +18,7 @@ export const HEAD_REACH = 9;
 /** How far from its point, where no joint lies that a hand could mean. */
 export const POINT_REACH = 6;
 const MEETING_RADIUS = 5;
-const LEAST_OFF = 2;
+const MIN_ERROR_PX = 2;
 
 /**
  * The pins of a view and where they lie in its pane: as the program drew them last, but for the one in the hand. A pin
@@ -63,7 +63,7 @@ export function drawPins(context, view, facts, camera, paneWidth) {
   const strengthOf = (/** @type {PlacedPin} */ { pin }) => (pin.person === state.person ? 1 : OTHERS);
   for (const one of placed) {
     context.globalAlpha = strengthOf(one);
-    drawOff(context, view, one);
+    drawError(context, view, one);
   }
   context.globalAlpha = 1;
   drawMeeting(context, view, overlay, camera, paneWidth);
@@ -93,14 +93,14 @@ function describe({ point, u, v, model_u, model_v }) {
  * @param {import("./pane_view.js").PaneView} view
  * @param {PlacedPin} placed
  */
-function drawOff(context, view, { pin, x, y }) {
+function drawError(context, view, { pin, x, y }) {
   if (pin.model_u === null || pin.model_v === null) return;
   const model = view.toScreen(pin.model_u, pin.model_v);
-  if (Math.hypot(model.x - x, model.y - y) < LEAST_OFF) return;
+  if (Math.hypot(model.x - x, model.y - y) < MIN_ERROR_PX) return;
   const line = new Path2D();
   line.moveTo(x, y);
   line.lineTo(model.x, model.y);
-  twice(context, line, OFF, 1.5);
+  strokeWithHalo(context, line, OFF, 1.5);
 }
 
 /**
@@ -114,7 +114,7 @@ function drawPin(context, { x, y, headX, headY }, color, isGrown) {
   const stem = new Path2D();
   stem.moveTo(x, y);
   stem.lineTo(headX, headY);
-  twice(context, stem, "#fff", 1.5);
+  strokeWithHalo(context, stem, "#fff", 1.5);
   const head = new Path2D();
   head.arc(headX, headY, radius, 0, 2 * Math.PI);
   context.strokeStyle = HALO;
@@ -146,7 +146,7 @@ function drawMeeting(context, view, overlay, camera, paneWidth) {
   diamond.lineTo(x, y + MEETING_RADIUS);
   diamond.lineTo(x - MEETING_RADIUS, y);
   diamond.closePath();
-  twice(context, diamond, CHOSEN, 1.5);
+  strokeWithHalo(context, diamond, CHOSEN, 1.5);
   if (mark.error_px !== null) label(context, x, y + 16, [`${mark.error_px.toFixed(1)} px`], paneWidth);
 }
 
@@ -158,7 +158,7 @@ function drawMeeting(context, view, overlay, camera, paneWidth) {
  * @param {string} color
  * @param {number} width
  */
-function twice(context, line, color, width) {
+function strokeWithHalo(context, line, color, width) {
   context.lineCap = context.lineJoin = "round";
   context.strokeStyle = HALO;
   context.lineWidth = width + 2;

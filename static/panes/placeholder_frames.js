@@ -6,7 +6,7 @@
 /** So far a frame may be away and so long take before another stands in: it may be decoded already. */
 const [STEP, PATIENCE_MS] = [2, 25];
 
-export class StandIns {
+export class PlaceholderFrames {
   #store;
   #recent;
   /** @type {number | null} the frame that is waited for */
@@ -35,9 +35,9 @@ export class StandIns {
     const late = this.#late;
     if (late === this.#awaited) return;
     this.#awaited = late;
-    if (late === null) this.#store.facts.standIn && this.#store.set({ standIn: null });
+    if (late === null) this.#store.facts.placeholder && this.#store.set({ placeholder: null });
     // A hand that scrubs on sees the next one at once, and so does who goes far: the true one takes its time.
-    else if (this.#store.facts.standIn || Math.abs(late - (this.#store.facts.shown?.frame ?? late)) > STEP) this.#stand();
+    else if (this.#store.facts.placeholder || Math.abs(late - (this.#store.facts.shown?.frame ?? late)) > STEP) this.#stand();
     else setTimeout(() => this.#stand(), PATIENCE_MS);
   }
 
@@ -49,7 +49,7 @@ export class StandIns {
     const cameras = [...reductions.keys()].filter((camera) => reductions[camera] > 0);
     const nearest = this.#recent.nearest(target, cameras);
     const isNearer = nearest !== null && shown && Math.abs(nearest - target) < Math.abs(shown.frame - target);
-    if (isNearer) this.#store.set({ standIn: { frame: nearest, target, pictures: this.#recent.of(nearest) } });
-    else this.#store.set({ standIn: { frame: shown?.frame ?? 0, target, pictures: null } });
+    if (isNearer) this.#store.set({ placeholder: { frame: nearest, target, pictures: this.#recent.of(nearest) } });
+    else this.#store.set({ placeholder: { frame: shown?.frame ?? 0, target, pictures: null } });
   }
 }

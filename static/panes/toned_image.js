@@ -1,28 +1,28 @@
-/** An image with another tone curve: made once for each picture and look, and kept until either changes. */
+/** An image with another tone curve: made once for each picture and tone, and kept until either changes. */
 
 import { isPlain, toneCurve } from "../model/image_tone.js";
 
 export class TonedImage {
   /** @type {ImageBitmap | OffscreenCanvas | null} */
   #source = null;
-  /** @type {import("../model/image_tone.js").Look | null} */
-  #look = null;
+  /** @type {import("../model/image_tone.js").ImageTone | null} */
+  #tone = null;
   /** @type {OffscreenCanvas | null} */
   #canvas = null;
 
   /**
    * @param {ImageBitmap | OffscreenCanvas} bitmap
-   * @param {import("../model/image_tone.js").Look | undefined} look
-   * @returns {CanvasImageSource & {width: number, height: number}} the bitmap itself where the look is plain
+   * @param {import("../model/image_tone.js").ImageTone | undefined} tone
+   * @returns {CanvasImageSource & {width: number, height: number}} the bitmap itself where the tone is plain
    */
-  of(bitmap, look) {
-    if (!look || isPlain(look)) {
-      this.#source = this.#look = this.#canvas = null;
+  of(bitmap, tone) {
+    if (!tone || isPlain(tone)) {
+      this.#source = this.#tone = this.#canvas = null;
       return bitmap;
     }
-    if (bitmap === this.#source && look === this.#look && this.#canvas) return this.#canvas;
-    [this.#source, this.#look] = [bitmap, look];
-    this.#canvas = toned(bitmap, toneCurve(look));
+    if (bitmap === this.#source && tone === this.#tone && this.#canvas) return this.#canvas;
+    [this.#source, this.#tone] = [bitmap, tone];
+    this.#canvas = tonedImage(bitmap, toneCurve(tone));
     return this.#canvas;
   }
 }
@@ -31,7 +31,7 @@ export class TonedImage {
  * @param {ImageBitmap | OffscreenCanvas} bitmap
  * @param {Uint8ClampedArray} curve
  */
-function toned(bitmap, curve) {
+function tonedImage(bitmap, curve) {
   const { width, height } = bitmap;
   const canvas = new OffscreenCanvas(width, height);
   const context = /** @type {OffscreenCanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: true }));

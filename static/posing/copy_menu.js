@@ -2,7 +2,7 @@
 
 import { byId } from "../widgets/elements.js";
 
-const MOST_KEYFRAMES = 12;
+const MAX_KEYFRAMES = 12;
 
 export class CopyMenu {
   #store;
@@ -37,7 +37,7 @@ export class CopyMenu {
       .filter(([frame, cell]) => cell.keyframe && frame !== here)
       .map(([frame]) => frame)
       .sort((a, b) => Math.abs(a - here) - Math.abs(b - here))
-      .slice(0, MOST_KEYFRAMES)
+      .slice(0, MAX_KEYFRAMES)
       .sort((a, b) => a - b);
     const others = [...session.people.entries()].filter(([person]) => person !== (state?.person ?? 0));
     const items = [

@@ -21,7 +21,7 @@ export class FrameCard {
    */
   constructor(store, posing) {
     this.#store = store;
-    this.#other = button("take-other", () => posing.takeOther());
+    this.#other = button("take-alternative", () => posing.takeAlternative());
     this.#card.open = localStorage.getItem(STORED_OPEN) === "yes";
     this.#card.addEventListener("toggle", () => {
       localStorage.setItem(STORED_OPEN, this.#card.open ? "yes" : "no");

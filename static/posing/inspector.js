@@ -2,9 +2,9 @@
 
 import { CopyMenu } from "./copy_menu.js";
 import { button, byId } from "../widgets/elements.js";
-import { numberEntry } from "../widgets/number_field.js";
+import { numberField } from "../widgets/number_field.js";
 import { makeScrubber } from "../widgets/scrubber.js";
-import { spoken } from "../widgets/text.js";
+import { displayName } from "../widgets/text.js";
 
 const LOCK = '<path d="M4 7.5h8v5.5H4zM5.5 7.5V5.2a2.5 2.5 0 0 1 5 0v2.3" />';
 const UNLOCKED = '<path d="M4 7.5h8v5.5H4zM5.5 7.5V4.2a2.5 2.5 0 0 1 4.7-1.2" />';
@@ -12,9 +12,9 @@ const UNITS = { deg: "°", cm: "cm" };
 /** How far a number goes for a CSS pixel that its name is drawn sideways. */
 const PER_PIXEL = { deg: 0.5, cm: 0.2 };
 /** More degrees of freedom than these are named in short. */
-const MOST_IN_FULL = 3;
+const MAX_FULL_NAMES = 3;
 
-/** @typedef {{dof: number, row: HTMLElement, entry: import("../widgets/number_field.js").Entry, lock: HTMLButtonElement}} Field */
+/** @typedef {{dof: number, row: HTMLElement, entry: import("../widgets/number_field.js").NumberField, lock: HTMLButtonElement}} Field */
 
 export class Inspector {
   #store;
@@ -79,7 +79,7 @@ export class Inspector {
    * @param {string} name
    */
   #addStep(id, unit, name) {
-    const entry = numberEntry({
+    const entry = numberField({
       name,
       take: (text) => {
         const step = Number(text);
@@ -103,14 +103,14 @@ export class Inspector {
     const built = JSON.stringify([state.person, person.points, dofs]);
     if (built !== this.#built) {
       this.#built = built;
-      this.#joint.replaceChildren(...person.points.map((name) => new Option(spoken(name), name)));
-      this.#fields = dofs.map((dof) => this.#field(person.dofs[dof], dof, dofs.length > MOST_IN_FULL, point));
+      this.#joint.replaceChildren(...person.points.map((name) => new Option(displayName(name), name)));
+      this.#fields = dofs.map((dof) => this.#field(person.dofs[dof], dof, dofs.length > MAX_FULL_NAMES, point));
       this.#list.replaceChildren(...this.#fields.map(({ row }) => row));
     }
     this.#joint.value = point;
     this.#joint.classList.toggle("is-nothing", state.point === null);
     for (const field of this.#fields) this.#fill(field, person.dofs[field.dof], state, field.dof === selected);
-    showLock(this.#lock, this.#posing.isLocked(dofs), `${spoken(point)} (O), its limb (Shift+O)`);
+    showLock(this.#lock, this.#posing.isLocked(dofs), `${displayName(point)} (O), its limb (Shift+O)`);
     this.#lock.disabled = dofs.length === 0;
     this.#reset.title = `Reset ${limb.name} to the neutral pose (R)`;
     this.#reset.setAttribute("aria-label", `Reset ${limb.name}`);
@@ -124,10 +124,10 @@ export class Inspector {
    * @returns {Field}
    */
   #field(info, dof, isShort, point) {
-    const name = info.joint === point ? info.name : `${spoken(info.joint)} ${info.name}`;
+    const name = info.joint === point ? info.name : `${displayName(info.joint)} ${info.name}`;
     const row = document.createElement("div");
     row.className = isShort ? "dof is-short" : "dof";
-    row.title = `${spoken(info.joint)} ${info.name}, ${range(info)}. Draw its name sideways (Shift: finely), or U selects the next, + and - turn the selected one.`;
+    row.title = `${displayName(info.joint)} ${info.name}, ${range(info)}. Draw its name sideways (Shift: finely), or U selects the next, + and - turn the selected one.`;
     const label = document.createElement("span");
     label.className = "dof-name";
     label.textContent = isShort ? info.name.slice(0, 3) : name;
@@ -136,8 +136,8 @@ export class Inspector {
       perPixel: PER_PIXEL[info.unit],
       change: (value) => this.#posing.slide(dof, within(value, info)),
     });
-    const entry = numberEntry({
-      name: `${spoken(info.joint)} ${info.name}, ${UNITS[info.unit]}`,
+    const entry = numberField({
+      name: `${displayName(info.joint)} ${info.name}, ${UNITS[info.unit]}`,
       take: (text) => this.#take(info, dof, text),
       refuse: (text) => this.#notify({ type: "notice", level: "info", text }),
       step: (factor) => this.#posing.turn(factor),
@@ -167,7 +167,7 @@ export class Inspector {
     const value = Number(text);
     const isWithin = (info.low === null || value >= info.low - 0.05) && (info.high === null || value <= info.high + 0.05);
     if (text === "" || !Number.isFinite(value) || !isWithin || Math.abs(value) > 1e5) {
-      return `${spoken(info.joint)} ${info.name}: expected a number ${range(info)}, found “${text}”.`;
+      return `${displayName(info.joint)} ${info.name}: expected a number ${range(info)}, found “${text}”.`;
     }
     this.#posing.set(dof, value);
     return null;
@@ -190,7 +190,7 @@ export class Inspector {
     if (info.low !== null && info.high !== null) {
       row.style.setProperty("--at", String((value - info.low) / Math.max(1e-9, info.high - info.low)));
     }
-    showLock(lock, isLocked, `${spoken(info.joint)} ${info.name}`);
+    showLock(lock, isLocked, `${displayName(info.joint)} ${info.name}`);
   }
 }
 

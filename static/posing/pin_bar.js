@@ -26,12 +26,12 @@ export class PinBar {
       this.#live.blur();
     });
     /** @type {(keyof import("../model/store.js").Facts)[]} */
-    const shown = ["state", "connected", "overlay", "pinning", "livePins", "whose"];
+    const shown = ["state", "connected", "overlay", "pinning", "livePins", "scope"];
     store.subscribe((changed) => shown.some((fact) => changed.has(fact)) && this.#show());
   }
 
   #show() {
-    const { state, connected, overlay, pinning, livePins, session, whose } = this.#store.facts;
+    const { state, connected, overlay, pinning, livePins, session, scope } = this.#store.facts;
     const joint = state?.point?.replaceAll("_", " ") ?? null;
     const pins = overlay?.pins ?? [];
     const ofPerson = pins.filter(({ person }) => person === state?.person).length;
@@ -40,7 +40,7 @@ export class PinBar {
     this.#mode.setAttribute("aria-pressed", String(pinning));
     this.#live.checked = livePins;
     const several = (session?.people.length ?? 1) > 1;
-    const fitted = several && whose === "all" ? "everybody who has been placed" : "the person worked on";
+    const fitted = several && scope === "all" ? "everybody who has been placed" : "the person worked on";
     this.#fit.title = pins.length
       ? `Fit ${fitted} to pins and edges together (G)`
       : `Fit ${fitted} to the edges (G); pins, where there are any, count as well`;

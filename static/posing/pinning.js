@@ -3,13 +3,13 @@
  * drag joints and views do, and keeps from them what is meant for a pin.
  */
 
-import { whom } from "../model/selectors.js";
-import { GRAB_RADIUS } from "../panes/crowding.js";
+import { scopePerson } from "../model/selectors.js";
+import { GRAB_RADIUS } from "../panes/declutter.js";
 import { HEAD_REACH, POINT_REACH, isSame, placedPins } from "../panes/pin_drawing.js";
 
 const DRAG_THRESHOLD = 3;
 /** How long a pin that was let go waits to be drawn by the program. */
-const ANSWER_MS = 600;
+const RESPONSE_MS = 600;
 
 /**
  * @typedef {import("../panes/pane.js").Pane} Pane
@@ -84,7 +84,7 @@ export class Pinning {
   /** Fit everybody who has been placed, or the person worked on alone, to pins and edges. */
   fit() {
     const { facts } = this.#store;
-    if (facts.state) this.#send({ type: "fit", frame: facts.state.frame, person: whom(facts) });
+    if (facts.state) this.#send({ type: "fit", frame: facts.state.frame, person: scopePerson(facts) });
   }
 
   /**
@@ -280,7 +280,7 @@ export class Pinning {
     this.#held = null;
     held.pane.surface.classList.remove("is-dragging");
     this.#store.set({ dragging: false, ...(isKept ? {} : { heldPin: null }) });
-    setTimeout(() => !this.#held && this.#store.facts.heldPin && this.#store.set({ heldPin: null }), ANSWER_MS);
+    setTimeout(() => !this.#held && this.#store.facts.heldPin && this.#store.set({ heldPin: null }), RESPONSE_MS);
   }
 
   /** @param {string} text */

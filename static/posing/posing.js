@@ -2,7 +2,7 @@
 
 /** Steps of a key that is held down are sent together, this often at most. */
 const SEND_MS = 50;
-const ASKED_MS = 1500;
+const REQUEST_MS = 1500;
 const STEPS_KEY = "quadrille.steps";
 const DEFAULT_STEPS = { cm: 1, deg: 5 };
 
@@ -14,12 +14,12 @@ const DEFAULT_STEPS = { cm: 1, deg: 5 };
 export class Posing {
   #store;
   #send;
-  #steps = rememberedSteps();
+  #steps = restoredSteps();
   /** @type {Map<string, import("../model/protocol.js").PoseEdit>} steps that wait to be sent, by what they move */
   #waiting = new Map();
   #sentAt = -Infinity;
   /** @type {{point: string, at: number} | null} the joint asked for last, until the program has taken it */
-  #asked = null;
+  #requested = null;
 
   /**
    * @param {import("../model/store.js").Store} store
@@ -29,7 +29,7 @@ export class Posing {
     this.#store = store;
     this.#send = send;
     store.subscribe((changed) => {
-      if (this.#asked?.point === store.facts.state?.point) this.#asked = null;
+      if (this.#requested?.point === store.facts.state?.point) this.#requested = null;
       if (changed.has("state") || changed.has("session")) this.#keepDof();
     });
   }
@@ -54,8 +54,8 @@ export class Posing {
   /** The selected joint; null for none. */
   get selected() {
     // Keys come faster than the program's answers. An answer that never comes must not hold for long.
-    const asked = this.#asked && performance.now() < this.#asked.at + ASKED_MS ? this.#asked.point : null;
-    return asked ?? this.#store.facts.state?.point ?? null;
+    const requested = this.#requested && performance.now() < this.#requested.at + REQUEST_MS ? this.#requested.point : null;
+    return requested ?? this.#store.facts.state?.point ?? null;
   }
 
   /** The joint worked on: the selected one, else the root. */
@@ -92,7 +92,7 @@ export class Posing {
   selectPoint(point) {
     const { state } = this.#store.facts;
     if (!state) return;
-    this.#asked = { point, at: performance.now() };
+    this.#requested = { point, at: performance.now() };
     this.#store.set({ state });
     this.#send({ type: "select", person: state.person, point });
   }
@@ -158,7 +158,7 @@ export class Posing {
   }
 
   /** Take the other of two poses that are about as good; said again, go back. */
-  takeOther() {
+  takeAlternative() {
     this.#edit({ ...this.#head(), action: "alternative" });
   }
 
@@ -267,7 +267,7 @@ export class Posing {
 }
 
 /** @returns {Steps} */
-function rememberedSteps() {
+function restoredSteps() {
   try {
     const found = JSON.parse(localStorage.getItem(STEPS_KEY) ?? "{}");
     const good = (/** @type {"cm" | "deg"} */ unit) => (found[unit] > 0 ? Number(found[unit]) : DEFAULT_STEPS[unit]);

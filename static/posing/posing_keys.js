@@ -45,7 +45,7 @@ export function posingBindings(posing, inspector, plain) {
       keys: ["Shift X"],
       label: "Take the other of two poses that are as good, or go back",
       matches: plain("x", undefined, true),
-      run: () => posing.takeOther(),
+      run: () => posing.takeAlternative(),
     },
     { keys: ["R"], label: "Reset the joint's limb to neutral", matches: plain("r"), run: () => posing.resetLimb() },
     { keys: ["Alt ,"], label: "Copy the pose of the previous frame", matches: alt("Comma"), run: () => posing.copyNeighbour(-1) },

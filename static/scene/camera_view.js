@@ -1,6 +1,6 @@
 /** Looking through a camera in the 3-D view: which camera is meant, and the mark on its pane. */
 
-export class Snap {
+export class CameraView {
   #store;
   #grid;
   #send;

@@ -1,7 +1,7 @@
 /** The 3-D view in the page's scheme: viser is dark only where its address says so. */
 
 /** @param {HTMLIFrameElement} scene */
-export function followScheme(scene) {
+export function followColorScheme(scene) {
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const address = () => (dark.matches ? "viser/?darkMode" : "viser/");
   scene.src = address();

@@ -4,13 +4,13 @@
  */
 
 /** So seldom it is drawn while frames go by or something is at work: a twentieth of the time may go there. */
-const SELDOM_MS = 5000;
+const THROTTLE_MS = 5000;
 /** Frames still go by until one has been shown for so long. */
-const REST_MS = 250;
+const SETTLED_MS = 250;
 /** So long nothing waits: once it is loaded it fades in, and in another size it is empty until it is drawn. */
 const [LOADED_MS, RESIZED_MS] = [8000, 500];
 
-export class SceneRest {
+export class ScenePause {
   #scene;
   #store;
   #sought = -Infinity;
@@ -47,9 +47,9 @@ export class SceneRest {
     if (dragging) return true;
     // Whoever points at it works with it; the view through a camera belongs to its image.
     if (this.#scene.matches(":hover") || (state?.snapped ?? null) !== null) return false;
-    const isPassing = shown?.frame !== target || now < this.#sought + REST_MS;
+    const isPassing = shown?.frame !== target || now < this.#sought + SETTLED_MS;
     const isAtWork = state?.job.running || state?.track.running;
-    return (isPassing || isAtWork) && now < this.#drawn + SELDOM_MS;
+    return (isPassing || isAtWork) && now < this.#drawn + THROTTLE_MS;
   }
 
   /** @param {Window} view whose animation frames wait from now on, until it is loaded anew */

@@ -1,15 +1,15 @@
 /** The keys of the 3-D view, and of setting the floor. */
 
 /**
- * @param {import("./camera_view.js").Snap} snap
+ * @param {import("./camera_view.js").CameraView} cameraView
  * @param {import("./floor.js").Floor} floor
  * @param {(key: string, code?: string, shift?: boolean) => (event: KeyboardEvent) => boolean} plain
  * @returns {import("../widgets/key_matching.js").Binding[]}
  */
-export function sceneBindings(snap, floor, plain) {
+export function sceneBindings(cameraView, floor, plain) {
   const why = () => (floor.isOn ? null : "The floor is not being set; Shift+Y begins that.");
   return [
-    { keys: ["Y"], label: "3-D view: look through the camera pointed at, or let go", matches: plain("y"), run: () => snap.toggle() },
+    { keys: ["Y"], label: "3-D view: look through the camera pointed at, or let go", matches: plain("y"), run: () => cameraView.toggle() },
     {
       keys: ["Shift Y"],
       label: "Set the floor from three clicked points, or leave that",

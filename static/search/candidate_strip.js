@@ -3,7 +3,7 @@
 import { prepare } from "../panes/drawing.js";
 import { byId } from "../widgets/elements.js";
 import { keyOf } from "../model/pictures.js";
-import { runLookedAt } from "../model/search_runs.js";
+import { selectedRun } from "../model/search_runs.js";
 
 const WIDTH = 76;
 const HEIGHT = 58;
@@ -39,7 +39,7 @@ export class CandidateStrip {
 
   #show() {
     const { searchCandidates, session, filled, shown } = this.#store.facts;
-    const run = runLookedAt(this.#store.facts);
+    const run = selectedRun(this.#store.facts);
     const found = searchCandidates.get(run?.number ?? -1);
     const n = run ? (found?.costs.length ?? 0) : 0;
     while (this.#list.children.length > n) this.#list.lastElementChild?.remove();
@@ -71,7 +71,7 @@ export class CandidateStrip {
     element.className = "candidate";
     element.append(document.createElement("canvas"), document.createElement("output"));
     const preview = (/** @type {number | null} */ candidate) => {
-      const run = runLookedAt(this.#store.facts);
+      const run = selectedRun(this.#store.facts);
       if (run) this.#send({ type: "preview", run: run.number, candidate });
     };
     element.addEventListener("pointerenter", () => preview(index));
@@ -80,7 +80,7 @@ export class CandidateStrip {
     element.addEventListener("blur", () => preview(null));
     element.addEventListener("click", (event) => {
       if (event.detail > 0) element.blur();
-      const run = runLookedAt(this.#store.facts);
+      const run = selectedRun(this.#store.facts);
       if (run) this.#send({ type: "take", run: run.number, candidate: index });
     });
     return element;

@@ -6,7 +6,7 @@ import { colorName } from "../timeline/curve_drawing.js";
 import { prepare } from "../panes/drawing.js";
 import { byId } from "../widgets/elements.js";
 import { Plot } from "../widgets/plot.js";
-import { runLookedAt } from "../model/search_runs.js";
+import { selectedRun } from "../model/search_runs.js";
 import { count } from "../widgets/text.js";
 
 /** @typedef {import("../model/search_runs.js").Steps} Steps */
@@ -45,7 +45,7 @@ export class CostCurve {
   }
 
   get #run() {
-    return runLookedAt(this.#store.facts);
+    return selectedRun(this.#store.facts);
   }
 
   get #steps() {
@@ -119,12 +119,12 @@ export class CostCurve {
       if (run && steps) drawStages(context, plot, run, steps, style);
       runs.forEach((one, index) => {
         const of = all[index];
-        const isLookedAt = one.number === run?.number;
-        if (isLookedAt) drawTested(context, plot, of, style);
+        const isSelected = one.number === run?.number;
+        if (isSelected) drawTested(context, plot, of, style);
         context.strokeStyle = style.getPropertyValue(runColor(one.number));
-        context.globalAlpha = isLookedAt ? 1 : 0.6;
-        context.lineWidth = isLookedAt ? 2 : 1.25;
-        context.setLineDash(isLookedAt ? [] : [5, 4]);
+        context.globalAlpha = isSelected ? 1 : 0.6;
+        context.lineWidth = isSelected ? 2 : 1.25;
+        context.setLineDash(isSelected ? [] : [5, 4]);
         plot.drawLine(context, of.evaluations, of.best, true);
         context.setLineDash([]);
         context.globalAlpha = 1;

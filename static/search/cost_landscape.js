@@ -10,7 +10,7 @@ import { makeButton } from "./search_widgets.js";
 
 const UNITS = { rad: { factor: 180 / Math.PI, sign: "°" }, m: { factor: 100, sign: " cm" } };
 
-export class LandscapePanel {
+export class CostLandscape {
   #store;
   #send;
   #element = byId("landscape", HTMLElement);
@@ -40,7 +40,7 @@ export class LandscapePanel {
     });
     this.#toLeast = makeButton("To minimum", "Set this degree of freedom where the cost is least", () => {
       const found = store.facts.landscape;
-      if (found) this.#setTo(found.values[leastOf(found.total)]);
+      if (found) this.#setTo(found.values[indexOfMin(found.total)]);
     });
     this.#legend.className = "landscape-legend";
     this.#controls.append(this.#choice, this.#toLeast, this.#legend);
@@ -159,7 +159,7 @@ export class LandscapePanel {
     const isRight = now > (plot.left + plot.right) / 2;
     context.textAlign = isRight ? "right" : "left";
     context.fillText("now", now + (isRight ? -4 : 4), plot.top + 2);
-    const least = leastOf(found.total);
+    const least = indexOfMin(found.total);
     const [x, y] = [plot.x(found.values[least] * factor), plot.y(found.total[least])];
     context.beginPath();
     context.arc(x, y, 4.5, 0, 2 * Math.PI);
@@ -179,7 +179,7 @@ export class LandscapePanel {
    * @param {string} sign
    */
   #readOut(found, hovered, factor, sign) {
-    const least = leastOf(found.total);
+    const least = indexOfMin(found.total);
     const at = hovered ?? nearest(found.values, found.current);
     const value = hovered === null ? found.current : found.values[at];
     const outputs = this.#legend.querySelectorAll("output");
@@ -209,7 +209,7 @@ function legendEntry(label, color) {
 }
 
 /** @param {Float32Array} costs */
-function leastOf(costs) {
+function indexOfMin(costs) {
   return costs.reduce((best, cost, index) => (cost < costs[best] ? index : best), 0);
 }
 

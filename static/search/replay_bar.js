@@ -2,7 +2,7 @@
 
 import { byId, iconButton } from "../widgets/elements.js";
 import { makeButton } from "./search_widgets.js";
-import { runLookedAt } from "../model/search_runs.js";
+import { selectedRun } from "../model/search_runs.js";
 
 const STEPS_PER_S = 12;
 
@@ -18,7 +18,7 @@ export class ReplayBar {
   /** @type {ReturnType<typeof setInterval> | null} */
   #timer = null;
   /** The step asked for last: the program's answer may be on its way. */
-  #asked = -1;
+  #requested = -1;
 
   /**
    * @param {import("../model/store.js").Store} store
@@ -65,7 +65,7 @@ export class ReplayBar {
   update(changed) {
     if (!["drawer", "searchRuns", "searchRun", "searchSteps"].some((f) => changed.has(/** @type {"drawer"} */ (f)))) return;
     const { searchRuns } = this.#store.facts;
-    const run = runLookedAt(this.#store.facts);
+    const run = selectedRun(this.#store.facts);
     const replay = searchRuns?.replay ?? null;
     const isReady = !!run && run.steps > 0 && run.state !== "running";
     this.#slider.disabled = !isReady;
@@ -86,16 +86,16 @@ export class ReplayBar {
 
   get #at() {
     const replay = this.#store.facts.searchRuns?.replay;
-    if (this.#timer !== null) return this.#asked;
-    return replay ? replay.step : (runLookedAt(this.#store.facts)?.steps ?? 0) - 1;
+    if (this.#timer !== null) return this.#requested;
+    return replay ? replay.step : (selectedRun(this.#store.facts)?.steps ?? 0) - 1;
   }
 
   /** @param {number} step */
   #goTo(step) {
-    const run = runLookedAt(this.#store.facts);
+    const run = selectedRun(this.#store.facts);
     if (!run) return;
-    this.#asked = Math.max(-1, Math.min(run.steps - 1, step));
-    this.#send({ type: "replay", run: run.number, step: this.#asked });
+    this.#requested = Math.max(-1, Math.min(run.steps - 1, step));
+    this.#send({ type: "replay", run: run.number, step: this.#requested });
   }
 
   #togglePlay() {
@@ -103,7 +103,7 @@ export class ReplayBar {
       this.#pause();
       return;
     }
-    const run = runLookedAt(this.#store.facts);
+    const run = selectedRun(this.#store.facts);
     if (!run) return;
     const at = this.#at;
     this.#goTo(at >= run.steps - 1 ? -1 : at);
@@ -113,8 +113,8 @@ export class ReplayBar {
         this.#pause();
         return;
       }
-      this.#goTo(this.#asked + 1);
-      if (this.#asked >= (runLookedAt(this.#store.facts)?.steps ?? 0) - 1) this.#pause();
+      this.#goTo(this.#requested + 1);
+      if (this.#requested >= (selectedRun(this.#store.facts)?.steps ?? 0) - 1) this.#pause();
     }, 1000 / STEPS_PER_S);
     this.#play.setAttribute("aria-pressed", "true");
   }

@@ -3,7 +3,7 @@
 import { runColor } from "./cost_curve.js";
 import { byId } from "../widgets/elements.js";
 import { makeButton } from "./search_widgets.js";
-import { runLookedAt } from "../model/search_runs.js";
+import { selectedRun } from "../model/search_runs.js";
 import { count, px } from "../widgets/text.js";
 
 /** @typedef {{element: HTMLElement, figures: HTMLElement, differs: HTMLElement, compare: HTMLButtonElement, take: HTMLButtonElement}} Row */
@@ -78,7 +78,7 @@ export class RunList {
     const row = this.#rows.get(run.number);
     if (!row) return;
     const { searchRuns } = this.#store.facts;
-    row.element.classList.toggle("is-looked-at", runLookedAt(this.#store.facts)?.number === run.number);
+    row.element.classList.toggle("is-selected", selectedRun(this.#store.facts)?.number === run.number);
     const state = run.state === "over" ? "" : run.state === "running" ? "running · " : "stands · ";
     const thinned = run.thinned ? `; of its many steps ${count(run.steps)} are kept` : "";
     set(row.figures, `${state}${px(run.best_px)} · ${count(run.evaluations)} · ${run.seconds.toFixed(2)} s`);

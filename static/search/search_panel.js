@@ -8,7 +8,7 @@ import { ReplayBar } from "./replay_bar.js";
 import { RunList } from "./run_list.js";
 import { SearchTree } from "./search_tree.js";
 import { makeButton, makeNumber } from "./search_widgets.js";
-import { runLookedAt } from "../model/search_runs.js";
+import { selectedRun } from "../model/search_runs.js";
 import { count, px } from "../widgets/text.js";
 
 /** Expansions a second that can be watched; 0 stands for as many as there can be. */
@@ -125,7 +125,7 @@ export class SearchPanel {
     const isRunning = !!state?.job.running;
     const { step, stage, frame, again, track, stop } = this.#buttons;
     step.disabled = stage.disabled = frame.disabled = !isReady || isRunning;
-    const run = runLookedAt(this.#store.facts);
+    const run = selectedRun(this.#store.facts);
     again.disabled = !isReady || isRunning || run === null;
     track.disabled = !isReady;
     track.textContent = state?.track.running ? "Pause" : "Track";

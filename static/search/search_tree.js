@@ -4,7 +4,7 @@
  */
 
 import { byId } from "../widgets/elements.js";
-import { runLookedAt } from "../model/search_runs.js";
+import { selectedRun } from "../model/search_runs.js";
 import { makeNumber } from "./search_widgets.js";
 import { count } from "../widgets/text.js";
 
@@ -193,7 +193,7 @@ export class SearchTree {
   }
 
   #showRun() {
-    const run = runLookedAt(this.#store.facts);
+    const run = selectedRun(this.#store.facts);
     const stages = new Map(run?.stages.map((stage) => [`${stage.person} ${stage.name} ${stage.factor}`, stage]));
     for (const [key, element] of this.#cells) {
       const stage = stages.get(key);

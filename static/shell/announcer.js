@@ -1,13 +1,13 @@
 /** Says in a live region what has changed, for those who do not see the page. */
 
-import { spoken } from "../widgets/text.js";
+import { displayName } from "../widgets/text.js";
 
 const SETTLED_MS = 400;
 
 export class Announcer {
   #store;
   #region;
-  /** @type {import("../model/protocol.js").StateMessage | null} what was last spoken of */
+  /** @type {import("../model/protocol.js").StateMessage | null} what was last announced */
   #told = null;
   #timer = 0;
 
@@ -34,7 +34,7 @@ export class Announcer {
     this.#told = state;
     const words = [];
     if (state.person !== before.person) words.push(session?.people[state.person]?.name ?? "");
-    if (state.point !== before.point && state.point) words.push(`${spoken(state.point)} selected`);
+    if (state.point !== before.point && state.point) words.push(`${displayName(state.point)} selected`);
     if (state.undo !== before.undo || state.redo !== before.redo) {
       words.push(state.redo !== null && state.redo !== before.redo ? `undone: ${state.redo}` : (state.undo ?? "nothing to undo"));
     }

@@ -1,7 +1,7 @@
 /** Everything that can be done on the page, as a list for the palette: keys, buttons, layers, and places to jump to. */
 
 import { LAYERS } from "../model/layers.js";
-import { spoken } from "../widgets/text.js";
+import { displayName } from "../widgets/text.js";
 
 /**
  * @typedef {object} Command
@@ -13,7 +13,7 @@ import { spoken } from "../widgets/text.js";
  * @property {() => string | null} why why it is not possible now; null where it is
  * @property {() => void} run
  *
- * @typedef {object} Places
+ * @typedef {object} CommandContext
  * @property {import("../model/store.js").Store} store
  * @property {import("../model/navigation.js").Navigation} navigation
  * @property {import("../panes/pane_grid.js").PaneGrid} grid
@@ -80,11 +80,11 @@ export function buttonCommands(table) {
 /**
  * Layers, cameras, people, joints; and the frame, where the query is a number.
  *
- * @param {Places} places
+ * @param {CommandContext} context
  * @param {string} query
  * @returns {Command[]}
  */
-export function placeCommands({ store, navigation, grid, posing, layers, actions, away }, query) {
+export function contextCommands({ store, navigation, grid, posing, layers, actions, away }, query) {
   const { session, state, filled } = store.facts;
   /** @type {Command[]} */
   const commands = [];
@@ -117,7 +117,7 @@ export function placeCommands({ store, navigation, grid, posing, layers, actions
     });
   }
   const points = session?.people[state?.person ?? 0]?.points ?? [];
-  for (const point of points) add("Joint", `Select ${spoken(point)}`, () => posing.selectPoint(point), "joint");
+  for (const point of points) add("Joint", `Select ${displayName(point)}`, () => posing.selectPoint(point), "joint");
   return commands;
 }
 

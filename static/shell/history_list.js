@@ -76,7 +76,7 @@ export class HistoryList {
   #row({ edit, label, author, time, undone }, isCurrent) {
     const when = new Date(time);
     const [what, frame] = split(label);
-    const where = [what, frame, author, spokenTime(when)];
+    const where = [what, frame, author, displayTime(when)];
     const title = `${label}${author ? `, by ${author}` : ""}, ${when.toLocaleString()}${undone ? "; undone" : ""}. ${
       isCurrent ? "This is where the history stands." : undone ? "Redo up to here." : "Undo down to here."
     }`;
@@ -153,7 +153,7 @@ function split(label) {
 }
 
 /** @param {Date} when */
-function spokenTime(when) {
+function displayTime(when) {
   const minutes = (Date.now() - when.getTime()) / 60_000;
   if (minutes < 1) return "just now";
   if (minutes < 60) return `${Math.floor(minutes)} min ago`;

@@ -3,11 +3,11 @@
 import { button, byId, keyCaps } from "../widgets/elements.js";
 import { fitness } from "../widgets/fuzzy.js";
 
-export class KeyMap {
-  #dialog = byId("help", HTMLDialogElement);
-  #query = byId("help-query", HTMLInputElement);
-  #list = byId("help-keys", HTMLElement);
-  #none = byId("help-none", HTMLElement);
+export class KeyList {
+  #dialog = byId("key-list", HTMLDialogElement);
+  #query = byId("key-query", HTMLInputElement);
+  #list = byId("key-areas", HTMLElement);
+  #none = byId("key-none", HTMLElement);
 
   /** @param {import("../widgets/key_matching.js").Binding[]} table */
   constructor(table) {
@@ -31,7 +31,7 @@ export class KeyMap {
     }
     this.#list.replaceChildren(...areas.values());
     this.#query.addEventListener("input", () => this.#search());
-    button("show-help", () => this.show());
+    button("show-key-list", () => this.show());
     this.#dialog.addEventListener("click", (event) => event.target === this.#dialog && this.#dialog.close());
   }
 

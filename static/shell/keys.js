@@ -5,10 +5,10 @@ import { BY_KEY } from "../model/layers.js";
 import { closePopover } from "../widgets/popovers.js";
 import { posingBindings } from "../posing/posing_keys.js";
 import { alt, control, plain } from "../widgets/key_matching.js";
-import { peopleKeys } from "./people_keys.js";
-import { timelineKeys } from "../timeline/timeline_keys.js";
+import { peopleBindings } from "./people_keys.js";
+import { timelineBindings } from "../timeline/timeline_keys.js";
 import { sceneBindings } from "../scene/scene_keys.js";
-import { reasonsOf } from "../model/unavailable_reasons.js";
+import { unavailableReasons } from "../model/unavailable_reasons.js";
 import { keepsUndo } from "../widgets/typing.js";
 
 /** Keys that belong to viser's camera while the 3-D view has the focus. */
@@ -35,14 +35,14 @@ const SLIDER_KEYS = new Set([
  * @property {import("../model/layers.js").Layers} layers
  * @property {import("../panes/layers_menu.js").LayersMenu} layersMenu
  * @property {import("./people.js").People} people
- * @property {import("../scene/camera_view.js").Snap} snap
+ * @property {import("../scene/camera_view.js").CameraView} cameraView
  * @property {import("../posing/pinning.js").Pinning} pinning
  * @property {import("../scene/floor.js").Floor} floor
  * @property {import("./notices.js").Notices} notices
  * @property {import("./history_list.js").HistoryList} history
  * @property {() => void} showPalette
  * @property {() => void} showFirstSteps
- * @property {() => void} showHelp
+ * @property {() => void} showKeyList
  */
 
 /**
@@ -52,7 +52,7 @@ const SLIDER_KEYS = new Set([
 // prettier-ignore
 export function bindings({
   store, actions, navigation, playback, jumps, frameWindow, grid, gestures, drawer, posing, pinning, inspector, layers,
-  layersMenu, people, snap, floor, notices, history, showPalette, showFirstSteps, showHelp,
+  layersMenu, people, cameraView, floor, notices, history, showPalette, showFirstSteps, showKeyList,
 }) {
   const escape = () => {
     if (gestures.cancel() || closePopover() || floor.cancel() || pinning.cancel() || actions.leaveReplay()) return;
@@ -63,7 +63,7 @@ export function bindings({
     else if (store.facts.range) store.set({ range: null });
     else if (store.facts.filled !== null) grid.toggleFill(store.facts.filled);
   };
-  const why = reasonsOf(store);
+  const why = unavailableReasons(store);
   const search = (/** @type {"step" | "stage" | "frame"} */ action) => () => {
     if (store.facts.connected && !store.facts.state?.job.running) actions.search(action);
   };
@@ -99,7 +99,7 @@ export function bindings({
     { keys: ["H"], label: "History: what was done, and back to it", matches: plain("h"), run: () => history.toggle() },
     { keys: ["Shift H"], label: "Notices so far", matches: plain("h", undefined, true), run: () => notices.toggleLog() },
     { keys: ["Shift Esc"], label: "Dismiss the notices", matches: plain("escape", undefined, true), run: () => notices.dismissAll() },
-    { keys: ["?"], label: "Keys", matches: (event) => event.key === "?", run: showHelp },
+    { keys: ["?"], label: "Keys", matches: (event) => event.key === "?", run: showKeyList },
     { keys: [], label: "First steps: what to do with a new recording", matches: () => false, run: showFirstSteps },
     ]),
     ...area("Search", [
@@ -121,18 +121,18 @@ export function bindings({
     { keys: ["L"], label: "Follow the tracker, or not", matches: plain("l"), why: why.tracking, run: () => actions.toggleFollow() },
     ]),
     ...area("Timeline", [
-    ...timelineKeys({ store, actions, playback, jumps, frameWindow }),
+    ...timelineBindings({ store, actions, playback, jumps, frameWindow }),
     { keys: ["["], label: "A range begins here", matches: plain("[", "BracketLeft"), run: mark("first") },
     { keys: ["]"], label: "The range ends here", matches: plain("]", "BracketRight"), run: mark("last") },
     ]),
     // Before the keys of posing: Enter means the floor while it is being set.
     ...area("3-D view", [
-    ...sceneBindings(snap, floor, plain),
+    ...sceneBindings(cameraView, floor, plain),
     ], why.away),
     ...area("Posing", [
     ...posingBindings(posing, inspector, plain),
     ], why.away),
-    ...area("People", peopleKeys({ store, actions, posing, people }), why.away),
+    ...area("People", peopleBindings({ store, actions, posing, people }), why.away),
     ...area("Pins", [
     { keys: ["X"], label: "Pin the selected joint by clicks, or no more", matches: plain("x"), run: () => pinning.toggle() },
     { keys: ["G"], label: "Fit to pins and edges", matches: plain("g"), run: () => pinning.fit() },
@@ -166,7 +166,7 @@ export function bindings({
       matches: (event) => plain("", event.code, true)(event) && /^Digit[1-9]$/.test(event.code),
       run: (event) => layers.toggle([BY_KEY[Number(event.code.at(-1)) - 1]]),
     },
-    { keys: ["I"], label: "Brightness and contrast of a pane", matches: plain("i"), run: () => grid.openLook() },
+    { keys: ["I"], label: "Brightness and contrast of a pane", matches: plain("i"), run: () => grid.openToneMenu() },
     {
       keys: ["1 – 9"],
       label: "Fill the grid with a camera, and back; two digits for 10 to 16",

@@ -5,8 +5,8 @@ import { opensPopover, togglePopover } from "../widgets/popovers.js";
 
 const INFO_MS = 5000;
 const ERROR_MS = 20000;
-const MOST_SHOWN = 3;
-const MOST_LOGGED = 100;
+const MAX_SHOWN = 3;
+const MAX_LOGGED = 100;
 
 /**
  * @typedef {import("../model/protocol.js").NoticeMessage} Notice
@@ -39,7 +39,7 @@ export class Notices {
     const first = this.#log[0];
     if (first?.text === text) Object.assign(first, { count: first.count + 1, time: new Date() });
     else this.#log.unshift({ type, level, text, time: new Date(), count: 1 });
-    this.#log.length = Math.min(this.#log.length, MOST_LOGGED);
+    this.#log.length = Math.min(this.#log.length, MAX_LOGGED);
     this.#showLog();
     if (known) this.#again(known, level);
     else this.#add(level, text);
@@ -89,7 +89,7 @@ export class Notices {
     this.#shown.push(shown);
     this.#place.append(element);
     this.#wait(shown, level);
-    while (this.#shown.length > MOST_SHOWN) this.#remove(this.#shown[0]);
+    while (this.#shown.length > MAX_SHOWN) this.#remove(this.#shown[0]);
   }
 
   /**

@@ -1,12 +1,12 @@
 /** The command palette: everything that can be done, found by a few letters, done by Enter. */
 
-import { buttonCommands, keyCommands, placeCommands } from "./commands.js";
+import { buttonCommands, keyCommands, contextCommands } from "./commands.js";
 import { byId, keyCaps } from "../widgets/elements.js";
 import { fitness } from "../widgets/fuzzy.js";
 
 const RECENT = "quadrille.palette.recent";
-const MOST_RECENT = 12;
-const MOST_SHOWN = 60;
+const MAX_RECENT = 12;
+const MAX_SHOWN = 60;
 /** What was used lately comes a little before what fits as well. */
 const RECENT_BONUS = 6;
 
@@ -17,18 +17,18 @@ export class Palette {
   #input = byId("palette-query", HTMLInputElement);
   #list = byId("palette-list", HTMLElement);
   #why = byId("palette-why", HTMLElement);
-  #places;
+  #context;
   #table;
   /** @type {Command[]} what is shown, in order */
   #found = [];
   #at = 0;
 
   /**
-   * @param {import("./commands.js").Places} places
+   * @param {import("./commands.js").CommandContext} context
    * @param {() => import("../widgets/key_matching.js").Binding[]} table
    */
-  constructor(places, table) {
-    this.#places = places;
+  constructor(context, table) {
+    this.#context = context;
     this.#table = table;
     this.#input.addEventListener("input", () => this.#search());
     this.#input.addEventListener("keydown", (event) => this.#onKey(event));
@@ -53,18 +53,18 @@ export class Palette {
     const query = this.#input.value;
     const table = this.#table();
     const recent = recentIds();
-    const commands = [...placeCommands(this.#places, query), ...keyCommands(table), ...buttonCommands(table)];
+    const commands = [...contextCommands(this.#context, query), ...keyCommands(table), ...buttonCommands(table)];
     const scored = commands.flatMap((command) => {
       const found = fitness(query, `${command.label} ${command.area} ${command.words} ${command.keys.join(" ")}`);
       if (found === null) return [];
       const inLabel = fitness(query, command.label) ?? 0;
       const lately = recent.indexOf(command.id);
-      const bonus = lately < 0 ? 0 : RECENT_BONUS * (query.trim() ? 1 : 1000) * (1 - lately / MOST_RECENT);
+      const bonus = lately < 0 ? 0 : RECENT_BONUS * (query.trim() ? 1 : 1000) * (1 - lately / MAX_RECENT);
       return [{ command, isRecent: lately >= 0 && !query.trim(), score: found + inLabel + bonus }];
     });
     // Without a query the order is that of the table, but for what was used lately.
     scored.sort((a, b) => (query.trim() || a.isRecent || b.isRecent ? b.score - a.score : 0));
-    const shown = scored.slice(0, MOST_SHOWN);
+    const shown = scored.slice(0, MAX_SHOWN);
     this.#found = shown.map(({ command }) => command);
     this.#list.replaceChildren(...shown.map(({ command, isRecent }, index) => option(command, isRecent, index)));
     this.#list.scrollTop = 0;
@@ -112,7 +112,7 @@ export class Palette {
       this.#why.classList.add("is-asked");
       return;
     }
-    const recent = [command.id, ...recentIds().filter((id) => id !== command.id)].slice(0, MOST_RECENT);
+    const recent = [command.id, ...recentIds().filter((id) => id !== command.id)].slice(0, MAX_RECENT);
     localStorage.setItem(RECENT, JSON.stringify(recent));
     this.#dialog.close();
     command.run();

@@ -18,7 +18,7 @@ export class People {
   #panel = byId("people-panel", HTMLElement);
   #open = byId("show-people", HTMLButtonElement);
   #solo;
-  #whose = byId("search-whose", HTMLSelectElement);
+  #scope = byId("search-scope", HTMLSelectElement);
   /** @type {HTMLInputElement[]} */
   #chips = [];
   /** @type {Row[]} */
@@ -35,13 +35,13 @@ export class People {
     this.#posing = posing;
     this.#solo = button("solo", () => actions.toggleSolo());
     opensPopover(this.#panel, this.#open, () => this.toggle());
-    this.#whose.addEventListener("change", () => {
-      store.set({ whose: this.#whose.value === "one" ? "one" : "all" });
-      this.#whose.blur();
+    this.#scope.addEventListener("change", () => {
+      store.set({ scope: this.#scope.value === "one" ? "one" : "all" });
+      this.#scope.blur();
     });
     store.subscribe((changed) => {
       if (changed.has("session")) this.#build();
-      if (["session", "state", "connected", "whose"].some((f) => changed.has(/** @type {"state"} */ (f)))) this.#show();
+      if (["session", "state", "connected", "scope"].some((f) => changed.has(/** @type {"state"} */ (f)))) this.#show();
     });
   }
 
@@ -52,7 +52,7 @@ export class People {
   #build() {
     const everybody = this.#store.facts.session?.people ?? [];
     const people = everybody.length > 1 ? everybody : [];
-    byId("people-group", HTMLElement).hidden = this.#whose.hidden = people.length === 0;
+    byId("people-group", HTMLElement).hidden = this.#scope.hidden = people.length === 0;
     this.#chips = people.map((info, person) => this.#choice(this.#bar, "person", info, person));
     this.#bar.replaceChildren(...this.#chips.map((chip) => /** @type {HTMLElement} */ (chip.parentElement)));
     this.#rows = people.map((info, person) => this.#row(info, person));
@@ -107,7 +107,7 @@ export class People {
   }
 
   #show() {
-    const { state, session, connected, whose } = this.#store.facts;
+    const { state, session, connected, scope } = this.#store.facts;
     if (!state || !session || session.people.length < 2) return;
     const name = session.people[state.person].name;
     this.#chips.forEach((chip, person) => {
@@ -127,9 +127,9 @@ export class People {
     });
     this.#solo.disabled = !connected;
     this.#solo.setAttribute("aria-pressed", String(state.solo));
-    this.#whose.disabled = !connected;
-    const only = this.#whose.options[1];
+    this.#scope.disabled = !connected;
+    const only = this.#scope.options[1];
     if (only.textContent !== `Only ${name}`) only.textContent = `Only ${name}`;
-    this.#whose.value = whose;
+    this.#scope.value = scope;
   }
 }

@@ -1,15 +1,15 @@
 /** The keys of several people; `keys.js` takes them into its table. */
 
 import { plain } from "../widgets/key_matching.js";
-import { reasonsOf } from "../model/unavailable_reasons.js";
+import { unavailableReasons } from "../model/unavailable_reasons.js";
 
 /**
  * @param {{store: import("../model/store.js").Store, actions: import("../model/actions.js").Actions,
  *   posing: import("../posing/posing.js").Posing, people: import("./people.js").People}} parts
  * @returns {import("../widgets/key_matching.js").Binding[]}
  */
-export function peopleKeys({ store, actions, posing, people }) {
-  const why = reasonsOf(store).people;
+export function peopleBindings({ store, actions, posing, people }) {
+  const why = unavailableReasons(store).people;
   const shift = (/** @type {string} */ key) => plain(key, undefined, true);
   return [
     { keys: ["P"], label: "Work on the next person", matches: plain("p"), why, run: () => actions.stepPerson(1) },
@@ -27,7 +27,7 @@ export function peopleKeys({ store, actions, posing, people }) {
       label: "Search and fit everybody, or only the person worked on",
       matches: shift("e"),
       why,
-      run: () => actions.toggleWhose(),
+      run: () => actions.toggleScope(),
     },
     {
       keys: ["Shift C"],

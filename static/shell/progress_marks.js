@@ -3,7 +3,7 @@
 import { byId } from "../widgets/elements.js";
 
 /** @param {import("../model/store.js").Store} store */
-export function showProgress(store) {
+export function showProgressMarks(store) {
   const compiling = byId("compiling", HTMLElement);
   const listing = byId("listing", HTMLElement);
   store.subscribe((changed) => {

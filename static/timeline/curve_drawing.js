@@ -2,7 +2,7 @@
 
 import { roundUp } from "../widgets/frame_axis.js";
 import { extent, trace } from "../model/series.js";
-import { drawDiamond, placesOf } from "./timeline_drawing.js";
+import { drawDiamond, markPositions } from "./timeline_drawing.js";
 
 /**
  * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
@@ -14,7 +14,7 @@ const TICKS_HEIGHT = 16;
 const PLOT_GAP = 6;
 const TICK_GAP = 22;
 /** An angle that hardly moves must not look like one that swings. */
-const LEAST_SPAN = { deg: 20, cm: 10, px: 1 };
+const MIN_SPAN = { deg: 20, cm: 10, px: 1 };
 const UNITS = { deg: "degrees", cm: "cm", px: "px" };
 
 /**
@@ -29,7 +29,7 @@ const UNITS = { deg: "degrees", cm: "cm", px: "px" };
  */
 export function drawCurves(context, axis, height, curves, labels, hidden, keyframes, style) {
   const each = (height - TICKS_HEIGHT - PLOT_GAP * (curves.plots.length - 1)) / curves.plots.length;
-  const keys = placesOf(keyframes, axis);
+  const keys = markPositions(keyframes, axis);
   curves.plots.forEach((plot, index) => {
     const series = curves.series.filter((one) => one.plot === index && !hidden.has(one.label));
     const top = index * (each + PLOT_GAP);
@@ -75,7 +75,7 @@ export function colorName(index) {
 function scaleOf(unit, curves, top, bottom) {
   let { least, most } = extent(curves) ?? { least: 0, most: 0 };
   if (unit === "px") least = 0;
-  const lacking = Math.max(0, LEAST_SPAN[unit] - (most - least));
+  const lacking = Math.max(0, MIN_SPAN[unit] - (most - least));
   if (unit !== "px") least -= lacking / 2;
   most += unit === "px" ? lacking : lacking / 2;
   const margin = 0.06 * (most - least);

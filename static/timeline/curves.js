@@ -26,7 +26,7 @@ export class Curves {
   #frameWindow;
   #stage = byId("curves", HTMLElement);
   #legend = byId("curves-legend", HTMLElement);
-  #whose = byId("curves-whose", HTMLElement);
+  #person = byId("curves-person", HTMLElement);
   #lines = document.createElement("canvas");
   #cursor = document.createElement("canvas");
   /** The group that is shown; null while the drawer is closed or shows something else. */
@@ -83,7 +83,7 @@ export class Curves {
     const { drawer } = this.#store.facts;
     const group = CURVE_GROUPS.find((one) => one === drawer) ?? null;
     this.#stage.hidden = this.#legend.hidden = group === null;
-    if (group === null) this.#whose.hidden = true;
+    if (group === null) this.#person.hidden = true;
     if (group === this.#group) return;
     this.#group = group;
     if (this.#store.facts.connected) this.#actions.openCurves(group);
@@ -116,7 +116,7 @@ export class Curves {
   /** Build the legend: one switch per name, which stands for the curves of that name in all plots. */
   #describe() {
     const data = this.#data;
-    this.#nameWhose(data);
+    this.#showPerson(data);
     const labels = labelsOf(data);
     const described = JSON.stringify(labels);
     if (!data || described === this.#described) return;
@@ -143,13 +143,13 @@ export class Curves {
    *
    * @param {Data | null} data
    */
-  #nameWhose(data) {
+  #showPerson(data) {
     const people = this.#store.facts.session?.people ?? [];
-    const whose = data && people.length > 1 ? people[data.person] : null;
-    this.#whose.hidden = !whose;
-    this.#whose.textContent = whose?.name ?? "";
-    this.#whose.title = whose ? `The curves of ${whose.name} (P: of the next person)` : "";
-    this.#whose.style.setProperty("--person", whose?.color ?? "");
+    const person = data && people.length > 1 ? people[data.person] : null;
+    this.#person.hidden = !person;
+    this.#person.textContent = person?.name ?? "";
+    this.#person.title = person ? `The curves of ${person.name} (P: of the next person)` : "";
+    this.#person.style.setProperty("--person", person?.color ?? "");
   }
 
   /**

@@ -11,10 +11,10 @@ const STORED_TAB = "quadrille.drawer-tab";
 const STORED_CURVES = "quadrille.drawer-curves";
 const STORED_HEIGHT = "quadrille.drawer-height-";
 /** Height of what lies below the tabs: the usual share of the window, and what it never goes below, CSS pixels. */
-const USUAL_SHARES = { curves: 0.21, search: 0.3 };
-const LEAST_PX = 140;
+const DEFAULT_SHARES = { curves: 0.21, search: 0.3 };
+const MIN_PX = 140;
 /** What the panes keep of the window, CSS pixels. */
-const REST_PX = 340;
+const PANES_PX = 340;
 /** Height of the tabs, between the grip and the stage, CSS pixels. */
 const BAR_PX = 34;
 const KEY_STEP_PX = 16;
@@ -87,18 +87,18 @@ export class Drawer {
 
   /** Give the stage the height that was chosen, as far as the window has room for it. */
   #fit() {
-    const most = Math.max(LEAST_PX, innerHeight - REST_PX);
-    const chosen = Number(localStorage.getItem(STORED_HEIGHT + this.#kind)) || USUAL_SHARES[this.#kind] * innerHeight;
-    const height = Math.round(Math.max(LEAST_PX, Math.min(most, chosen)));
+    const most = Math.max(MIN_PX, innerHeight - PANES_PX);
+    const chosen = Number(localStorage.getItem(STORED_HEIGHT + this.#kind)) || DEFAULT_SHARES[this.#kind] * innerHeight;
+    const height = Math.round(Math.max(MIN_PX, Math.min(most, chosen)));
     this.#stage.style.height = `${height}px`;
     this.#grip.setAttribute("aria-valuenow", String(height));
-    this.#grip.setAttribute("aria-valuemin", String(LEAST_PX));
+    this.#grip.setAttribute("aria-valuemin", String(MIN_PX));
     this.#grip.setAttribute("aria-valuemax", String(most));
   }
 
   /** @param {number | null} height null for the usual one */
   #resize(height) {
-    localStorage.setItem(STORED_HEIGHT + this.#kind, height === null ? "" : String(Math.max(LEAST_PX, Math.round(height))));
+    localStorage.setItem(STORED_HEIGHT + this.#kind, height === null ? "" : String(Math.max(MIN_PX, Math.round(height))));
     this.#fit();
   }
 

@@ -10,7 +10,7 @@ const NEXT = "m6 3.5 5 4.5-5 4.5";
 export class JumpMenu {
   #store;
   #jumps;
-  #former;
+  #previous;
   #next;
   #open;
   #menu = byId("jump-menu", HTMLElement);
@@ -25,7 +25,7 @@ export class JumpMenu {
   constructor(store, jumps) {
     this.#store = store;
     this.#jumps = jumps;
-    this.#former = button("former-doubt", () => jumps.go("doubt", -1));
+    this.#previous = button("previous-doubt", () => jumps.go("doubt", -1));
     this.#next = button("next-doubt", () => jumps.go("doubt", 1));
     this.#open = button("show-jumps", () => this.#show(this.#menu.hidden));
     this.#build();
@@ -61,7 +61,7 @@ export class JumpMenu {
       name.textContent = label;
       const number = document.createElement("output");
       number.setAttribute("aria-label", `Number of frames: ${label}`);
-      const keyOf = (/** @type {boolean} */ back) => (key ? ` (${back ? formerKey(key) : key.replace(" ", "+")})` : "");
+      const keyOf = (/** @type {boolean} */ back) => (key ? ` (${back ? previousKey(key) : key.replace(" ", "+")})` : "");
       const buttons = [
         iconButton(PREVIOUS, `Former ${more}${keyOf(true)}`, () => this.#jumps.go(kind, -1)),
         iconButton(NEXT, `Next ${more}${keyOf(false)}`, () => this.#jumps.go(kind, 1)),
@@ -93,7 +93,7 @@ export class JumpMenu {
   #count() {
     const { connected, session } = this.#store.facts;
     const doubts = this.#jumps.count("doubt");
-    this.#former.disabled = this.#next.disabled = !connected || doubts === 0;
+    this.#previous.disabled = this.#next.disabled = !connected || doubts === 0;
     this.#open.disabled = !connected || !session;
     if (this.#menu.hidden) return;
     for (const [kind, { count: number, buttons }] of this.#rows) {
@@ -110,6 +110,6 @@ export class JumpMenu {
 }
 
 /** @param {string} key */
-function formerKey(key) {
+function previousKey(key) {
   return key.startsWith("Alt ") ? `Alt+Shift+${key.slice(4)}` : `Shift+${key}`;
 }

@@ -104,7 +104,7 @@ export class Jumps {
    *
    * @param {number} frame
    */
-  stretchAround(frame) {
+  intervalAround(frame) {
     const { timeline } = this.#store.facts;
     const isKey = (/** @type {number} */ at) => (timeline.marks[at] & KEYFRAME) !== 0;
     let [first, last] = [frame, frame];

@@ -15,7 +15,7 @@ export class Playback {
   #anchor = { frame: 0, time: 0 };
   #ticked = 0;
   /** The frame it asked for last. */
-  #asked = 0;
+  #requested = 0;
 
   /**
    * @param {import("../model/store.js").Store} store
@@ -32,7 +32,7 @@ export class Playback {
   toggle() {
     const { playing, session, connected, target } = this.#store.facts;
     if (playing || !session || !connected) return this.#navigation.pause();
-    const { first, last } = this.#stretch;
+    const { first, last } = this.#interval;
     const isOutside = target < first || target >= last;
     this.#store.set({ playing: true });
     this.#anchor = { frame: isOutside ? first : target, time: performance.now() };
@@ -61,7 +61,7 @@ export class Playback {
   }
 
   /** First and last frame that are played: in a loop those of the marked range, else to the end of the recording. */
-  get #stretch() {
+  get #interval() {
     const { session, range, loops } = this.#store.facts;
     return loops && range ? range : { first: 0, last: (session?.n_frames ?? 1) - 1 };
   }
@@ -78,13 +78,13 @@ export class Playback {
     // A hidden tab draws nothing, and a hand may have gone elsewhere: go on from there instead of jumping.
     // The next frame is due at once, so that a machine that draws so seldom goes on all the same.
     if (now - this.#ticked > GAP_MS) this.#anchor = { frame: target + 1, time: now };
-    if (target !== this.#asked) {
-      this.#asked = target;
+    if (target !== this.#requested) {
+      this.#requested = target;
       this.#anchor = this.#here();
     }
     this.#ticked = now;
-    if (this.#navigation.isUnderWay) return;
-    const { first, last } = this.#stretch;
+    if (this.#navigation.isWaiting) return;
+    const { first, last } = this.#interval;
     let due = this.#anchor.frame + Math.floor(((now - this.#anchor.time) * session.fps * rate) / 1000);
     if (everyFrame && due > target + 1) {
       due = target + 1;
@@ -101,7 +101,7 @@ export class Playback {
 
   /** @param {number} frame */
   #ask(frame) {
-    this.#asked = frame;
+    this.#requested = frame;
     this.#navigation.request(frame);
   }
 }

@@ -21,7 +21,7 @@ export class RangeBar {
   #bar = byId("range-bar", HTMLElement);
   #text = byId("range-text", HTMLElement);
   #work = byId("range-work", HTMLElement);
-  #whose = byId("range-whose", HTMLSelectElement);
+  #scope = byId("range-scope", HTMLSelectElement);
   #buttons;
   #stop;
   /** The message of the work that ended before this range was marked. */
@@ -37,7 +37,7 @@ export class RangeBar {
     this.#buttons = BUTTONS.map(([id, action]) => button(id, () => this.#act(action)));
     this.#stop = button("range-stop", () => actions.stopRange());
     button("range-close", () => store.set({ range: null }));
-    this.#whose.addEventListener("change", () => this.#whose.blur());
+    this.#scope.addEventListener("change", () => this.#scope.blur());
     store.subscribe((changed) => {
       if (changed.has("session")) this.#listPeople();
       if (changed.has("range")) this.#old = store.facts.state?.range?.message ?? "";
@@ -50,12 +50,12 @@ export class RangeBar {
   /** @param {import("../model/protocol.js").RangeAction} action */
   #act(action) {
     this.#old = "";
-    this.#actions.onRange(action, this.#whose.value === "one" ? (this.#store.facts.state?.person ?? 0) : null);
+    this.#actions.onRange(action, this.#scope.value === "one" ? (this.#store.facts.state?.person ?? 0) : null);
   }
 
   #listPeople() {
-    this.#whose.hidden = (this.#store.facts.session?.people.length ?? 1) < 2;
-    if (this.#whose.hidden) this.#whose.value = "all";
+    this.#scope.hidden = (this.#store.facts.session?.people.length ?? 1) < 2;
+    if (this.#scope.hidden) this.#scope.value = "all";
   }
 
   #show() {
@@ -75,7 +75,7 @@ export class RangeBar {
       ? `${work.what} ${count(work.done)} of ${count(work.total)}`
       : told || `${count(n)} frame${n === 1 ? "" : "s"}`;
     const one = session?.people[state?.person ?? 0]?.name ?? "";
-    const option = this.#whose.options[1];
+    const option = this.#scope.options[1];
     if (option.textContent !== `Only ${one}`) option.textContent = `Only ${one}`;
     this.#place();
   }

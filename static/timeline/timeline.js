@@ -91,7 +91,7 @@ export class Timeline {
     });
     element.addEventListener("dblclick", (event) => {
       if (this.#isOverview(event)) this.#frameWindow.zoom(0, 0);
-      else this.#store.set({ range: this.#jumps.stretchAround(this.#axis.frameUnder(event, element)) });
+      else this.#store.set({ range: this.#jumps.intervalAround(this.#axis.frameUnder(event, element)) });
     });
     zoomByWheel(element, this.#frameWindow, () => this.#axis);
     element.addEventListener("keydown", (event) => {

@@ -132,7 +132,7 @@ export function drawSources(context, axis, cells, style, { top, bottom }) {
  */
 export function drawKeyframes(context, axis, keyframes, { top, bottom }) {
   const y = (top + bottom) / 2;
-  for (const x of placesOf(keyframes, axis)) drawDiamond(context, x, y, 4);
+  for (const x of markPositions(keyframes, axis)) drawDiamond(context, x, y, 4);
 }
 
 /**
@@ -146,7 +146,7 @@ export function drawKeyframes(context, axis, keyframes, { top, bottom }) {
 export function drawAmbiguous(context, axis, frames, { top, bottom }) {
   const middle = (top + bottom) / 2;
   context.lineWidth = 1.25;
-  for (const x of placesOf(frames, axis)) {
+  for (const x of markPositions(frames, axis)) {
     for (const y of [middle - 2, middle + 2]) {
       context.beginPath();
       context.arc(x, y, 2, 0, 2 * Math.PI);
@@ -164,7 +164,7 @@ export function drawAmbiguous(context, axis, frames, { top, bottom }) {
  * @param {Iterable<number>} frames
  * @param {FrameAxis} axis
  */
-export function placesOf(frames, axis) {
+export function markPositions(frames, axis) {
   const places = new Map();
   for (const frame of frames) {
     if (axis.shows(frame)) places.set(Math.floor(axis.middle(frame) / KEYFRAME_GAP), axis.middle(frame));
@@ -265,7 +265,7 @@ export function drawOverview(context, whole, cells, style, overview) {
     });
   }
   context.fillStyle = style.getPropertyValue("--text");
-  for (const x of placesOf(keyframesOf(cells), whole)) context.fillRect(x - 0.5, overview.top, 1, 3);
+  for (const x of markPositions(keyframesOf(cells), whole)) context.fillRect(x - 0.5, overview.top, 1, 3);
 }
 
 /**

@@ -2,7 +2,7 @@
 
 import { KINDS } from "./jumps.js";
 import { alt, plain } from "../widgets/key_matching.js";
-import { reasonsOf } from "../model/unavailable_reasons.js";
+import { unavailableReasons } from "../model/unavailable_reasons.js";
 
 /**
  * @param {{store: import("../model/store.js").Store, actions: import("../model/actions.js").Actions,
@@ -10,7 +10,7 @@ import { reasonsOf } from "../model/unavailable_reasons.js";
  *   frameWindow: import("./frame_window.js").FrameWindow}} parts
  * @returns {import("../widgets/key_matching.js").Binding[]}
  */
-export function timelineKeys({ store, actions, playback, jumps, frameWindow }) {
+export function timelineBindings({ store, actions, playback, jumps, frameWindow }) {
   const interpolate = () => {
     if (store.facts.connected && store.facts.range) actions.onRange("interpolate", null);
   };
@@ -47,7 +47,7 @@ export function timelineKeys({ store, actions, playback, jumps, frameWindow }) {
       keys: ["Shift I"],
       label: "Interpolate the marked range",
       matches: plain("i", undefined, true),
-      why: reasonsOf(store).range,
+      why: unavailableReasons(store).range,
       run: interpolate,
     },
     { keys: ["Z"], label: "Timeline: see fewer frames", matches: plain("z"), run: () => frameWindow.zoomIn() },

@@ -1,7 +1,7 @@
 /** A field for one number: Enter applies, Esc restores, the arrows step, and what is no number is refused with a sentence. */
 
 /**
- * @typedef {object} Entry
+ * @typedef {object} NumberField
  * @property {HTMLInputElement} element
  * @property {(text: string) => void} show what stands there while nobody types
  */
@@ -12,15 +12,15 @@
  * @param {(text: string) => string | null} options.take apply what was typed; says why where it cannot
  * @param {(why: string) => void} options.refuse tell the user why
  * @param {((factor: number) => void) | null} options.step what the up and down arrows do, null for nothing
- * @returns {Entry}
+ * @returns {NumberField}
  */
-export function numberEntry({ name, take, refuse, step }) {
+export function numberField({ name, take, refuse, step }) {
   const element = document.createElement("input");
   element.type = "text";
   element.inputMode = "decimal";
   element.autocomplete = "off";
   element.spellcheck = false;
-  element.className = "number-entry";
+  element.className = "number-field";
   element.setAttribute("aria-label", name);
   let shown = "";
 

@@ -1,9 +1,9 @@
 /** The bar between panes and 3-D view: dragged, moved by arrow keys, put back by a double click; remembered. */
 
 const STORED = "quadrille.panes-fraction";
-const USUAL = 0.62;
-const LEAST_PANES_PX = 480;
-const LEAST_SCENE_PX = 300;
+const DEFAULT_FRACTION = 0.62;
+const MIN_PANES_PX = 480;
+const MIN_SCENE_PX = 300;
 const KEY_STEP_PX = 24;
 
 /**
@@ -11,12 +11,12 @@ const KEY_STEP_PX = 24;
  * @param {HTMLElement} bar
  */
 export function makeSplitter(workspace, bar) {
-  let fraction = Number(localStorage.getItem(STORED)) || USUAL;
+  let fraction = Number(localStorage.getItem(STORED)) || DEFAULT_FRACTION;
 
   const show = () => {
     const width = workspace.clientWidth;
-    const most = width - LEAST_SCENE_PX;
-    const panes = Math.round(Math.max(Math.min(LEAST_PANES_PX, most), Math.min(most, fraction * width)));
+    const most = width - MIN_SCENE_PX;
+    const panes = Math.round(Math.max(Math.min(MIN_PANES_PX, most), Math.min(most, fraction * width)));
     workspace.style.setProperty("--panes-width", `${panes}px`);
     bar.setAttribute("aria-valuenow", String(Math.round((100 * panes) / Math.max(1, width))));
     return panes;
@@ -36,7 +36,7 @@ export function makeSplitter(workspace, bar) {
     if (bar.hasPointerCapture(event.pointerId)) moveTo(event.clientX - workspace.getBoundingClientRect().left);
   });
   bar.addEventListener("lostpointercapture", () => workspace.classList.remove("is-splitting"));
-  bar.addEventListener("dblclick", () => moveTo(USUAL * workspace.clientWidth));
+  bar.addEventListener("dblclick", () => moveTo(DEFAULT_FRACTION * workspace.clientWidth));
   bar.addEventListener("keydown", (event) => {
     const step = { ArrowLeft: -KEY_STEP_PX, ArrowRight: KEY_STEP_PX }[event.key];
     if (step === undefined) return;

@@ -12,7 +12,7 @@ export function px(value) {
  *
  * @param {string} name
  */
-export function spoken(name) {
+export function displayName(name) {
   return name.replaceAll("_", " ");
 }
 

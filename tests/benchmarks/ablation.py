@@ -26,7 +26,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.motion.prediction import PredictSettings
 from tracker.search.best_first import SearchSettings
-from tracker.session.assemble import assemble
+from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
 from tracker.simulate import simulate
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -86,11 +86,13 @@ def recorded(data: Path, folder: Path) -> list[Clip]:
     for name, height in (("walk", 1.75), ("balance_real", 1.75), ("fast_arms", 1.55)):
         reference = next((data / name).glob("*.trc"))
         assemble(
-            folder / name,
-            calibration=data / name / "Calib.toml",
-            videos=sorted((data / name).glob("*.mp4")),
-            background=data / name / "background",
-            heights=height,
+            NewSession(
+                folder / name,
+                calibration=data / name / "Calib.toml",
+                videos=sorted((data / name).glob("*.mp4")),
+                background=data / name / "background",
+                heights=height,
+            )
         )
         session = load_session(folder / name)
         joints = read_joints(reference, session.fps)

@@ -24,7 +24,7 @@ from app.session.frame_cache import Frames
 from app.storage.saver import Saver
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
-from tracker.session.assemble import assemble
+from tracker.session.assemble import NewSession, assemble
 from tracker.store.annotation_store import AnnotationStore
 
 VIEWS = (0, 1)
@@ -129,10 +129,10 @@ def main() -> None:
     parser.add_argument("--data", type=Path, required=True, help="the folder with `walk`")
     walk = parser.parse_args().data / "walk"
     with tempfile.TemporaryDirectory() as name:
-        session = assemble(
+        session = assemble(NewSession(
             Path(name) / "session", calibration=walk / "Calib.toml", videos=sorted(walk.glob("*.mp4")),
             background=walk / "background", heights=1.75,
-        )  # fmt: skip
+        ))  # fmt: skip
         with (
             closing(Recording(session.cameras)) as recording,
             closing(AnnotationStore(session.annotations_path)) as store,

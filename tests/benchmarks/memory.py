@@ -15,7 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.cli.actions import init_from_joints, target
+from app.cli.init import init_from_joints
+from app.cli.target import load_target
 from app.cli.track import track
 from app.runtime.malloc_trim import give_back_freed_memory
 from app.runtime.progress import Reporter
@@ -102,7 +103,7 @@ def main() -> None:
     give_back_freed_memory()  # as the program does
     with tempfile.TemporaryDirectory() as name:
         session = long_session(words.session, Path(name), words.times)
-        at = target(session.folder, None, several=False)
+        at = load_target(session.folder, None, several=False)
         init_from_joints(at, 0, read_joints(words.joints, session.fps), sizes=False)
         print(f"before the first frame: {resident_mb():.0f} MB")
         watch = Watch()

@@ -1,4 +1,6 @@
-"""The smallest program that speaks the pane socket (docs/protocol.md): a stick figure, and an ear for the page.
+"""The smallest program that speaks the pane socket (docs/protocol.md): a stick figure.
+
+Messages in both directions are checked against their declarations.
 
 It stands in for the controller in tests of the page alone; `python tests/support/fake_endpoint.py` serves it on a port.
 """
@@ -15,6 +17,9 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 from aiohttp import WSMsgType, web
+from declared_messages import checked
+
+from app.page.message_parsing import parse
 
 WIDTH, HEIGHT, N_FRAMES = 640, 480, 120
 CAMERA_NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
@@ -61,6 +66,13 @@ PLOTS = {
     "cost": [("Cost", "px", ("mean", *CAMERA_NAMES))],
 }
 REMARK = "left arm relocated"
+
+
+def encoded(message):
+    """The JSON of a message to the page; fails if the message does not fit its declaration."""
+    text = json.dumps(message)
+    checked(text)
+    return text
 
 
 def status_of(frame):
@@ -148,6 +160,7 @@ class FakeEndpoint:
             await self.send_all(socket)
             async for message in socket:
                 if message.type is WSMsgType.TEXT:
+                    parse(message.data)
                     told = json.loads(message.data)
                     kept = {"pause_3d": self.greetings, "view": self.views}.get(told["type"], self.received)
                     kept.append(told)
@@ -337,11 +350,11 @@ class FakeEndpoint:
             }
             for p in range(self.n_people)
         ]
-        await socket.send_str(json.dumps({
+        await socket.send_str(encoded({
             "type": "session", "name": "elbow_rotation", "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
             "people": people,
         }))  # fmt: skip
-        await socket.send_str(json.dumps(self.state))
+        await socket.send_str(encoded(self.state))
         sources = ["manual", "searched", "searched", "tracked", "tracked", "tracked", "interpolated", "smoothed"]
         cells = {
             k: {
@@ -357,18 +370,19 @@ class FakeEndpoint:
         }
         for person in (None, *(range(self.n_people) if self.n_people > 1 else ())):
             told = {"type": "timeline", "person": person, "cells": cells, "replace": True}
-            await socket.send_str(json.dumps(told))
-        await socket.send_str(json.dumps({"type": "inconsistent", "frames": DISAGREEING}))
+            await socket.send_str(encoded(told))
+        await socket.send_str(encoded({"type": "inconsistent", "frames": DISAGREEING}))
         if self.views:
             await self.send_frame([socket])
 
     async def broadcast(self, message):
+        text = encoded(message)
         for socket in list(self.sockets):
             with contextlib.suppress(ConnectionError):
-                await socket.send_str(json.dumps(message))
+                await socket.send_str(text)
 
     async def send_binary(self, header, payload, sockets=None):
-        text = json.dumps(header).encode()
+        text = encoded(header).encode()
         for socket in list(self.sockets) if sockets is None else sockets:
             with contextlib.suppress(ConnectionError):
                 await socket.send_bytes(struct.pack("<I", len(text)) + text + payload)

@@ -7,12 +7,13 @@ from contextlib import asynccontextmanager
 
 import aiohttp
 from aiohttp import web
+from declared_messages import checked
 
-from app.page.socket import Panes
+from app.page.socket import PaneSocket
 
 
 class Page:
-    """A page that keeps everything it is told."""
+    """A page that keeps every message, and checks it against its declaration."""
 
     def __init__(self, socket):
         self._socket = socket
@@ -20,6 +21,10 @@ class Page:
 
     async def send(self, kind, **fields):
         await self._socket.send_str(json.dumps({"type": kind, **fields}))
+
+    async def send_raw(self, data, binary=False):
+        """Send bytes as they are, as a text message or a binary one."""
+        await self._socket.send_frame(data, aiohttp.WSMsgType.BINARY if binary else aiohttp.WSMsgType.TEXT)
 
     async def shows(self, *layers, reductions=(1, 1, 1, 1), by_part=False):
         """Say what the page shows."""
@@ -36,18 +41,18 @@ class Page:
 
     def _read(self, message):
         if message.type is aiohttp.WSMsgType.TEXT:
-            return json.loads(message.data)
+            return checked(message.data)
         assert message.type is aiohttp.WSMsgType.BINARY, message
         (length,) = struct.unpack_from("<I", message.data)
-        return json.loads(message.data[4 : 4 + length]) | {"payload": message.data[4 + length :]}
+        return checked(message.data[4 : 4 + length]) | {"payload": message.data[4 + length :]}
 
 
 @asynccontextmanager
 async def visiting(controller):
     async def serve(request):
-        socket = web.WebSocketResponse()
+        socket = web.WebSocketResponse(decode_text=False)
         await socket.prepare(request)
-        await Panes(controller).serve(socket)
+        await PaneSocket(controller).serve(socket)
         return socket
 
     app = web.Application()

@@ -11,7 +11,6 @@ from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
-from tracker.formats.model_toml import load_model
 from tracker.geometry.arrays import Array
 from tracker.session.session import load_session
 
@@ -28,11 +27,6 @@ class RealFrame(NamedTuple):
 @pytest.fixture(scope="session")
 def sample_folder():
     return SAMPLE
-
-
-@pytest.fixture(scope="session")
-def gavrila():
-    return load_model("gavrila22")
 
 
 @pytest.fixture(scope="session")

@@ -13,8 +13,6 @@ from tracker.geometry.arrays import Array
 
 ALONG = 7
 """Samples along the axis of each part."""
-NEAREST_M = 0.05
-"""What comes nearer to the camera's plane is not seen, metres."""
 
 
 def ellipsoids(model: BodyModel) -> Array:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from tracker.appearance.axis_visibility import (
     ALONG,
-    NEAREST_M,
     axis_sample,
     is_occluded,
     pixel_on_axis,
@@ -25,6 +24,7 @@ from tracker.body.kinematics import Kinematics, chain_poses
 from tracker.body.model import BodyModel
 from tracker.compute.numba_options import BORROW
 from tracker.geometry.arrays import Array, FloatArray, Image, IntArray
+from tracker.geometry.cameras import NEAR_PLANE_M
 from tracker.images.color_histogram import BINS, bin_of
 
 _STEP_PX = 2
@@ -246,7 +246,7 @@ def _look_along(
             for sample in range(ALONG):
                 z = axis_sample(shapes[i], sample)
                 depth = axis[1, 2] + z * axis[2, 2]
-                if depth < NEAREST_M or is_occluded(Ts[c, i], axis, z, i, rays, all_parts, limb.shape[0]):
+                if depth < NEAR_PLANE_M or is_occluded(Ts[c, i], axis, z, i, rays, all_parts, limb.shape[0]):
                     continue
                 behind = _OPEN
                 u, v, du, dv = pixel_on_axis(axis, z)

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from tracker.appearance.axis_visibility import (
     ALONG,
-    NEAREST_M,
     axis_sample,
     ellipsoids,
     is_occluded,
@@ -28,9 +27,10 @@ from tracker.appearance.limb_score import ColorView, LimbScorer, StaticParts
 from tracker.body.kinematics import Kinematics, chain_poses
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.numba_options import BORROW
-from tracker.contours.occluding_contours import part_poses, projection
+from tracker.contours.occluding_contours import part_poses
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, Image
+from tracker.geometry.cameras import NEAR_PLANE_M
 from tracker.images.color_histogram import BINS, bin_of
 
 _SMOOTHING_BINS = 0.7
@@ -86,7 +86,7 @@ class Colors:
             person: index of the body that is looked at.
         """
         self._views = [
-            ColorView(projection(v.camera), v.camera.center_world, v.colors, v.distance, v.theta_px)
+            ColorView(v.camera.projection, v.camera.center_world, v.colors, v.distance, v.theta_px)
             for v in views
             if v.colors is not None
         ]
@@ -274,7 +274,7 @@ def _look(
         project_axis(P, eye, Ts[part], shapes[part], axis)
         for a in range(ALONG):
             z = axis_sample(shapes[part], a)
-            if axis[1, 2] + z * axis[2, 2] < NEAREST_M or is_occluded(Ts[part], axis, z, part, rays, near, n_near):
+            if axis[1, 2] + z * axis[2, 2] < NEAR_PLANE_M or is_occluded(Ts[part], axis, z, part, rays, near, n_near):
                 continue
             u, v, du, dv = pixel_on_axis(axis, z)
             for s in range(_ACROSS):

@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.numba_options import FAST
-from tracker.contours.occluding_contours import part_poses, projection
+from tracker.contours.occluding_contours import part_poses
 from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import Camera
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 
 _RINGS, _SECTORS = 16, 24
-_NEAREST_M = 0.05
-"""A triangle that comes nearer to the camera's plane is not drawn, metres."""
 
 
 class _Mesh(NamedTuple):
@@ -44,7 +42,7 @@ def part_labels(bodies: Sequence[PosedBody], camera: Camera) -> NDArray[np.uint8
     if not bodies:
         return labels
     mesh = _mesh(tuple(b.model for b in bodies))
-    T = projection(camera) @ part_poses(bodies)  # (P, 3, 4), to homogeneous pixels
+    T = camera.projection @ part_poses(bodies)  # (P, 3, 4), to homogeneous pixels
     nearness = np.zeros((camera.height, camera.width), np.float32)
     image = np.empty((mesh.points.shape[1], 3), np.float32)
     _project(T.astype(np.float32), mesh.points, mesh.owners, image)
@@ -75,7 +73,7 @@ def _project(T: NDArray[np.float32], points: NDArray[np.float32], owners: NDArra
     for k in range(points.shape[1]):
         p, x, y, z = owners[k], points[0, k], points[1, k], points[2, k]
         w = T[p, 2, 0] * x + T[p, 2, 1] * y + T[p, 2, 2] * z + T[p, 2, 3]
-        if w < _NEAREST_M:
+        if w < NEAR_PLANE_M:
             image[k, 2] = 0.0
             continue
         near = np.float32(1.0) / w

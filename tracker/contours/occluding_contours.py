@@ -21,14 +21,12 @@ from tracker.contours.generator import MAX_POINTS, grid_outline, revolved_outlin
 from tracker.contours.surfaces import Surfaces, surfaces_of
 from tracker.contours.visibility import JOINT_MARGIN_M, LANES, mark_occluded
 from tracker.geometry.arrays import Array, FloatArray
-from tracker.geometry.cameras import Camera
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 
 PIECE_PX = 4.0
 """Longest piece of contour that is scored or occluded as a whole, px."""
 MAX_PIECES = 6000
 """Room for the pieces of one view; a 22-DOF body that fills a 640x480 image has some 600."""
-_NEAREST_M = 0.05
-"""What comes nearer to the camera's plane is not drawn, metres."""
 _SAG_PX = 0.2
 """How far the middle of a chord around a part may lie inside the arc, px; the grid of other parts leaves as much."""
 _THIN2 = np.float32(0.1**2)
@@ -104,7 +102,7 @@ def trace(bodies: Sequence[PosedBody], camera: Camera, piece_px: float = PIECE_P
     """
     surfaces = surfaces_of(tuple(b.model for b in bodies))
     out = contour_buffer(camera, len(bodies), piece_px)
-    n = trace_view(projection(camera), camera.center_world, part_poses(bodies), surfaces, piece_px, out)
+    n = trace_view(camera.projection, camera.center_world, part_poses(bodies), surfaces, piece_px, out)
     return Contour(out.pieces_px[:n], out.parts[:n], out.occluded[:n], out.points_world[:n])
 
 
@@ -120,11 +118,6 @@ def contour_buffer(camera: Camera, n_bodies: int, piece_px: float = PIECE_PX) ->
         np.empty((room, 4), np.float32), np.empty(room, np.int32), np.empty(room, np.bool_),
         np.empty((room, 3), np.float32),
     )  # fmt: skip
-
-
-def projection(camera: Camera) -> Array:
-    """Projection matrix of undistorted pixels, (3, 4)."""
-    return camera.K @ camera.T_camera_world[:3]
 
 
 @njit(nogil=True, cache=True)
@@ -333,7 +326,7 @@ def trace_part(
         depth += P[2, i] * to_world[part, i, 3]
         unit_eye[i] = to_unit[part, i, 4]
     # A part that reaches the plane of the camera has no contour that could be drawn.
-    if depth >= surfaces.radii[part] + _NEAREST_M:
+    if depth >= surfaces.radii[part] + NEAR_PLANE_M:
         n_profile = surfaces.profile_sizes[part]
         if n_profile > 0:
             radius = max(half_axes[part, 0], half_axes[part, 1])

@@ -135,7 +135,7 @@ class ContourResiduals:
         )
         weights = settings.information_per_px * np.array([settings.model_to_image, settings.image_to_model])
         arrays = ViewArrays(
-            np.stack([occluding_contours.projection(v.camera) for v in views]),
+            np.stack([v.camera.projection for v in views]),
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
             np.concatenate([v.distance.ravel() for v in views]),

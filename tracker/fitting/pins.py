@@ -13,8 +13,8 @@ from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import NormalEquations, normal_equations
 from tracker.geometry.arrays import Array, IntArray
-from tracker.geometry.cameras import Camera
-from tracker.geometry.triangulation import _NEAREST_M, PointObservation, sigma_px
+from tracker.geometry.cameras import Camera, project_with_jacobian
+from tracker.geometry.triangulation import PointObservation, sigma_px
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,17 +38,10 @@ class PinBlock:
         """See `ResidualBlock`."""
         parts = model.point_parts[self.points]
         points_world = model.points_at(kinematics, self.points)
-        Ts_camera_world, K = self._projections
-        x = np.einsum("nij,nj->ni", Ts_camera_world[:, :3, :3], points_world) + Ts_camera_world[:, :3, 3]
-        J = Ts_camera_world[:, :3, :3] @ model.point_jacobian(kinematics, parts, points_world)  # (N, 3, n_dofs)
-        is_near = x[:, 2] < _NEAREST_M
-        z = np.where(is_near, _NEAREST_M, x[:, 2])[:, None]
-        slopes = x[:, :2] / z  # (N, 2)
-        J_z = np.where(is_near[:, None], 0.0, J[:, 2])  # (N, n_dofs)
-        J_slopes = (J[:, :2] - slopes[:, :, None] * J_z[:, None]) / z[:, :, None]  # (N, 2, n_dofs)
-        found_px = np.einsum("nij,nj->ni", K[:, :2, :2], slopes) + K[:, :2, 2]
-        r = (found_px - self.positions_px) / self.sigmas_px[:, None]
-        rows = K[:, :2, :2] @ J_slopes / self.sigmas_px[:, None, None]
+        points_px, px_by_point = project_with_jacobian(*self._projections, points_world)
+        r = (points_px - self.positions_px) / self.sigmas_px[:, None]
+        point_by_dofs = model.point_jacobian(kinematics, parts, points_world)  # (N, 3, n_dofs)
+        rows = px_by_point @ point_by_dofs / self.sigmas_px[:, None, None]
         return normal_equations(r.ravel(), rows.reshape(-1, model.n_dofs))
 
     @cached_property

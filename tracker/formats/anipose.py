@@ -20,10 +20,10 @@ from tracker.geometry.cameras import DISTORTION_COUNTS, Camera
 
 Units = Literal["m", "mm"]
 
-# Farther than this from the world's origin, in metres, the numbers of a studio are millimetres.
-_FARTHEST_M = 100.0
-# Nearer than this with every camera, read as millimetres, the numbers of a studio are metres.
-_NEAREST_M = 0.05
+MAX_STUDIO_M = 100.0
+"""A camera read as metres and farther from the origin than this has translations in millimetres."""
+MIN_STUDIO_M = 0.05
+"""Cameras read as millimetres that are all nearer to the origin than this have translations in metres."""
 _ROTATION_TOLERANCE = 1e-3  # a rotation matrix printed with four digits still passes
 
 
@@ -156,14 +156,14 @@ def _rotation(value: Any, where: str) -> Array:
 def _check_units(cameras: tuple[Camera, ...], path: Path, units: Units) -> None:
     distances = [float(np.linalg.norm(c.center_world)) for c in cameras]
     farthest = max(distances)
-    if units == "m" and farthest > _FARTHEST_M:
+    if units == "m" and farthest > MAX_STUDIO_M:
         name = cameras[distances.index(farthest)].name
         raise CalibrationError(
             f"calibration {path}: camera '{name}' would stand {farthest:.0f} m from the origin, so its translations "
             "look like millimetres and metres were expected; say --units mm"
         )
     # All at the origin is one camera that defines the world: nothing can be told from it.
-    if units == "mm" and 0 < farthest < _NEAREST_M:
+    if units == "mm" and 0 < farthest < MIN_STUDIO_M:
         raise CalibrationError(
             f"calibration {path}: read as millimetres all cameras would stand within {farthest * 1000:.2g} mm of the "
             "origin, so its translations look like metres; leave out --units mm"

@@ -17,6 +17,9 @@ DISTORTION_COUNTS = (0, 4, 5, 8)
 Region = tuple[int, int, int, int]
 """A box in an image: first column, first row, and those after the last, px."""
 
+NEAR_PLANE_M = 0.05
+"""Depth of the near plane, metres: nothing closer to a camera is drawn or matched."""
+
 
 @dataclass(frozen=True, eq=False)
 class Camera:
@@ -61,6 +64,11 @@ class Camera:
     def T_camera_world(self) -> Array:
         """Inverse pose, (4, 4): maps world coordinates to camera coordinates."""
         return rigid.inverse(self.T_world_camera)
+
+    @cached_property
+    def projection(self) -> Array:
+        """Projection matrix, (3, 4): maps homogeneous world points to homogeneous undistorted pixels."""
+        return self.K @ self.T_camera_world[:3]
 
     @property
     def center_world(self) -> Array:
@@ -108,6 +116,10 @@ class Camera:
         with np.errstate(divide="ignore", invalid="ignore"):
             xy = np.where(z > 1e-9, points_camera[..., :2] / z, np.nan)
         return self._normalized_to_px(xy)
+
+    def project_with_jacobian(self, points_world: Array) -> tuple[Array, Array]:
+        """Project world points `(N, 3)` to undistorted pixels, with derivatives; see `project_with_jacobian`."""
+        return project_with_jacobian(self.T_camera_world, self.K, points_world)
 
     def rays(self, points_px: Array) -> Array:
         """Unit directions in the world, `(..., 3)`, of the lines of sight of original pixels `(..., 2)`.
@@ -174,6 +186,29 @@ class Camera:
         flat = points_px.reshape(-1, 1, 2)
         out = cv2.undistortPoints(flat, self.K, self.distortion, criteria=criteria)
         return np.asarray(out, dtype=np.float64).reshape(points_px.shape)
+
+
+def project_with_jacobian(Ts_camera_world: Array, K: Array, points_world: Array) -> tuple[Array, Array]:
+    """Project points to undistorted pixels, and differentiate the pixels by the points.
+
+    A depth below `NEAR_PLANE_M` counts as `NEAR_PLANE_M`, with derivative 0: the image of a point stays finite.
+
+    Args:
+        Ts_camera_world: inverse pose of one camera, (4, 4), or of each point's camera, (N, 4, 4).
+        K: pinhole matrix of one camera, (3, 3), or of each point's camera, (N, 3, 3), px.
+        points_world: (N, 3), metres.
+
+    Returns:
+        Undistorted pixels, (N, 2), and their derivatives by the points, (N, 2, 3), px per metre.
+    """
+    R, focal = Ts_camera_world[..., :3, :3], K[..., :2, :2]
+    points_camera = (R @ points_world[:, :, None])[..., 0] + Ts_camera_world[..., :3, 3]
+    depths = points_camera[:, 2:]
+    z = np.maximum(depths, NEAR_PLANE_M)
+    slopes = points_camera[:, :2] / z
+    z_by_point = (depths >= NEAR_PLANE_M) * R[..., 2, :]
+    slopes_by_point = (R[..., :2, :] - slopes[:, :, None] * z_by_point[:, None]) / z[:, :, None]
+    return (focal @ slopes[:, :, None])[..., 0] + K[..., :2, 2], focal @ slopes_by_point
 
 
 def viewed_point(cameras: Sequence[Camera]) -> Array:

@@ -6,16 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import Camera
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera, project_with_jacobian
 
 _SIGMA_SHARE = 0.001
 """Standard deviation of a pin against the longer side of the image: 0.64 px of 640. A hand is off by three times as
 much; but where edges and a pin disagree the edges of a body of another shape are wrong together, and the hand is to
 win. Large pictures are shown smaller, so that a hand is off by more of their pixels."""
-
-
-_NEAREST_M = 0.05
-"""Depths below this count as this: what lies behind a camera pulls as if it were just before it."""
 
 
 _LEAST_ANGLE_RAD = np.radians(1.0)
@@ -73,7 +69,7 @@ def triangulate(cameras: Sequence[Camera], positions_px: Array) -> Triangulation
     centers = np.stack([c.center_world for c in views])
     point = np.linalg.solve(across.sum(axis=0), (across @ centers[..., None]).sum(axis=0)[:, 0])
     point = _nearest_in_the_images(views, positions_px, point)
-    behind = [c.name for c in views if c.depths(point) < _NEAREST_M]
+    behind = [c.name for c in views if c.depths(point) < NEAR_PLANE_M]
     if behind:
         return _nowhere(views, f"the lines of sight meet behind {' and '.join(behind)}: check the pins of this joint")
     return Triangulation(point, np.linalg.norm(_residuals(views, positions_px, point)[0], axis=1), "")
@@ -85,25 +81,21 @@ def _nowhere(views: Sequence[Camera], why: str) -> Triangulation:
 
 def _residuals(views: Sequence[Camera], positions_px: Array, point: Array) -> tuple[Array, Array]:
     """Image minus pin in each view, (N, 2), px, and its derivative by the point, (N, 2, 3)."""
-    T, K = np.stack([c.T_camera_world for c in views]), np.stack([c.K for c in views])
-    x = T[:, :3, :3] @ point + T[:, :3, 3]
-    z = x[:, 2:]
-    slopes = x[:, :2] / z
-    J = (T[:, :2, :3] - slopes[:, :, None] * T[:, 2:3, :3]) / z[:, :, None]
-    r = np.einsum("nij,nj->ni", K[:, :2, :2], slopes) + K[:, :2, 2] - positions_px
-    return r, K[:, :2, :2] @ J
+    Ts_camera_world, K = np.stack([c.T_camera_world for c in views]), np.stack([c.K for c in views])
+    points_px, J = project_with_jacobian(Ts_camera_world, K, np.broadcast_to(point, (len(views), 3)))
+    return points_px - positions_px, J
 
 
 def _nearest_in_the_images(views: Sequence[Camera], positions_px: Array, point: Array) -> Array:
     """Gauss-Newton on the distances in the images, from a point on; it stays where a step would go behind a camera."""
     weights = 1 / np.array([sigma_px(c) for c in views])[:, None]
-    if min(c.depths(point) for c in views) < _NEAREST_M:
+    if min(c.depths(point) for c in views) < NEAR_PLANE_M:
         return point
     r, J = _residuals(views, positions_px, point)
     for _ in range(20):
         rows = (J * weights[:, :, None]).reshape(-1, 3)
         step = -np.linalg.lstsq(rows, (r * weights).ravel(), rcond=None)[0]
-        if min(c.depths(point + step) for c in views) < _NEAREST_M:
+        if min(c.depths(point + step) for c in views) < NEAR_PLANE_M:
             break
         there = _residuals(views, positions_px, point + step)
         if np.sum((there[0] * weights) ** 2) >= np.sum((r * weights) ** 2):

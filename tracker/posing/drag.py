@@ -13,7 +13,7 @@ from tracker.errors import TrackerError
 from tracker.fitting.gauss_newton import NormalEquations, PosePrior, ResidualBlock, normal_equations, solve
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import Camera
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.posing.orient import orient
 from tracker.posing.picking import place_on_part
 
@@ -31,8 +31,6 @@ _STIFF_WEIGHT = 0.015
 _DEPTH_WEIGHT = 0.1
 """Weight of keeping the point's depth, against 1 for being under the pointer: where the limb's lengths allow only one
 of the two, the point goes where the hand sees it go."""
-_NEAREST_M = 0.05
-"""Depths below this count as this: a point is not dragged through the camera."""
 
 _ON_JOINT_PX = 8.0
 """A point grabbed this near to the joint that it turns about does not go round it."""
@@ -207,29 +205,22 @@ class _UnderPointer:
 
     def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
-        hand, (R, t) = self.hand, self._world_to_camera
+        hand, (target_px, m_per_px, depth_axis) = self.hand, self._image
         point_world = rigid.apply(kinematics.Ts_world_part[hand.part], hand.place_part)
-        x, target = R @ point_world + t, self._target
-        z = max(x[2], _NEAREST_M)
-        # Angles times depth, so that both are in metres.
-        across = hand.depth_m * (x[:2] / z - target[:2] / target[2])
-        r = np.array([across[0], across[1], self.depth_weight * (x[2] - target[2])])
-        by_x = np.zeros((3, 3))  # d(r)/d(x)
-        by_x[0, 0] = by_x[1, 1] = hand.depth_m / z
-        by_x[:2, 2], by_x[2, 2] = -hand.depth_m / z**2 * x[:2], self.depth_weight
+        points_px, px_by_point = hand.camera.project_with_jacobian(point_world[None])
+        r, by_point = np.empty(3), np.empty((3, 3))
+        r[:2], by_point[:2] = m_per_px @ (points_px[0] - target_px), m_per_px @ px_by_point[0]
+        r[2], by_point[2] = depth_axis @ (point_world - self.target_world), depth_axis
         J_world = model.point_jacobian(kinematics, np.array([hand.part]), point_world[None])[0]  # (3, n_dofs)
-        return normal_equations(r, by_x @ R @ J_world)
+        return normal_equations(r, by_point @ J_world)
 
     @cached_property
-    def _world_to_camera(self) -> tuple[Array, Array]:
-        T_camera_world = self.hand.camera.T_camera_world
-        return T_camera_world[:3, :3], T_camera_world[:3, 3]
-
-    @cached_property
-    def _target(self) -> Array:
-        """In the camera, (3,)."""
-        R, t = self._world_to_camera
-        return np.asarray(R @ self.target_world + t)
+    def _image(self) -> tuple[Array, Array, Array]:
+        """The target's pixel, (2,), metres at the grab's depth per pixel, (2, 2), and the weighted depth axis, (3,)."""
+        camera = self.hand.camera
+        target_px = camera.project_with_jacobian(self.target_world[None])[0][0]
+        m_per_px = np.asarray(self.hand.depth_m * np.linalg.inv(camera.K[:2, :2]), dtype=np.float64)
+        return target_px, m_per_px, self.depth_weight * camera.T_camera_world[2, :3]
 
 
 def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
@@ -267,7 +258,7 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
 def _has_reached(hand: Grab, values: Array, target_world: Array) -> bool:
     """Whether the grabbed point is where it should be, as far as a hand can tell."""
     seen = rigid.apply(hand.camera.T_camera_world, np.stack([hand.place_world(values), target_world]))
-    across = hand.depth_m * np.diff(seen[:, :2] / np.maximum(seen[:, 2:], _NEAREST_M), axis=0)
+    across = hand.depth_m * np.diff(seen[:, :2] / np.maximum(seen[:, 2:], NEAR_PLANE_M), axis=0)
     return bool(np.linalg.norm(across) < _REACHED_M and abs(seen[1, 2] - seen[0, 2]) < _REACHED_DEPTH_M)
 
 

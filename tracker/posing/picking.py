@@ -10,11 +10,9 @@ import numpy as np
 from tracker.body.model import BodyModel, PosedBody
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, FloatArray
-from tracker.geometry.cameras import Camera
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.shapes import Shape
 
-_NEAREST_M = 0.05
-"""A part that reaches nearer to the camera than this has no outline."""
 _RINGS, _SECTORS = 10, 20
 """Fineness of an outline: it is within some 1% of the part's girth."""
 
@@ -43,7 +41,7 @@ def part_hulls(bodies: Sequence[PosedBody], cameras: Sequence[Camera]) -> list[l
         points = _surfaces(body.model) @ np.swapaxes(Ts[:, :3, :3], 1, 2) + Ts[:, None, :3, 3]
         for camera, out in zip(cameras, found, strict=True):
             depths, px = camera.depths(points), camera.project(points[:, 1:]).astype(np.float32)
-            for part in np.flatnonzero(depths[:, 1:].min(axis=1) >= _NEAREST_M):
+            for part in np.flatnonzero(depths[:, 1:].min(axis=1) >= NEAR_PLANE_M):
                 hull = cv2.convexHull(px[part]).reshape(-1, 2)
                 out.append(PartHull(b, int(part), float(depths[part, 0]), hull))
     return found

@@ -149,7 +149,7 @@ class ChamferCost:
         ]
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
         self._arrays = _ViewArrays(
-            np.stack([occluding_contours.projection(v.camera) for v in views]),
+            np.stack([v.camera.projection for v in views]),
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
             _distances(tuple(views)),
@@ -215,7 +215,7 @@ class ChamferCost:
             np.empty(room * len(views), np.int32), np.zeros(len(views) + 1, np.int64),
         )  # fmt: skip
         n = _trace_views(
-            np.stack([occluding_contours.projection(v.camera) for v in views]),
+            np.stack([v.camera.projection for v in views]),
             np.stack([v.camera.center_world for v in views]),
             occluding_contours.part_poses(bodies), self._surfaces,
             occluding_contours.piece_buffer(self._surfaces, room), out,

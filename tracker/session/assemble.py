@@ -1,6 +1,7 @@
-"""A new session from a calibration and loose footage: who belongs to whom, and whether they fit together."""
+"""Make a session from a calibration and loose footage: match them, and check that they fit together."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from tracker.errors import RecordingError, SessionError
@@ -14,61 +15,62 @@ from tracker.session.session import PALETTE, Person, Session, create_session
 
 DEFAULT_MODEL = "gavrila34"
 
-# Relative difference above which two frame rates are two: 29.97 and 30 differ by twice as much.
 _RATE_TOLERANCE = 5e-4
+"""Relative difference above which two frame rates differ; 29.97 and 30 differ by twice as much."""
 _VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
 
 
-def assemble(
-    folder: str | Path,
-    *,
-    calibration: str | Path,
-    videos: Sequence[str | Path] = (),
-    camera_paths: Mapping[str, str | Path] | None = None,
-    background: str | Path | None = None,
-    masks: str | Path | None = None,
-    offsets: Mapping[str, int] | None = None,
-    people: Sequence[str] = ("person",),
-    models: Mapping[str, str] | str = DEFAULT_MODEL,
-    heights: Mapping[str, float] | float | None = None,
-    fps: float | None = None,
-    up: str = "z",
-    units: Units = "m",
-) -> Session:
-    """Make a session folder of a calibration and footage; nothing is written unless all of it fits.
+@dataclass(frozen=True)
+class NewSession:
+    """A request for a new session."""
 
-    Args:
-        folder: where the session goes; must not exist, or be empty.
-        calibration: TOML file in the anipose layout.
-        videos: video files or image folders, each named after its camera.
-        camera_paths: footage by camera name, whatever its own name; goes before `videos`.
-        background: folder of CAM.png or CAM.mp4 of the empty scene.
-        masks: folder of CAM/%06d.png.
-        offsets: frames by which to shift a camera: frame k of the session is its frame k + offset.
-        people: names of the people to track.
-        models: body model (preset or .toml file) of all people, or by name; the rest have gavrila34.
-        heights: body height of all people, or by name, metres; the rest have their model's own.
-        fps: frame rate, 1/s; needed where all footage is folders of images.
-        up: world axis that points up.
-        units: unit of the calibration's translations.
+    folder: Path
+    """Where the session goes; must not exist, or be empty."""
+    calibration: Path
+    """TOML file in the anipose layout."""
+    videos: Sequence[Path] = ()
+    """Video files or image folders, each named after its camera."""
+    camera_paths: Mapping[str, Path] = field(default_factory=dict)
+    """Footage by camera name, under any file name; goes before `videos`."""
+    background: Path | None = None
+    """Folder of CAM.png or CAM.mp4 of the empty scene."""
+    masks: Path | None = None
+    """Folder of CAM/%06d.png."""
+    offsets: Mapping[str, int] = field(default_factory=dict)
+    """Shift by camera name: frame k of the session is frame k + offset of the camera."""
+    people: Sequence[str] = ("person",)
+    """Names of the people to track."""
+    models: Mapping[str, str] | str = DEFAULT_MODEL
+    """Body model (preset or .toml file) of all people, or by name; the default for names left out."""
+    heights: Mapping[str, float] | float | None = None
+    """Body height of all people, or by name, metres; the model's own for names left out."""
+    fps: float | None = None
+    """Frame rate, 1/s; needed if all footage is folders of images."""
+    up: str = "z"
+    """World axis that points up."""
+    units: Units = "m"
+    """Unit of the calibration's translations."""
+
+
+def assemble(request: NewSession) -> Session:
+    """Make a session folder of a calibration and footage. Nothing is written unless all of it fits.
 
     Raises:
-        SessionError: a name that is not known, a camera without footage or footage without a camera.
+        SessionError: an unknown name, a camera without footage or footage without a camera.
         RecordingError: footage that is unreadable, or does not fit the calibration or the other cameras.
         CalibrationError: the calibration is malformed.
         ModelError: a body model is unknown or malformed.
     """
-    cameras = read_calibration(calibration, units)
-    offsets = offsets or {}
-    _check_names(offsets, [c.name for c in cameras], "camera", "--offset")
-    paths = _match(cameras, [Path(v) for v in videos], {n: Path(p) for n, p in (camera_paths or {}).items()})
+    cameras = read_calibration(request.calibration, request.units)
+    _check_names(request.offsets, [c.name for c in cameras], "camera", "--offset")
+    paths = _match(cameras, request.videos, request.camera_paths)
     sources = tuple(
         CameraSource(
             c,
             paths[c.name],
-            _find_background(Path(background), c) if background is not None else None,
-            _find_masks(Path(masks), c) if masks is not None else None,
-            offsets.get(c.name, 0),
+            _find_background(request.background, c) if request.background is not None else None,
+            _find_masks(request.masks, c) if request.masks is not None else None,
+            request.offsets.get(c.name, 0),
         )
         for c in cameras
     )
@@ -76,21 +78,15 @@ def assemble(
     try:
         for c in cameras:
             check_size(c.name, footage[c.name].path, footage[c.name].size, c.size)
-        common_fps = _common_rate(footage, fps)
-        n_frames = _common_length(footage, offsets)
+        fps = _common_rate(footage, request.fps)
+        n_frames = _common_length(footage, request.offsets)
     finally:
         for f in footage.values():
             f.close()
     for source in sources:
         _check_side_files(source)
-    return create_session(
-        folder,
-        cameras=sources,
-        people=_make_people(people, models, heights),
-        fps=common_fps,
-        n_frames=n_frames,
-        up=up,
-    )
+    people = _make_people(request.people, request.models, request.heights)
+    return create_session(request.folder, cameras=sources, people=people, fps=fps, n_frames=n_frames, up=request.up)
 
 
 def _match(cameras: Sequence[Camera], videos: Sequence[Path], camera_paths: Mapping[str, Path]) -> dict[str, Path]:
@@ -171,7 +167,7 @@ def _find_masks(folder: Path, camera: Camera) -> Path:
 
 
 def _check_side_files(source: CameraSource) -> None:
-    """Read the background and the first mask, so that a misfit shows now and not in the midst of tracking."""
+    """Read the background and the first mask, so that a misfit shows before tracking starts."""
     read_background(source)
     if source.masks is not None:
         first = min(source.masks.glob("[0-9]" * 6 + ".png"))

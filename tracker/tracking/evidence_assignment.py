@@ -126,7 +126,7 @@ class _View:
             np.zeros(n_people, np.bool_),
         )  # fmt: skip
         _assign(
-            occluding_contours.projection(view.camera), view.camera.center_world, self._Ts, self._surfaces,
+            view.camera.projection, view.camera.center_world, self._Ts, self._surfaces,
             occluding_contours.contour_buffer(view.camera, n_people), edges, silhouette, view.theta_px, out,
         )  # fmt: skip
         return out

@@ -33,6 +33,7 @@ class Hand:
         self._grab: posing.Grab | None = None  # as the gesture began
         self._hold: posing.Grab | None = None  # as its present mode began
         self._grab_page = 0
+        self._scores_moves = False  # whether the pose in hand is still to be scored in the background
         self._costs = Latest(self._cost, "cost in hand", _REST_S)
 
     def close(self) -> None:
@@ -87,10 +88,13 @@ class Hand:
             drag = DragState(camera, person, name, pointer_px, self._grab.part, (x, y, z), part is not None)
             self._screen.set(person=person, point=selected, drag=drag)
 
-    def move_drag(self, page: int, pointer_px: tuple[float, float], seq: int, mode: str = "move") -> None:
+    def move_drag(
+        self, page: int, pointer_px: tuple[float, float], seq: int, mode: str = "move", is_last: bool = False
+    ) -> None:
         """Let the held point follow the pointer; or turn its part, or push it in depth (see `tracker.posing.drag`).
 
-        Whenever the mode changes the hand takes hold anew, where the pointer was: nothing jumps.
+        Whenever the mode changes the hand takes hold anew, where the pointer was: nothing jumps. The last move of a
+        drag is not scored here, because `end_drag` scores its pose.
         """
         ways = {"move": posing.drag, "turn": posing.turn, "push": posing.push}
         with self._screen.lock:
@@ -105,7 +109,9 @@ class Hand:
             seqs = (*(s for s in self._screen.state.drag_seqs if s[0] != page), (page, seq))[-16:]
             people = self._screen.posed(drag.person, values)
             self._screen.set(people=people, drag=replace(drag, pointer_px=pointer_px), drag_seqs=seqs)
-            self._costs.offer(self._screen.state)
+            self._scores_moves = not is_last
+            if not is_last:
+                self._costs.offer(self._screen.state)
             if time.monotonic() - self._screen.last_save > _CHECKPOINT_S:
                 self._screen.save(f"drag {display_name(drag.point)}", "manual", self._grab)
 
@@ -129,6 +135,7 @@ class Hand:
         hand, drag = self._grab, self._screen.state.drag
         if hand is None or drag is None:
             return
+        self._scores_moves = False
         if not np.array_equal(hand.values, self._screen.state.poses[drag.person]) or self._screen.edit_of is hand:
             self._screen.save(f"drag {display_name(drag.point)}", "manual", hand)
         self._grab = self._hold = self._screen.edit_of = None
@@ -138,7 +145,7 @@ class Hand:
         """Work out what the pose in hand costs, unless it has changed by then, or been let go: others know its cost."""
         time.sleep(_HEAD_START_S)
         state = self._screen.state
-        costs = self._screen.costs(state.poses) if state.drag is not None else {}
+        costs = self._screen.costs(state.poses) if self._scores_moves and state.drag is not None else {}
         with self._screen.lock:
             if costs and self._screen.state.drag is not None and self._screen.state.people is state.people:
                 self._screen.set(**costs)

@@ -113,7 +113,7 @@ async def test_what_cannot_be_tracked_is_a_notice(controller):
         assert notice["level"] == "error"
         assert "frames to track before frame 2" in notice["text"]
         await page.send("curves", group="ears")
-        assert "'ears' is no group of curves" in (await page.hear("notice"))["text"]
+        assert "expected a value of docs/protocol.md as 'group', found 'ears'" in (await page.hear("notice"))["text"]
 
 
 async def test_a_tracker_that_fails_is_a_notice_once(controller, tracker):
@@ -216,7 +216,7 @@ async def test_a_range_is_worked_on_and_told(controller):
         await page.send("range", action="reviewed", first=3, last=4, person=0)
         assert set((await page.hear("timeline"))["cells"]) == {"3", "4"}
         await page.send("range", action="fold", first=3, last=4, person=0)
-        assert "fold" in (await page.hear("notice"))["text"]
+        assert "found 'fold'" in (await page.hear("notice"))["text"]
         await page.send("range", action="interpolate", first=10, last=12, person=None)
         assert "poses at both ends" in (await page.hear("notice"))["text"]
 
@@ -241,9 +241,37 @@ async def test_what_is_not_understood_is_refused_and_nothing_has_happened(contro
     before = controller.state
     async with visiting(controller) as page:
         await page.send(kind, **({"phase": "start"} if kind == "pin" else {}), **fields)
-        assert "not understood" in (await page.hear("notice"))["text"]
+        assert "the page sent a wrong message" in (await page.hear("notice"))["text"]
     now = controller.state
     assert (now.pins, now.people, now.undo, now.cast) == (before.pins, before.people, before.undo, before.cast)
+
+
+@pytest.mark.parametrize(
+    ("data", "binary"),
+    [
+        (b"{", False), (b"\xff\xfe", False), (b'{"type":"seek"}', True), (b"[" * 100_000, False),
+        (b'{"type":"seek","frame":1e400}', False), (b'{"frame":1}', False),
+        (b'{"type":"seek","frame":' + b"[" * 100_000, False),
+    ],
+)  # fmt: skip
+async def test_a_wrong_message_is_one_notice_and_the_socket_stays_open(controller, caplog, data, binary):
+    async with visiting(controller) as page:
+        await page.hear("timeline")
+        await page.send_raw(data, binary)
+        assert (await page.hear("notice"))["text"].startswith("expected ")
+        await page.send("seek", frame=7)
+        await page.hear("state", lambda m: m["frame"] == 7)
+        assert len([m for m in page.told if m["type"] == "notice"]) == 1
+    assert not caplog.records
+
+
+async def test_a_fault_of_the_program_is_a_notice(controller, monkeypatch):
+    monkeypatch.setattr(controller, "undo", lambda: 1 / 0)
+    async with visiting(controller) as page:
+        await page.send("undo")
+        assert "ZeroDivisionError" in (await page.hear("notice"))["text"]
+        await page.send("seek", frame=7)
+        await page.hear("state", lambda m: m["frame"] == 7)
 
 
 async def test_many_cells_travel_as_columns(controller, monkeypatch):
@@ -340,11 +368,11 @@ async def test_what_a_page_sees_anew_is_sent_and_nothing_else(controller):
 async def test_a_view_that_is_not_understood_is_a_notice(controller):
     async with visiting(controller) as page:
         await page.shows("image", "x-rays")
-        assert "no layers are called x-rays" in (await page.hear("notice"))["text"]
+        assert "as 'layers[1]', found 'x-rays'" in (await page.hear("notice"))["text"]
         await page.shows("image", reductions=(1, 1))
         assert "for each of 4 cameras" in (await page.hear("notice"))["text"]
-        await page.shows("image", reductions=(1, 1, 0.5, float("nan")))
-        assert "expected 0 or a reduction from 1 to" in (await page.hear("notice"))["text"]
+        await page.shows("image", reductions=(1, 1, 0.5, 0))
+        assert "expected 0 or a reduction from 1 to 64" in (await page.hear("notice"))["text"]
 
 
 def size_of(picture):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gestures import wait_for
 
-from app.scene3d.camera_view import SnapView
+from app.scene3d.camera_view import CameraView
 from tracker.geometry import rigid
 
 START = (np.array([3.0, 3.0, 2.0]), np.array([1.0, 0.0, 0.0, 0.0]))
@@ -57,7 +57,7 @@ def controller(opened):
 def page(controller):
     page, connect = Page(), []
     server = SimpleNamespace(on_client_connect=connect.append, on_client_disconnect=lambda _: None)
-    SnapView(server, controller)
+    CameraView(server, controller)
     asyncio.run(connect[0](page))
     return page
 

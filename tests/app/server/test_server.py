@@ -22,7 +22,7 @@ class EchoPanes:
     async def serve(self, socket):
         async for message in socket:
             if message.type is aiohttp.WSMsgType.TEXT:
-                await socket.send_str(message.data)
+                await socket.send_str(message.data.decode())
 
 
 class FakeViser:

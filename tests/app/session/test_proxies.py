@@ -34,7 +34,7 @@ def test_stopped_it_goes_on(run, session, monkeypatch):
     monkeypatch.setattr(proxies.Proxy, "make", make)
     status, _, err = run("index", session)
     assert status == 1
-    assert "goes on from here" in err
+    assert "run it again to resume" in err
     loaded = load_session(session)
     assert sum(p.n_frames for p in proxies.proxies(loaded) if p) == 69 - 1
     assert run("index", session)[0] == 0

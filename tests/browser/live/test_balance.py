@@ -10,7 +10,7 @@ from program import Program
 
 from tracker.evaluation.references import read_joints
 from tracker.fitting.gauss_newton import fit_to_points
-from tracker.session.assemble import assemble
+from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
 
 JOINTS = ("shoulder", "knee", "ankle", "elbow", "wrist")
@@ -25,10 +25,12 @@ def balance(data_folder, tmp_path_factory):
     data = data_folder("balance_real")
     folder = tmp_path_factory.mktemp("balance") / "session"
     assemble(
-        folder,
-        calibration=data / "Calib.toml",
-        videos=sorted(data.glob("cam*.mp4")),
-        background=data / "background",
+        NewSession(
+            folder,
+            calibration=data / "Calib.toml",
+            videos=sorted(data.glob("cam*.mp4")),
+            background=data / "background",
+        )
     )
     session = load_session(folder)
     joints = read_joints(data / "reference_joints.trc", session.fps)

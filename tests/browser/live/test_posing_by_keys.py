@@ -113,7 +113,7 @@ async def test_locks_hold_under_keys_and_show(live):
     await live.locator("#joint-name").blur()
     await live.keyboard.press("o")
     await shows(live, "quadrille.state.state.locked.length === 1")
-    assert await live.locator(".dof .number-entry").is_disabled()
+    assert await live.locator(".dof .number-field").is_disabled()
     before = (await state_of(live))["state"]
     await live.keyboard.press("+")
     await shows(live, "document.querySelector('#notices')?.textContent.includes('left elbow extension is locked')")
@@ -128,7 +128,7 @@ async def test_locks_hold_under_keys_and_show(live):
 async def test_wrong_numbers_are_refused_and_restored(live):
     await go_to(live, 9)
     await select(live, "left_elbow")
-    entry = live.locator(".dof .number-entry")
+    entry = live.locator(".dof .number-field")
     for wrong in ("abc", "200", "-5", ""):
         await entry.focus()
         await entry.fill(wrong)
@@ -140,7 +140,7 @@ async def test_wrong_numbers_are_refused_and_restored(live):
     before = await entry.input_value()
     await entry.fill("12,5")  # a comma is a point in half of the world
     await live.keyboard.press("Enter")
-    await shows(live, f"document.querySelector('.dof .number-entry').value === '12.5' && '{before}' !== '12.5'")
+    await shows(live, f"document.querySelector('.dof .number-field').value === '12.5' && '{before}' !== '12.5'")
     await shows(live, "quadrille.state.state.undo === 'set left elbow extension, frame 9'")
     await live.locator("#step-deg").fill("0")
     await live.keyboard.press("Enter")

@@ -132,20 +132,20 @@ async def test_brightness_belongs_to_one_camera_and_is_remembered(page):
     pane = await page.locator(".pane").first.bounding_box()
     await page.mouse.move(pane["x"] + 60, pane["y"] + 200)
     await page.keyboard.press("i")
-    await set_slider(page, "[data-look=brightness]", 30)
-    await shows(page, "quadrille.state.looks[0].brightness === 30")
+    await set_slider(page, "[data-tone=brightness]", 30)
+    await shows(page, "quadrille.state.imageTones[0].brightness === 30")
     assert await color_at(page) == pytest.approx([c + 0.3 * 255 for c in plain], abs=3)
     assert await color_at(page, (1, *PLACE[1:])) == other
-    await set_slider(page, "[data-look=contrast]", -50)
-    await shows(page, "quadrille.state.looks[0].contrast === -50")
+    await set_slider(page, "[data-tone=contrast]", -50)
+    await shows(page, "quadrille.state.imageTones[0].contrast === -50")
     assert await color_at(page) == pytest.approx([(c + 127.5) / 2 + 0.3 * 255 for c in plain], abs=3)
     await page.reload()
     await shows(page, "window.quadrille?.state.shown.pictures['image 0'] && quadrille.state.overlay")
     assert (await color_at(page))[0] > plain[0] + 60
     await page.mouse.move(pane["x"] + 60, pane["y"] + 200)
     await page.keyboard.press("i")
-    await page.locator("#look-menu").get_by_role("button", name="Reset").click()
-    await shows(page, "quadrille.state.looks[0].brightness === 0")
+    await page.locator("#image-tone-menu").get_by_role("button", name="Reset").click()
+    await shows(page, "quadrille.state.imageTones[0].brightness === 0")
     assert await color_at(page) == plain
 
 

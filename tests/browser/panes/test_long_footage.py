@@ -27,7 +27,7 @@ COLORED = "255,180,84"
 async def visit(page, *frames):
     for frame in frames:
         await page.evaluate(GO, frame)
-        await shows(page, f"quadrille.state.shown.frame === {frame} && !quadrille.state.standIn", 15)
+        await shows(page, f"quadrille.state.shown.frame === {frame} && !quadrille.state.placeholder", 15)
 
 
 @asynccontextmanager
@@ -37,17 +37,17 @@ async def slow(page, endpoint, frame):
     await page.evaluate(GO, frame)
     yield
     endpoint.held.set()
-    await shows(page, f"quadrille.state.shown.frame === {frame} && !quadrille.state.standIn", 15)
+    await shows(page, f"quadrille.state.shown.frame === {frame} && !quadrille.state.placeholder", 15)
     endpoint.held = None
 
 
 async def test_the_nearest_frame_stands_in_marked_and_is_replaced_by_the_true_one(page, endpoint):
     await visit(page, 40, 90)
     async with slow(page, endpoint, 45):
-        await shows(page, "quadrille.state.standIn?.frame === 40 && quadrille.state.standIn.pictures")
-        assert await page.locator(".pane-stand-in").all_inner_texts() == ["frame 40, while 45 loads"] * 4
+        await shows(page, "quadrille.state.placeholder?.frame === 40 && quadrille.state.placeholder.pictures")
+        assert await page.locator(".pane-placeholder").all_inner_texts() == ["frame 40, while 45 loads"] * 4
         assert (await state_of(page))["shown"]["frame"] == 90
-    assert await page.locator(".pane-stand-in:visible").count() == 0
+    assert await page.locator(".pane-placeholder:visible").count() == 0
 
 
 async def test_no_hand_takes_anything_of_a_frame_that_stands_in(page, endpoint):
@@ -56,7 +56,7 @@ async def test_no_hand_takes_anything_of_a_frame_that_stands_in(page, endpoint):
     x, y = await to_client(page, 0, u, v)
     assert COLORED in await page.evaluate(COLORS)
     async with slow(page, endpoint, 45):
-        await shows(page, "quadrille.state.standIn?.pictures")
+        await shows(page, "quadrille.state.placeholder?.pictures")
         assert COLORED not in await page.evaluate(COLORS)  # the model of another frame is not drawn over it
         await page.mouse.move(x, y)
         await page.mouse.down()
@@ -69,9 +69,9 @@ async def test_no_hand_takes_anything_of_a_frame_that_stands_in(page, endpoint):
 async def test_where_the_frame_on_the_screen_is_the_nearest_it_stays_and_is_marked(page, endpoint):
     await visit(page, 40)
     async with slow(page, endpoint, 44):
-        await shows(page, "quadrille.state.standIn")
-        assert (await state_of(page))["standIn"] == {"frame": 40, "target": 44, "pictures": False}
-        assert await page.locator(".pane-stand-in").first.inner_text() == "frame 40, while 44 loads"
+        await shows(page, "quadrille.state.placeholder")
+        assert (await state_of(page))["placeholder"] == {"frame": 40, "target": 44, "pictures": False}
+        assert await page.locator(".pane-placeholder").first.inner_text() == "frame 40, while 44 loads"
 
 
 async def test_a_hand_that_scrubs_on_is_followed(page, endpoint):
@@ -80,7 +80,8 @@ async def test_a_hand_that_scrubs_on_is_followed(page, endpoint):
         for wish, stand_in in ((61, 60), (22, 20), (59, 60)):
             await page.evaluate(GO, wish)
             await shows(
-                page, f"quadrille.state.standIn?.frame === {stand_in} && quadrille.state.standIn.target === {wish}"
+                page,
+                f"quadrille.state.placeholder?.frame === {stand_in} && quadrille.state.placeholder.target === {wish}",
             )
 
 
@@ -91,7 +92,7 @@ async def test_playing_shows_no_stand_ins(page, endpoint):
         await shows(page, "quadrille.state.playing && quadrille.state.target > 5")
         await asyncio.sleep(0.2)
         state = await state_of(page)
-        assert (state["shown"]["frame"], state["standIn"]) == (5, None)
+        assert (state["shown"]["frame"], state["placeholder"]) == (5, None)
         await page.keyboard.press("Space")
         await page.evaluate(GO, 5)
 
@@ -106,9 +107,9 @@ async def test_the_mark_fits_a_narrow_pane(browser, address, endpoint, scheme):
     await shows(page, OPENED, 15)
     await visit(page, 99_000)
     async with slow(page, endpoint, 99_999):
-        await shows(page, "quadrille.state.standIn")
+        await shows(page, "quadrille.state.placeholder")
         widths = await page.eval_on_selector_all(
-            ".pane-stand-in", "all => all.map((m) => [m.scrollWidth, m.clientWidth])"
+            ".pane-placeholder", "all => all.map((m) => [m.scrollWidth, m.clientWidth])"
         )
         assert len(widths) == 16
         assert all(needed <= given for needed, given in widths)

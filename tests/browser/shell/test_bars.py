@@ -133,7 +133,7 @@ async def test_playback_keeps_no_backlog_and_stops_at_the_end(page, endpoint):
 @pytest.mark.parametrize(("width", "height", "scale"), [(1280, 720, 0.5), (1100, 680, 0.5)])
 async def test_nothing_is_cut_off_in_small_windows(page, width, height, scale):
     await page.set_viewport_size({"width": width, "height": height})
-    help_box = await page.locator("#show-help").bounding_box()
+    help_box = await page.locator("#show-key-list").bounding_box()
     assert help_box["x"] + help_box["width"] <= width
     curves = await page.locator("#show-curves").bounding_box()
     assert curves["x"] + curves["width"] <= width

@@ -76,7 +76,7 @@ async def test_every_key_and_button_is_in_it(page):
     await page.evaluate("document.querySelector('#palette').close()")
     missing = await page.evaluate(
         """async () => {
-          const rows = [...document.querySelectorAll('#help-keys dd')].map((d) => d.textContent);
+          const rows = [...document.querySelectorAll('#key-areas dd')].map((d) => d.textContent);
           document.querySelector('#show-palette').click();
           const query = document.querySelector('#palette-query');
           const missing = [];
@@ -99,17 +99,16 @@ async def test_every_key_and_button_is_in_it(page):
 async def test_the_list_of_keys_is_searched_and_fits(page):
     await page.set_viewport_size({"width": 1280, "height": 720})
     await page.keyboard.press("?")
-    box = await page.locator("#help").bounding_box()
+    box = await page.locator("#key-list").bounding_box()
     assert box["x"] >= 0
     assert box["y"] >= 0
     assert box["x"] + box["width"] <= 1280
     assert box["y"] + box["height"] <= 720
-    assert await page.evaluate(
-        "document.querySelector('#help .scroller').scrollWidth <= document.querySelector('#help .scroller').clientWidth"
-    )
-    assert "More" not in await page.locator("#help h3").all_inner_texts()  # every key is about something
+    scroller = page.locator("#key-list .scroller")
+    assert await scroller.evaluate("(element) => element.scrollWidth <= element.clientWidth")
+    assert "More" not in await page.locator("#key-list h3").all_inner_texts()  # every key is about something
     await page.keyboard.type("former doubt")
-    assert await page.locator("#help dd:visible").all_inner_texts() == ["Former doubtful or lost frame"]
+    assert await page.locator("#key-list dd:visible").all_inner_texts() == ["Former doubtful or lost frame"]
 
 
 async def test_undo_holds_in_every_part_of_the_page(page, endpoint):

@@ -49,8 +49,8 @@ async def test_searches_and_fits_are_of_everybody_or_of_one(couple, endpoint):
     await until(lambda: len(endpoint.heard("fit")) == 2)
     assert [m["person"] for m in endpoint.heard("search")] == [None, 0]
     assert [m["person"] for m in endpoint.heard("fit")] == [None, 0]
-    await shows(couple, "document.querySelector('#search-whose').selectedOptions[0].textContent === 'Only person 0'")
-    await couple.select_option("#search-whose", "all")
+    await shows(couple, "document.querySelector('#search-scope').selectedOptions[0].textContent === 'Only person 0'")
+    await couple.select_option("#search-scope", "all")
     await couple.keyboard.press("s")
     await until(lambda: len(endpoint.heard("search")) == 3)
     assert endpoint.heard("search")[-1]["person"] is None
@@ -78,9 +78,9 @@ async def test_each_has_a_lane_and_two_poses_as_good_are_gone_to(couple, endpoin
     assert height > 72
     await couple.keyboard.press("Alt+a")
     await shows(couple, "quadrille.state.state.frame === 71")
-    assert not await couple.locator("#take-other").is_visible()
+    assert not await couple.locator("#take-alternative").is_visible()
     endpoint.state["people"][1]["alternatives"] = 1
     await endpoint.broadcast(endpoint.state)
-    await couple.locator("#take-other").click()
+    await couple.locator("#take-alternative").click()
     await couple.keyboard.press("Shift+X")
     await until(lambda: [m["action"] for m in endpoint.heard("pose")] == ["alternative", "alternative"])

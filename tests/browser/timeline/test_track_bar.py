@@ -139,7 +139,7 @@ async def test_doubtful_and_lost_frames_are_visited_one_after_the_other(page, en
     for frame in (31, 32, 50, 50):
         await page.keyboard.press("n")
         await shows(page, f"quadrille.state.shown.frame === {frame}")
-    await page.locator("#former-doubt").click()
+    await page.locator("#previous-doubt").click()
     await shows(page, "quadrille.state.shown.frame === 32")
     await page.locator("#next-doubt").click()
     await shows(page, "quadrille.state.shown.frame === 50")

@@ -7,7 +7,6 @@ from staging import SUIT, at, camera_at, cameras_around, dressed, posed, solid
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
-from tracker.contours.occluding_contours import projection
 
 BINS, SAMPLES = 12, 7
 
@@ -34,7 +33,7 @@ def plain_samples(views, bodies, person, values, limb, away=()):
     first = sum(len(b.model.parts) for b in bodies[:person])
     Ts = model.kinematics(values).Ts_world_part
     for view in views:
-        eye, P = view.camera.center_world, projection(view.camera)
+        eye, P = view.camera.center_world, view.camera.projection
         for part in limb:
             T, center, half = Ts[part], model.centers_part[part], model.shapes[part].half_axes
             for share in np.linspace(-0.8, 0.8, SAMPLES):
@@ -146,7 +145,7 @@ def test_a_limb_and_others_that_reach_the_cameras_plane(gavrila, distance):
     found = Colors(near, bodies).limb_scorer(stand, arm.parts, known)(poses)
     assert np.isfinite(found).all()
     for pose, nats in zip(poses, found, strict=True):
-        P = projection(camera)
+        P = camera.projection
         T = gavrila.kinematics(pose).Ts_world_part[arm.parts]
         if (P[2, :3] @ T[:, :3, 3].T + P[2, 3] > 0.4).all():
             assert nats == pytest.approx(plain_look(near, bodies, 0, pose, arm.parts, known.log_ratios), abs=15)

@@ -12,7 +12,6 @@ from tracker.contours.occluding_contours import (
     part_poses,
     piece_buffer,
     place_parts,
-    projection,
     surfaces_of,
 )
 from tracker.contours.static_cache import (
@@ -50,7 +49,7 @@ def traced_with_kept(bodies, then, moves):
     surfaces = surfaces_of(tuple(b.model for b in bodies))
     room = contour_room(CAMERAS[0], len(bodies))
     out, static = piece_buffer(surfaces, room), static_contours_buffer(len(CAMERAS), room, 1, moves)
-    views = [(i, projection(c), c.center_world) for i, c in enumerate(CAMERAS)]
+    views = [(i, c.projection, c.center_world) for i, c in enumerate(CAMERAS)]
     place_parts(part_poses(bodies), surfaces, out)
     for i, P, eye in views:
         trace_static(P, eye, surfaces, PIECE_PX, static, out)

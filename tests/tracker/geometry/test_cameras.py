@@ -4,7 +4,7 @@ import pytest
 
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
-from tracker.geometry.cameras import Camera, epipolar_segment, viewed_point
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera, epipolar_segment, project_with_jacobian, viewed_point
 
 K = np.array([[600.0, 0.0, 315.3], [0.0, 610.0, 244.7], [0.0, 0.0, 1.0]])
 DISTORTIONS = {
@@ -200,3 +200,31 @@ def test_one_camera_alone_looks_at_what_is_some_metres_ahead():
     point = viewed_point([alone])
     assert alone.depths(point) == pytest.approx(4.0, abs=0.05)
     np.testing.assert_allclose(alone.project(point), K[:2, 2], atol=1e-6)
+
+
+def test_jacobian_of_the_projection_against_finite_differences():
+    c, points, h = camera(5), cloud(), 1e-6
+    points_px, J = c.project_with_jacobian(points)
+    np.testing.assert_allclose(points_px, c.pinhole.project(points), atol=1e-9)
+    for axis, step in enumerate(h * np.eye(3)):
+        slope = (c.pinhole.project(points + step) - c.pinhole.project(points - step)) / (2 * h)
+        np.testing.assert_allclose(J[:, :, axis], slope, rtol=1e-5, atol=1e-4)
+
+
+def test_a_point_behind_the_near_plane_is_projected_from_the_near_plane():
+    c = camera(0)
+    along = c.T_world_camera[:3, :3] @ np.array([[0.01, 0.02, d] for d in (0.03, NEAR_PLANE_M - 1e-9, -2.0)]).T
+    points_px, J = c.project_with_jacobian(c.center_world + along.T)
+    np.testing.assert_allclose(points_px, np.tile(points_px[0], (3, 1)))
+    np.testing.assert_allclose(J @ c.T_world_camera[:3, 2], 0.0, atol=1e-9)
+
+
+def test_cameras_of_the_points_are_projected_one_by_one():
+    cameras = [camera(0), looking_at((-2.0, 2.0, 1.0), (0.0, 0.0, 1.0))]
+    points = cloud(2)
+    Ts_camera_world, K = np.stack([c.T_camera_world for c in cameras]), np.stack([c.K for c in cameras])
+    points_px, J = project_with_jacobian(Ts_camera_world, K, points)
+    for c, point, px, by_point in zip(cameras, points, points_px, J, strict=True):
+        one_px, one_J = c.project_with_jacobian(point[None])
+        np.testing.assert_allclose(one_px[0], px)
+        np.testing.assert_allclose(one_J[0], by_point)

@@ -10,7 +10,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.anipose import write_calibration
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
-from tracker.session.assemble import assemble
+from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
 
 K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])
@@ -33,7 +33,7 @@ def room(tmp_path):
 
 def new(room, **changes):
     settings = {"calibration": room / "Calib.toml", "videos": [room / "left.mp4", room / "front.mp4"]}
-    return assemble(room / "s", **(settings | changes))
+    return assemble(NewSession(room / "s", **(settings | changes)))
 
 
 def assert_refused(room, kind, expected, **changes):
@@ -101,7 +101,9 @@ def test_side_files(room):
     assert [c.masks.name for c in session.cameras] == ["front", "left"]
     cv2.imwrite(str(room / "bg" / "front.png"), np.zeros((5, 5, 3), np.uint8))
     with pytest.raises(RecordingError, match=r"camera 'front'.*5x5"):
-        assemble(room / "t", calibration=room / "Calib.toml", videos=room.glob("*.mp4"), background=room / "bg")
+        assemble(
+            NewSession(room / "t", calibration=room / "Calib.toml", videos=room.glob("*.mp4"), background=room / "bg")
+        )
 
 
 def test_missing_side_files(room):
@@ -195,11 +197,13 @@ def test_wrong_options(room, changes, kind, expected):
 def test_footage_at_hand(data_folder, tmp_path, name):
     folder = data_folder(name)
     session = assemble(
-        tmp_path / "s",
-        calibration=folder / "Calib.toml",
-        videos=sorted(folder.glob("*.mp4")),
-        background=folder / "background",
-        masks=folder / "masks" if (folder / "masks").exists() else None,
+        NewSession(
+            tmp_path / "s",
+            calibration=folder / "Calib.toml",
+            videos=sorted(folder.glob("*.mp4")),
+            background=folder / "background",
+            masks=folder / "masks" if (folder / "masks").exists() else None,
+        )
     )
     assert len(session.cameras) == 4
     assert session.fps in (30.0, 60.0)

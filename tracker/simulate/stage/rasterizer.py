@@ -7,11 +7,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array, IntArray
-from tracker.geometry.cameras import Camera
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 
 SAMPLES = 2
 """Samples per pixel along each axis. The colour of a pixel is the mean over its area, which is centred at integers."""
-NEAR_M = 0.05
 
 AMBIENT_SKY = 0.52
 AMBIENT_GROUND = 0.36
@@ -60,7 +59,7 @@ def cast(
     found = np.zeros(shape, dtype=np.float32) if inverse_depths is None else inverse_depths.copy()
     hits = Hits(np.full(shape, -1, dtype=np.int32), found, np.zeros((*shape, 3), dtype=np.float32))
     depths = camera.depths(vertices_world)
-    inverse = np.where(depths > NEAR_M, 1.0 / np.maximum(depths, NEAR_M), -1.0)
+    inverse = np.where(depths > NEAR_PLANE_M, 1.0 / np.maximum(depths, NEAR_PLANE_M), -1.0)
     _rasterize(np.nan_to_num(camera.project(vertices_world)), inverse, faces, *hits)
     return hits
 

@@ -7,7 +7,7 @@ import pytest
 from gestures import PAGE, drag, pixel_of, wait_for
 
 from app.page import messages
-from app.state import page_view
+from app.state.page_view import View
 from tracker.body.dimensions import PartDimensions, sizes_of
 from tracker.errors import TrackerError
 from tracker.session.session import load_session
@@ -45,7 +45,7 @@ def test_a_draft_is_drawn_and_changes_nothing(posed, session):
     lengthen(posed)
     assert length(posed.sizing.model(0)) == pytest.approx(length(before) + 0.01)
     assert length(posed.sizing.model(0), "right_forearm") == pytest.approx(length(before) + 0.01)  # both sides alike
-    view = page_view.view_of({"layers": ["contours"], "reductions": [1] * 4, "by_part": False}, 4)
+    view = View(frozenset(["contours"]), (1.0,) * 4)
     drawn = messages.overlay(posed.session_of(posed.state), posed.state, PAGE, view, None)
     assert b'"ghost"' in drawn
     assert posed.models == (before,)
@@ -86,12 +86,12 @@ def test_poses_that_are_kept_are_shown_with_their_own_body_and_marked(posed):
     for frame in FRAMES:
         np.testing.assert_array_equal(joints(posed, frame), was[frame])
         assert posed.models == (old,)
-        assert messages.state(posed.session, posed.state)["other_sizes"]
+        assert messages.state(posed.session, posed.state).other_sizes
     # A draft on a frame without a pose has the present body, its joints near those of the nearest pose.
     draft = joints(posed, 4)
     assert length(posed.models[0]) == pytest.approx(length(old) + 0.01)
     assert np.linalg.norm(draft - was[3], axis=1).max() < 0.01
-    assert not messages.state(posed.session, posed.state)["other_sizes"]
+    assert not messages.state(posed.session, posed.state).other_sizes
     # An edit of a kept pose leaves it its body; refitting afterwards is a second edit.
     posed.seek(3)
     drag(posed, "left_wrist", (3.0, 0.0))

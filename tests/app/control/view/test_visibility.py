@@ -21,7 +21,7 @@ def drawn_people(controller):
     drawn = (
         overlays.paths(session, state, ALL, None),
         overlays.handles(session, state, ALL.cameras),
-        part_outlines.outlines(session, state, ALL),
+        part_outlines.part_hulls(session, state, ALL),
         pin_marks.pin_marks(session, state),
     )
     return [{one.person for one in kind} for kind in drawn]

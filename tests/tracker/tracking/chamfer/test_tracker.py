@@ -17,7 +17,7 @@ from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.motion.prediction import PredictSettings
 from tracker.search import chamfer_cost
 from tracker.search.best_first import SearchSettings
-from tracker.session.assemble import assemble
+from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
 from tracker.tracking.chamfer.limb_recovery import LimbSearch
 from tracker.tracking.chamfer.settings import TrackSettings, pose_cost, search_frame
@@ -332,10 +332,12 @@ def test_a_real_recording(data_folder, tmp_path):
     """Three frames of a cluttered room from the reference's pose, as `init --method joints` sets it."""
     folder = data_folder("balance_real")
     session = assemble(
-        tmp_path / "s",
-        calibration=folder / "Calib.toml",
-        videos=sorted(folder.glob("*.mp4")),
-        background=folder / "background",
+        NewSession(
+            tmp_path / "s",
+            calibration=folder / "Calib.toml",
+            videos=sorted(folder.glob("*.mp4")),
+            background=folder / "background",
+        )
     )
     model = session.people[0].model
     reference = read_joints(folder / "reference_joints.trc", session.fps)
@@ -354,7 +356,7 @@ def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folde
     """Without a background: an arm swings before a patterned picture and along a skirting board."""
     folder = data_folder("walk")
     session = assemble(
-        tmp_path / "s", calibration=folder / "Calib.toml", videos=sorted(folder.glob("*.mp4")), heights=1.75
+        NewSession(tmp_path / "s", calibration=folder / "Calib.toml", videos=sorted(folder.glob("*.mp4")), heights=1.75)
     )
     model, frames = session.people[0].model, range(12)
     reference = read_joints(folder / "ground_truth.trc", session.fps)

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from app.scene3d import pace
-from app.scene3d.pace import Pace
+from app.scene3d import throttle
+from app.scene3d.throttle import Throttle
 
 SOFTWARE = frozenset({1})
 
@@ -20,7 +20,7 @@ def clock(monkeypatch):
         clock.now += seconds
         clock.meanwhile()
 
-    monkeypatch.setattr(pace, "time", SimpleNamespace(monotonic=lambda: clock.now, sleep=sleep))
+    monkeypatch.setattr(throttle, "time", SimpleNamespace(monotonic=lambda: clock.now, sleep=sleep))
     return clock
 
 
@@ -31,7 +31,7 @@ def controller(opened):
 
 
 def test_with_a_graphics_card_everything_is_drawn_at_once(controller, clock):
-    drawn = Pace(controller)
+    drawn = Throttle(controller)
     for frame in (1, 2, 3):
         controller.state = replace(controller.state, frame=frame)
         assert drawn.due(controller.state) is controller.state
@@ -40,7 +40,7 @@ def test_with_a_graphics_card_everything_is_drawn_at_once(controller, clock):
 
 def test_work_is_drawn_but_once_in_a_while(controller, clock):
     running = replace(controller.state, holding_3d=SOFTWARE, job=replace(controller.state.job, running=True))
-    drawn, due = Pace(controller), []
+    drawn, due = Throttle(controller), []
     for seconds in (0.0, 1.9, 2.1, 3.9):
         clock.now = 100.0 + seconds
         due.append(drawn.due(running) is not None)
@@ -51,7 +51,7 @@ def test_work_is_drawn_but_once_in_a_while(controller, clock):
 
 def test_frames_that_go_by_are_passed_over_and_the_one_that_stays_is_drawn(controller, clock):
     controller.state = replace(controller.state, holding_3d=SOFTWARE, frame=1)
-    drawn = Pace(controller)
+    drawn = Throttle(controller)
     assert drawn.due(controller.state) is controller.state
     left, stays = replace(controller.state, frame=5), replace(controller.state, frame=9)
     controller.state = left
@@ -76,7 +76,7 @@ def test_frames_that_go_by_are_passed_over_and_the_one_that_stays_is_drawn(contr
 
 
 def test_who_looks_through_a_camera_sees_bodies_and_image_together(controller, clock):
-    drawn = Pace(controller)
+    drawn = Throttle(controller)
     controller.state = replace(controller.state, holding_3d=SOFTWARE, frame=7, snapped=0)
     assert drawn.due(controller.state) is controller.state
     assert clock.now == 100.0

@@ -12,7 +12,7 @@ export const GRAB_RADIUS = 12;
  * @param {import("../model/protocol.js").PersonInfo[]} people
  * @param {import("../model/store.js").Joint | null} held the joint that a hand holds; it stays
  */
-export function uncrowded(placed, people, held) {
+export function decluttered(placed, people, held) {
   const isMinor = (/** @type {PlacedHandle} */ { handle }) =>
     people[handle.person]?.minor.includes(handle.point) ?? false;
   const major = placed.filter((one) => !isMinor(one));

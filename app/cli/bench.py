@@ -1,0 +1,41 @@
+"""`quadrille bench`: measure the tracker's speed and compare it with a baseline."""
+
+import sys
+from pathlib import Path
+
+from app.cli.json_output import format_json
+from app.runtime.progress import Reporter
+
+
+def command(json: bool = False, baseline: Path | None = None, save: Path | None = None, tolerance: float = 0.4) -> None:
+    """Measure the tracker's speed on this machine and compare it with a baseline; status 1 if it became slower.
+
+    Args:
+        json: print one JSON object.
+        baseline: file to compare with; the program's own by default.
+        save: save the ratios in this file instead of comparing them.
+        tolerance: with --save, the share by which a ratio may later be worse.
+    """
+    from rich.console import Console
+
+    from app.bench import report as bench_report
+
+    reference = (
+        {"tolerance": tolerance, "ratios": {}}
+        if save
+        else bench_report.read_baseline(baseline or bench_report.BASELINE)
+    )
+    rows = []
+    with Reporter(silent=json).over(bench_report.N_ROWS, "measuring") as tick:
+        for row in bench_report.measure():
+            rows.append(row)
+            tick()
+    if save:
+        bench_report.save_baseline(rows, save, tolerance)
+    found = bench_report.report(rows, reference)
+    if json:
+        print(format_json(found))
+    else:
+        bench_report.show(found, Console())
+    if found["slower"]:
+        sys.exit(1)

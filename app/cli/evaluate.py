@@ -1,0 +1,89 @@
+"""`quadrille evaluate`: compare stored poses with a reference."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from app.cli.arguments import SessionArg
+from app.cli.json_output import format_json
+from app.cli.target import Target, load_target, parse_frames
+from tracker.errors import SessionError
+
+if TYPE_CHECKING:
+    from tracker.evaluation.metrics import Alignment
+    from tracker.evaluation.references import Reference
+
+
+@dataclass(frozen=True)
+class EvaluateArguments:
+    """Arguments of `quadrille evaluate`."""
+
+    session: SessionArg
+    """session folder."""
+    reference: Path
+    """TRC file, pose table (CSV; its body in NAME_model.toml beside it) or session folder."""
+    frames: str | None = None
+    """A:B, half open; from the first to the last pose by default."""
+    person: str | None = None
+    """name; needed in a session of several people."""
+    joint_map: Path | None = None
+    """TOML file that maps the file's joint names to the body's."""
+    axes: str = "x,y,z"
+    """the file's axes in the session's order, such as x,-z,y."""
+    align: Literal["none", "rigid-all"] = "none"
+    """rigid-all moves the whole reference onto the estimate first."""
+    json: bool = False
+    """print one JSON object."""
+
+
+def command(arguments: Annotated[EvaluateArguments, tyro.conf.arg(name="")]) -> None:
+    """Compare stored poses with a reference: mean errors of the limb joints, lost frames, angles.
+
+    Joints and parts are compared by name, so that the reference may be of another body model.
+    """
+    from tracker.evaluation.references import read_reference
+
+    at = load_target(arguments.session, arguments.person, several=False)
+    reference = read_reference(arguments.reference, at.session, at.people[0], arguments.joint_map, arguments.axes)
+    found = evaluate(at, reference, arguments.frames, arguments.align)
+    print(format_json(found) if arguments.json else _format(found))
+
+
+def evaluate(at: Target, reference: "Reference", frames: str | None, align: "Alignment") -> dict[str, Any]:
+    """Compare the stored poses of one person with a reference, over the given frames or all that have poses.
+
+    Raises:
+        SessionError: the person has no pose.
+    """
+    from tracker.evaluation.metrics import evaluate_joints, evaluate_poses
+    from tracker.evaluation.references import stored_motion
+
+    session, (index,) = at
+    person = session.people[index]
+    joints, motion = stored_motion(session, index)
+    if motion is None or not motion.poses:
+        raise SessionError(f"'{person.name}' has no poses yet; place the body in the page, or use init and track")
+    poses = motion.poses
+    wanted = range(min(poses), max(poses) + 1) if frames is None else parse_frames(frames, session)
+    result = evaluate_joints(joints, reference.joints, wanted, align)
+    if reference.motion is not None:
+        result = evaluate_poses(result, motion, reference.motion, wanted)
+    return {"person": person.name, **asdict(result)}
+
+
+def _format(found: dict[str, Any]) -> str:
+    counts = f"{found['frames']} frames, {found['missing_frames']} missing, {found['lost_frames']} lost"
+    lines = [
+        f"{found['person']}: {counts}",
+        f"  MPJPE {found['mpjpe_mm']:.1f} mm, median {found['median_mm']:.1f}, 95% {found['p95_mm']:.1f}",
+    ]
+    lines += [f"  {joint.replace('_', ' '):16} {error:6.1f} mm" for joint, error in found["per_joint_mm"].items()]
+    if found["axis_error_deg"] is not None:
+        worst = f"{found['worst_axis_error_deg']:.2f} in frame {found['worst_axis_frame']}"
+        lines.append(f"  part axes {found['axis_error_deg']:.2f} deg, worst frame's mean {worst}")
+        lines.append(f"  without twist {found['long_axis_error_deg']:.2f} deg")
+        errors = found["per_part_axis_deg"].items()
+        lines += [f"  {part.replace('_', ' '):16} {error:6.2f} deg" for part, error in errors]
+    return "\n".join(lines)

@@ -1,0 +1,76 @@
+"""`quadrille info`: show the contents of a session."""
+
+from contextlib import closing
+from typing import TYPE_CHECKING, Any
+
+from app.cli.arguments import SessionArg
+from app.cli.json_output import format_json
+
+if TYPE_CHECKING:
+    from tracker.session.session import Session
+    from tracker.store.records import FrameRow
+
+
+def command(session: SessionArg, /, json: bool = False) -> None:
+    """Show the contents of a session.
+
+    Args:
+        session: session folder.
+        json: print one JSON object.
+    """
+    from tracker.session.session import load_session
+
+    summary = summarize(load_session(session))
+    print(format_json(summary) if json else _format(summary))
+
+
+def summarize(session: "Session") -> dict[str, Any]:
+    """Summarize the cameras, people and poses of a session."""
+    from tracker.store.annotation_store import AnnotationStore
+
+    poses: dict[str, list[FrameRow]] = {p.name: [] for p in session.people}
+    if session.annotations_path.exists():
+        with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+            poses = {name: store.frames(name) for name in poses}
+    return {
+        "name": session.name,
+        "folder": str(session.folder),
+        "frames": session.n_frames,
+        "fps": session.fps,
+        "up": session.up,
+        "cameras": [
+            {
+                "name": c.camera.name,
+                "size": list(c.camera.size),
+                "footage": str(c.footage),
+                "background": c.background is not None,
+                "masks": c.masks is not None,
+                "offset": c.offset,
+            }
+            for c in session.cameras
+        ],
+        "people": [
+            {
+                "name": p.name,
+                "model": p.model.name,
+                "height_m": p.model.height_m,
+                "dofs": p.model.n_dofs,
+                "poses": len(poses[p.name]),
+                "keyframes": sum(row.keyframe for row in poses[p.name]),
+            }
+            for p in session.people
+        ],
+    }
+
+
+def _format(summary: dict[str, Any]) -> str:
+    head = f"{summary['name']}: {summary['frames']} frames at {summary['fps']:g} per second, up is {summary['up']}"
+    lines = [head]
+    for c in summary["cameras"]:
+        extras = "".join(f", {name}" for name in ("background", "masks") if c[name])
+        shift = f", offset {c['offset']}" if c["offset"] else ""
+        lines.append(f"  camera {c['name']}: {c['size'][0]}x{c['size'][1]}, {c['footage']}{extras}{shift}")
+    for p in summary["people"]:
+        body = f"{p['model']} of {p['height_m']:.2f} m, {p['dofs']} degrees of freedom"
+        lines.append(f"  person {p['name']}: {body}, {p['poses']} poses, {p['keyframes']} keyframes")
+    return "\n".join(lines)

@@ -1,0 +1,164 @@
+"""`quadrille init`: set a first pose, from known joints or from a table of poses."""
+
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from app.cli.arguments import SessionArg
+from app.cli.json_output import format_json
+from app.cli.target import Target, load_target, parse_frames
+from tracker.errors import TrackerError
+
+if TYPE_CHECKING:
+    from tracker.formats.pose_csv import PoseTable
+    from tracker.formats.trc import MarkerTable
+    from tracker.geometry.arrays import Array
+    from tracker.session.session import Person, Session
+
+
+@dataclass(frozen=True)
+class InitArguments:
+    """Arguments of `quadrille init`."""
+
+    session: SessionArg
+    """session folder."""
+    joints: Path | None = None
+    """TRC file of 3-D joints."""
+    poses: Path | None = None
+    """table of poses (CSV), as `simulate` writes it."""
+    method: Literal["joints", "poses"] = "joints"
+    """joints fits the pose to known joints; poses copies it from a table."""
+    frame: int = 0
+    """frame to set."""
+    person: str | None = None
+    """name; needed in a session of several people."""
+    fit_sizes: bool = False
+    """measure the body's segment lengths from the joints of all frames too."""
+    joint_map: Path | None = None
+    """TOML file that maps the file's joint names to the body's."""
+    axes: str = "x,y,z"
+    """the file's axes in the session's order, such as x,-z,y."""
+    json: bool = False
+    """print one JSON object."""
+
+
+def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None:
+    """Set a first pose."""
+    from tracker.evaluation.references import read_joints
+    from tracker.formats.pose_csv import read_pose_table
+
+    method, frame = arguments.method, arguments.frame
+    at = load_target(arguments.session, arguments.person, several=False)
+    parse_frames(f"{frame}:{frame + 1}", at.session)
+    path = arguments.joints if method == "joints" else arguments.poses
+    if path is None:
+        raise TrackerError(f"expected --{method} FILE, found none; say where the {method} are")
+    if method == "poses":
+        found = init_from_poses(at, frame, read_pose_table(path))
+        text = f"{found['person']}, frame {frame}: set from {path}"
+    else:
+        joints = read_joints(path, at.session.fps, arguments.joint_map, arguments.axes)
+        found = init_from_joints(at, frame, joints, arguments.fit_sizes)
+        residual = f"{found['mean_mm']:.1f} mm from {len(found['residual_mm'])} joints on average"
+        text = f"{found['person']}, frame {frame}: {residual}"
+    print(format_json(found) if arguments.json else text)
+
+
+def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool) -> dict[str, Any]:
+    """Fit the pose of one person to known limb joints and store it as a keyframe.
+
+    Args:
+        at: the session and the person.
+        frame: frame to set.
+        joints: positions of joints under the body's names.
+        sizes: measure the body's lengths from all frames first. They become a new model revision; no pose changes.
+
+    Returns:
+        The residual of each joint, mm, and their mean.
+
+    Raises:
+        TrackerError: the joints have no such frame.
+    """
+    import numpy as np
+
+    from tracker.acquisition.from_joints import fit_sizes
+    from tracker.fitting.gauss_newton import fit_to_points
+    from tracker.formats.joint_maps import LIMB_JOINTS
+    from tracker.session.lock import SessionLock
+    from tracker.session.session import save_session
+
+    session, (index,) = at
+    person = session.people[index]
+    row = np.flatnonzero(joints.frames == frame)
+    if not len(row):
+        raise TrackerError(f"expected joints of frame {frame}, found frames 0 to {joints.frames[-1]} in the file")
+    points = dict(zip(joints.names, joints.points[row[0]], strict=True))
+    # Conventions disagree about neck and head; the limbs alone determine the trunk too.
+    limbs = {n: p for n, p in points.items() if n in LIMB_JOINTS and np.all(np.isfinite(p))}
+    if sizes:
+        person = replace(person, model=fit_sizes(person.model, joints))
+    fit = fit_to_points(person.model, limbs)
+    with SessionLock(session.folder):
+        if sizes:
+            people = tuple(person if i == index else p for i, p in enumerate(session.people))
+            save_session(replace(session, people=people))
+        _store_keyframe(session, person, frame, fit.pose, "joints")
+    fitted = dict(zip(person.model.point_names, person.model.points_world(fit.pose), strict=True))
+    residuals = {n: float(1000 * np.linalg.norm(fitted[n] - p)) for n, p in limbs.items()}
+    mean = float(np.mean(list(residuals.values())))
+    return {"person": person.name, "frame": frame, "residual_mm": residuals, "mean_mm": mean}
+
+
+def init_from_poses(at: Target, frame: int, table: "PoseTable") -> dict[str, Any]:
+    """Store one person's pose of a frame from a table of poses, as a keyframe.
+
+    Args:
+        at: the session and the person.
+        frame: frame in the session and in the table.
+        table: poses of a body with the person's degrees of freedom.
+
+    Raises:
+        TrackerError: the table has no such frame, or poses of another body.
+    """
+    import numpy as np
+
+    from tracker.session.lock import SessionLock
+
+    session, (index,) = at
+    person = session.people[index]
+    values = table.values_for(person.model)
+    if values is None:
+        raise TrackerError(
+            f"expected poses of '{person.model.name}', the body of '{person.name}', found '{table.model}', which has "
+            f"other degrees of freedom ({_differences(table.value_names, person.model.value_names)}); make the session "
+            "with the --model, a preset or a file, that the poses are of"
+        )
+    row = np.flatnonzero(table.frames == frame)
+    if not len(row):
+        raise TrackerError(f"expected a pose of frame {frame}, found frames {table.frames.tolist()[:8]} in the table")
+    with SessionLock(session.folder):
+        _store_keyframe(session, person, frame, values[row[0]], "poses")
+    return {"person": person.name, "frame": frame}
+
+
+def _differences(found: Sequence[str], expected: Sequence[str]) -> str:
+    """List the first few names that only one of two lists has."""
+    missing, extra = ([n for n in a if n not in b] for a, b in ((expected, found), (found, expected)))
+    listed = [f"{what} {', '.join(n[:3])}" for what, n in (("without", missing), ("with", extra)) if n]
+    return ", ".join(listed)
+
+
+def _store_keyframe(session: "Session", person: "Person", frame: int, values: "Array", method: str) -> None:
+    from tracker.formats.model_toml import format_model
+    from tracker.store.annotation_store import AnnotationStore
+    from tracker.store.records import PoseChange, PoseRecord
+
+    with closing(AnnotationStore(session.annotations_path)) as store:
+        revision = store.add_model_revision(person.name, format_model(person.model))
+        sources = ("imported",) * len(values)
+        record = PoseRecord(values, sources, revision, keyframe=True, settings={"method": method})
+        store.commit(f"init from {method}, frame {frame}", [PoseChange(person.name, frame, record)])

@@ -1,0 +1,65 @@
+"""`quadrille new`: make a session from videos and a calibration."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from app.cli.arguments import SessionArg, parse_common_or_pairs, parse_pairs
+
+
+@dataclass(frozen=True)
+class NewArguments:
+    """Arguments of `quadrille new`."""
+
+    session: SessionArg
+    """folder to make."""
+    calibration: Path
+    """TOML file in the anipose / Pose2Sim layout."""
+    videos: tuple[Path, ...] = ()
+    """video files or image folders, each named after its camera."""
+    camera: tuple[str, ...] = ()
+    """NAME=PATH: footage of a camera, under any file name."""
+    background: Path | None = None
+    """folder of CAM.png or CAM.mp4 of the empty scene."""
+    masks: Path | None = None
+    """folder of CAM/%06d.png by video frame; 0 is background."""
+    offset: tuple[str, ...] = ()
+    """CAM=N: frame k of the session is frame k + N of this camera."""
+    people: tuple[str, ...] = ("person",)
+    """names of the people."""
+    model: tuple[str, ...] = ()
+    """body model of all people, or NAME=MODEL."""
+    height: tuple[str, ...] = ()
+    """body height in metres of all people, or NAME=METRES."""
+    fps: float | None = None
+    """frame rate; needed if all footage is folders of images."""
+    up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
+    """world axis that points up."""
+    units: Literal["m", "mm"] = "m"
+    """unit of the calibration's translations."""
+
+
+def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
+    """Make a session from videos and a calibration."""
+    from tracker.session.assemble import DEFAULT_MODEL, NewSession, assemble
+
+    made = assemble(
+        NewSession(
+            arguments.session,
+            calibration=arguments.calibration,
+            videos=arguments.videos,
+            camera_paths=parse_pairs(arguments.camera, "--camera", Path),
+            background=arguments.background,
+            masks=arguments.masks,
+            offsets=parse_pairs(arguments.offset, "--offset", int),
+            people=arguments.people,
+            models=parse_common_or_pairs(arguments.model, "--model", str) or DEFAULT_MODEL,
+            heights=parse_common_or_pairs(arguments.height, "--height", float),
+            fps=arguments.fps,
+            up=arguments.up,
+            units=arguments.units,
+        )
+    )
+    print(f"made {made.folder}: {len(made.cameras)} cameras, {made.n_frames} frames at {made.fps:g} per second")

@@ -1,0 +1,41 @@
+"""`quadrille open`: open a session in the page."""
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from tracker.errors import TrackerError
+
+
+def command(
+    session: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION")] = None,
+    /,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    allow_host: tuple[str, ...] = (),
+    browser: bool = True,
+    sample: str | None = None,
+    start_again: bool = False,
+) -> None:
+    """Open a session in the page; without SESSION, a working copy of a bundled sample.
+
+    Args:
+        session: session folder.
+        host: address to listen at; anything but loopback needs --allow-host.
+        port: port to listen at; 0 takes a free one.
+        allow_host: names by which browsers may call this machine.
+        browser: open the page in the default browser.
+        sample: name of the sample: tango, two people to be placed by hand (the default), or elbow_rotation, one person.
+        start_again: discard the working copy of the sample and make a new one.
+    """
+    from app.server.workbench import Serving, open_session
+    from app.session.samples import DEFAULT_SAMPLE, sample_copy
+
+    if session is not None and (sample is not None or start_again):
+        raise TrackerError(
+            f"expected a session or a sample, found {session} and {'--sample' if sample else '--start-again'}; "
+            "leave one of them out"
+        )
+    folder = sample_copy(sample or DEFAULT_SAMPLE, start_again) if session is None else session
+    open_session(folder, Serving(host, port, allow_host, browser), lambda line: print(line, flush=True))

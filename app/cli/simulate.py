@@ -1,0 +1,40 @@
+"""`quadrille simulate`: make a session of a simulated recording."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from app.runtime.progress import Reporter
+
+
+def command(
+    out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUT")],
+    /,
+    scene: str = "elbow_rotation",
+    cameras: int = 4,
+    frames: int = 50,
+    seed: int = 0,
+    masks: bool = False,
+    body: Literal["skinned", "model"] = "skinned",
+) -> None:
+    """Make a session of a simulated recording with known truth.
+
+    Args:
+        out: folder to make.
+        scene: motion of the person or the people.
+        cameras: number of cameras.
+        frames: number of frames.
+        seed: seed of everything random.
+        masks: write true masks too.
+        body: skinned, a smooth body unlike the model; model, the very shapes that are fitted.
+    """
+    from tracker.simulate import simulate
+
+    reporter = Reporter()
+    with reporter.over(frames * cameras, "rendering") as tick:  # one tick per image
+        simulate(
+            out, scene=scene, n_cameras=cameras, n_frames=frames, seed=seed, body=body, masks=masks,
+            progress=lambda *_: tick(),
+        )  # fmt: skip
+    print(f"made {out}")

@@ -1,0 +1,140 @@
+"""Commands of a page: messages of the pane socket to calls of the controller (docs/protocol.md)."""
+
+from collections.abc import Callable
+from typing import Any
+
+from app.control.controller import Controller
+from app.page import client_messages as wire
+from app.page.message_parsing import MessageError
+from app.page.pose_commands import POSE_COMMANDS
+from app.page.search_commands import SEARCH_COMMANDS
+
+
+def dispatch(controller: Controller, page: int, message: wire.ClientMessage) -> None:
+    """Carry out a message of a page.
+
+    Args:
+        controller: of the session.
+        page: number of the page.
+        message: as parsed.
+
+    Raises:
+        TrackerError: it cannot be done.
+        MessageError: it names a camera or a person that the session does not have.
+    """
+    check_indices(controller, message)
+    COMMANDS[type(message)](controller, page, message)
+
+
+def check_indices(controller: Controller, message: wire.ClientMessage) -> None:
+    """Check that the session has the camera and the person of a message.
+
+    Raises:
+        MessageError: it has not.
+    """
+    for name, count in (("camera", len(controller.session.cameras)), ("person", len(controller.models))):
+        index = getattr(message, name, None)
+        if index is not None and index >= count:
+            raise MessageError(f"an index below {count} as '{name}'", str(index))
+
+
+def _drag(controller: Controller, page: int, message: wire.Drag) -> None:
+    hand, pointer_px = controller.hand, (message.u, message.v)
+    if message.phase == "start":
+        hand.begin_drag(
+            page, message.camera, message.person, message.point, pointer_px, message.frame, message.part
+        )  # fmt: skip
+    if message.phase == "cancel":
+        hand.cancel_drag(page)
+    else:
+        hand.move_drag(page, pointer_px, message.seq, message.mode, is_last=message.phase == "end")
+    if message.phase == "end":
+        hand.end_drag(page)
+
+
+def _pin(controller: Controller, page: int, message: wire.DragPin) -> None:
+    pinning, position_px = controller.pinning, (message.u, message.v)
+    if message.phase == "start":
+        pinning.begin(
+            page, message.frame, message.camera, message.person, message.point, position_px, message.live
+        )  # fmt: skip
+    elif message.phase == "cancel":
+        pinning.cancel(page)
+    else:
+        pinning.move(page, position_px)
+    if message.phase == "end":
+        pinning.end(page)
+
+
+def _unpin(controller: Controller, _: int, message: wire.RemovePins) -> None:
+    controller.pinning.remove(message.frame, message.person, message.point, message.camera)
+
+
+def _control_tracking(controller: Controller, _: int, message: wire.ControlTracking) -> None:
+    actions: dict[str, Callable[[], None]] = {
+        "pause": controller.pause_tracking,
+        "resume": controller.go_on_tracking,
+        "stop": controller.stop,
+    }
+    actions[message.action]()
+
+
+def _range(controller: Controller, _: int, message: wire.EditRange) -> None:
+    ranges, first, last = controller.ranges, message.first, message.last
+    people = None if message.person is None else [message.person]
+    match message.action:
+        case "interpolate":
+            ranges.interpolate(first, last, people)
+        case "clear":
+            ranges.clear(first, last, people)
+        case "track_forward" | "track_backward":
+            ranges.track(first, last, backward=message.action == "track_backward")
+        case mark:
+            ranges.mark(first, last, mark, people)
+
+
+def _mark(controller: Controller, _: int, message: wire.ToggleMark) -> None:
+    ranges = controller.ranges
+    {"keyframe": ranges.toggle_keyframe, "reviewed": ranges.toggle_reviewed}[message.toggle]()
+
+
+def _floor(controller: Controller, _: int, message: wire.EditFloor) -> None:
+    flooring = controller.flooring
+    actions: dict[str, Callable[[], None]] = {
+        "begin": flooring.begin,
+        "next": flooring.go_on,
+        "take_back": flooring.take_back,
+        "apply": flooring.apply,
+        "cancel": flooring.cancel,
+        "revert": flooring.revert,
+    }
+    actions[message.action]()
+
+
+COMMANDS: dict[type[wire.Message], Callable[[Controller, int, Any], None]] = {
+    wire.Seek: lambda controller, _, m: controller.seek(m.frame),
+    wire.Select: lambda controller, _, m: controller.select(m.person, m.point),
+    wire.ShowPerson: lambda controller, _, m: controller.casting.show(m.person, m.shown),
+    wire.Solo: lambda controller, _, m: controller.casting.solo(m.on),
+    wire.LookThrough: lambda controller, _, m: controller.view_3d.snap(m.camera),
+    wire.Pause3d: lambda controller, page, m: controller.hold_3d(page, m.pause),
+    wire.Drag: _drag,
+    wire.DragPin: _pin,
+    wire.RemovePins: _unpin,
+    wire.FitPose: lambda controller, _, m: controller.pinning.fit(m.frame, m.person),
+    wire.StartTracking: lambda controller, _, m: controller.track(m.action == "backward", m.until),
+    wire.ControlTracking: _control_tracking,
+    wire.EditRange: _range,
+    wire.StopRange: lambda controller, _, __: controller.ranges.halt(),
+    wire.ToggleMark: _mark,
+    wire.FollowTracking: lambda controller, _, m: controller.follow(m.follow),
+    wire.EditFloor: _floor,
+    wire.MarkFloor: lambda controller, _, m: controller.flooring.mark(m.camera, (m.u, m.v)),
+    wire.Undo: lambda controller, _, __: controller.undo(),
+    wire.Redo: lambda controller, _, __: controller.redo(),
+    wire.GoTo: lambda controller, _, m: controller.history.go_to(m.edit),
+    wire.Save: lambda controller, _, __: controller.history.save(),
+    **POSE_COMMANDS,
+    **SEARCH_COMMANDS,
+}
+"""What each message does. The connection itself answers those that subscribe a page to something (`socket`)."""

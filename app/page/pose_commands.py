@@ -1,0 +1,69 @@
+"""Commands that edit a pose without a drag (docs/protocol.md)."""
+
+from collections.abc import Callable
+from typing import Any
+
+from app.control.controller import Controller
+from app.drawing import dof_labels
+from app.page import client_messages as wire
+from app.page.message_parsing import MessageError
+
+
+def _set(controller: Controller, _: int, message: wire.SetDof) -> None:
+    value = message.value / _display_factor(controller, message.person, message.dof)
+    controller.pose_edits.set_dof(message.person, message.dof, value, message.frame)
+
+
+def _turn(controller: Controller, _: int, message: wire.TurnDof) -> None:
+    by = message.by / _display_factor(controller, message.person, message.dof)
+    controller.pose_edits.turn(message.person, message.dof, by, message.frame)
+
+
+def _nudge(controller: Controller, _: int, message: wire.Nudge) -> None:
+    _check_point(controller, message.person, message.point)
+    right_m, up_m = message.right / 100, message.up / 100
+    controller.pose_edits.nudge(message.person, message.point, message.camera, right_m, up_m, message.frame)
+
+
+def _copy_person(controller: Controller, _: int, message: wire.CopyPerson) -> None:
+    if message.source >= len(controller.models):
+        raise MessageError(f"an index below {len(controller.models)} as 'from'", str(message.source))
+    controller.pose_edits.copy_person(message.person, message.source, message.frame)
+
+
+def _reset(controller: Controller, _: int, message: wire.ResetLimb) -> None:
+    _check_point(controller, message.person, message.point)
+    controller.pose_edits.reset(message.person, message.point, message.frame)
+
+
+def _lock(controller: Controller, _: int, message: wire.LockDofs) -> None:
+    for dof in message.dofs:
+        _display_factor(controller, message.person, dof)
+    controller.locks.set(message.person, message.dofs, message.locked)
+
+
+POSE_COMMANDS: dict[type[wire.Message], Callable[[Controller, int, Any], None]] = {
+    wire.SetDof: _set,
+    wire.TurnDof: _turn,
+    wire.Nudge: _nudge,
+    wire.Mirror: lambda controller, _, m: controller.pose_edits.mirror(m.person, m.frame),
+    wire.CopyFrame: lambda controller, _, m: controller.pose_edits.copy_from(m.person, m.source, m.frame),
+    wire.CopyPerson: _copy_person,
+    wire.TakeAlternative: lambda controller, _, m: controller.choosing.exchange(m.person, m.frame),
+    wire.ResetLimb: _reset,
+    wire.LockDofs: _lock,
+}
+
+
+def _display_factor(controller: Controller, person: int, dof: int) -> float:
+    """Return the factor from radians or metres to degrees or centimetres."""
+    model = controller.models[person]
+    if dof >= model.n_dofs:
+        raise MessageError(f"a degree of freedom of {model.name} below {model.n_dofs}", str(dof))
+    return float(dof_labels.factors(model)[dof])
+
+
+def _check_point(controller: Controller, person: int, point: str | None) -> None:
+    model = controller.models[person]
+    if point is not None and point not in model.point_names:
+        raise MessageError(f"a point of {model.name}", f"'{point}'")

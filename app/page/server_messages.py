@@ -1,0 +1,419 @@
+"""Text messages from the program to the page: the one declaration of their types and fields.
+
+`messages` and `search_feed` make them, `protocol_docs` writes the page's types and docs/protocol.md from them.
+Positions are in undistorted pixels, frames count from 0, cameras and people are indices into the session's lists.
+"""
+
+from typing import Literal, TypeAlias, Union, get_args
+
+import msgspec
+
+Status: TypeAlias = Literal["", "good", "doubtful", "lost"]
+RunState: TypeAlias = Literal["running", "paused", "over"]
+
+
+class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A part of a message."""
+
+
+class Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
+    """A message to a page, or the header of a binary one."""
+
+
+# --- session -------------------------------------------------------------------------------------------------------
+
+
+class CameraInfo(Part, frozen=True):
+    """A camera."""
+
+    name: str
+    width: int
+    """Pixels."""
+    height: int
+    """Pixels."""
+
+
+class DofInfo(Part, frozen=True):
+    """A degree of freedom."""
+
+    joint: str
+    name: str
+    """Name within the joint."""
+    unit: Literal["deg", "cm"]
+    low: float | None
+    """Lower limit; null where there is none."""
+    high: float | None
+    """Upper limit; null where there is none."""
+
+
+class Limb(Part, frozen=True):
+    """The limb that a point belongs to."""
+
+    name: str
+    dofs: tuple[int, ...]
+    """Indices of its degrees of freedom."""
+
+
+class PersonInfo(Part, frozen=True):
+    """A person."""
+
+    name: str
+    color: str
+    """`#rrggbb`."""
+    model: str
+    """Name of the body model."""
+    height_m: float
+    points: tuple[str, ...]
+    """Names of the joints and landmarks."""
+    minor: tuple[str, ...]
+    """Points that give way to others where they crowd."""
+    bones: tuple[tuple[str, str], ...]
+    """Pairs of points that the stick figure connects."""
+    parts: tuple[str, ...]
+    """Names of the body parts."""
+    dofs: tuple[DofInfo, ...]
+    point_dofs: dict[str, tuple[int, ...]]
+    """By point: the degrees of freedom of its joint, by index."""
+    point_limbs: dict[str, Limb]
+    """By point: its limb."""
+
+
+class SessionMessage(Message, frozen=True, tag="session"):
+    """The session; the first message on each connection."""
+
+    name: str
+    fps: float
+    n_frames: int
+    cameras: tuple[CameraInfo, ...]
+    people: tuple[PersonInfo, ...]
+
+
+# --- state ---------------------------------------------------------------------------------------------------------
+
+
+class PersonState(Part, frozen=True):
+    """A person on the shown frame."""
+
+    source: str | None
+    """Origin of the stored pose; null where there is none."""
+    status: Status
+    shown: bool
+    """False for a hidden person."""
+    alternatives: int
+    """Number of poses that the tracker found about as good."""
+
+
+class Job(Part, frozen=True):
+    """The search of the shown frame. A paused search has a `kind` and is not running."""
+
+    running: bool
+    kind: str | None
+    """Null where there is no search."""
+    stage: str | None
+    """The stage that is searched."""
+    stages: tuple[str, ...]
+    """Names of all stages, in order."""
+    evaluations: int
+    """Poses scored."""
+    per_second: float
+    """Poses scored per second."""
+    best_px: float | None
+    """Cost of the best pose."""
+    message: str
+    """Result of the last search, or empty."""
+
+
+class Track(Part, frozen=True):
+    """The tracking run. A paused run has a `first` and is not running."""
+
+    running: bool
+    first: int | None
+    """First frame; null where there is no run."""
+    last: int | None
+    """Last frame."""
+    at: int | None
+    """The frame tracked last."""
+    done: int
+    """Frames tracked, of the current pass."""
+    total: int
+    """Frames to track, of the current pass."""
+    per_second: float
+    """Frames per second."""
+    doubtful: int
+    """Frames with status `doubtful`."""
+    lost: int
+    """Frames with status `lost`."""
+    back: bool
+    """Whether the run is in its second pass."""
+    message: str
+    """Result of the last run, or empty."""
+
+
+class RangeWork(Part, frozen=True):
+    """The work on a range of frames."""
+
+    running: bool
+    what: str
+    """For people to read: `interpolating`."""
+    done: int
+    """Frames written."""
+    total: int
+    """Frames to write."""
+    message: str
+    """Result of the last work, or empty."""
+
+
+class ReplayedStep(Part, frozen=True):
+    """The recorded step that is shown in place of the stored poses."""
+
+    run: int
+    step: int
+    """-1 for the start."""
+    steps: int
+    """Recorded steps of the run."""
+    stage: str | None
+
+
+class FloorPicking(Part, frozen=True):
+    """Progress of setting the floor."""
+
+    point: int
+    """Number of the current point, from 1."""
+    views: int
+    """Number of views in which it is marked."""
+    marked: bool
+    """Whether any point is marked anywhere."""
+    known: bool
+    """Whether the current point is triangulated."""
+    error_px: float | None
+    """Largest distance of a mark from the image of the triangulated point."""
+    ready: bool
+    """Whether there is a plane to apply."""
+    why: str
+    """Why there is none."""
+
+
+class FootageProgress(Part, frozen=True):
+    """Progress of the first scan of long videos."""
+
+    listed: float | None
+    """Share of the frames, 0 to 1; null when the scan is complete."""
+    error: str | None
+    """What is wrong with a file."""
+
+
+class StateMessage(Message, frozen=True, tag="state"):
+    """Texts and figures of the page, whenever any changed; during a drag or a search at most 5 times per second."""
+
+    frame: int
+    person: int
+    """The person worked on."""
+    point: str | None
+    """The point last touched."""
+    people: tuple[PersonState, ...]
+    solo: bool
+    """Whether everybody but the person worked on is dimmed."""
+    cost_px: float | None
+    """Mean over the views."""
+    view_costs_px: tuple[float | None, ...]
+    """By camera."""
+    source: str | None
+    """Origin of the pose of the person worked on: `manual`, `pinned`, `searched`, `fitted`, `tracked`, ..."""
+    status: Status
+    remark: str
+    """What the tracker did on this frame."""
+    part_costs_px: tuple[float | None, ...]
+    """By part; null for an unseen one, empty where unknown."""
+    dofs: tuple[float, ...]
+    """Degrees of freedom of the person worked on, degrees and centimetres."""
+    locked: tuple[int, ...]
+    """Indices of the locked ones."""
+    other_sizes: bool
+    """Whether the pose belongs to a former revision of the body, and is drawn with it."""
+    job: Job
+    replay: ReplayedStep | None
+    """While one is shown, the costs are those of the step, and the overlay shows its best and its candidate."""
+    track: Track
+    range: RangeWork
+    follow: bool
+    """Whether each frame is shown as it is tracked."""
+    snapped: int | None
+    """The camera that the 3-D view looks through."""
+    floor: FloorPicking | None
+    """Null while nobody sets the floor."""
+    footage: FootageProgress
+    compiling: bool
+    """Whether kernels are being compiled, as after an installation."""
+    undo: str | None
+    """Label of the entry that undo would undo."""
+    redo: str | None
+    """Label of the entry that redo would redo."""
+    saved: bool
+    save_error: str | None
+
+
+# --- other text messages -------------------------------------------------------------------------------------------
+
+
+class HistoryEntry(Part, frozen=True):
+    """An edit that undo or redo can reach."""
+
+    edit: int
+    label: str
+    author: str
+    time: str
+    """ISO 8601, UTC."""
+    undone: bool
+    """Whether redo would redo it."""
+
+
+class HistoryMessage(Message, frozen=True, tag="history"):
+    """The history, whenever it changed; only for subscribed pages."""
+
+    entries: tuple[HistoryEntry, ...]
+    """Latest first. The first that is not `undone` is the present one."""
+    later: bool
+    """Whether there are more undone entries than requested."""
+    earlier: bool
+    """Whether there are more done entries than requested."""
+
+
+class NoticeMessage(Message, frozen=True, tag="notice"):
+    """One sentence for the user."""
+
+    level: Literal["error", "info"]
+    text: str
+
+
+class Cell(Part, frozen=True):
+    """A frame with a pose."""
+
+    source: str
+    cost_px: float | None
+    keyframe: bool
+    status: Status
+    remark: str
+    reviewed: bool
+    ambiguous: bool
+    """Whether there is an alternative, and nobody has confirmed the pose."""
+
+
+class TimelineMessage(Message, frozen=True, tag="timeline"):
+    """Cells of the timeline that changed, by frame; null removes one. One message for all people, then one for each."""
+
+    person: int | None
+    """Null for all people together: the worst of each frame, reviewed if all are."""
+    cells: dict[str, Cell | None]
+    replace: bool
+    """Whether all other frames have no pose."""
+
+
+class InconsistentMessage(Message, frozen=True, tag="inconsistent"):
+    """Frames whose pose does not agree with the motion around it (`tracker/motion/consistency.py`)."""
+
+    frames: tuple[int, ...]
+    """All of them, ascending."""
+
+
+class SearchLeaf(Part, frozen=True):
+    """A group of degrees of freedom that is searched together.
+
+    A bound or step is null if it does not apply to the group, or differs within it.
+    """
+
+    person: int
+    name: str
+    dofs: tuple[str, ...]
+    bound_rad: float | None
+    step_rad: float | None
+    bound_m: float | None
+    step_m: float | None
+    angles: int
+    """Number of angles among its degrees of freedom."""
+    lengths: int
+    """Number of lengths among them."""
+    own: bool
+    """Whether any bound or step differs from that of all groups."""
+
+
+class SearchSetupMessage(Message, frozen=True, tag="search_setup"):
+    """Settings of the search and its decomposition, in the order of search; only for pages that watch searches."""
+
+    theta_px: float | None
+    outliers: Literal["truncated", "paper"]
+    passes: tuple[float, ...]
+    patience: int
+    max_expansions: int
+    limbs_apart: bool
+    bound_rad: float
+    bound_m: float
+    step_rad: float
+    step_m: float
+    speed: float | None
+    """Expansions per second; null for no limit."""
+    leaves: tuple[SearchLeaf, ...]
+
+
+class SearchStage(Part, frozen=True):
+    """A stage of a run."""
+
+    person: int
+    name: str
+    factor: float
+    """Factor on the steps."""
+    evaluations: int
+    gain_px: float
+    """Decrease of the cost."""
+    done: bool
+    running: bool
+
+
+class SearchRun(Part, frozen=True):
+    """A search of the shown frame."""
+
+    number: int
+    state: RunState
+    start_px: float | None
+    """Cost at the start."""
+    best_px: float | None
+    """Least cost."""
+    evaluations: int
+    seconds: float
+    """Time of work."""
+    steps: int
+    """Recorded steps."""
+    thinned: int
+    """How often recorded steps were thinned, to stay below 10,000."""
+    differs: dict[str, str]
+    """Settings that are not the same in all runs, by label."""
+    stages: tuple[SearchStage, ...]
+
+
+class Replay(Part, frozen=True):
+    """The recorded step that is shown."""
+
+    run: int
+    step: int
+    stage: str | None
+    candidate_px: float | None
+    """Cost of the candidate."""
+    best_px: float | None
+    """Least cost until then."""
+    evaluations: int
+
+
+class SearchRunsMessage(Message, frozen=True, tag="search_runs"):
+    """Runs of the shown frame, oldest first; only for pages that watch searches."""
+
+    runs: tuple[SearchRun, ...]
+    replay: Replay | None
+    compared: int | None
+    """Number of the run whose result is drawn."""
+
+
+TextMessage: TypeAlias = Union[  # noqa: UP007
+    SessionMessage, StateMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
+    SearchSetupMessage, SearchRunsMessage,
+]  # fmt: skip
+
+TEXT_MESSAGES: tuple[type[Message], ...] = get_args(TextMessage)

@@ -1,0 +1,101 @@
+"""Meshes of the people in viser's 3-D scene."""
+
+from collections.abc import Sequence
+
+import viser
+
+from app.state.view_3d import View3d
+from tracker.body.model import PosedBody
+from tracker.contours.occluding_contours import part_poses
+from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
+from tracker.session.session import Session
+
+_DIMMED = 0.2
+"""Opacity of dimmed people, as a share of that of the others."""
+
+
+class PeopleMeshes:
+    """The body parts of all people as meshes."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        root: str,
+        session: Session,
+        color: tuple[int, int, int] | None = None,
+        opacity: float | None = None,
+    ) -> None:
+        """Add the meshes below a node of the scene.
+
+        Args:
+            server: owns the scene.
+            root: name of the node.
+            session: with the people.
+            color: of all meshes; by default each part has its own.
+            opacity: of all meshes; opaque by default.
+        """
+        self._people = session.people
+        self.handles = [
+            [
+                server.scene.add_mesh_simple(
+                    f"{root}/{person.name}/{part.name}",
+                    shape.triangles().vertices + center,
+                    shape.triangles().faces,
+                    color=color or _rgb(part.color),
+                    opacity=opacity,
+                    cast_shadow=False,
+                    receive_shadow=False,
+                )
+                for part, shape, center in zip(
+                    person.model.parts, person.model.shapes, person.model.centers_part, strict=True
+                )
+            ]
+            for person in self._people
+        ]
+        """By person and part."""
+
+    def pose(self, poses: Sequence[Array | None]) -> None:
+        """Move each person to a pose, (n_values,); None leaves a person in place. Visibility does not change."""
+        for person, handles, values in zip(self._people, self.handles, poses, strict=True):
+            if values is not None:
+                Ts = part_poses([PosedBody(person.model, values)])
+                turns = rigid.quaternion_from_matrix(Ts[:, :3, :3])
+                for handle, T, wxyz in zip(handles, Ts, turns, strict=True):
+                    handle.position, handle.wxyz = T[:3, 3], wxyz
+
+    def remove(self) -> None:
+        """Remove the meshes from the scene."""
+        for handles in self.handles:
+            for handle in handles:
+                handle.remove()
+
+    def show_only(self, people: frozenset[int]) -> None:
+        """Show some people, by index, and hide the others."""
+        for index, handles in enumerate(self.handles):
+            _set_visible(handles, index in people)
+
+    def set_appearance(self, view: View3d, hidden: frozenset[int], dimmed: frozenset[int]) -> None:
+        """Set visibility, colour and opacity.
+
+        Args:
+            view: what the 3-D view shows.
+            hidden: indices of the people to hide.
+            dimmed: indices of the people to dim.
+        """
+        for index, (person, handles) in enumerate(zip(self._people, self.handles, strict=True)):
+            opacity = _DIMMED * view.opacity if index in dimmed else view.opacity
+            for part, handle in zip(person.model.parts, handles, strict=True):
+                handle.color = _rgb(part.color if view.colors == "parts" else person.color)
+                handle.opacity = None if opacity >= 1 else opacity
+            _set_visible(handles, view.bodies and index not in hidden)
+
+
+def _set_visible(handles: Sequence[viser.MeshHandle], visible: bool) -> None:
+    for handle in handles:
+        if handle.visible != visible:
+            handle.visible = visible
+
+
+def _rgb(color: str) -> tuple[int, int, int]:
+    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)

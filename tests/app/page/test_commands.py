@@ -1,0 +1,51 @@
+"""Commands of a page on a real controller."""
+
+import time
+
+import pytest
+from gestures import PAGE
+
+from app.control.session import session_state
+from app.page.client_messages import Drag, FitPose, LockDofs, Nudge, SetDof
+from app.page.commands import dispatch
+from app.page.message_parsing import MessageError
+
+
+def drag_to(u, phase, seq):
+    return Drag(phase=phase, frame=2, camera=0, person=0, point="left_wrist", u=u, v=240.0, seq=seq)
+
+
+@pytest.fixture
+def scorings(placed, monkeypatch):
+    """The poses scored from now on."""
+    scored, score = [], session_state.pose_cost
+    monkeypatch.setattr(session_state, "pose_cost", lambda *args: scored.append(args[2]) or score(*args))
+    return scored
+
+
+def test_the_end_of_a_drag_scores_once(placed, scorings):
+    dispatch(placed, PAGE, drag_to(320.0, "start", 1))
+    for seq in range(2, 6):
+        dispatch(placed, PAGE, drag_to(320.0 + seq, "move", seq))
+    dispatch(placed, PAGE, drag_to(340.0, "end", 6))
+    time.sleep(0.5)  # for the background, which must not score it too
+    assert len([poses for poses in scorings if poses[0] is placed.state.poses[0]]) == 1
+    assert placed.state.cost_px is not None
+    assert placed.state.drag is None
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        FitPose(frame=2, person=7),
+        Nudge(frame=2, person=0, action="nudge", camera=9, right=1.0, up=0.0),
+        Nudge(frame=2, person=0, action="nudge", camera=0, right=1.0, up=0.0, point="tail"),
+        SetDof(frame=2, person=0, action="set", dof=999, value=1.0),
+        LockDofs(frame=2, person=0, action="lock", dofs=[0, 999], locked=True),
+    ],
+)
+def test_what_the_session_does_not_have_is_refused(placed, message):
+    before = placed.state
+    with pytest.raises(MessageError, match=r"^expected "):
+        dispatch(placed, PAGE, message)
+    assert placed.state is before
