@@ -37,7 +37,7 @@ from app.storage.saver import Saver
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
 from tracker.session.session import Session
-from tracker.store.records import FrameNumbers
+from tracker.store.records import FramePose
 from tracker.tracking.chamfer.settings import TrackSettings
 
 
@@ -131,7 +131,7 @@ class Controller:
         with self._lock:
             return self._saver.timeline(since, person)
 
-    def numbers(self, person: int, since: int = 0) -> tuple[list[int], list[FrameNumbers]]:
+    def numbers(self, person: int, since: int = 0) -> tuple[list[int], list[FramePose]]:
         """Frames on which a person's stored poses changed after a version of the timeline, and what they hold now.
 
         For 0 all frames on which the person has a pose.

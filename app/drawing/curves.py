@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array, FloatArray
-from tracker.store.records import FrameNumbers
+from tracker.store.records import FramePose
 
 CurveGroup = Literal["arms", "torso", "legs", "cost"]
 GROUPS: tuple[CurveGroup, ...] = get_args(CurveGroup)
@@ -54,7 +54,7 @@ def plots_of(model: BodyModel, cameras: Sequence[str], group: str) -> list[Plot]
     return [plot for plot in plots if plot.dofs]
 
 
-def samples(model: BodyModel, plots: Sequence[Plot], frames: Sequence[int], rows: Sequence[FrameNumbers]) -> FloatArray:
+def samples(model: BodyModel, plots: Sequence[Plot], frames: Sequence[int], rows: Sequence[FramePose]) -> FloatArray:
     """Sample the curves of some plots, one after the other.
 
     Args:
@@ -81,13 +81,13 @@ def samples(model: BodyModel, plots: Sequence[Plot], frames: Sequence[int], rows
         else:
             out[first, at] = [np.nan if row.cost_px is None else row.cost_px for row in known]
             for column, row in zip(at, known, strict=True):
-                if len(row.views_px) == n - 1:
-                    out[first + 1 : first + n, column] = [np.nan if c is None else c for c in row.views_px]
+                if len(row.view_costs_px) == n - 1:
+                    out[first + 1 : first + n, column] = [np.nan if c is None else c for c in row.view_costs_px]
         first += n
     return out
 
 
-def _dof_values(model: BodyModel, rows: Sequence[FrameNumbers]) -> Array:
+def _dof_values(model: BodyModel, rows: Sequence[FramePose]) -> Array:
     """Return poses in degrees of freedom, (N, n_dofs), rad and metres; ball joints as rotation vectors."""
     values = np.stack([row.values for row in rows])
     if model.value_names == model.dof_names:

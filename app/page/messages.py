@@ -19,7 +19,7 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import FloatArray
 from tracker.posing.drag import minor_points
 from tracker.session.session import Person, Session
-from tracker.store.records import SOURCES, STATUSES, FrameNumbers, HistoryEntry
+from tracker.store.records import SOURCES, STATUSES, FramePose, HistoryEntry
 
 _FEW_CELLS = 2000
 """Largest number of timeline cells sent by name. More are sent as columns, which take a tenth of the bytes and time."""
@@ -188,7 +188,7 @@ def history(entries: Sequence[HistoryEntry], limit: int) -> wire.HistoryMessage:
 
 
 def curves(
-    session: Session, person: int, group: CurveGroup, frames: Sequence[int], rows: Sequence[FrameNumbers], replace: bool
+    session: Session, person: int, group: CurveGroup, frames: Sequence[int], rows: Sequence[FramePose], replace: bool
 ) -> bytes:
     """Sample a group of curves of one person; NaN where a frame has no pose.
 

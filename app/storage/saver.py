@@ -23,7 +23,7 @@ from tracker.store.records import (
     SOURCES,
     Alternative,
     Change,
-    FrameNumbers,
+    FramePose,
     FrameRow,
     HistoryEntry,
     Pin,
@@ -111,7 +111,7 @@ class Saver:
             return None
         source, revision = _summary(record.sources), record.model_revision
         others = () if record.keyframe else tuple(a.values for a in self.alternatives(person, frame))
-        return Shown(record.values, source, record.status, record.remark, record.parts_px, (), revision, others)
+        return Shown(record.values, source, record.status, record.remark, record.part_costs_px, (), revision, others)
 
     def alternatives(self, person: int, frame: int) -> tuple[Alternative, ...]:
         """Poses about as good as the stored one, best first; those of a body of other joints are passed over."""
@@ -167,13 +167,13 @@ class Saver:
         near = sorted(frames[max(0, at - 1) : at + 1], key=lambda f: (abs(f - frame), f))
         return self.pose_now(person, near[0]) if near else None
 
-    def numbers(self, person: int, frames: Sequence[int]) -> list[FrameNumbers]:
+    def numbers(self, person: int, frames: Sequence[int]) -> list[FramePose]:
         """What is stored on those of some frames, ascending, that have a pose. Needs no lock of the controller."""
         name, found, first = self._session.people[person].name, [], 0
         for i, frame in enumerate(frames):
             # Read in pieces: whoever wants to write waits for one at most.
             if i + 1 == len(frames) or frames[i + 1] != frame + 1 or i - first >= _READ_FRAMES:
-                found += self._store.numbers(name, range(frames[first], frame + 1))
+                found += self._store.frame_poses(name, range(frames[first], frame + 1))
                 first = i + 1
         return found
 
@@ -206,7 +206,7 @@ class Saver:
             keyframe = source in _BY_HAND or (stored is not None and stored.keyframe)
             told = asdict(state.settings) if source in ("searched", "fitted") else {}
             record = PoseRecord(
-                shown.values, sources, revision, keyframe, "", state.cost_px, told, views_px=state.view_costs_px
+                shown.values, sources, revision, keyframe, "", state.cost_px, told, view_costs_px=state.view_costs_px
             )
             changes.append(PoseChange(name, state.frame, record))
         return self.write(f"{label}, frame {state.frame}", changes, amend, by_program=False)

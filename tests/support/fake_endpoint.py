@@ -7,11 +7,11 @@ It stands in for the controller in tests of the page alone; `python tests/suppor
 
 import asyncio
 import contextlib
+import functools
 import itertools
 import json
 import struct
 import sys
-import time
 from dataclasses import dataclass, field
 
 import cv2
@@ -109,8 +109,6 @@ class FakeEndpoint:
     """Every message of every page, but for what each says when it connects."""
     frame_s: float = 0.05
     """How long a run takes for a frame."""
-    seek_times: list = field(default_factory=list)
-    """When each seek came, s."""
     greetings: list = field(default_factory=list)
     """What the pages said when they connected."""
     views: list = field(default_factory=list)
@@ -124,7 +122,6 @@ class FakeEndpoint:
         self.before_drag = None
         self.seq = 0
         self.epipolar_of = None
-        self.jpegs = {}
         self.set_numbers = itertools.count(1)
         self.search_task = None
         self.track_task = None
@@ -164,11 +161,16 @@ class FakeEndpoint:
                     told = json.loads(message.data)
                     kept = {"pause_3d": self.greetings, "view": self.views}.get(told["type"], self.received)
                     kept.append(told)
-                    if told["type"] == "seek":
-                        self.seek_times.append(time.monotonic())
                     await self.answer(told)
         finally:
             self.sockets.discard(socket)
+
+    async def rest(self):
+        """End what it does by itself."""
+        for task in filter(None, (self.search_task, self.track_task)):
+            task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await task
 
     async def answer(self, message):
         match message["type"]:
@@ -461,13 +463,15 @@ class FakeEndpoint:
 
     def picture(self, camera, frame, layer):
         """The image of a room with a bright figure that shows its number; masks and a distance image of even colour."""
-        size = self.sizes[camera % len(self.sizes)]
-        key = (camera, frame if layer == "image" else 0, layer)
-        if key not in self.jpegs:
-            color = {"silhouette": (140, 224, 74), "distance": (164, 255, 252), "parts": (30, 30, 250)}.get(layer)
-            image = room(camera, frame) if color is None else np.full((HEIGHT, WIDTH, 3), color, np.uint8)
-            self.jpegs[key] = cv2.imencode(".jpg", cv2.resize(image, size))[1].tobytes()
-        return self.jpegs[key]
+        return jpeg(self.sizes[camera % len(self.sizes)], camera, frame if layer == "image" else 0, layer)
+
+
+@functools.lru_cache(maxsize=2000)
+def jpeg(size, camera, frame, layer):
+    """A picture as JPEG."""
+    color = {"silhouette": (140, 224, 74), "distance": (164, 255, 252), "parts": (30, 30, 250)}.get(layer)
+    image = room(camera, frame) if color is None else np.full((HEIGHT, WIDTH, 3), color, np.uint8)
+    return cv2.imencode(".jpg", cv2.resize(image, size))[1].tobytes()
 
 
 def room(camera, frame):

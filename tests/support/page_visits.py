@@ -30,7 +30,7 @@ class Page:
         """Say what the page shows."""
         await self.send("view", layers=layers, reductions=reductions, by_part=by_part)
 
-    async def hear(self, kind, condition=lambda _: True, timeout_s=10.0):
+    async def hear(self, kind, condition=lambda _: True, timeout_s=60.0):
         """The next message of a kind for which a condition holds; binary ones with their `payload`."""
         async with asyncio.timeout(timeout_s):
             while True:

@@ -1,1 +1,4 @@
-"""The annotation database: an append-only tree of edits, current poses, pins, undo."""
+"""The annotation database of a session: a log of edits, current poses and pins, undo, body models, settings.
+
+Imports `geometry`. Callers use `annotation_store.AnnotationStore` and the records of `records`.
+"""

@@ -1,4 +1,4 @@
-"""What the store of annotations takes and gives: poses with their provenance, pins, edits."""
+"""The records that the store of annotations reads and writes: poses with their provenance, pins, edits."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,56 +6,56 @@ from typing import Any, NamedTuple
 
 from tracker.geometry.arrays import Array
 
-# From a person's hand to a foreign file. Stored by index: add at the end, never reorder.
 SOURCES = ("manual", "pinned", "searched", "fitted", "tracked", "interpolated", "smoothed", "imported")
-# How good a pose is, as its tracker judges; empty where nobody has judged it.
+"""Sources of a value, most manual first. Stored by index: add at the end, never reorder."""
 STATUSES = ("", "good", "doubtful", "lost")
+"""Quality of a pose as assessed by its tracker; empty if not assessed."""
 
 
 @dataclass(frozen=True, eq=False)
 class PoseRecord:
-    """The pose of a person in a frame, and where it came from."""
+    """The pose of a person in a frame, with its provenance."""
 
     values: Array
     """Pose, (n_values,), in the order of the body model's `value_names`."""
     sources: tuple[str, ...]
-    """Where each value came from, one of `SOURCES`, (n_values,)."""
+    """Source of each value, one of `SOURCES`, (n_values,)."""
     model_revision: int
     """The body model that the values belong to."""
     keyframe: bool = False
     """Whether a person set or verified the frame, so that no program may change it."""
     status: str = ""
-    """How good it is as its tracker judges, one of `STATUSES`."""
+    """Quality as assessed by its tracker, one of `STATUSES`."""
     cost_px: float | None = None
-    """Mean cost over the views, px; None where nobody has computed it."""
+    """Mean cost over the views, px; None if not computed."""
     settings: Mapping[str, Any] = field(default_factory=dict)
-    """What the program that made it was told; anything that JSON holds."""
+    """Settings of the program that made it; any JSON values."""
     author: str = ""
-    """Who made the edit; filled in by the store, like the next two."""
+    """Author of the edit; filled in by the store, like the next two."""
     time: str = ""
-    """When the edit was made, ISO 8601, UTC."""
+    """Time of the edit, ISO 8601, UTC."""
     program: str = ""
     """Version of the program that made the edit."""
-    views_px: tuple[float | None, ...] = ()
+    view_costs_px: tuple[float | None, ...] = ()
     """Cost of each view in the order of the session's cameras, px; None without edges, empty where unknown."""
-    parts_px: tuple[float | None, ...] = ()
+    part_costs_px: tuple[float | None, ...] = ()
     """Cost of each part in the order of the body model's, px; None for an unseen part, empty where unknown."""
     remark: str = ""
-    """What the tracker did on the frame, for people to read: `left arm relocated`."""
+    """Note of the tracker on the frame, for display."""
     reviewed: bool = False
-    """Whether a person has looked at it and left it as it is; a keyframe counts as reviewed besides."""
+    """Whether a person has checked it and left it unchanged. A keyframe counts as reviewed too."""
 
 
 @dataclass(frozen=True, eq=False)
 class Alternative:
-    """Another pose of a person in a frame that is about as good as the one that was taken."""
+    """Another pose of a person in a frame, about as good as the chosen one."""
 
     values: Array
     """Pose, (n_values,), in the order of the body model's `value_names`."""
     model_revision: int
     """The body model that the values belong to."""
     cost_px: float | None = None
-    """Mean cost over the views with everybody else as they were found, px; None where nobody has computed it."""
+    """Mean cost over the views, with the other people in their estimated poses, px; None if not computed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,18 +67,18 @@ class PoseChange:
     pose: PoseRecord | None
     """The new pose; None clears."""
     alternatives: tuple[Alternative, ...] = ()
-    """Poses that are about as good, best first, for a person to choose from; kept as long as the pose is shown."""
+    """Alternatives, best first, that a person may choose instead."""
 
 
 class MarkChange(NamedTuple):
-    """Mark the pose of a person in a frame, which stays as it is; nothing happens where there is none."""
+    """Mark the pose of a person in a frame without changing it; a frame without pose is ignored."""
 
     person: str
     frame: int
     keyframe: bool
-    """Whether a person vouches for it, so that no program may change it."""
+    """Whether a person set or verified it, so that no program may change it."""
     reviewed: bool
-    """Whether a person has looked at it."""
+    """Whether a person has checked it."""
 
 
 class PinChange(NamedTuple):
@@ -90,11 +90,11 @@ class PinChange(NamedTuple):
     """One of the body model's `point_names`."""
     camera: str
     position_px: tuple[float, float] | None
-    """Where the point is seen, original pixels; None clears."""
+    """Position of the point in the image, original pixels; None clears."""
 
 
 class Pin(NamedTuple):
-    """Where a person says that a point of the body is seen."""
+    """The position of a body point in an image, set by a person."""
 
     point: str
     camera: str
@@ -106,41 +106,41 @@ Change = PoseChange | MarkChange | PinChange
 
 
 class Committed(NamedTuple):
-    """What became of a commit."""
+    """The result of a commit."""
 
     edit: int
     """Id of the edit, for `amend`."""
     skipped: tuple[tuple[str, int], ...]
-    """Person and frame of the keyframes that a program was kept from changing."""
+    """Person and frame of the keyframes left unchanged because a program made the edit."""
 
 
 class FrameRow(NamedTuple):
-    """A frame that has a pose, in short."""
+    """A summary of a frame that has a pose."""
 
     frame: int
     source: str
-    """The source of any of its values that is nearest to a person's hand (the first in `SOURCES`)."""
+    """The most manual source of its values (the first in `SOURCES`)."""
     status: str
     cost_px: float | None
     keyframe: bool
-    views_px: tuple[float | None, ...] = ()
+    view_costs_px: tuple[float | None, ...] = ()
     """Cost of each view, px; None without edges, empty where unknown."""
     remark: str = ""
-    """What the tracker did on the frame."""
+    """Note of the tracker on the frame, for display."""
     reviewed: bool = False
-    """Whether a person has looked at it, or set it."""
+    """Whether a person has checked or set it."""
     ambiguous: bool = False
-    """Whether other poses are about as good and nobody has vouched for this one."""
+    """Whether it has alternatives and is no keyframe."""
 
 
-class FrameNumbers(NamedTuple):
-    """The numbers of a frame that has a pose, for curves."""
+class FramePose(NamedTuple):
+    """The pose and costs of a frame."""
 
     frame: int
     values: Array
     """Pose, (n_values,), of the body model that it was made with."""
     cost_px: float | None
-    views_px: tuple[float | None, ...]
+    view_costs_px: tuple[float | None, ...]
     """Cost of each view, px; None without edges, empty where unknown."""
     model_revision: int = 0
     """The body model that the values belong to."""
@@ -154,14 +154,14 @@ class HistoryEntry(NamedTuple):
     author: str
     time: str
     undone: bool
-    """Whether redo would do it again."""
+    """Whether it is undone, so that redo applies it."""
 
 
 class ModelRevision(NamedTuple):
-    """A body model as it was when poses were made with it; never changed."""
+    """A body model that poses were made with; never changed."""
 
     id: int
     person: str
     toml: str
-    """Text of the model file, with its sizes."""
+    """Text of the model file, including its dimensions."""
     time: str

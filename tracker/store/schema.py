@@ -1,6 +1,6 @@
-"""The tables of the store of annotations, and how a store of an older version becomes one of today's.
+"""The tables of the store of annotations, and the upgrade of older versions.
 
-Upgrading adds tables and columns and never rewrites a row: the log of edits is what undo stands on.
+An upgrade adds tables and columns and never rewrites a row, because undo depends on the log of edits.
 """
 
 import sqlite3
@@ -66,7 +66,6 @@ CREATE TABLE pins (
 CREATE TABLE settings (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 """
 
-# Statements that bring a store of each older version to the next.
 _UPGRADES = {
     1: (
         "ALTER TABLE pose_changes ADD COLUMN views_px BLOB",
@@ -84,26 +83,27 @@ _UPGRADES = {
         "PRIMARY KEY (change, rank)) WITHOUT ROWID",
     ),
 }
-# Columns of the changes of poses that a store of each older version lacks. Where it must not be written it is read
-# through temporary views, which stand in front of the tables of their names.
-_LACKING = {
+"""Statements that upgrade a store from each older version to the next."""
+_MISSING_COLUMNS = {
     1: ("views_px", "parts_px", "remark", "told", "reviewed"),
     2: ("told", "reviewed"),
     3: ("reviewed",),
     4: (),
 }
+"""Columns of `pose_changes` that each older version lacks. A store opened read only is read through temporary views,
+which hide the tables of the same names."""
 
 
 def version(db: sqlite3.Connection) -> int:
-    """Version of a store; 0 for an empty file."""
+    """Return the version of a store; 0 for an empty file."""
     return int(db.execute("PRAGMA user_version").fetchone()[0])
 
 
 def upgrade(db: sqlite3.Connection) -> int:
-    """Make the tables of a new store, or those that an older one lacks, within a transaction of the caller.
+    """Create the tables of a new store, or upgrade an older one, within a transaction of the caller.
 
     Returns:
-        The version that the store then has: another program may have been faster, and newer.
+        The version that the store then has. It is newer than `VERSION` if a newer program has upgraded it meanwhile.
     """
     found = version(db)
     if found > VERSION:
@@ -116,15 +116,15 @@ def upgrade(db: sqlite3.Connection) -> int:
 
 
 def show_as_new(db: sqlite3.Connection) -> int:
-    """Let a store of an older version be read like one of today's, its file untouched; returns what it reads as."""
+    """Make an older store readable like one of today's without writing to it; returns the version it reads as."""
     found = version(db)
-    if found not in _LACKING:
+    if found not in _MISSING_COLUMNS:
         return found
-    if _LACKING[found]:
-        nothing = ", ".join(f"NULL AS {column}" for column in _LACKING[found])
-        db.execute(f"CREATE TEMP VIEW pose_changes AS SELECT *, {nothing} FROM main.pose_changes")
-    nothing = ", ".join(f"NULL AS {column}" for column in ("change", "rank", "model_revision", "numbers", "cost_px"))
-    db.execute(f"CREATE TEMP VIEW alternatives AS SELECT {nothing} WHERE 0")
-    if "told" in _LACKING[found]:
+    if _MISSING_COLUMNS[found]:
+        nulls = ", ".join(f"NULL AS {column}" for column in _MISSING_COLUMNS[found])
+        db.execute(f"CREATE TEMP VIEW pose_changes AS SELECT *, {nulls} FROM main.pose_changes")
+    nulls = ", ".join(f"NULL AS {column}" for column in ("change", "rank", "model_revision", "numbers", "cost_px"))
+    db.execute(f"CREATE TEMP VIEW alternatives AS SELECT {nulls} WHERE 0")
+    if "told" in _MISSING_COLUMNS[found]:
         db.execute("CREATE TEMP VIEW told AS SELECT NULL AS id, NULL AS settings WHERE 0")
     return VERSION

@@ -187,7 +187,7 @@ class Sizing:
             told = {"method": "refit", "model_revision": record.model_revision}
             pose = replace(
                 record, values=values, model_revision=revision, status="", cost_px=None, settings=told,
-                views_px=(), parts_px=(), remark="refitted to other sizes",
+                view_costs_px=(), part_costs_px=(), remark="refitted to other sizes",
             )  # fmt: skip
             changes.append(PoseChange(name, row.frame, pose))
             moved = becomes.points_world(values) - was.points_world(record.values)

@@ -138,7 +138,7 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     assert sorted(found) == [0, 1, 2, 3, 4, 5]
     assert {k: found[k].time for k in (1, 2)} == done
     assert {found[k].status for k in range(1, 6)} <= {"good", "doubtful"}
-    assert len(found[3].views_px) == 4
+    assert len(found[3].view_costs_px) == 4
     status, out, _ = run("track", session, "--frames", "0:6", "--json")  # and once done, it begins anew
     assert (json.loads(out)["frames"], json.loads(out)["resumed_at"]) == (6, None)
 

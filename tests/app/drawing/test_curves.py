@@ -3,7 +3,7 @@ import pytest
 
 from app.drawing.curves import GROUPS, Plot, plots_of, samples
 from tracker.formats.model_toml import load_model, parse_model
-from tracker.store.records import FrameNumbers
+from tracker.store.records import FramePose
 
 CAMERAS = ("front", "left")
 
@@ -67,14 +67,14 @@ def test_ball_joints_are_rotation_vectors_named_by_their_joint():
     values = model.neutral()
     at = model.value_names.index("left_wrist.qw")
     values[at : at + 4] = np.cos(np.radians(15)), 0.0, np.sin(np.radians(15)), 0.0
-    found = samples(model, [plots["Left arm"]], [0], [FrameNumbers(0, values, None, ())])
+    found = samples(model, [plots["Left arm"]], [0], [FramePose(0, values, None, ())])
     np.testing.assert_allclose(found[:, 0], [0, 0, 0, 0, 30, 0], atol=1e-4)
 
 
 def test_values_are_in_degrees_and_centimetres_with_gaps(gavrila):
     values = np.zeros(22)
     values[:4] = 1.5, -0.25, 0.9, np.pi / 2
-    rows = [FrameNumbers(3, values, 1.0, ()), FrameNumbers(7, np.zeros(9), 1.0, ())]  # the latter of another body
+    rows = [FramePose(3, values, 1.0, ()), FramePose(7, np.zeros(9), 1.0, ())]  # the latter of another body
     plots = plots_of(gavrila, CAMERAS, "torso")
     found = samples(gavrila, plots, [3, 5, 7], rows)
     assert found.shape == (6, 3)
@@ -87,9 +87,9 @@ def test_costs_are_the_mean_and_the_views(gavrila):
     assert plots == [Plot("Cost", "px", ("mean", "front", "left"), ())]
     zero = np.zeros(22)
     rows = [
-        FrameNumbers(1, zero, 2.0, (1.5, None)),
-        FrameNumbers(2, zero, 3.0, ()),
-        FrameNumbers(4, zero, None, (1, 1)),
+        FramePose(1, zero, 2.0, (1.5, None)),
+        FramePose(2, zero, 3.0, ()),
+        FramePose(4, zero, None, (1, 1)),
     ]
     found = samples(gavrila, plots, [1, 2, 4], rows)
     np.testing.assert_array_equal(found, [[2, 3, np.nan], [1.5, np.nan, 1], [np.nan, np.nan, 1]])

@@ -1,5 +1,4 @@
 import threading
-import time
 
 import pytest
 from gestures import wait_for
@@ -103,10 +102,8 @@ def test_a_step_that_does_not_end_is_said():
     watched = Watched(steps())
     watched.job.run()
     begun.wait()
-    began = time.monotonic()
     with pytest.raises(TrackerError, match=r"still at work.* try again"):
-        watched.job.stop(timeout=0.05)
-    assert time.monotonic() - began < 5
+        watched.job.stop(timeout=0.05)  # or this would wait for `go` for ever
     go.set()
     wait_for(lambda: watched.paused == 1)  # it stopped as soon as it could
 

@@ -221,11 +221,8 @@ class TestGrid:
         await until(lambda: all(endpoint.views[-1]["reductions"]))
 
 
+@pytest.mark.endpoint(n_cameras=16)
 class TestZoom:
-    @pytest.fixture
-    def endpoint(self):
-        return FakeEndpoint(n_cameras=16)
-
     async def test_zooming_in_asks_for_finer_pictures_of_that_camera(self, page, endpoint):
         before = endpoint.views[-1]["reductions"]
         assert min(before) > 1

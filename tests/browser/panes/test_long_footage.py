@@ -4,7 +4,7 @@ import asyncio
 from contextlib import asynccontextmanager
 
 import pytest
-from page_driver import OPENED, handle_of, shows, state_of, to_client
+from page_driver import handle_of, shows, state_of, to_client
 
 GO = """(frame) => {
   const box = document.querySelector("#frame");
@@ -98,13 +98,10 @@ async def test_playing_shows_no_stand_ins(page, endpoint):
 
 
 @pytest.mark.parametrize("scheme", ["dark", "light"])
-async def test_the_mark_fits_a_narrow_pane(browser, address, endpoint, scheme):
-    endpoint.n_cameras, endpoint.n_frames = 16, 100_000
-    endpoint.__post_init__()
-    context = await browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme=scheme)
-    page = await context.new_page()
-    await page.goto(address)
-    await shows(page, OPENED, 15)
+@pytest.mark.endpoint(n_cameras=16, n_frames=100_000)
+async def test_the_mark_fits_a_narrow_pane(page, endpoint, scheme):
+    await page.set_viewport_size({"width": 1280, "height": 720})
+    await page.emulate_media(color_scheme=scheme)
     await visit(page, 99_000)
     async with slow(page, endpoint, 99_999):
         await shows(page, "quadrille.state.placeholder")
@@ -113,4 +110,3 @@ async def test_the_mark_fits_a_narrow_pane(browser, address, endpoint, scheme):
         )
         assert len(widths) == 16
         assert all(needed <= given for needed, given in widths)
-    await context.close()

@@ -3,7 +3,7 @@
 import asyncio
 
 import pytest
-from fake_endpoint import FakeEndpoint, project
+from fake_endpoint import project
 from page_driver import dragging, handle_of, shows, state_of, to_client, until
 
 PIXEL = """([x, y]) => {
@@ -257,11 +257,8 @@ async def test_the_splitter_moves_by_drag_and_key_within_bounds(page):
     assert (await page.locator("#scene").bounding_box())["width"] >= 290
 
 
+@pytest.mark.endpoint(n_people=2, n_cameras=6)
 class TestPeople:
-    @pytest.fixture
-    def endpoint(self):
-        return FakeEndpoint(n_people=2, n_cameras=6)
-
     async def test_six_cameras_and_two_people(self, page, endpoint):
         assert await page.locator(".pane:visible").count() == 6
         await page.locator("#people input").nth(1).check(force=True)

@@ -1,7 +1,6 @@
 """What the program says: notices, their log, what is not saved, the first card; against `fake_endpoint`."""
 
 import pytest
-from fake_endpoint import FakeEndpoint
 from page_driver import shows, until
 
 
@@ -48,7 +47,8 @@ async def test_notices_leave_panes_and_bars_free(page, endpoint):
         assert apart, (part, box, other)
 
 
-async def test_what_is_not_saved_says_why_is_tried_again_and_holds_the_page(page, endpoint):
+async def test_what_is_not_saved_says_why_is_tried_again_and_holds_the_page(fresh_page, endpoint):
+    page = fresh_page
     assert not await page.locator("#unsaved").is_visible()
     endpoint.state |= {"saved": False, "save_error": "the disk is full; make room"}
     await endpoint.broadcast(endpoint.state)
@@ -101,11 +101,8 @@ async def test_the_first_card_is_put_away_for_good_and_found_again(browser, addr
     await context.close()
 
 
+@pytest.mark.endpoint(n_people=2)
 class TestSeveralPeople:
-    @pytest.fixture
-    def endpoint(self):
-        return FakeEndpoint(n_people=2)
-
     async def test_the_first_card_begins_with_the_choice_of_a_person(self, page):
         await page.keyboard.press("Control+k")
         await page.keyboard.type("first steps")

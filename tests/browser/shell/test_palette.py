@@ -1,7 +1,7 @@
 """The palette, the list of keys, and keys that hold everywhere, against `fake_endpoint`."""
 
 import pytest
-from page_driver import OPENED, shows, to_client, until
+from page_driver import shows, to_client, until
 
 
 async def open_palette(page, query=""):
@@ -141,12 +141,9 @@ async def test_a_key_that_does_nothing_says_why(page, endpoint):
     assert not endpoint.received
 
 
-async def test_people_are_changed_by_key_by_name_and_by_a_click(browser, endpoint, address):
-    endpoint.n_people = 2
-    endpoint.__post_init__()
-    page = await (await browser.new_context(viewport={"width": 1280, "height": 720})).new_page()
-    await page.goto(address)
-    await shows(page, OPENED)
+@pytest.mark.endpoint(n_people=2)
+async def test_people_are_changed_by_key_by_name_and_by_a_click(page, endpoint):
+    await page.set_viewport_size({"width": 1280, "height": 720})
     chosen = page.locator("#people input:checked")
     for key, person in (("p", 1), ("p", 0), ("Shift+P", 1), ("Shift+P", 0)):
         await page.keyboard.press(key)
@@ -163,7 +160,6 @@ async def test_people_are_changed_by_key_by_name_and_by_a_click(browser, endpoin
     u, v = next((h["u"], h["v"]) for h in handles if h["camera"] == 0 and h["person"] == 0 and h["point"] == "r_wrist")
     await page.mouse.click(*await to_client(page, 0, u, v))
     await shows(page, "quadrille.state.state.person === 0 && quadrille.state.state.point === 'r_wrist'")
-    await page.context.close()
 
 
 async def test_one_frame_without_a_pose_is_a_page_too(browser, endpoint, address):

@@ -1,23 +1,17 @@
 """Two people in the page: chosen, dimmed, hidden; whom searches move, and who is in the hand's reach."""
 
+import pytest
 import pytest_asyncio
-from page_driver import OPENED, handle_of, shows, state_of, to_client, until
+from page_driver import handle_of, shows, state_of, to_client, until
+
+pytestmark = pytest.mark.endpoint(n_people=2)
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def couple(browser, endpoint, address):
+async def couple(page):
     """The page on two people, of whom person 0 is worked on."""
-    endpoint.n_people = 2
-    endpoint.__post_init__()
-    context = await browser.new_context(viewport={"width": 1280, "height": 720})
-    page = await context.new_page()
-    errors = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    await page.goto(address)
-    await shows(page, OPENED)
-    yield page
-    await context.close()
-    assert errors == []
+    await page.set_viewport_size({"width": 1280, "height": 720})
+    return page
 
 
 async def drag_wrist(page, person):

@@ -43,15 +43,15 @@ def xs(store, person="ann"):
 def test_pose_comes_back_whole(store, path):
     full = pose(
         0.1, keyframe=True, status="lost", cost_px=1.25, settings={"step_deg": 5, "tree": ["arms"]},
-        views_px=(0.5, None, 2.0), parts_px=(None, 0.25), remark="left arm relocated", reviewed=True,
+        view_costs_px=(0.5, None, 2.0), part_costs_px=(None, 0.25), remark="left arm relocated", reviewed=True,
     )  # fmt: skip
     store.commit("Place", [PoseChange("ann", 7, full)], author="eve")
     store.close()
     back = AnnotationStore(path, read_only=True).pose("ann", 7)
     np.testing.assert_array_equal(back.values, full.values)  # to the bit
     for name in (
-        "sources", "model_revision", "keyframe", "status", "cost_px", "settings", "views_px", "parts_px", "remark",
-        "reviewed",
+        "sources", "model_revision", "keyframe", "status", "cost_px", "settings", "view_costs_px", "part_costs_px",
+        "remark", "reviewed",
     ):  # fmt: skip
         assert getattr(back, name) == getattr(full, name), name
     assert back.author == "eve"
@@ -75,7 +75,7 @@ def test_people_have_their_own_poses(store):
 
 def test_frames_in_short(store):
     searched = PoseRecord(
-        np.zeros(2), ("tracked", "searched"), 1, status="good", cost_px=0.5, views_px=(None, 0.5), remark="twice"
+        np.zeros(2), ("tracked", "searched"), 1, status="good", cost_px=0.5, view_costs_px=(None, 0.5), remark="twice"
     )
     store.commit("a", [put(9, 1.0, keyframe=True), PoseChange("ann", 3, searched)])
     assert store.frames("ann") == [
@@ -86,14 +86,25 @@ def test_frames_in_short(store):
 
 def test_a_mark_leaves_the_pose_as_it_is(store):
     told = {"method": "chamfer"}
-    put_it = put(3, 1.0, cost_px=0.5, status="good", settings=told, views_px=(None, 0.5), parts_px=(2.0,), remark="x")
+    put_it = put(
+        3, 1.0, cost_px=0.5, status="good", settings=told, view_costs_px=(None, 0.5), part_costs_px=(2.0,), remark="x"
+    )
     store.commit("a", [put_it])
     before = store.pose("ann", 3)
     store.commit("verify", [MarkChange("ann", 3, keyframe=True, reviewed=True), MarkChange("ann", 4, True, True)])
     after = store.pose("ann", 3)
     assert (after.keyframe, after.reviewed) == (True, True)
     np.testing.assert_array_equal(after.values, before.values)
-    for name in ("sources", "model_revision", "status", "cost_px", "settings", "views_px", "parts_px", "remark"):
+    for name in (
+        "sources",
+        "model_revision",
+        "status",
+        "cost_px",
+        "settings",
+        "view_costs_px",
+        "part_costs_px",
+        "remark",
+    ):
         assert getattr(after, name) == getattr(before, name), name
     assert [row.frame for row in store.frames("ann")] == [3]  # where there is no pose there is nothing to mark
     assert store.frames_of(2) == [3]
@@ -150,11 +161,11 @@ def test_a_new_pose_is_not_reviewed(store):
 
 
 def test_numbers_of_a_range(store):
-    store.commit("a", [put(k, float(k), cost_px=0.5 * k, views_px=(1.0, None)) for k in (1, 4, 6)])
-    rows = store.numbers("ann", range(2, 6))
-    assert [(row.frame, row.cost_px, row.views_px) for row in rows] == [(4, 2.0, (1.0, None))]
+    store.commit("a", [put(k, float(k), cost_px=0.5 * k, view_costs_px=(1.0, None)) for k in (1, 4, 6)])
+    rows = store.frame_poses("ann", range(2, 6))
+    assert [(row.frame, row.cost_px, row.view_costs_px) for row in rows] == [(4, 2.0, (1.0, None))]
     np.testing.assert_array_equal(rows[0].values, [4.0, 2.0, 1 / 3])
-    assert [row.frame for row in store.numbers("ann", range(7))] == [1, 4, 6]
+    assert [row.frame for row in store.frame_poses("ann", range(7))] == [1, 4, 6]
 
 
 def test_a_status_is_one_of_those_known(store):
@@ -389,8 +400,8 @@ def test_threads(store):
 
 
 def test_writes_are_full_and_without_a_write_ahead_log(store):
-    assert store._db.execute("PRAGMA journal_mode").fetchone() == ("delete",)
-    assert store._db.execute("PRAGMA synchronous").fetchone()[0] >= 2
+    assert store._connection.db.execute("PRAGMA journal_mode").fetchone() == ("delete",)
+    assert store._connection.db.execute("PRAGMA synchronous").fetchone()[0] >= 2
 
 
 def test_read_only(store, path):

@@ -88,7 +88,7 @@ def test_in_version_3_nobody_had_reviewed_but_keyframes(version_3, read_only):
         (1, True, True), (2, False, False), (3, False, False),
     ]  # fmt: skip
     found = store.pose("ann", 3)
-    assert (found.reviewed, found.remark, found.views_px) == (False, "late", (1.0, None))
+    assert (found.reviewed, found.remark, found.view_costs_px) == (False, "late", (1.0, None))
     assert found.settings == {"step_deg": 5}
     store.close()
     assert (version_3.read_bytes() == before) == read_only
@@ -113,14 +113,20 @@ def test_older_version_keeps_everything(version_1):
     assert store.pins("ann", 1) == [Pin("left_wrist", "front", (10.25, -3.5))]
     assert store.setting("tree") == {"arms": [1]}
     back = store.pose("ann", 3)
-    assert (back.cost_px, back.views_px, back.parts_px, back.remark, back.program) == (1.5, (), (), "", "0.1.0")
+    assert (back.cost_px, back.view_costs_px, back.part_costs_px, back.remark, back.program) == (
+        1.5,
+        (),
+        (),
+        "",
+        "0.1.0",
+    )
     assert store.undo() == "track"
     assert store.undo() == "drag"
     assert xs(store) == {1: 0.1}
     assert (store.pose("ann", 1).settings, store.pose("ann", 1).author) == ({"step_deg": 5}, "eve")
     assert [store.redo(), store.redo(), store.redo(), store.redo()] == ["drag", "track", "clear", None]
     assert xs(store) == {1: 0.3, 3: 3.0}
-    record = PoseRecord(np.array([5.0]), ("manual",), 1, views_px=(1.0,), remark="both")
+    record = PoseRecord(np.array([5.0]), ("manual",), 1, view_costs_px=(1.0,), remark="both")
     store.commit("new", [PoseChange("ann", 5, record)])
     assert store.undo() == "new"
     store.close()
@@ -134,8 +140,8 @@ def test_older_version_that_is_only_read_stays_as_it_is(version_1):
     before = version_1.read_bytes()
     store = AnnotationStore(version_1, read_only=True)
     assert store.pose("ann", 2).remark == ""
-    assert [row.views_px for row in store.frames("ann")] == [(), (), ()]
-    assert [row.frame for row in store.numbers("ann", range(9))] == [1, 2, 3]
+    assert [row.view_costs_px for row in store.frames("ann")] == [(), (), ()]
+    assert [row.frame for row in store.frame_poses("ann", range(9))] == [1, 2, 3]
     assert [h.label for h in store.history()] == ["clear", "track", "drag", "place"]
     store.close()
     assert version_1.read_bytes() == before

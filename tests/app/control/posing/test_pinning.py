@@ -1,12 +1,12 @@
 """Pins in the program: gestures, the fit that follows, undo, and what is on disk after each."""
 
-import time
-
 import numpy as np
 import pytest
 from gestures import FRONT, PAGE, drag, pixel_of, wait_for
 
 from tracker.errors import TrackerError
+from tracker.fitting.gauss_newton_compiled import solve
+from tracker.posing import pinned_fit
 from tracker.store.annotation_store import AnnotationStore
 
 RIGHT, BACK = 1, 2
@@ -247,17 +247,25 @@ def test_fit_leaves_locked_degrees_of_freedom_alone(opened):
     assert not set(moved) & set(locked)
 
 
-def test_a_live_pin_follows_at_interactive_rate(opened):
-    controller = opened()
+def test_a_live_pin_costs_a_few_steps_of_the_solver_a_move(opened, monkeypatch):
+    """Some 40 ms on a quiet machine of two cores."""
+    controller, iterations = opened(), []
     drag(controller, "torso", (4.0, 0.0))
-    start, times = pixel_of(controller, "left_wrist"), []
+
+    def counted(*arguments):
+        fit = solve(*arguments)
+        iterations[-1].append(fit.iterations)
+        return fit
+
+    monkeypatch.setattr(pinned_fit, "solve", counted)
+    start = pixel_of(controller, "left_wrist")
     controller.pinning.begin(PAGE, 0, FRONT, 0, "left_wrist", tuple(start), True)
     for i in range(12):
-        began = time.perf_counter()
+        iterations.append([])
         controller.pinning.move(PAGE, tuple(start + i))
-        times.append(time.perf_counter() - began)
     controller.pinning.end(PAGE)
-    assert np.median(times) < 0.25  # some 40 ms on a quiet machine of two cores
+    assert max(len(each) for each in iterations) <= 3  # by the pins, then by the edges from far and from near
+    assert np.median([sum(each) for each in iterations]) < 60
 
 
 def test_pins_belong_to_the_frame_that_a_tracker_shows(placed, tracker):

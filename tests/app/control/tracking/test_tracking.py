@@ -51,7 +51,7 @@ def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, sess
         (6, "tracked", "good"), (7, "tracked", "lost"), (8, "tracked", "good"), (9, "tracked", "good"),
     ]  # fmt: skip
     record = store.pose("person", 4)
-    assert (record.views_px, record.parts_px, record.remark) == (shown_costs(), shown.parts_px, shown.remark)
+    assert (record.view_costs_px, record.part_costs_px, record.remark) == (shown_costs(), shown.parts_px, shown.remark)
     assert record.settings["method"]
     store.close()
     assert placed.timeline()[4] == {

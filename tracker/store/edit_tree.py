@@ -1,0 +1,178 @@
+"""The tree of edits: undo, redo, history.
+
+Each edit has the one before it as its parent. `head` is the last edit done: the current poses and pins are those after
+it. Undo moves head to the parent, redo to the youngest child. A commit after an undo starts a new branch; the old one
+stays in the log but is out of reach.
+"""
+
+import sqlite3
+from datetime import UTC, datetime
+from functools import cache
+from importlib import metadata
+from typing import Any
+
+from tracker.errors import SessionError
+from tracker.store.connection import Connection
+from tracker.store.records import HistoryEntry
+
+_KEYS = {"pose": ("person, frame", "numbers"), "pin": ("person, frame, point, camera", "u")}
+"""For each kind of annotation its key, and the column that is NULL in a change that clears it."""
+_YOUNGEST = "(SELECT max(id) FROM edits WHERE parent IS {})"
+
+
+class EditTree:
+    """The edits of a store, and which of them is the last one done."""
+
+    def __init__(self, connection: Connection) -> None:
+        """Use an open store."""
+        self._connection = connection
+
+    def add(self, db: sqlite3.Connection, label: str, author: str) -> int:
+        """Add an edit after head, within a transaction, make it head and return its id."""
+        edit = db.execute(
+            "INSERT INTO edits (parent, label, author, time, program) VALUES (?, ?, ?, ?, ?)",
+            (head(db), label, author, now(), _program_version()),
+        ).lastrowid
+        assert edit is not None
+        db.execute("UPDATE head SET edit = ?", (edit,))
+        return edit
+
+    def undo(self) -> str | None:
+        """Undo the last edit; returns its label, or None if there is none."""
+        with self._connection.transaction() as db:
+            row = db.execute("SELECT e.id, e.label FROM head h JOIN edits e ON e.id = h.edit").fetchone()
+            if row is None:
+                return None
+            _undo(db, row[0])
+            return str(row[1])
+
+    def redo(self) -> str | None:
+        """Redo the edit that was undone last; returns its label, or None if there is none."""
+        with self._connection.transaction() as db:
+            row = db.execute(
+                "SELECT id, label FROM edits WHERE parent IS (SELECT edit FROM head) ORDER BY id DESC LIMIT 1"
+            ).fetchone()
+            if row is None:
+                return None
+            _redo(db, row[0])
+            return str(row[1])
+
+    def go_to(self, edit: int | None) -> list[int]:
+        """Undo or redo, all or nothing, until an edit is the last one done; None undoes all edits.
+
+        Returns:
+            Ids of the edits undone or redone, in that order.
+
+        Raises:
+            SessionError: neither undo nor redo leads there.
+        """
+        with self._connection.transaction() as db:
+            start = head(db)
+            back = _chain(db, "?", "(SELECT parent FROM edits WHERE id = line.id)", start)
+            if edit in back:
+                path = back[: back.index(edit)]
+                for last in path:
+                    _undo(db, last)
+                return path
+            onward = _chain(db, _YOUNGEST.format("?"), _YOUNGEST.format("line.id"), start)
+            if edit not in onward:
+                raise SessionError(f"entry {edit} of the history cannot be reached any more; look at the list again")
+            path = onward[: onward.index(edit) + 1]
+            for following in path:
+                _redo(db, following)
+            return path
+
+    def history(self, limit: int) -> list[HistoryEntry]:
+        """List the edits that redo and undo can reach, latest first, at most `limit` of each."""
+        undone = self._entries(_YOUNGEST.format("(SELECT edit FROM head)"), _YOUNGEST.format("line.id"), limit)
+        done = self._entries("(SELECT edit FROM head)", "line.parent", limit)
+        return [HistoryEntry(e, label, author, time, undone=True) for e, label, author, time in reversed(undone)] + [
+            HistoryEntry(e, label, author, time, undone=False) for e, label, author, time in done
+        ]
+
+    def frames_of(self, edit: int) -> list[int]:
+        """List the frames whose poses or pins an edit changes, ascending."""
+        sql = "SELECT frame FROM pose_changes WHERE edit = ?1 UNION SELECT frame FROM pin_changes WHERE edit = ?1"
+        return sorted(frame for (frame,) in self._connection.all(sql, (edit,)))
+
+    def _entries(self, start: str, onward: str, limit: int) -> list[Any]:
+        """Follow the tree from edit to edit; `start` and `onward` are SQL for their ids."""
+        columns = "edits.id, edits.parent, edits.label, edits.author, edits.time"
+        return self._connection.all(
+            f"WITH RECURSIVE line (id, parent, label, author, time, n) AS (SELECT {columns}, 1 FROM edits "
+            f"WHERE id = {start} UNION ALL SELECT {columns}, n + 1 FROM line JOIN edits ON edits.id = {onward} "
+            "WHERE n < ?) SELECT id, label, author, time FROM line",
+            (limit,),
+        )
+
+
+def head(db: sqlite3.Connection) -> int | None:
+    """Return the id of the last edit done; None if there is none."""
+    (edit,) = db.execute("SELECT edit FROM head").fetchone()
+    return None if edit is None else int(edit)
+
+
+def show_change(db: sqlite3.Connection, kind: str, change: int | None, shown: int | None) -> None:
+    """Make a change current in place of another change of the same pose or pin.
+
+    Args:
+        db: connection within a transaction.
+        kind: `pose` or `pin`.
+        change: id of a change, which names the pose or pin.
+        shown: id of the change that becomes current; None leaves the pose or pin cleared.
+    """
+    key, content = _KEYS[kind]
+    db.execute(f"DELETE FROM {kind}s WHERE ({key}) = (SELECT {key} FROM {kind}_changes WHERE id = ?)", (change,))
+    db.execute(
+        f"INSERT INTO {kind}s ({key}, change) SELECT {key}, id FROM {kind}_changes "
+        f"WHERE id = ? AND {content} IS NOT NULL",
+        (shown,),
+    )
+
+
+def now() -> str:
+    """Return the time as the store writes it: ISO 8601, UTC, milliseconds."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+def _undo(db: sqlite3.Connection, edit: int) -> None:
+    (parent,) = db.execute("SELECT parent FROM edits WHERE id = ?", (edit,)).fetchone()
+    _move_head(db, "undo", edit, parent)
+    for kind in ("pose", "pin"):
+        for change, previous in _changes(db, kind, edit)[::-1]:
+            show_change(db, kind, change, previous)
+
+
+def _redo(db: sqlite3.Connection, edit: int) -> None:
+    _move_head(db, "redo", edit, edit)
+    for kind in ("pose", "pin"):
+        for change, _ in _changes(db, kind, edit):
+            show_change(db, kind, change, change)
+
+
+def _changes(db: sqlite3.Connection, kind: str, edit: int) -> list[tuple[int, int | None]]:
+    """Ids of an edit's changes and of the changes that were current before them, in order."""
+    return db.execute(f"SELECT id, previous FROM {kind}_changes WHERE edit = ? ORDER BY id", (edit,)).fetchall()
+
+
+def _move_head(db: sqlite3.Connection, kind: str, edit: int, parent: int | None) -> None:
+    db.execute("INSERT INTO moves (kind, edit, time) VALUES (?, ?, ?)", (kind, edit, now()))
+    db.execute("UPDATE head SET edit = ?", (parent,))
+
+
+def _chain(db: sqlite3.Connection, start: str, onward: str, parameter: int | None) -> list[Any]:
+    """Ids of edits from one to the next in the tree, then None; `start` and `onward` are SQL for them."""
+    rows = db.execute(
+        f"WITH RECURSIVE line (id) AS (SELECT {start} UNION ALL SELECT {onward} FROM line "
+        "WHERE id IS NOT NULL) SELECT id FROM line",
+        (parameter,),
+    )
+    return [edit for (edit,) in rows]
+
+
+@cache
+def _program_version() -> str:
+    try:
+        return metadata.version("quadrille")
+    except metadata.PackageNotFoundError:  # run from the source tree without an installation
+        return "unknown"
