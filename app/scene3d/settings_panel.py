@@ -8,13 +8,13 @@ import viser
 
 from app.control.controller import Controller
 from tracker.errors import TrackerError
-from tracker.motion.prediction import MOST_ORDER, PredictSettings
+from tracker.motion.prediction import MAX_ORDER, PredictSettings
 from tracker.search.best_first import SearchSettings
 from tracker.tracking.chamfer.settings import Estimation, RecoverSettings, TrackSettings
 
 _METHODS: dict[Estimation, str] = {"refine": "refine, else search", "search": "search alone (paper)"}
 _ORDERS = ("stays", "constant velocity", "constant acceleration")
-assert len(_ORDERS) == MOST_ORDER + 1
+assert len(_ORDERS) == MAX_ORDER + 1
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,8 @@ import { hasSearch, hasTrack } from "./selectors.js";
 
 /** @typedef {() => string | null} Reason */
 
+/** @typedef {ReturnType<typeof unavailableReasons>} Reasons */
+
 /** @param {import("./store.js").Store} store */
 export function unavailableReasons(store) {
   const facts = () => store.facts;

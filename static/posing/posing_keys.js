@@ -1,4 +1,6 @@
-/** The keys of posing without a drag. */
+/** Keys that edit poses and pins. */
+
+import { alt, inArea, plain } from "../widgets/key_matching.js";
 
 /** @type {[string, string, import("./posing.js").Way][]} */
 const WAYS = [
@@ -11,15 +13,12 @@ const WAYS = [
 /**
  * @param {import("./posing.js").Posing} posing
  * @param {import("./inspector.js").Inspector} inspector
- * @param {(key: string, code?: string, shift?: boolean) => (event: KeyboardEvent) => boolean} plain
- * @returns {import("../widgets/key_matching.js").Binding[]}
+ * @param {() => string | null} why why posing is unavailable
  */
-export function posingBindings(posing, inspector, plain) {
-  const alt = (/** @type {string} */ code) => (/** @type {KeyboardEvent} */ event) =>
-    event.altKey && !event.ctrlKey && !event.metaKey && !event.shiftKey && event.code === code;
+export function posingBindings(posing, inspector, why) {
   const sign = (/** @type {string[]} */ keys) => (/** @type {KeyboardEvent} */ event) =>
     keys.includes(event.key) && !event.ctrlKey && !event.metaKey && !event.altKey;
-  return [
+  const bindings = [
     { keys: ["J"], label: "Next joint", matches: plain("j"), run: () => posing.toJoint(1) },
     { keys: ["Shift J"], label: "Previous joint", matches: plain("j", undefined, true), run: () => posing.toJoint(-1) },
     ...WAYS.map(([arrow, name, way]) => ({
@@ -48,7 +47,39 @@ export function posingBindings(posing, inspector, plain) {
       run: () => posing.takeAlternative(),
     },
     { keys: ["R"], label: "Reset the joint's limb to neutral", matches: plain("r"), run: () => posing.resetLimb() },
-    { keys: ["Alt ,"], label: "Copy the pose of the previous frame", matches: alt("Comma"), run: () => posing.copyNeighbour(-1) },
-    { keys: ["Alt ."], label: "Copy the pose of the next frame", matches: alt("Period"), run: () => posing.copyNeighbour(1) },
+    { keys: ["Alt ,"], label: "Copy the pose of the previous frame", matches: alt("Comma", false), run: () => posing.copyNeighbour(-1) },
+    { keys: ["Alt ."], label: "Copy the pose of the next frame", matches: alt("Period", false), run: () => posing.copyNeighbour(1) },
   ];
+  return inArea("Posing", bindings, why);
+}
+
+/**
+ * @param {import("./pinning.js").Pinning} pinning
+ * @param {() => string | null} why why pins are unavailable
+ */
+export function pinBindings(pinning, why) {
+  const shift = (/** @type {string} */ key) => plain(key, undefined, true);
+  const bindings = [
+    { keys: ["X"], label: "Pin the selected joint by clicks, or no more", matches: plain("x"), run: () => pinning.toggle() },
+    { keys: ["G"], label: "Fit to pins and edges", matches: plain("g"), run: () => pinning.fit() },
+    {
+      keys: ["Shift G"],
+      label: "The body follows pins that are dragged, or not",
+      matches: shift("g"),
+      run: () => pinning.toggleLive(),
+    },
+    {
+      keys: ["Delete"],
+      label: "Remove the pin under the pointer, else those of the joint",
+      matches: plain("delete"),
+      run: () => pinning.remove(),
+    },
+    {
+      keys: ["Shift Delete"],
+      label: "Remove all pins of the person on this frame",
+      matches: shift("delete"),
+      run: () => pinning.clear(),
+    },
+  ];
+  return inArea("Pins", bindings, why);
 }

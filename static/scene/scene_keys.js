@@ -1,14 +1,16 @@
-/** The keys of the 3-D view, and of setting the floor. */
+/** Keys of the 3-D view and of the floor. */
+
+import { inArea, plain } from "../widgets/key_matching.js";
 
 /**
  * @param {import("./camera_view.js").CameraView} cameraView
  * @param {import("./floor.js").Floor} floor
- * @param {(key: string, code?: string, shift?: boolean) => (event: KeyboardEvent) => boolean} plain
- * @returns {import("../widgets/key_matching.js").Binding[]}
+ * @param {() => string | null} away why the 3-D view is unavailable
  */
-export function sceneBindings(cameraView, floor, plain) {
+export function sceneBindings(cameraView, floor, away) {
   const why = () => (floor.isOn ? null : "The floor is not being set; Shift+Y begins that.");
-  return [
+  /** @type {import("../widgets/key_matching.js").Binding[]} */
+  const bindings = [
     { keys: ["Y"], label: "3-D view: look through the camera pointed at, or let go", matches: plain("y"), run: () => cameraView.toggle() },
     {
       keys: ["Shift Y"],
@@ -31,4 +33,5 @@ export function sceneBindings(cameraView, floor, plain) {
       run: () => floor.takeBack(),
     },
   ];
+  return inArea("3-D view", bindings, away);
 }

@@ -18,18 +18,17 @@ export class Palette {
   #list = byId("palette-list", HTMLElement);
   #why = byId("palette-why", HTMLElement);
   #context;
-  #table;
+  /** @type {import("../widgets/key_matching.js").Binding[]} */
+  #table = [];
   /** @type {Command[]} what is shown, in order */
   #found = [];
   #at = 0;
 
   /**
    * @param {import("./commands.js").CommandContext} context
-   * @param {() => import("../widgets/key_matching.js").Binding[]} table
    */
-  constructor(context, table) {
+  constructor(context) {
     this.#context = context;
-    this.#table = table;
     this.#input.addEventListener("input", () => this.#search());
     this.#input.addEventListener("keydown", (event) => this.#onKey(event));
     this.#dialog.addEventListener("click", (event) => event.target === this.#dialog && this.#dialog.close());
@@ -37,6 +36,11 @@ export class Palette {
       const option = event.target instanceof Element ? event.target.closest("[role=option]") : null;
       if (option) this.#choose([...this.#list.children].indexOf(option));
     });
+  }
+
+  /** @param {import("../widgets/key_matching.js").Binding[]} table */
+  setBindings(table) {
+    this.#table = table;
   }
 
   toggle() {
@@ -51,9 +55,8 @@ export class Palette {
 
   #search() {
     const query = this.#input.value;
-    const table = this.#table();
     const recent = recentIds();
-    const commands = [...contextCommands(this.#context, query), ...keyCommands(table), ...buttonCommands(table)];
+    const commands = [...contextCommands(this.#context, query), ...keyCommands(this.#table), ...buttonCommands(this.#table)];
     const scored = commands.flatMap((command) => {
       const found = fitness(query, `${command.label} ${command.area} ${command.words} ${command.keys.join(" ")}`);
       if (found === null) return [];

@@ -1,17 +1,15 @@
-/** The keys of several people; `keys.js` takes them into its table. */
+/** Keys for sessions with several people. */
 
-import { plain } from "../widgets/key_matching.js";
-import { unavailableReasons } from "../model/unavailable_reasons.js";
+import { inArea, plain } from "../widgets/key_matching.js";
 
 /**
- * @param {{store: import("../model/store.js").Store, actions: import("../model/actions.js").Actions,
- *   posing: import("../posing/posing.js").Posing, people: import("./people.js").People}} parts
- * @returns {import("../widgets/key_matching.js").Binding[]}
+ * @param {{actions: import("../model/actions.js").Actions, posing: import("../posing/posing.js").Posing,
+ *   people: import("./people.js").People, reasons: import("../model/unavailable_reasons.js").Reasons}} parts
  */
-export function peopleBindings({ store, actions, posing, people }) {
-  const why = unavailableReasons(store).people;
+export function peopleBindings({ actions, posing, people, reasons }) {
+  const why = reasons.people;
   const shift = (/** @type {string} */ key) => plain(key, undefined, true);
-  return [
+  return inArea("People", [
     { keys: ["P"], label: "Work on the next person", matches: plain("p"), why, run: () => actions.stepPerson(1) },
     { keys: ["Shift P"], label: "Work on the person before", matches: shift("p"), why, run: () => actions.stepPerson(-1) },
     { keys: ["Shift A"], label: "Solo: dim the others, or no more", matches: shift("a"), why, run: () => actions.toggleSolo() },
@@ -37,5 +35,5 @@ export function peopleBindings({ store, actions, posing, people }) {
       run: () => posing.copyNextPerson(),
     },
     { keys: ["Shift U"], label: "List of the people", matches: shift("u"), why, run: () => people.toggle() },
-  ];
+  ]);
 }

@@ -10,7 +10,7 @@ import numpy as np
 from app.control.search.search_runs import Runs
 from app.control.session.session_state import Screen
 from app.state.state import SizeDraft
-from tracker.body.dimensions import BodyDimensions, PartDimensions, mirror_part, scaled, sizes_of, with_sizes
+from tracker.body.dimensions import BodyDimensions, PartDimensions, dimensions_of, mirror_part, scaled, with_dimensions
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.posing.retarget import retarget_pose
@@ -117,7 +117,7 @@ class Sizing:
         with self._editing():
             screen, name = self._screen, self._screen.session.people[person].name
             before, model = screen.saver.revision(person), self.model(person)
-            same = model is screen.present[person] or sizes_of(model) == sizes_of(screen.present[person])
+            same = model is screen.present[person] or dimensions_of(model) == dimensions_of(screen.present[person])
             if not same:
                 screen.embody(save_model(screen.session, person, model))
             refitted = self._refit(person) if refit else _Refitted([], 0.0)
@@ -163,12 +163,12 @@ class Sizing:
             screen.set(draft=None, sizes_message="")
 
     def _sizes(self, person: int) -> BodyDimensions:
-        return sizes_of(self.model(person))
+        return dimensions_of(self.model(person))
 
     def _draft(self, person: int, sizes: BodyDimensions) -> None:
         if sizes == self._sizes(person):
             return
-        model = with_sizes(self._screen.present[person], sizes)
+        model = with_dimensions(self._screen.present[person], sizes)
         self._screen.set(draft=SizeDraft(person, model), sizes_message="")
 
     def _refit(self, person: int) -> _Refitted:

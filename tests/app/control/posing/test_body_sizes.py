@@ -8,7 +8,7 @@ from gestures import PAGE, drag, pixel_of, wait_for
 
 from app.page import messages
 from app.state.page_view import View
-from tracker.body.dimensions import PartDimensions, sizes_of
+from tracker.body.dimensions import PartDimensions, dimensions_of
 from tracker.errors import TrackerError
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
@@ -17,11 +17,11 @@ FRAMES = (0, 3)
 
 
 def length(model, part="left_forearm"):
-    return sizes_of(model).parts[part].length_m
+    return dimensions_of(model).parts[part].length_m
 
 
 def lengthen(controller, by_m=0.01, part="left_forearm"):
-    own = sizes_of(controller.sizing.model(0)).parts[part]
+    own = dimensions_of(controller.sizing.model(0)).parts[part]
     controller.sizing.set_part(0, part, PartDimensions(own.length_m + by_m, own.girths_m))
 
 
