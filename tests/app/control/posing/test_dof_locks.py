@@ -78,7 +78,7 @@ def test_a_tracking_run_is_told_what_is_locked(placed, tracker):
     placed.track(backward=False, until=4)
     tracker.let_go(2)
     wait_for(lambda: placed.state.track.message)
-    (free,) = tracker.told["free"]
+    (free,) = tracker.run.subjects.active_dofs
     assert set(np.flatnonzero(~free)) == set(locked)
 
 

@@ -139,14 +139,14 @@ def test_a_verified_frame_stays_when_a_program_comes_by(placed, tracker):
     placed.seek(5)
     placed.ranges.toggle_keyframe()
     placed.ranges.track(2, 8, backward=False)
-    wait_for(lambda: tracker.told["frames"] == range(3, 9))
-    assert set(tracker.told["fixed"]) == {5}
+    wait_for(lambda: tracker.run.frames == range(3, 9))
+    assert set(tracker.run.subjects.keyframes) == {5}
     tracker.let_go(20)
     wait_for(lambda: placed.state.track.first is None)
     assert cells(placed)[5] == ("tracked", True, True)
     placed.ranges.track(2, 8, backward=True)
     assert placed.state.frame == 8
-    wait_for(lambda: tracker.told["frames"] == range(7, 1, -1))
+    wait_for(lambda: tracker.run.frames == range(7, 1, -1))
     tracker.let_go(20)
     wait_for(lambda: placed.state.track.first is None)
 
