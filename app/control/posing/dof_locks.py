@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager
 
 from app.control.session.session_state import Screen
 from tracker.body.model import BodyModel
-from tracker.session.locked_dofs import SETTING, kept_locks, to_keep
+from tracker.session.locked_dofs import SETTING, load_locks, locks_setting
 
 
 class Locks:
@@ -19,7 +19,7 @@ class Locks:
             editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
         """
         self._screen, self._editing = screen, editing
-        screen.set(locked=kept_locks(screen.session.people, screen.saver.setting))
+        screen.set(locked=load_locks(screen.session.people, screen.saver.setting))
 
     def set(self, person: int, dofs: Collection[int], locked: bool) -> None:
         """Lock or unlock degrees of freedom of a person, each ball joint as a whole; on disk when this returns.
@@ -35,7 +35,7 @@ class Locks:
             if now == before[person]:
                 return
             everybody = (*before[:person], now, *before[person + 1 :])
-            self._screen.saver.keep_setting(SETTING, to_keep(self._screen.session.people, everybody))
+            self._screen.saver.keep_setting(SETTING, locks_setting(self._screen.session.people, everybody))
             self._screen.set(locked=everybody)
 
 

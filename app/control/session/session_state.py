@@ -19,7 +19,7 @@ from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.triangulation import PointObservation
 from tracker.posing.default_pose import default_pose
 from tracker.posing.retarget import retarget_pose
-from tracker.session.locked_dofs import free_of
+from tracker.session.locked_dofs import active_dofs
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import pose_cost
 
@@ -70,7 +70,7 @@ class Screen:
 
     def free(self, person: int) -> NDArray[np.bool_]:
         """The degrees of freedom of a person that may move, (n_dofs,): those that are not locked."""
-        return free_of(self.present[person], self.state.locked[person])
+        return active_dofs(self.present[person], self.state.locked[person])
 
     def within_locks(self, poses: Sequence[Array]) -> tuple[Array, ...]:
         """Poses, (n_values,) of each person, with what is locked as it is shown."""
