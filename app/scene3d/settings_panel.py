@@ -102,7 +102,7 @@ class SettingsPanel:
         async def changed(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:  # otherwise the program set it
                 try:
-                    self._controller.set_settings(self.read())
+                    self._controller.search.set_settings(self.read())
                 except TrackerError as error:
                     event.client.add_notification("Settings", str(error), color="red", auto_close_seconds=8.0)
 

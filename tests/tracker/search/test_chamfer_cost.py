@@ -3,11 +3,11 @@ import cv2
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-from staging import at, camera_at, cameras_around, own_evidence, shaken, solid
+from staging import at, camera_at, cameras_around, own_evidence, shaken, solid, view_evidence
 
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
-from tracker.evidence.view_evidence import ViewEvidence, default_theta_px, view_evidence
+from tracker.evidence.view_evidence import ViewEvidence, default_theta_px
 from tracker.formats.model_toml import load_model
 from tracker.search.chamfer_cost import ChamferCost
 
@@ -123,7 +123,7 @@ def test_view_without_edges_has_no_say(gavrila):
     values = gavrila.neutral()
     cameras = cameras_around(3)
     views = own_evidence([PosedBody(gavrila, values)], cameras)
-    blind = view_evidence(cameras[1], 1.0, np.zeros((480, 640), dtype=bool))
+    blind = view_evidence(cameras[1], np.zeros((480, 640), dtype=bool))
     moved = shaken(gavrila, values, np.random.default_rng(0), 0.2, 0.05)
     all_three = ChamferCost(views, [PosedBody(gavrila, values)])([moved])
     two = ChamferCost([views[0], blind, views[2]], [PosedBody(gavrila, values)])

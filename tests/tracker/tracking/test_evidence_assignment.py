@@ -6,7 +6,7 @@ from staging import at, camera_at, own_evidence, solid
 
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import Silhouette, with_segments
-from tracker.images.edge_segments import Segments
+from tracker.images.edge_segments import Segments, sample_segments
 from tracker.images.silhouette_contour import SilhouetteContour
 from tracker.tracking.evidence_assignment import Shares, Sharing, _tell_apart
 
@@ -22,7 +22,7 @@ def seen(bodies, camera=FRONT):
     outline = Silhouette(
         inside, view.points_px, view.normals, 1.0, SilhouetteContour(view.points_px, view.normals), 40.0
     )
-    return replace(view, segments=each, silhouette=outline)
+    return replace(view, segments=each, samples=sample_segments(each), silhouette=outline)
 
 
 def off_px(points, body):
@@ -69,12 +69,13 @@ def test_the_shares_of_three_are_those_of_the_simple_version(person):
     segments = Segments(near, normals, np.arange(0, 1501, 3))
     view = seen(bodies)
     outline = replace(view.silhouette, points_px=points, normals=normals)
-    view = replace(view, segments=segments, silhouette=outline)
+    view = replace(view, segments=segments, samples=sample_segments(segments), silhouette=outline)
     (own,) = Shares(Sharing([view]), bodies).own(person, everywhere=True)
     kept, clear = own_segments(view, bodies, person)
     assert 5 < np.count_nonzero(~kept) < 250
     np.testing.assert_array_equal(own.accepted[clear > 1e-3], kept[clear > 1e-3])
-    each = replace(view, segments=Segments(points, normals, np.arange(1501)))
+    segments = Segments(points, normals, np.arange(1501))
+    each = replace(view, segments=segments, samples=sample_segments(segments))
     kept, clear = own_segments(each, bodies, person)
     assert clear.min() > 1e-6
     np.testing.assert_array_equal(own.silhouette.points_px, points[kept])
@@ -170,5 +171,5 @@ def test_a_hidden_contour_explains_nothing():
 
 def test_edges_without_direction_are_shared_by_nobody():
     bodies = [at(BALL, 0, -0.25, 0), at(BALL, 0, 0.25, 0)]
-    view = replace(seen(bodies), segments=None)
+    view = replace(seen(bodies), segments=None, samples=None)
     assert Shares(Sharing([view]), bodies).own(0)[0] is view

@@ -2,14 +2,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_evidence, posed, shaken, solid
+from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_evidence, posed, shaken, solid, view_evidence
 from tracking_runs import track
 
 from tracker.body.model import PosedBody
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
-from tracker.evidence.view_evidence import view_evidence
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
@@ -271,7 +270,7 @@ def test_the_prediction_stands_while_nothing_is_seen(gavrila):
     truth = dancing(gavrila, 4)
     cameras = cameras_around()
     views = [dressed([PosedBody(gavrila, v)], cameras, SUIT) for v in truth]
-    views[3] = tuple(view_evidence(c, 1.0, np.zeros((480, 640), dtype=bool)) for c in cameras)
+    views[3] = tuple(view_evidence(c, np.zeros((480, 640), dtype=bool)) for c in cameras)
     settings = TrackSettings(trust_rad=0.1, trust_m=0.03)
     *_, last = track(Shown(views), [gavrila], truth[:1], range(4), settings)
     assert last.statuses == ("lost",)
