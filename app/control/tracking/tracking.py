@@ -231,8 +231,8 @@ class Tracking:
             elif i not in tracked:
                 people.append(ShownPose(shown.values, None, revision=self._screen.state.revisions[i]))
             else:
-                parts_px = tuple(finite_or_none(c) for c in found.part_costs_px[i])
-                people.append(ShownPose(found.poses[i], "tracked", found.statuses[i], found.notes[i], parts_px))
+                part_costs_px = tuple(finite_or_none(c) for c in found.part_costs_px[i])
+                people.append(ShownPose(found.poses[i], "tracked", found.statuses[i], found.notes[i], part_costs_px))
         models, revisions = self._screen.bodies(people)
         return {
             "frame": found.frame,
