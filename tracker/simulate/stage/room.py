@@ -70,7 +70,7 @@ def floor_shadow(vertices_world: Array, faces: IntArray) -> NDArray[np.float32]:
 
 
 def see_room(camera: Camera, seed: int) -> Backdrop:
-    """RegionFeatures at the empty room, furnished by a random seed."""
+    """Render the empty room, furnished by a random seed, as one camera sees it."""
     boxes = furnished(seed)
     samples = camera.scaled(SAMPLES)
     u, v = np.meshgrid(np.arange(samples.width), np.arange(samples.height))
