@@ -23,7 +23,7 @@ from app.bench.sample_frames import FRAME, read_crowd, read_frame
 from app.session.samples import sample_copy
 from tracker.errors import TrackerError
 from tracker.files import write_text_atomic
-from tracker.simulate import simulate
+from tracker.simulate import Simulation, simulate
 
 BASELINE = Path(__file__).with_name("baseline.json")
 N_ROWS = 19
@@ -37,13 +37,13 @@ def measure() -> Iterator[Row]:
     frame = read_frame(sample_copy("elbow_rotation"))
     cones = frame.with_model("gavrila22_cones")
     with TemporaryDirectory() as folder, _one_thread():
-        simulate(Path(folder) / "six", scene="exercise", n_cameras=6, n_frames=2)
+        simulate(Path(folder) / "six", Simulation("exercise", n_cameras=6, n_frames=2))
         six = read_frame(Path(folder) / "six").with_model("gavrila22_cones")
         yield from bench_rows.candidates(frame, cones, yardstick)
         yield from bench_rows.searches(frame, cones, yardstick)
         yield from bench_rows.iterations(cones, six, yardstick)
         yield from bench_rows.evolution(cones, yardstick)
-        simulate(Path(folder) / "crowd", scene="crowd_of_three", n_frames=1)
+        simulate(Path(folder) / "crowd", Simulation("crowd_of_three", n_frames=1))
         yield from bench_rows.crowds(read_crowd(Path(folder) / "crowd", 0), yardstick)
     yield bench_rows.pipeline(frame, yardstick)
     yield bench_rows.pipeline_of_two(read_crowd(sample_copy("tango"), FRAME), yardstick)

@@ -29,12 +29,10 @@ def command(
         masks: write true masks too.
         body: skinned, a smooth body unlike the model; model, the very shapes that are fitted.
     """
-    from tracker.simulate import simulate
+    from tracker.simulate import Simulation, simulate
 
     reporter = Reporter()
     with reporter.over(frames * cameras, "rendering") as tick:  # one tick per image
-        simulate(
-            out, scene=scene, n_cameras=cameras, n_frames=frames, seed=seed, body=body, masks=masks,
-            progress=lambda *_: tick(),
-        )  # fmt: skip
+        simulation = Simulation(scene, cameras, frames, seed, body=body, masks=masks)
+        simulate(out, simulation, progress=lambda *_: tick())
     print(f"made {out}")

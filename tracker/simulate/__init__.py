@@ -5,6 +5,6 @@
 mounts the cameras; `render` and `film` make images; `encode` and `record` write them into a session folder.
 """
 
-from tracker.simulate.record import simulate
+from tracker.simulate.record import Simulation, simulate
 
-__all__ = ["simulate"]
+__all__ = ["Simulation", "simulate"]
