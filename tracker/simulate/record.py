@@ -39,7 +39,7 @@ Progress = Callable[[int, int], None]
 
 PRESET = "gavrila22"
 BACKGROUND_FRAMES = 3
-"""Frames filmed of the empty room, of which the last is kept: the codec has settled by then."""
+"""Frames filmed of the empty room. The last one is stored, because the codec has settled by then."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def _shoot(
 
 
 def _shoot_background(source: CameraSource, backdrop: Backdrop, fps: float, rng: np.random.Generator) -> None:
-    """Write the empty room as the same camera and codec record it, with noise of its own."""
+    """Write the empty room as the same camera and codec record it, with independent noise."""
     assert source.background is not None
     source.background.parent.mkdir(exist_ok=True)
     clip = source.background.with_suffix(".mp4")
@@ -193,7 +193,7 @@ def _write_truth(
 ) -> None:
     for role, model, values in zip(cast, models, poses, strict=True):
         suffix = "" if len(cast) == 1 else f"_{role.name}"
-        # The root is a place within the trunk that no marker set knows.
+        # The root lies within the trunk; no marker set has it.
         kept = [i for i, name in enumerate(model.point_names) if name != model.joints[0].name]
         points = np.array([model.points_world(v)[kept] for v in values])
         write_trc(folder / f"truth{suffix}.trc", [model.point_names[i] for i in kept], points, fps)
