@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from staging import cameras_around, posed
 
-from tracker.body.dimensions import PartDimensions, sizes_of, with_sizes
+from tracker.body.dimensions import PartDimensions, dimensions_of, with_dimensions
 from tracker.formats.model_toml import load_model
 from tracker.geometry.triangulation import PointObservation
 from tracker.posing.retarget import retarget_pose
@@ -14,12 +14,12 @@ from tracker.posing.retarget import retarget_pose
 def bodies():
     """A body, and the same with forearms and thighs 1.5 cm longer."""
     model = load_model("gavrila34")
-    sizes = sizes_of(model)
+    sizes = dimensions_of(model)
     parts = {
         n: PartDimensions(p.length_m + 0.015 * n.endswith(("forearm", "thigh")), p.girths_m)
         for n, p in sizes.parts.items()
     }
-    return model, with_sizes(model, sizes._replace(parts=parts))
+    return model, with_dimensions(model, sizes._replace(parts=parts))
 
 
 def off_m(values, becomes, was_values, was):
