@@ -31,12 +31,10 @@ def command(
         body: skinned, a smooth body unlike the model; model, the very shapes that are fitted.
         size: width and height of the images, px, both even.
     """
-    from tracker.simulate import simulate
+    from tracker.simulate import Simulation, simulate
 
     reporter = Reporter()
     with reporter.over(frames * cameras, "rendering") as tick:  # one tick per image
-        simulate(
-            out, scene=scene, n_cameras=cameras, n_frames=frames, seed=seed, size=size, body=body,
-            masks=masks, progress=lambda *_: tick(),
-        )  # fmt: skip
+        simulation = Simulation(scene, cameras, frames, seed, size, body=body, masks=masks)
+        simulate(out, simulation, progress=lambda *_: tick())
     print(f"made {out}")

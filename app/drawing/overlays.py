@@ -86,9 +86,9 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     state = state.drawn
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
-    tried = state.job.candidate if state.job.running or state.look.replay is not None else None
+    tried = state.search.candidate if state.search.running or state.search_view.replay is not None else None
     drafted, others = _with_draft(state, bodies), _alternatives(state, bodies)
-    ghosts = ((state.look.compared, COMPARED_COLOR), (state.look.preview, PREVIEW_COLOR))
+    ghosts = ((state.search_view.compared, COMPARED_COLOR), (state.search_view.preview, PREVIEW_COLOR))
     for index in sorted(view.cameras):
         camera = session.cameras[index].camera.pinhole
         if not view.layers.isdisjoint(("contours", "hidden")):
@@ -109,7 +109,7 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
             out += [s for s in _segments(bodies, views[index], index, view) if s.kind in view.layers]
     if state.drag is not None and "epipolar" in view.layers:
         out += [line for line in _epipolar_lines(session, state) if line.camera in view.cameras]
-    return [p for p in out if p.kind not in _PERSON_KINDS or p.person not in state.cast.hidden]
+    return [p for p in out if p.kind not in _PERSON_KINDS or p.person not in state.visibility.hidden]
 
 
 def handles(session: Session, state: State, cameras: Collection[int]) -> list[Handle]:
@@ -123,7 +123,7 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
         for person, body in enumerate(bodies):
             px = camera.project(points[person])
             for i, name in enumerate(body.model.point_names):
-                if person not in state.cast.hidden and np.all(np.isfinite(px[i])):
+                if person not in state.visibility.hidden and np.all(np.isfinite(px[i])):
                     u, v = float(px[i, 0]), float(px[i, 1])
                     out.append(Handle(index, person, name, u, v, not hidden[first + i]))
             first += len(px)

@@ -39,7 +39,7 @@ class BodyPanel:
 
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Build the folders."""
-        self._server, self._controller, self._sizing = server, controller, controller.sizing
+        self._server, self._controller, self._sizing = server, controller, controller.body_sizes
         self._folders = [self._add(i) for i in range(len(controller.session.people))]
 
     def show(self, state: State) -> None:
