@@ -13,7 +13,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.pose_csv import read_pose_table
 from tracker.motion.prediction import predict
 from tracker.session.session import Session
-from tracker.simulate.record import simulate
+from tracker.simulate.record import Simulation, simulate
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.confidence import Status
 
@@ -46,7 +46,7 @@ class Shown:
 def filmed(tmp_path_factory):
     """Six frames of a figure of the tracker's own parts that moves all its limbs, in four small views."""
     folder = tmp_path_factory.mktemp("filmed") / "small"
-    session = simulate(folder, "exercise", 4, N, 3, (320, 240), body="model")
+    session = simulate(folder, Simulation("exercise", 4, N, 3, (320, 240), body="model"))
     with Recording(session.cameras) as recording:
         frames = [list(recording.read(k)) for k in range(N)]
     return Filmed(session, frames, read_pose_table(folder / "truth.csv").values_for(session.people[0].model))

@@ -240,13 +240,13 @@ def test_several_people(run, tmp_path):
 
 
 def test_simulate(run, tmp_path):
-    status, out, err = run(
-        "simulate", tmp_path / "sim", "--frames", "2", "--cameras", "2", "--body", "model", "--masks"
-    )
+    options = ("--frames", "2", "--cameras", "2", "--size", "160", "120", "--body", "model", "--masks")
+    status, out, err = run("simulate", tmp_path / "sim", *options)
     assert (status, out) == (0, f"made {tmp_path / 'sim'}\n")
     assert err.splitlines()[-1].startswith("rendering: 4 of 4, ")  # an image of each camera for each frame
     made = load_session(tmp_path / "sim")
     assert (made.n_frames, [c.camera.name for c in made.cameras]) == (2, ["cam1", "cam2"])
+    assert {c.camera.size for c in made.cameras} == {(160, 120)}
     for name in ("truth.trc", "truth.csv", "truth_model.toml", "masks/cam2/000001.png", "background/cam1.png"):
         assert (tmp_path / "sim" / name).is_file(), name
     assert run("info", tmp_path / "sim")[0] == 0
