@@ -48,7 +48,7 @@ class ReplayState:
     """Cost of the candidate, px."""
     best_px: float | None
     """Cost of the best poses, px."""
-    best_views_px: tuple[float | None, ...]
+    best_view_costs_px: tuple[float | None, ...]
     """Cost of the best poses in each view, px; empty where unknown."""
     evaluations: int
     """Poses scored so far."""
@@ -84,5 +84,5 @@ class CostLandscape:
     """Sampled values, (N,), ascending, rad or metres."""
     totals_px: Array
     """Costs, (N,), px."""
-    views_px: Array
+    view_costs_px: Array
     """Costs in each view, (N, V), px; NaN for views without edges."""

@@ -26,7 +26,7 @@ from tracker.contours import occluding_contours
 from tracker.contours.static_cache import StaticContours, static_contours_buffer
 from tracker.contours.surfaces import surfaces_of
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.contour_arrays import ContourTerm, ViewArrays, scratch_buffer, sums_buffer
+from tracker.fitting.contour_arrays import ContourTerm, Scratch, Sums, ViewArrays, scratch_buffer, sums_buffer
 from tracker.fitting.contour_kernels import COST_ONLY, accumulate_normal_equations
 from tracker.fitting.gauss_newton import NormalEquations
 from tracker.fitting.match_points import points_to_match
@@ -76,11 +76,21 @@ class PartCosts(NamedTuple):
     """Share of the silhouette's contour that some part explains, (V,); NaN in views without a silhouette."""
 
 
+class Workspace(NamedTuple):
+    """Buffers for one pose. Residuals that share a workspace must be used one at a time."""
+
+    Ts: Array
+    """Poses of all parts, (P, 4, 4), metres."""
+    scratch: Scratch
+    sums: Sums
+
+
 class ContourResiduals:
     """Residuals of one person's contours against the edges of all views; see `ResidualBlock`.
 
-    The other people are fixed. They occlude, and take the edges that are nearer to them. Each object owns the scratch
-    of its kernels, so that only one thread may use it at a time; `clone_for_thread` makes one for another thread.
+    The other people are fixed. They occlude, and take the edges that are nearer to them. Only one thread may use an
+    object at a time, because its kernels work in its `workspace`; `clone_for_thread` makes an object for another
+    thread.
     """
 
     def __init__(
@@ -91,6 +101,7 @@ class ContourResiduals:
         settings: MatchSettings | None = None,
         theta_px: float | None = None,
         everywhere: bool = False,
+        contours: Sequence[occluding_contours.Contour] | None = None,
     ) -> None:
         """Prepare the evidence for the kernels.
 
@@ -101,14 +112,18 @@ class ContourResiduals:
             settings: weights and scales.
             theta_px: outlier distance, px of the footage; by default that of each view.
             everywhere: keep edge points at any distance from the predicted contours, for poses far from the prediction.
+            contours: predicted contours of all bodies in each view; traced here by default.
         """
         settings = settings or MatchSettings()
         self._model = bodies[person].model
         self._own = parts_of([b.model for b in bodies], person)
         thetas = [v.outlier_px(theta_px) for v in views]
+        near: Sequence[occluding_contours.Contour | None] = [None] * len(views)
+        if not everywhere:
+            near = contours or [occluding_contours.trace(bodies, v.camera) for v in views]
         points = [
-            points_to_match(v, bodies, np.inf if everywhere else _CAPTURE * theta, settings.edges, settings.silhouette)
-            for v, theta in zip(views, thetas, strict=True)
+            points_to_match(v, contour, _CAPTURE * theta, settings.edges, settings.silhouette)
+            for v, contour, theta in zip(views, near, thetas, strict=True)
         ]
         sorted_points = [sort_points(p, v.camera.size) for p, v in zip(points, views, strict=True)]
         self._n_silhouette_points = np.array(
@@ -145,25 +160,34 @@ class ContourResiduals:
         moves[parts] = True
         return static_contours_buffer(len(arrays.sizes), self._max_pieces, arrays.points.shape[1], moves)
 
-    def restricted_to(self, parts: IntArray) -> "ContourResiduals":
-        """Return the residuals for poses that differ in some parts of the person only, indices (n,); faster.
+    @property
+    def workspace(self) -> Workspace:
+        """Buffers of these residuals."""
+        return Workspace(self._term.Ts, self._term.scratch, self._term.sums)
+
+    def restricted_to(self, parts: IntArray, workspace: Workspace) -> "ContourResiduals":
+        """Return the residuals for poses that differ in some parts of the person only; faster.
 
         Residuals of other parts count in the cost, but not in the derivatives. Poses in which other parts move too are
         evaluated correctly, but more slowly.
+
+        Args:
+            parts: indices of the parts that move, (n,).
+            workspace: buffers to use, such as those of these residuals if the two are used one at a time.
         """
-        return self._copy(self._own.start + parts)
+        out, term = copy(self), self._term
+        static = self._static_buffer(self._own.start + parts, len(term.Ts), term.views)
+        out._term = term._replace(static=static, **workspace._asdict())
+        return out
 
     def clone_for_thread(self) -> "ContourResiduals":
         """Return the same residuals for another thread: the evidence is shared, the scratch is not."""
-        return self._copy(np.flatnonzero(self._term.static.moves))
-
-    def _copy(self, moving: IntArray) -> "ContourResiduals":
-        """Return the same residuals with a choice of moving parts, indices (n,), and with scratch of its own."""
         out, term = copy(self), self._term
+        moving, n_points = np.flatnonzero(term.static.moves), term.views.points.shape[1]
         out._term = term._replace(
             Ts=term.Ts.copy(),
             static=self._static_buffer(moving, len(term.Ts), term.views),
-            scratch=scratch_buffer(term.surfaces, self._max_pieces, term.views.points.shape[1]),
+            scratch=scratch_buffer(term.surfaces, self._max_pieces, n_points),
             sums=sums_buffer(len(term.Ts), len(term.views.sizes)),
         )
         return out

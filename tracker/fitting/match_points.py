@@ -4,13 +4,10 @@ The contour of a silhouette mostly is an edge as well. One point then stands for
 their summed weight, so that it pulls a pose like both.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.model import PosedBody
 from tracker.compute.numba_options import BORROW
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import SCENE_SPACING_PX, ViewEvidence
@@ -26,14 +23,14 @@ _SAME_PX, _SAME_COS = 2.0, 0.9
 
 
 def points_to_match(
-    view: ViewEvidence, bodies: Sequence[PosedBody], reach_px: float, edges: float, silhouette: float
+    view: ViewEvidence, contour: occluding_contours.Contour | None, reach_px: float, edges: float, silhouette: float
 ) -> FloatArray:
     """Return the points of a view within reach of the visible contours, (N, N_COLUMNS).
 
     Args:
         view: evidence of the view.
-        bodies: all bodies in the scene.
-        reach_px: largest distance of points from the contours, working px; infinity keeps all points.
+        contour: contours of all bodies in the view; None keeps all points.
+        reach_px: largest distance of points from the visible contours, working px.
         edges: weight of an edge point.
         silhouette: weight of a silhouette point in a fully trusted view.
     """
@@ -48,9 +45,8 @@ def points_to_match(
         own[:, :2], own[:, 2:4], own[:, 4:] = shown.points_px, shown.normals, (weight, 1.0, 1.0)
         cells = (view.camera.height // SCENE_SPACING_PX + 1, view.camera.width // SCENE_SPACING_PX + 1)
         n = _merge(points, n_edges, np.full(cells, -1, np.int64))
-    if np.isinf(reach_px):
+    if contour is None:
         return points[:n]
-    contour = occluding_contours.trace(bodies, view.camera)
     near = np.zeros((view.camera.height // _AREA_PX + 1, view.camera.width // _AREA_PX + 1), np.bool_)
     _mark(contour.pieces_px, contour.occluded, int(np.ceil(reach_px / _AREA_PX)), near)
     return points[: _pack(points[:n], near)]

@@ -7,41 +7,32 @@ views. Costs are in undistorted pixels of the footage; the views may have a smal
 
 import os
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import Tree, forward_kinematics
 from tracker.body.model import BodyModel, PosedBody, parts_of
-from tracker.compute.numba_options import FAST
-from tracker.compute.threads import helpers
+from tracker.compute.threads import kernel_pool
 from tracker.contours import occluding_contours
-from tracker.contours.pieces import PIECE_PX, Pieces, piece_buffer, place_parts
-from tracker.contours.surfaces import Surfaces, surfaces_of
+from tracker.contours.pieces import piece_buffer
+from tracker.contours.surfaces import surfaces_of
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.segment_distance import (
     RowSortedPoints,
-    Segments,
-    nearest_segment,
     segment_buffer,
     sort_points,
     stack_rows,
     within_reach,
 )
-from tracker.images.distance_transform import bilinear
+from tracker.search.chamfer_kernels import Scratch, TracedContours, ViewArrays, score_candidates, trace_views
 
 Outliers = Literal["truncated", "paper"]
 
-_ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)  # Python floats would promote to float64
-_JOINED = 10
-"""Largest number of consecutive pieces on one straight edge that are joined to one segment: longer segments would reach
-too many points."""
 
 _MIN_SHARED_CANDIDATES = 6
 """Smallest number of candidates that is worth waking another thread."""
@@ -52,52 +43,12 @@ class Cost(NamedTuple):
 
     total_px: float
     """Mean over the views with edges, px of the footage."""
-    views_px: Array
+    view_costs_px: Array
     """Cost of each view, (V,), px of the footage; NaN for a view without edges."""
     forward_px: Array
     """Model to image, (V,), px of the footage."""
     backward_px: Array
     """Image to model, (V,), px of the footage."""
-
-
-class _ViewArrays(NamedTuple):
-    """The evidence of all views as arrays; lengths in working px."""
-
-    P: Array
-    """Projection matrices, (V, 3, 4)."""
-    eyes: Array
-    """Camera centres in the world, (V, 3), metres."""
-    sizes: NDArray[np.int64]
-    """Image widths and heights, (V, 2), px."""
-    distances: FloatArray
-    """Distance images, one after the other, row by row."""
-    points: FloatArray
-    """u and v of the edge points near the prediction, (2, N), one view (see `segment_distance.RowSortedPoints`) after
-    the other."""
-    rows: NDArray[np.int64]
-    """Index of the first point of each strip and row within its view, (V, strips, largest height + 1)."""
-    firsts: NDArray[np.int64]
-    """Index of the first edge point of each view, then the number of all, (V + 1,)."""
-    counts: NDArray[np.int64]
-    """Number of edge points of each view, (V,)."""
-    thetas: Array
-    """Outlier distances, (V,), px."""
-
-
-class _Scratch(NamedTuple):
-    """Buffers of the kernels, used by one thread at a time."""
-
-    pieces: Pieces
-    segments: Segments
-    """Visible pieces, joined where they are straight."""
-    visible: FloatArray
-    """u and v of the middle of each visible piece, px, and its squared length, px^2, (3, room)."""
-    lengths: FloatArray
-    """Length of each visible piece, (room,), px."""
-    distances: FloatArray
-    """Distances of pieces or of edge points, (room,), px."""
-    ones: FloatArray
-    """Weights of edge points, (room,)."""
 
 
 class ChamferCost:
@@ -132,12 +83,14 @@ class ChamferCost:
         self._surfaces = surfaces_of(self.models)
         self._scales = np.array([v.scale for v in views])
         thetas = [v.outlier_px(theta_px) for v in views]
+        widest = max((v.camera for v in views), key=lambda camera: camera.width)
+        room = occluding_contours.contour_room(widest, len(self.models))
+        self._predicted, self._contours = tuple(b.values for b in predicted), self._traced(views, predicted, room)
         near = [
-            _near(v, occluding_contours.trace(predicted, v.camera), theta)
-            for v, theta in zip(views, thetas, strict=True)
+            _near(v, *pieces, theta) for v, pieces, theta in zip(views, self._pieces_by_view(), thetas, strict=True)
         ]
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
-        self._arrays = _ViewArrays(
+        self._arrays = ViewArrays(
             np.stack([v.camera.projection for v in views]),
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
@@ -148,15 +101,21 @@ class ChamferCost:
             np.array([n.n_points for n in near], dtype=np.int64),
             np.array(thetas),
         )
-        widest = max((v.camera for v in views), key=lambda camera: camera.width)
-        self._room = max(occluding_contours.contour_room(widest, len(self.models)), self._arrays.points.shape[1])
+        self._room = max(room, self._arrays.points.shape[1])
         self._own = threading.local()
 
     def __call__(self, poses: Sequence[Array]) -> Cost:
         """Return the cost of one pose of every body, (n_values,) each."""
-        directed_px = self._directed(0, poses[0][None], poses)[0] / self._scales[:, None]
-        views_px = self._blank_unseen(directed_px.mean(axis=-1))
-        return Cost(float(self._mean(views_px)), views_px, directed_px[:, 0], directed_px[:, 1])
+        return self._cost(self._directed(0, poses[0][None], poses)[0])
+
+    def at_prediction(self) -> Cost:
+        """Return the cost of the predicted poses, whose contours are already traced."""
+        return self._cost(self._directed(0, self._predicted[0][None], self._predicted, self._contours)[0])
+
+    def _cost(self, directed: Array) -> Cost:
+        directed_px = directed / self._scales[:, None]
+        view_costs_px = self._blank_unseen(directed_px.mean(axis=-1))
+        return Cost(float(self._mean(view_costs_px)), view_costs_px, directed_px[:, 0], directed_px[:, 1])
 
     def of_person(self, person: int, candidates: Array, poses: Sequence[Array]) -> tuple[Array, Array]:
         """Return the costs of many candidate poses of one person, with the others fixed at `poses`.
@@ -169,8 +128,8 @@ class ChamferCost:
         Returns:
             The total costs, (C,), and those of each view, (C, V), px of the footage; NaN for views without edges.
         """
-        views_px = self._blank_unseen(self._directed(person, candidates, poses).mean(axis=-1) / self._scales)
-        return self._mean(views_px), views_px
+        view_costs_px = self._blank_unseen(self._directed(person, candidates, poses).mean(axis=-1) / self._scales)
+        return self._mean(view_costs_px), view_costs_px
 
     @property
     def edge_points_px(self) -> tuple[FloatArray, ...]:
@@ -180,7 +139,34 @@ class ChamferCost:
             arrays.points[:, first : first + n].T for first, n in zip(arrays.firsts[:-1], arrays.counts, strict=True)
         )
 
-    def _directed(self, person: int, candidates: Array, poses: Sequence[Array]) -> Array:
+    @property
+    def predicted_pieces_px(self) -> list[FloatArray]:
+        """Visible contours of the predicted bodies in each view, u0, v0, u1, v1, (M, 4), working px."""
+        return [pieces[~occluded] for pieces, occluded in self._pieces_by_view()]
+
+    def _pieces_by_view(self) -> Iterator[tuple[FloatArray, NDArray[np.bool_]]]:
+        """Yield the pieces of the predicted contours in each view, (N, 4), and whether they are occluded, (N,)."""
+        ends, occluded, _, firsts = self._contours
+        for a, b in pairwise(firsts.tolist()):
+            yield np.ascontiguousarray(ends[:, a:b].T), occluded[a:b]
+
+    def _traced(self, views: Sequence[ViewEvidence], bodies: Sequence[PosedBody], room: int) -> TracedContours:
+        """Trace the contours of posed bodies in all views."""
+        out = TracedContours(
+            np.empty((4, room * len(views)), np.float32), np.empty(room * len(views), np.bool_),
+            np.empty(room * len(views), np.int32), np.zeros(len(views) + 1, np.int64),
+        )  # fmt: skip
+        n = trace_views(
+            np.stack([v.camera.projection for v in views]),
+            np.stack([v.camera.center_world for v in views]),
+            occluding_contours.part_poses(bodies), self._surfaces,
+            piece_buffer(self._surfaces, room), out,
+        )  # fmt: skip
+        return TracedContours(out.ends[:, :n].copy(), out.occluded[:n].copy(), out.edges[:n].copy(), out.firsts)
+
+    def _directed(
+        self, person: int, candidates: Array, poses: Sequence[Array], contours: TracedContours | None = None
+    ) -> Array:
         """Return the directed costs of candidates of a person, see `of_person`, (C, V, 2), working px.
 
         All callers use one kernel: another would sum single-precision numbers in another order.
@@ -190,17 +176,18 @@ class ChamferCost:
         directed = np.empty((len(candidates), len(self._seen), 2))
         poses_of = np.ascontiguousarray(candidates, dtype=np.float64)
         Ts, paper = self._part_poses(poses), self.outliers == "paper"
+        traced = contours or _no_contours()
 
         def score(share: slice) -> None:
-            _score_candidates(
+            score_candidates(
                 poses_of[share], first, model.n_dofs, model.tree, Ts, self._surfaces, self._arrays, paper,
-                self._scratch(), directed[share],
+                traced, self._scratch(), directed[share],
             )  # fmt: skip
 
         if self._threads > 1 and len(candidates) >= _MIN_SHARED_CANDIDATES:
             shares = np.linspace(0, len(candidates), self._threads + 1).astype(int)
             slices = [slice(a, b) for a, b in pairwise(shares)]
-            others = [helpers().submit(score, s) for s in slices[1:]]
+            others = [kernel_pool().submit(score, s) for s in slices[1:]]
             score(slices[0])
             for other in others:
                 other.result()
@@ -211,166 +198,44 @@ class ChamferCost:
     def _part_poses(self, poses: Sequence[Array]) -> Array:
         return occluding_contours.part_poses([PosedBody(m, p) for m, p in zip(self.models, poses, strict=True)])
 
-    def _scratch(self) -> _Scratch:
+    def _scratch(self) -> Scratch:
         """Return the scratch of the calling thread."""
-        scratch: _Scratch | None = getattr(self._own, "scratch", None)
+        scratch: Scratch | None = getattr(self._own, "scratch", None)
         if scratch is None:
             room = self._room
-            scratch = self._own.scratch = _Scratch(
+            scratch = self._own.scratch = Scratch(
                 piece_buffer(self._surfaces, room),
                 segment_buffer(room), np.empty((3, room), np.float32),
                 np.empty(room, np.float32), np.empty(room, np.float32), np.ones(room, np.float32),
             )  # fmt: skip
         return scratch
 
-    def _blank_unseen(self, views_px: Array) -> Array:
-        views_px[..., ~self._seen] = np.nan
-        return views_px
+    def _blank_unseen(self, view_costs_px: Array) -> Array:
+        view_costs_px[..., ~self._seen] = np.nan
+        return view_costs_px
 
-    def _mean(self, views_px: Array) -> Array:
+    def _mean(self, view_costs_px: Array) -> Array:
         """Return the mean over the views with edges, (..., V) to (...); without any, that of the outlier distances."""
         if not self._seen.any():
-            return np.full(views_px.shape[:-1], np.mean(self._arrays.thetas / self._scales))
-        return views_px[..., self._seen].mean(axis=-1)
+            return np.full(view_costs_px.shape[:-1], np.mean(self._arrays.thetas / self._scales))
+        return view_costs_px[..., self._seen].mean(axis=-1)
 
 
-@lru_cache(maxsize=1)  # a drag makes dozens of costs a second from the same views
+@lru_cache(maxsize=1)  # a hand makes dozens of costs a second from the same views
 def _distances(views: tuple[ViewEvidence, ...]) -> FloatArray:
     """Return the distance images, one after the other, row by row."""
     return np.concatenate([v.distance.ravel() for v in views])
 
 
-def _near(view: ViewEvidence, contour: occluding_contours.Contour, theta: float) -> RowSortedPoints:
+@lru_cache(maxsize=1)
+def _no_contours() -> TracedContours:
+    """Return no contours, so that poses are traced."""
+    return TracedContours(
+        np.empty((4, 0), np.float32), np.empty(0, np.bool_), np.empty(0, np.int32), np.empty(0, np.int64)
+    )
+
+
+def _near(view: ViewEvidence, pieces_px: FloatArray, occluded: NDArray[np.bool_], theta: float) -> RowSortedPoints:
     """Return the edge points within theta of the visible model contour."""
     everything = sort_points(view.points_px, view.camera.size)
-    return within_reach(everything, contour.pieces_px, contour.occluded, theta)
-
-
-@njit(**FAST)
-def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool) -> float:
-    """Return the mean of n distances with weights w and outliers as in `ChamferCost`; theta without any."""
-    total, weight = 0.0, 0.0
-    if not paper:
-        for i in range(n):
-            total += w[i] * (d[i] if d[i] < theta else theta)
-            weight += w[i]
-        return total / weight if weight > 0 else theta
-    everything, squares = 0.0, 0.0
-    for i in range(n):
-        everything += w[i]
-        if d[i] <= theta:
-            total += w[i] * d[i]
-            squares += w[i] * d[i] * d[i]
-            weight += w[i]
-    if weight <= 0.0:
-        return theta
-    mean = total / weight
-    bound = min(theta, mean + 2.0 * np.sqrt(max(0.0, squares / weight - mean * mean)))
-    total, weight = 0.0, 0.0
-    for i in range(n):
-        if d[i] <= bound:
-            total += w[i] * d[i]
-            weight += w[i]
-    return total / weight if weight >= 0.5 * everything else theta
-
-
-@njit(**FAST)
-def _distance(image: FloatArray, width: int, height: int, u: np.float32, v: np.float32) -> np.float32:
-    """Return the distance at a pixel; outside the image, that of the nearest border pixel plus the distance to it."""
-    inside = bilinear(image, width, height, u, v)[0]
-    half_u, half_v = _HALF * np.float32(width - 1), _HALF * np.float32(height - 1)
-    off_u, off_v = abs(u - half_u) - half_u, abs(v - half_v) - half_v
-    off_u, off_v = off_u if off_u > _ZERO else _ZERO, off_v if off_v > _ZERO else _ZERO
-    return inside + np.sqrt(off_u * off_u + off_v * off_v)
-
-
-@njit(**FAST)
-def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, visible: FloatArray) -> float:
-    """Return the mean distance of n visible pieces, see `_Scratch`, cut off at theta; theta if none is visible.
-
-    The loop stores nothing, so that it is vectorized.
-    """
-    limit = np.float32(theta)
-    spared = weight = 0.0
-    for i in range(np.uint64(n)):
-        d = _distance(image, width, height, visible[0, i], visible[1, i])
-        length = np.sqrt(visible[2, i])
-        spared += float(length * (limit - d if d < limit else _ZERO))
-        weight += float(length)
-    return theta - spared / weight if weight > 0.0 else theta
-
-
-@njit(**FAST)
-def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: float, scratch: _Scratch) -> float:
-    """Return the same by the paper's robust mean."""
-    visible, lengths, d = scratch.visible, scratch.lengths, scratch.distances
-    for i in range(n):
-        d[i] = _distance(image, width, height, visible[0, i], visible[1, i])
-        lengths[i] = np.sqrt(visible[2, i])
-    return _robust_mean(d, lengths, n, theta, True)
-
-
-@njit(**FAST)
-def _take_visible(n: int, pieces: Pieces, visible: FloatArray, segments: Segments) -> tuple[int, int]:
-    """Pack the visible ones of n pieces and join them to segments; return both numbers."""
-    ends, occluded, edges = pieces.ends, pieces.occluded, pieces.edges
-    su, sv, du, dv = segments.u, segments.v, segments.du, segments.dv
-    joined, edge, k, m = 0, -1, np.uint64(0), np.uint64(0)
-    for i in range(np.uint64(n)):
-        if occluded[i]:
-            edge = -1
-            continue
-        x0, y0, x1, y1 = ends[0, i], ends[1, i], ends[2, i], ends[3, i]
-        if edges[i] != edge or joined == _JOINED:
-            edge, joined = edges[i], 0
-            su[k], sv[k] = x0, y0
-            k += np.uint64(1)
-        joined += 1
-        last = k - np.uint64(1)
-        du[last], dv[last] = x1 - su[last], y1 - sv[last]
-        visible[0, m], visible[1, m] = _HALF * (x0 + x1), _HALF * (y0 + y1)
-        visible[2, m] = (x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0)
-        m += np.uint64(1)
-    return int(m), int(k)
-
-
-@njit(**FAST)
-def _score(
-    Ts: Array,
-    surfaces: Surfaces,
-    views: _ViewArrays,
-    paper: bool,
-    scratch: _Scratch,
-    directed: Array,
-) -> None:
-    """Fill the directed costs of one pose, (V, 2): model to image and image to model, working px."""
-    d, pixel = scratch.distances, 0
-    place_parts(Ts, surfaces, scratch.pieces)
-    for view in range(views.P.shape[0]):
-        width, height, theta = views.sizes[view, 0], views.sizes[view, 1], views.thetas[view]
-        n = occluding_contours.trace_pieces(views.P[view], views.eyes[view], surfaces, PIECE_PX, scratch.pieces)
-        n_visible, n_segments = _take_visible(n, scratch.pieces, scratch.visible, scratch.segments)
-        image = views.distances[pixel : pixel + width * height]
-        if paper:
-            directed[view, 0] = _forward_paper(n_visible, image, width, height, theta, scratch)
-        else:
-            directed[view, 0] = _forward(n_visible, image, width, height, theta, scratch.visible)
-        first, last = views.firsts[view], views.firsts[view + 1]
-        u, v = views.points[0][first:last], views.points[1][first:last]
-        nearest_segment(u, v, views.rows[view], scratch.segments, n_segments, theta, d)
-        directed[view, 1] = _robust_mean(d, scratch.ones, views.counts[view], theta, paper)
-        pixel += width * height
-
-
-@njit(nogil=True, cache=True)
-def _score_candidates(
-    candidates: Array, first: int, n_dofs: int, tree: Tree, Ts: Array,
-    surfaces: Surfaces, views: _ViewArrays, paper: bool, scratch: _Scratch, directed: Array,
-) -> None:  # fmt: skip
-    """Run `_score` for many poses of the person whose parts begin at `first`; directed is (C, V, 2)."""
-    last = first + tree.parents.shape[0]
-    own = Ts.copy()
-    axes, origins = np.empty((n_dofs, 3)), np.empty((n_dofs, 3))
-    for c in range(candidates.shape[0]):
-        forward_kinematics(candidates[c], tree, own[first:last], axes, origins)
-        _score(own, surfaces, views, paper, scratch, directed[c])
+    return within_reach(everything, pieces_px, occluded, theta)

@@ -56,7 +56,7 @@ class Replay:
                 shown = ReplayState(
                     number, at, len(run.steps), run.poses_of(kept.candidate), run.poses_of(kept.best),
                     run.stages[kept.stage].name, kept.candidate_px, kept.best_px,
-                    tuple(finite_or_none(float(c)) for c in kept.best_views_px), kept.evaluations,
+                    tuple(finite_or_none(float(c)) for c in kept.best_view_costs_px), kept.evaluations,
                 )  # fmt: skip
             self._set_view(replace(self._view, replay=shown, preview=None))
 

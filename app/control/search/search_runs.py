@@ -34,7 +34,7 @@ class RecordedStep(NamedTuple):
     """Cost of the cheapest pose just scored, px."""
     best_px: float
     """Least cost so far, px."""
-    best_views_px: FloatArray
+    best_view_costs_px: FloatArray
     """The same in each view, (V,), px; NaN for views without edges."""
     candidate: FloatArray
     """Values of all people, one after the other, with the cheapest pose just scored."""
@@ -128,7 +128,7 @@ class SearchRun:
             self.start_px = step.best_px
         self.steps.append(
             RecordedStep(
-                self._at, step.evaluations, step.candidate_px, step.best_px, step.best_views_px.astype(np.float32),
+                self._at, step.evaluations, step.candidate_px, step.best_px, step.best_view_costs_px.astype(np.float32),
                 np.concatenate(step.candidate).astype(np.float32), self._best_row, better or step.stage_done,
             )
         )  # fmt: skip

@@ -17,6 +17,7 @@ from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.search.best_first import SearchStep, stages
 from tracker.tracking.chamfer.settings import TrackSettings, search_frame
+from tracker.tracking.subjects import Subjects
 
 _SAVE_S = 0.5
 """A running search is on disk at least this often."""
@@ -149,8 +150,9 @@ class SearchRunner:
             start_px = session_state.costs(poses)["cost_px"]
             known_px = np.nan if start_px is None else start_px
             run = self._runs.begin(frame, models, poses, known_px, settings, free)
+            subjects = Subjects.of(models, active_dofs=free)
             job: Job[SearchStep] = Job(
-                lambda: search_frame(session_state.frames.evidence(frame), models, poses, settings, free=free),
+                lambda: search_frame(session_state.frames.evidence(frame), subjects, poses, settings),
                 lambda step, seconds: self._stepped(job, step, seconds),
                 lambda error: self._ended(job, error),
                 lambda: self._paused(job),
@@ -177,7 +179,7 @@ class SearchRunner:
                 best_px=step.best_px, candidate=step.candidate, message="",
             )  # fmt: skip
             changed = any(a is not b for a, b in zip(people, session_state.state.people, strict=True))
-            view_costs_px = tuple(finite_or_none(c) for c in step.best_views_px)
+            view_costs_px = tuple(finite_or_none(c) for c in step.best_view_costs_px)
             session_state.set(people=people, search=shown, cost_px=step.best_px, view_costs_px=view_costs_px)
             if changed and time.monotonic() - session_state.last_save > _SAVE_S:
                 session_state.save("search", "searched", job)

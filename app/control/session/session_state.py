@@ -20,7 +20,7 @@ from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.triangulation import PointObservation
 from tracker.posing.default_pose import default_pose
 from tracker.posing.retarget import retarget_pose
-from tracker.session.locked_dofs import free_of
+from tracker.session.locked_dofs import active_dofs
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import pose_cost
 
@@ -71,7 +71,7 @@ class SessionState:
 
     def active_dofs(self, person: int) -> NDArray[np.bool_]:
         """Return which degrees of freedom of a person are not locked, (n_dofs,)."""
-        return free_of(self.present[person], self.state.locked[person])
+        return active_dofs(self.present[person], self.state.locked[person])
 
     def within_locks(self, poses: Sequence[Array]) -> tuple[Array, ...]:
         """Return poses, (n_values,) each, with locked degrees of freedom as in the shown poses."""
@@ -156,7 +156,7 @@ class SessionState:
         cost = pose_cost(views, models or self.models, poses, self.state.settings)(poses)
         return {
             "cost_px": finite_or_none(cost.total_px),
-            "view_costs_px": tuple(finite_or_none(c) for c in cost.views_px),
+            "view_costs_px": tuple(finite_or_none(c) for c in cost.view_costs_px),
         }
 
     def show_pose(self, person: int, values: Array) -> None:
