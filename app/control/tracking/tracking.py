@@ -85,7 +85,7 @@ class Tracking:
         with self._activities.editing():
             state, saver = screen.state, screen.saver
             models = screen.present
-            people = tuple(i for i in range(len(models)) if saver.frames(i))
+            people = tuple(i for i in range(len(models)) if saver.index.frames(i))
             if not people:
                 raise TrackerError("expected a person who has been placed, found none; pose the body here first")
             frames = self._frames(backward, until, people)
@@ -99,7 +99,7 @@ class Tracking:
                     screen.present_poses(),
                     frames,
                 ),
-                [StoredPerson(p.name, saver.revision(i)) for i, p in enumerate(screen.session.people)],
+                [StoredPerson(p.name, saver.revisions.current(i)) for i, p in enumerate(screen.session.people)],
                 _SaverSink(screen),
                 f"track {way} from frame {frames[0]}",
             )
