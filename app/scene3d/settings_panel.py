@@ -10,8 +10,7 @@ from app.control.controller import Controller
 from tracker.errors import TrackerError
 from tracker.motion.prediction import MAX_ORDER, PredictSettings
 from tracker.search.best_first import SearchSettings
-from tracker.tracking.chamfer.limb_recovery import RecoverSettings
-from tracker.tracking.chamfer.settings import Estimation, TrackSettings
+from tracker.tracking.chamfer.settings import Estimation, RecoverSettings, TrackSettings
 
 _METHODS: dict[Estimation, str] = {"refine": "refine, else search", "search": "search alone (paper)"}
 _ORDERS = ("stays", "constant velocity", "constant acceleration")

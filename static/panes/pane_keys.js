@@ -19,12 +19,12 @@ export function paneBindings({ grid, layers, layersMenu }) {
     { keys: ["I"], label: "Brightness and contrast of a pane", matches: plain("i"), run: () => grid.openToneMenu() },
     {
       keys: ["1 – 9"],
-      label: "Fill the grid with a camera, and back; two digits for 10 to 16",
+      label: "Fill the grid with a camera (toggle); two digits for 10 to 16",
       matches: (event) => plain(event.key.toLowerCase())(event) && /^[1-9]$/.test(event.key),
       run: (event) => grid.typeCamera(Number(event.key)),
     },
     { keys: ["PageDown"], label: "Fill the grid with the next camera", matches: plain("pagedown"), run: () => grid.stepFill(1) },
-    { keys: ["PageUp"], label: "Fill the grid with the camera before", matches: plain("pageup"), run: () => grid.stepFill(-1) },
+    { keys: ["PageUp"], label: "Fill the grid with the previous camera", matches: plain("pageup"), run: () => grid.stepFill(-1) },
     {
       keys: ["0"],
       label: "Show the whole image",

@@ -23,32 +23,32 @@ export function posingBindings(posing, inspector, why) {
     { keys: ["Shift J"], label: "Previous joint", matches: plain("j", undefined, true), run: () => posing.toJoint(-1) },
     ...WAYS.map(([arrow, name, way]) => ({
       keys: [arrow],
-      label: `Joint or body one step ${name} in the active view (Shift: ten, Ctrl: a tenth)`,
+      label: `Move the joint or body one step ${name} in the active view (Shift: ×10, Ctrl: ×0.1)`,
       matches: (/** @type {KeyboardEvent} */ event) =>
         event.key === `Arrow${name[0].toUpperCase()}${name.slice(1)}` && !event.altKey && !event.metaKey,
       run: (/** @type {KeyboardEvent} */ event) => posing.nudge(way, event.shiftKey ? 10 : event.ctrlKey ? 0.1 : 1),
     })),
     { keys: ["U"], label: "Next degree of freedom of the joint", matches: plain("u"), run: () => posing.nextDof() },
-    { keys: ["+"], label: "Selected degree of freedom: one step more", matches: sign(["+", "="]), run: () => posing.turn(1) },
-    { keys: ["-"], label: "Selected degree of freedom: one step less", matches: sign(["-", "_"]), run: () => posing.turn(-1) },
-    { keys: ["Enter"], label: "Type the selected degree of freedom in", matches: plain("enter"), run: () => inspector.type() },
-    { keys: ["O"], label: "Lock the joint, or unlock it", matches: plain("o"), run: () => posing.toggleLock(posing.dofs) },
+    { keys: ["+"], label: "Increase the selected degree of freedom by one step", matches: sign(["+", "="]), run: () => posing.turn(1) },
+    { keys: ["-"], label: "Decrease the selected degree of freedom by one step", matches: sign(["-", "_"]), run: () => posing.turn(-1) },
+    { keys: ["Enter"], label: "Type a value for the selected degree of freedom", matches: plain("enter"), run: () => inspector.type() },
+    { keys: ["O"], label: "Lock or unlock the joint", matches: plain("o"), run: () => posing.toggleLock(posing.dofs) },
     {
       keys: ["Shift O"],
-      label: "Lock the joint's limb, or unlock it",
+      label: "Lock or unlock the joint's limb",
       matches: plain("o", undefined, true),
       run: () => posing.toggleLock(posing.limb.dofs),
     },
     { keys: ["M"], label: "Mirror the pose left to right", matches: plain("m"), run: () => posing.mirror() },
     {
       keys: ["Shift X"],
-      label: "Take the other of two poses that are as good, or go back",
+      label: "Switch to the alternative pose, or back",
       matches: plain("x", undefined, true),
       run: () => posing.takeAlternative(),
     },
-    { keys: ["R"], label: "Reset the joint's limb to neutral", matches: plain("r"), run: () => posing.resetLimb() },
-    { keys: ["Alt ,"], label: "Copy the pose of the previous frame", matches: alt("Comma", false), run: () => posing.copyNeighbour(-1) },
-    { keys: ["Alt ."], label: "Copy the pose of the next frame", matches: alt("Period", false), run: () => posing.copyNeighbour(1) },
+    { keys: ["R"], label: "Reset the joint's limb to the neutral pose", matches: plain("r"), run: () => posing.resetLimb() },
+    { keys: ["Alt ,"], label: "Copy the pose from the previous frame", matches: alt("Comma", false), run: () => posing.copyNeighbour(-1) },
+    { keys: ["Alt ."], label: "Copy the pose from the next frame", matches: alt("Period", false), run: () => posing.copyNeighbour(1) },
   ];
   return inArea("Posing", bindings, why);
 }
@@ -60,17 +60,17 @@ export function posingBindings(posing, inspector, why) {
 export function pinBindings(pinning, why) {
   const shift = (/** @type {string} */ key) => plain(key, undefined, true);
   const bindings = [
-    { keys: ["X"], label: "Pin the selected joint by clicks, or no more", matches: plain("x"), run: () => pinning.toggle() },
+    { keys: ["X"], label: "Pin the selected joint by clicks (toggle)", matches: plain("x"), run: () => pinning.toggle() },
     { keys: ["G"], label: "Fit to pins and edges", matches: plain("g"), run: () => pinning.fit() },
     {
       keys: ["Shift G"],
-      label: "The body follows pins that are dragged, or not",
+      label: "Update the body while a pin is dragged (toggle)",
       matches: shift("g"),
       run: () => pinning.toggleLive(),
     },
     {
       keys: ["Delete"],
-      label: "Remove the pin under the pointer, else those of the joint",
+      label: "Remove the pin under the pointer, or else those of the selected joint",
       matches: plain("delete"),
       run: () => pinning.remove(),
     },

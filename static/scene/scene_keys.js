@@ -8,26 +8,26 @@ import { inArea, plain } from "../widgets/key_matching.js";
  * @param {() => string | null} away why the 3-D view is unavailable
  */
 export function sceneBindings(cameraView, floor, away) {
-  const why = () => (floor.isOn ? null : "The floor is not being set; Shift+Y begins that.");
+  const why = () => (floor.isOn ? null : "The floor is not being set. Press Shift+Y to start.");
   /** @type {import("../widgets/key_matching.js").Binding[]} */
   const bindings = [
-    { keys: ["Y"], label: "3-D view: look through the camera pointed at, or let go", matches: plain("y"), run: () => cameraView.toggle() },
+    { keys: ["Y"], label: "3-D view: look through the active camera (toggle)", matches: plain("y"), run: () => cameraView.toggle() },
     {
       keys: ["Shift Y"],
-      label: "Set the floor from three clicked points, or leave that",
+      label: "Set the floor from three clicked points (toggle)",
       matches: plain("y", undefined, true),
       run: () => floor.toggle(),
     },
     {
       keys: ["Enter"],
-      label: "While the floor is set: next point, then apply",
+      label: "Setting the floor: next point, then apply",
       matches: (event) => floor.isOn && plain("enter")(event),
       why,
       run: () => floor.goOn(),
     },
     {
       keys: ["Backspace"],
-      label: "While the floor is set: take the last click back",
+      label: "Setting the floor: undo the last click",
       matches: (event) => floor.isOn && plain("backspace")(event),
       why,
       run: () => floor.takeBack(),

@@ -15,7 +15,7 @@ export function searchBindings(store, actions, { search: why }) {
   return inArea("Search", [
     { keys: ["S"], label: "Search: one step", matches: plain("s"), why, run: search("step") },
     { keys: ["Shift S"], label: "Search: to the end of the stage", matches: shift("s"), why, run: search("stage") },
-    { keys: ["Shift F"], label: "Search: again from the same start", matches: shift("f"), run: () => actions.searchAgain() },
+    { keys: ["Shift F"], label: "Search: repeat from the same start", matches: shift("f"), run: () => actions.searchAgain() },
     { keys: ["F"], label: "Search: this frame", matches: plain("f"), why, run: search("frame") },
   ]);
 }

@@ -7,7 +7,7 @@ import { fitness } from "../widgets/fuzzy.js";
 const RECENT = "quadrille.palette.recent";
 const MAX_RECENT = 12;
 const MAX_SHOWN = 60;
-/** What was used lately comes a little before what fits as well. */
+/** What was recent comes a little before what fits as well. */
 const RECENT_BONUS = 6;
 
 /** @typedef {import("./commands.js").Command} Command */
@@ -65,14 +65,14 @@ export class Palette {
       const bonus = lately < 0 ? 0 : RECENT_BONUS * (query.trim() ? 1 : 1000) * (1 - lately / MAX_RECENT);
       return [{ command, isRecent: lately >= 0 && !query.trim(), score: found + inLabel + bonus }];
     });
-    // Without a query the order is that of the table, but for what was used lately.
+    // Without a query the order is that of the table, but for what was recent.
     scored.sort((a, b) => (query.trim() || a.isRecent || b.isRecent ? b.score - a.score : 0));
     const shown = scored.slice(0, MAX_SHOWN);
     this.#found = shown.map(({ command }) => command);
     this.#list.replaceChildren(...shown.map(({ command, isRecent }, index) => option(command, isRecent, index)));
     this.#list.scrollTop = 0;
     this.#show(0);
-    if (!shown.length) this.#why.textContent = `Nothing is called “${query}”. A number goes to that frame.`;
+    if (!shown.length) this.#why.textContent = `No results for “${query}”. Enter a number to go to that frame.`;
   }
 
   /** @param {KeyboardEvent} event */
@@ -140,7 +140,7 @@ function option({ area, label, keys, why }, isRecent, index) {
   const text = document.createElement("span");
   text.textContent = label;
   const where = document.createElement("small");
-  where.textContent = isRecent ? `${area}, used lately` : area;
+  where.textContent = isRecent ? `${area}, recent` : area;
   item.append(text, where, keyCaps(keys));
   return item;
 }

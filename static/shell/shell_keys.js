@@ -25,13 +25,13 @@ export function helpBindings({ actions, history, notices, palette, keyList, firs
       matches: (event) => control("z", true)(event) || control("y", false)(event),
       run: () => actions.redo(),
     },
-    { keys: ["H"], label: "History: what was done, and back to it", matches: plain("h"), run: () => history.toggle() },
-    { keys: ["Shift H"], label: "Notices so far", matches: shift("h"), run: () => notices.toggleLog() },
-    { keys: ["Shift Esc"], label: "Dismiss the notices", matches: shift("escape"), run: () => notices.dismissAll() },
-    { keys: ["?"], label: "Keys", matches: (event) => event.key === "?", run: () => keyList.show() },
+    { keys: ["H"], label: "History of edits", matches: plain("h"), run: () => history.toggle() },
+    { keys: ["Shift H"], label: "Messages", matches: shift("h"), run: () => notices.toggleLog() },
+    { keys: ["Shift Esc"], label: "Dismiss all messages", matches: shift("escape"), run: () => notices.dismissAll() },
+    { keys: ["?"], label: "Keyboard shortcuts", matches: (event) => event.key === "?", run: () => keyList.show() },
     {
       keys: [],
-      label: "First steps: what to do with a new recording",
+      label: "First steps with a new recording",
       matches: () => false,
       run: () => firstSteps.show(),
     },
@@ -58,6 +58,6 @@ export function escapeBinding({ store, actions, notices, grid, gestures, pinning
     else if (range) store.set({ range: null });
     else if (filled !== null) grid.toggleFill(filled);
   };
-  const label = "Cancel the drag, leave the replay, else stop what is at work, else put the marked range away";
+  const label = "Cancel a drag, exit the replay, stop a run, or unmark the range";
   return { keys: ["Esc"], label, area: "Tracking", matches: plain("escape"), run };
 }

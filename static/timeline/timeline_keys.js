@@ -22,7 +22,7 @@ export function frameBindings(navigation, playback) {
     { keys: [","], label: "Previous frame", matches: plain(",", "Comma"), run: () => navigation.step(-1) },
     { keys: ["."], label: "Next frame", matches: plain(".", "Period"), run: () => navigation.step(1) },
     { keys: ["Shift ,"], label: "Ten frames back", matches: plain("<", "Comma", true), run: () => navigation.step(-10) },
-    { keys: ["Shift ."], label: "Ten frames on", matches: plain(">", "Period", true), run: () => navigation.step(10) },
+    { keys: ["Shift ."], label: "Ten frames forward", matches: plain(">", "Period", true), run: () => navigation.step(10) },
     { keys: ["Home"], label: "First frame", matches: plain("home"), run: () => navigation.first() },
     { keys: ["End"], label: "Last frame", matches: plain("end"), run: () => navigation.last() },
     { keys: ["Space"], label: "Play or pause", matches: plain(" "), run: () => playback.toggle() },
@@ -44,12 +44,12 @@ export function trackBindings(store, actions, reasons) {
     { keys: ["Shift T"], label: "Track backward", matches: shift("t"), why, run: track("backward") },
     {
       keys: ["Alt P"],
-      label: "Pause tracking, or go on",
+      label: "Pause or continue tracking",
       matches: alt("KeyP", false),
       why: tracking,
       run: () => actions.togglePause(),
     },
-    { keys: ["L"], label: "Follow the tracker, or not", matches: plain("l"), why: tracking, run: () => actions.toggleFollow() },
+    { keys: ["L"], label: "Follow the tracker (toggle)", matches: plain("l"), why: tracking, run: () => actions.toggleFollow() },
   ]);
 }
 
@@ -57,8 +57,8 @@ export function trackBindings(store, actions, reasons) {
 export function drawerBindings(drawer) {
   return inArea("Views", [
     { keys: ["C"], label: "Curves", matches: plain("c"), run: () => drawer.toggleCurves() },
-    { keys: ["B"], label: "Search: watch it in the drawer", matches: plain("b"), run: () => drawer.toggle("search") },
-    { keys: ["V"], label: "Landscape of the cost", matches: plain("v"), run: () => drawer.toggle("landscape") },
+    { keys: ["B"], label: "Search panel", matches: plain("b"), run: () => drawer.toggle("search") },
+    { keys: ["V"], label: "Cost landscape", matches: plain("v"), run: () => drawer.toggle("landscape") },
   ]);
 }
 
@@ -72,16 +72,16 @@ export function timelineBindings({ store, actions, playback, jumps, frameWindow,
     ...KINDS.filter(({ key }) => key).flatMap(({ kind, key, more }) => jumpKeys(jumps, kind, key, more)),
     {
       keys: ["Q"],
-      label: "Middle of the longest stretch without a keyframe",
+      label: "Middle of the longest gap between keyframes",
       matches: plain("q"),
       run: () => jumps.toLongestGap(),
     },
     ...markBindings(store, actions, reasons),
-    { keys: ["Z"], label: "Timeline: see fewer frames", matches: plain("z"), run: () => frameWindow.zoomIn() },
-    { keys: ["Shift Z"], label: "Timeline: see more frames", matches: shift("z"), run: () => frameWindow.zoomOut() },
+    { keys: ["Z"], label: "Timeline: zoom in", matches: plain("z"), run: () => frameWindow.zoomIn() },
+    { keys: ["Shift Z"], label: "Timeline: zoom out", matches: shift("z"), run: () => frameWindow.zoomOut() },
     {
       keys: ["Alt Z"],
-      label: "Timeline: the marked range, or all frames",
+      label: "Timeline: show the marked range, or all frames",
       matches: alt("KeyZ", false),
       run: () => frameWindow.fit(),
     },
@@ -97,7 +97,7 @@ function playBindings(playback) {
   return [
     {
       keys: ["Shift Space"],
-      label: "Play in a loop, of the marked range where there is one, or not",
+      label: "Loop playback, within the marked range if there is one (toggle)",
       matches: shift(" "),
       run: () => playback.toggleLoop(),
     },
@@ -119,12 +119,12 @@ function markBindings(store, actions, reasons) {
   return [
     {
       keys: ["K"],
-      label: "Keyframe: vouch for this pose, or take that back",
+      label: "Keyframe: confirm this pose (toggle)",
       matches: plain("k"),
       run: () => actions.toggleMark("keyframe"),
     },
-    { keys: ["Shift K"], label: "Take the marks of this frame away", matches: shift("k"), run: () => actions.unmark() },
-    { keys: ["E"], label: "Reviewed, or not", matches: plain("e"), run: () => actions.toggleMark("reviewed") },
+    { keys: ["Shift K"], label: "Remove the marks of this frame", matches: shift("k"), run: () => actions.unmark() },
+    { keys: ["E"], label: "Reviewed (toggle)", matches: plain("e"), run: () => actions.toggleMark("reviewed") },
     {
       keys: ["Shift I"],
       label: "Interpolate the marked range",
@@ -146,8 +146,8 @@ function rangeBindings(store) {
     store.set({ range: { first: Math.min(target, other), last: Math.max(target, other) } });
   };
   return [
-    { keys: ["["], label: "A range begins here", matches: plain("[", "BracketLeft"), run: mark("first") },
-    { keys: ["]"], label: "The range ends here", matches: plain("]", "BracketRight"), run: mark("last") },
+    { keys: ["["], label: "Mark the start of a range", matches: plain("[", "BracketLeft"), run: mark("first") },
+    { keys: ["]"], label: "Mark the end of a range", matches: plain("]", "BracketRight"), run: mark("last") },
   ];
 }
 
@@ -166,6 +166,6 @@ function jumpKeys(jumps, kind, key, what) {
   const former = key.startsWith("Alt ") ? `Alt Shift ${letter}` : `Shift ${letter}`;
   return [
     { keys: [key], label: `Next ${what}`, matches: match(false), why, run: () => jumps.go(kind, 1) },
-    { keys: [former], label: `Former ${what}`, matches: match(true), why, run: () => jumps.go(kind, -1) },
+    { keys: [former], label: `Previous ${what}`, matches: match(true), why, run: () => jumps.go(kind, -1) },
   ];
 }

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from true_starts import read_simulated
 
+from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
@@ -101,7 +102,7 @@ class Limbs:
         for limb in quality.limbs:
             of_limb = _joints(model, limb.name)
             if of_limb.any():
-                self.evidence.append(confidence.evidence(quality, limb))
+                self.evidence.append(confidence.features(quality, limb))
                 self.lost.append(bool(off[of_limb].any()))
                 self.searched.append(searched)
                 self.frames.append((person, found.frame))
@@ -110,7 +111,7 @@ class Limbs:
 
 def _joints(model: BodyModel, limb: str) -> NDArray[np.bool_]:
     """Which of the limb joints belong to a limb."""
-    parts = next(x.parts for x in confidence.limbs(model) if x.name == limb)
+    parts = next(x.parts for x in limbs(model) if x.name == limb)
     return np.isin([model.point_parts[model.point_names.index(n)] for n in LIMB_JOINTS], parts)
 
 

@@ -90,7 +90,7 @@ async def layers(page: Page) -> None:
 async def searching(page: Page) -> None:
     """A search at a speed for watching."""
     await page.keyboard.press("b")
-    await page.select_option("select[aria-label='Expansions a second']", index=1)
+    await page.select_option("select[aria-label='Expansions per second']", index=1)
     await page.keyboard.press("f")
     await shows(page, "quadrille.state.state.job.evaluations > 50", 60)
 

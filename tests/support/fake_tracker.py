@@ -51,7 +51,7 @@ class FakeTracker:
             for i in run.subjects.tracked:
                 poses[i] = keyframes.get(frame, {}).get(i, poses[i] + STEP_M * (np.arange(len(poses[i])) == 0))
             status = "doubtful" if frame == 4 else "lost" if frame % 7 == 0 else "good"
-            remark = "left arm searched anew" if frame == 4 else ""
+            remark = "left arm relocated" if frame == 4 else ""
             self.seen.append(frame)
             views_px = np.array([1.0, np.nan, 2.0, 3.0])
             parts_px = np.array([0.5] * (N_PARTS - 1) + [np.nan])

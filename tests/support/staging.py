@@ -9,11 +9,12 @@ from scipy.spatial import cKDTree
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.observer import Observer
-from tracker.evidence.view_evidence import view_evidence
+from tracker.evidence.view_evidence import RegionFeatures, select_evidence
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import parse_model
 from tracker.geometry.cameras import Camera
 from tracker.geometry.triangulation import PointObservation
+from tracker.images.edge_segments import link_edges
 
 SIZE = (640, 480)
 
@@ -74,9 +75,19 @@ def edge_map(bodies, camera):
     return image > 0
 
 
+def view_evidence(
+    camera, edge_map, gradients=None, corner_px=(0, 0), image_size=None, predicted_px=None, static_edges=None
+):
+    """Evidence at scale 1 from an edge map, (H, W); without gradients, (2, H, W), edges have no directions."""
+    found = edge_map.view(np.uint8)
+    segments = None if gradients is None else link_edges(found, gradients)
+    features = RegionFeatures(camera, 1.0, corner_px, image_size, found, segments)
+    return select_evidence(features, predicted_px, static_edges)
+
+
 def own_evidence(bodies, cameras):
     """Evidence that shows the visible contours of bodies and nothing else; edges run as the contours do."""
-    return tuple(_across(view_evidence(c, 1.0, edge_map(bodies, c)), bodies) for c in cameras)
+    return tuple(_across(view_evidence(c, edge_map(bodies, c)), bodies) for c in cameras)
 
 
 def _across(view, bodies):

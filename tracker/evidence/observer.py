@@ -1,7 +1,7 @@
-"""Frames of a recording turned into evidence.
+"""Compute the evidence of the frames of a recording.
 
-The observer works only in the regions asked for, on several views at a time, and one frame ahead: it decodes that
-frame, and where it is told the region in time it finds there what does not depend on the prediction.
+The observer processes only the requested regions, several views at a time and one frame ahead. It decodes the next
+frame. If that frame's regions are known in time, it also extracts the features that do not depend on the prediction.
 """
 
 import threading
@@ -32,24 +32,24 @@ from tracker.images.static_edges import StaticEdgeModel
 from tracker.images.working_view import fit_region
 
 FOREGROUND_MARGIN = 0.012
-"""How far around the silhouette edges are kept, as a fraction of the longer side of the image."""
+"""Width of the margin around the silhouette in which edges count, as a fraction of the longer side of the image."""
 _WORKERS = 2
 _FRAMES_AHEAD = 2
 
 
 class _Ahead(NamedTuple):
-    """A frame as far as it is looked at before its evidence is asked for."""
+    """A frame that is prefetched."""
 
     prepared: Future[list[Prepared | None]]
-    """Each view; None where it is damaged."""
+    """Each view; None where the frame is damaged."""
     features: Future[list[RegionFeatures]] | None = None
-    """A region of each view; None where no regions are known."""
+    """Features of a region of each view; None while no regions are known."""
     with_static_edges: bool = False
-    """Whether what stands still is going to be known."""
+    """Whether static edges will be refused, which lowers the edge thresholds."""
 
 
 class Observer:
-    """Turns the frames of a recording into evidence. Safe to use from several threads."""
+    """Computes evidence from the frames of a recording. Thread-safe."""
 
     def __init__(self, cameras: Sequence[CameraSource], recording: Recording) -> None:
         """Read the backgrounds.
@@ -63,8 +63,8 @@ class Observer:
         """
         self.cameras = tuple(cameras)
         self.recording = recording
-        """Their footage."""
-        # OpenCV's own threads would only be in the way of those that work on other views.
+        """Footage of the views."""
+        # OpenCV's own threads would compete with the threads of other views.
         self._pool, self._pool_ahead = (
             ThreadPoolExecutor(_WORKERS, name, initializer=cv2.setNumThreads, initargs=(1,))
             for name in ("observe", "observe ahead")
@@ -76,19 +76,19 @@ class Observer:
 
     @property
     def working_cameras(self) -> tuple[Camera, ...]:
-        """The views as they are matched, whole: without lens distortion, at the working scale."""
+        """Cameras of the whole views in working pixels: without lens distortion, at working scale."""
         return tuple(v.view.camera for v in self._views)
 
     def prefetch(self, k: int, regions: Sequence[Region | None] | None = None, with_static_edges: bool = False) -> None:
-        """Begin to decode frame k, and to do with it what needs no prediction; `evidence` will find it done.
+        """Begin to decode frame k and to extract its features; `evidence` uses the result.
 
-        At most two frames are kept so. To be called again when the regions are known. A frame that cannot be read is
-        reported when its evidence is asked for.
+        At most two frames are prefetched. Call again once the regions are known. A frame that cannot be read raises in
+        `evidence`, not here.
 
         Args:
-            k: the frame.
-            regions: where `evidence` is going to look, if it is known; asked for others it looks anew, so that what it
-                gives does not depend on what was told here.
+            k: frame number.
+            regions: regions that `evidence` will be asked for, if known. Other regions are processed again, so that the
+                result never depends on this hint.
             with_static_edges: whether `evidence` will be given static edges.
         """
         with self._lock:
@@ -109,16 +109,16 @@ class Observer:
         predicted_px: Sequence[FloatArray | None] | None = None,
         static_edges: Sequence[StaticEdgeModel] | None = None,
     ) -> tuple[ViewEvidence, ...]:
-        """The edges of frame k in each view, kept to the foreground where masks or a background tell it.
+        """Return the evidence of frame k in each view, restricted to the foreground where masks or a background exist.
 
-        A damaged frame has no edges: the view has no say in the cost.
+        A damaged frame has no edges, so its view does not count in the cost.
 
         Args:
-            k: the frame.
-            regions: where to look in each view, working px, see `working.region_around`; None is the whole image.
+            k: frame number.
+            regions: region of each view, working px, see `working_view.region_around`; None is the whole image.
             predicted_px: visible pieces of the predicted contours in each view, (M, 4), px of `working_cameras`, by
-                which segments of edges are accepted; None keeps all edges.
-            static_edges: what is known to stand still in each view; asked where neither masks nor a background tell.
+                which segments are accepted; None keeps all edges.
+            static_edges: static edges of each view, refused where neither masks nor a background exist.
         """
         with self._lock:
             ahead = self._ahead.pop(k, None)
@@ -174,11 +174,11 @@ class Observer:
         if prepared is None:
             nothing = np.zeros((camera.height, camera.width), np.uint8)
             return RegionFeatures(camera, scale, box[:2], working.size, nothing)
-        smooth = view.smoothed(prepared, box)
+        smooth = view.smooth_region(prepared, box)
         changes = view.changes(prepared, smooth, box)
         margin_px = FOREGROUND_MARGIN * max(working.size)
-        foreground = None if changes is None else background_subtraction.grow(changes.anything, margin_px)
-        # Texture that stands still need not be kept out by thresholds, which would keep out the weaker edges of bodies.
+        foreground = None if changes is None else background_subtraction.dilate(changes.anything, margin_px)
+        # The model of static edges refuses texture, so low thresholds can keep the weaker edges of bodies.
         edges = detect_edges(
             smooth, levels(prepared.strengths, restricted=changes is not None or with_static_edges), foreground
         )

@@ -29,6 +29,7 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_kernels import (
     COST_ONLY,
     ContourTerm,
+    Scratch,
     Sums,
     ViewArrays,
     accumulate_normal_equations,
@@ -81,6 +82,15 @@ class PartCosts(NamedTuple):
     """Share of the silhouette's contour that some part explains, (V,); NaN in views without a silhouette."""
 
 
+class Workspace(NamedTuple):
+    """Room for the sums of a pose; what shares it must be used one at a time."""
+
+    Ts: Array
+    """Poses of all parts, (P, 4, 4)."""
+    scratch: Scratch
+    sums: Sums
+
+
 class ContourResiduals:
     """The residuals of one person's contours against the edges of all views: a block for `gauss_newton.solve`.
 
@@ -95,6 +105,7 @@ class ContourResiduals:
         settings: MatchSettings | None = None,
         theta_px: float | None = None,
         everywhere: bool = False,
+        contours: Sequence[occluding_contours.Contour] | None = None,
     ) -> None:
         """Prepare the evidence for the kernel.
 
@@ -105,14 +116,18 @@ class ContourResiduals:
             settings: how to match.
             theta_px: outlier distance, px of the footage; by default that of each view.
             everywhere: keep edge points however far from the predicted contours they are, for poses far from it.
+            contours: the predicted contours of everybody in each view; traced here by default.
         """
         settings = settings or MatchSettings()
         self._model = bodies[person].model
         self._own = parts_of([b.model for b in bodies], person)
         thetas = [v.outlier_px(theta_px) for v in views]
+        near: Sequence[occluding_contours.Contour | None] = [None] * len(views)
+        if not everywhere:
+            near = contours or [occluding_contours.trace(bodies, v.camera) for v in views]
         points = [
-            points_to_match(v, bodies, np.inf if everywhere else _CAPTURE * theta, settings.edges, settings.silhouette)
-            for v, theta in zip(views, thetas, strict=True)
+            points_to_match(v, contour, _CAPTURE * theta, settings.edges, settings.silhouette)
+            for v, contour, theta in zip(views, near, thetas, strict=True)
         ]
         sorted_points = [sort_points(p, v.camera.size) for p, v in zip(points, views, strict=True)]
         self._n_silhouette_points = np.array(
@@ -149,15 +164,24 @@ class ContourResiduals:
         moves[parts] = True
         return static_contours_buffer(len(arrays.sizes), self._max_pieces, arrays.points.shape[1], moves)
 
-    def restricted_to(self, parts: IntArray) -> "ContourResiduals":
-        """The same, quicker, for poses that differ in some parts of the person alone, indices (n,).
+    @property
+    def workspace(self) -> Workspace:
+        """The room that this works in."""
+        return Workspace(self._term.Ts, self._term.scratch, self._term.sums)
+
+    def restricted_to(self, parts: IntArray, workspace: Workspace) -> "ContourResiduals":
+        """The same, quicker, for poses that differ in some parts of the person alone.
 
         It speaks for and against these parts only: what pulls at the others counts as cost, and is left out of the
-        derivatives. Poses in which the others move too are as right, and slower. The room to work in is shared: use one
-        at a time.
+        derivatives. Poses in which the others move too are as right, and slower.
+
+        Args:
+            parts: indices of the parts that move, (n,).
+            workspace: room to work in, such as that of this one if the two are used one at a time.
         """
         out, term = copy(self), self._term
-        out._term = term._replace(static=self._static_buffer(self._own.start + parts, len(term.Ts), term.views))
+        static = self._static_buffer(self._own.start + parts, len(term.Ts), term.views)
+        out._term = term._replace(static=static, **workspace._asdict())
         return out
 
     def clone_for_thread(self) -> "ContourResiduals":

@@ -4,13 +4,10 @@ Where a silhouette ends there mostly is an edge as well. One point then speaks f
 as much as they do together, which pulls at a pose as they both do.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.model import PosedBody
 from tracker.compute.numba_options import BORROW
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import SCENE_SPACING_PX, ViewEvidence
@@ -25,14 +22,14 @@ _SAME_PX, _SAME_COS = 2.0, 0.9
 
 
 def points_to_match(
-    view: ViewEvidence, bodies: Sequence[PosedBody], reach_px: float, edges: float, silhouette: float
+    view: ViewEvidence, contour: occluding_contours.Contour | None, reach_px: float, edges: float, silhouette: float
 ) -> FloatArray:
     """Points of a view within reach of the visible contours, (N, N_COLUMNS).
 
     Args:
         view: what the view shows.
-        bodies: everybody in the scene.
-        reach_px: how far from their contours points are kept, working px; all may be.
+        contour: of everybody in the scene; None keeps all points.
+        reach_px: how far from the visible contour points are kept, working px.
         edges: weight of a point of an edge.
         silhouette: weight of a point of the silhouette, where it is fully trusted.
     """
@@ -47,9 +44,8 @@ def points_to_match(
         own[:, :2], own[:, 2:4], own[:, 4:] = shown.points_px, shown.normals, (weight, 1.0, 1.0)
         cells = (view.camera.height // SCENE_SPACING_PX + 1, view.camera.width // SCENE_SPACING_PX + 1)
         n = _merge(points, n_edges, np.full(cells, -1, np.int64))
-    if np.isinf(reach_px):
+    if contour is None:
         return points[:n]
-    contour = occluding_contours.trace(bodies, view.camera)
     near = np.zeros((view.camera.height // _AREA_PX + 1, view.camera.width // _AREA_PX + 1), np.bool_)
     _mark(contour.pieces_px, contour.occluded, int(np.ceil(reach_px / _AREA_PX)), near)
     return points[: _pack(points[:n], near)]

@@ -5,7 +5,7 @@ from collections.abc import Collection
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from tracker.body.model import BodyModel
-from tracker.session.locked_dofs import SETTING, kept_locks, to_keep
+from tracker.session.locked_dofs import SETTING, load_locks, locks_setting
 
 
 class DofLocks:
@@ -19,7 +19,7 @@ class DofLocks:
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities
-        session_state.set(locked=kept_locks(session_state.session.people, session_state.saver.setting))
+        session_state.set(locked=load_locks(session_state.session.people, session_state.saver.setting))
 
     def set(self, person: int, dofs: Collection[int], locked: bool) -> None:
         """Lock or unlock degrees of freedom, each ball joint as a whole; on disk when this returns.
@@ -40,7 +40,7 @@ class DofLocks:
             if now == before[person]:
                 return
             after = (*before[:person], now, *before[person + 1 :])
-            self._session_state.saver.store_setting(SETTING, to_keep(self._session_state.session.people, after))
+            self._session_state.saver.store_setting(SETTING, locks_setting(self._session_state.session.people, after))
             self._session_state.set(locked=after)
 
 

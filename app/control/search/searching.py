@@ -17,6 +17,7 @@ from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.search.best_first import SearchStep, stages
 from tracker.tracking.chamfer.settings import TrackSettings, search_frame
+from tracker.tracking.subjects import Subjects
 
 _SAVE_S = 0.5
 """A running search is saved at least this often."""
@@ -147,8 +148,9 @@ class SearchRunner:
             start_px = session_state.costs(poses)["cost_px"]
             known_px = np.nan if start_px is None else start_px
             run = self._runs.begin(frame, models, poses, known_px, settings, free)
+            subjects = Subjects.of(models, active_dofs=free)
             job: Job[SearchStep] = Job(
-                lambda: search_frame(session_state.frames.evidence(frame), models, poses, settings, free=free),
+                lambda: search_frame(session_state.frames.evidence(frame), subjects, poses, settings),
                 lambda step, seconds: self._stepped(job, step, seconds),
                 lambda error: self._ended(job, error),
                 lambda: self._paused(job),

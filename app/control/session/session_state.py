@@ -20,7 +20,7 @@ from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.triangulation import PointObservation
 from tracker.posing.default_pose import default_pose
 from tracker.posing.retarget import retarget_pose
-from tracker.session.locked_dofs import free_of
+from tracker.session.locked_dofs import active_dofs
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import pose_cost
 
@@ -71,7 +71,7 @@ class SessionState:
 
     def active_dofs(self, person: int) -> NDArray[np.bool_]:
         """Return which degrees of freedom of a person are not locked, (n_dofs,)."""
-        return free_of(self.present[person], self.state.locked[person])
+        return active_dofs(self.present[person], self.state.locked[person])
 
     def within_locks(self, poses: Sequence[Array]) -> tuple[Array, ...]:
         """Return poses, (n_values,) each, with locked degrees of freedom as in the shown poses."""

@@ -231,8 +231,8 @@ class Tracking:
             elif i not in tracked:
                 people.append(ShownPose(shown.values, None, revision=self._screen.state.revisions[i]))
             else:
-                parts_px = tuple(finite_or_none(c) for c in found.parts_px[i])
-                people.append(ShownPose(found.poses[i], "tracked", found.statuses[i], found.remarks[i], parts_px))
+                parts_px = tuple(finite_or_none(c) for c in found.part_costs_px[i])
+                people.append(ShownPose(found.poses[i], "tracked", found.statuses[i], found.notes[i], parts_px))
         models, revisions = self._screen.bodies(people)
         return {
             "frame": found.frame,
@@ -240,7 +240,7 @@ class Tracking:
             "models": models,
             "revisions": revisions,
             "cost_px": finite_or_none(found.cost_px),
-            "view_costs_px": tuple(finite_or_none(c) for c in found.views_px),
+            "view_costs_px": tuple(finite_or_none(c) for c in found.view_costs_px),
         }
 
     def _paused(self, run: _Run) -> None:

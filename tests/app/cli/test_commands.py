@@ -156,8 +156,8 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
 
     def elsewhere(frame):
         found = estimates[frame]
-        remarks = ("followed back from frame 2",)
-        return found._replace(poses=(found.poses[0] + 0.01,), remarks=remarks, statuses=("good",))
+        notes = ("tracked back from frame 2",)
+        return found._replace(poses=(found.poses[0] + 0.01,), notes=notes, statuses=("good",))
 
     def ways_back(run, found, settings):
         offered.append(found)
@@ -175,7 +175,7 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
     assert told["statuses"] == {"person": {"good": 4, "lost": 1}}
     found = stored(session)
     np.testing.assert_array_equal(found[1].values, estimates[1].poses[0] + 0.01)
-    assert (found[1].status, found[1].remark) == ("good", "followed back from frame 2")
+    assert (found[1].status, found[1].remark) == ("good", "tracked back from frame 2")
     for k in (2, 3, 4):
         np.testing.assert_array_equal(found[k].values, estimates[k].poses[0])
     assert found[3].status == "lost"

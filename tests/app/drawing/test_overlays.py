@@ -12,7 +12,7 @@ from app.state.people import ShownPose
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.images.edge_segments import Segments
+from tracker.images.edge_segments import Segments, sample_segments
 
 
 def kinds_of(paths, kind, camera=0):
@@ -65,7 +65,13 @@ def test_segments_lie_in_undistorted_pixels_of_the_whole_image(controller):
     segments = Segments(points, normals, np.array([0, 4, 6]))
     camera = controller.session.cameras[0].camera.pinhole.scaled(0.5).cropped((10, 20, 60, 70))
     view = ViewEvidence(
-        camera, 0.5, np.empty((0, 2), np.float32), np.empty((50, 50), np.float32), (10, 20), segments=segments
+        camera,
+        0.5,
+        np.empty((0, 2), np.float32),
+        np.empty((50, 50), np.float32),
+        (10, 20),
+        segments=segments,
+        samples=sample_segments(segments),
     )
     paths = drawn(controller, controller.state, [view] * 4)
     lines = np.concatenate([p.segments_px for p in paths if p.camera == 0])

@@ -46,7 +46,7 @@ async def test_a_run_is_watched_frame_by_frame(controller, tracker):
         await page.hear("state", lambda m: m["track"]["running"] and m["track"]["total"] == 4)
         tracker.let_go(2)
         state = await page.hear("state", lambda m: m["frame"] == 4)
-        assert (state["status"], state["remark"]) == ("doubtful", "left arm searched anew")
+        assert (state["status"], state["remark"]) == ("doubtful", "left arm relocated")
         assert state["part_costs_px"] == [0.5] * 9 + [None]
         assert state["view_costs_px"] == [1.0, None, 2.0, 3.0]
         await page.hear("overlay", lambda m: m["frame"] == 4)
@@ -58,7 +58,7 @@ async def test_a_run_is_watched_frame_by_frame(controller, tracker):
         cells = {k: c for m in page.told if m["type"] == "timeline" for k, c in m["cells"].items()}
         cells |= (await page.hear("timeline", lambda m: "6" in m["cells"]))["cells"] if "6" not in cells else {}
         assert cells["4"]["status"] == "doubtful"
-        assert cells["4"]["remark"] == "left arm searched anew"
+        assert cells["4"]["remark"] == "left arm relocated"
 
 
 async def test_images_come_though_the_tracker_is_ahead_by_then(controller, tracker):

@@ -3,17 +3,17 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from staging import camera_at
+from staging import camera_at, view_evidence
 
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.errors import RecordingError
 from tracker.evidence.observer import FOREGROUND_MARGIN, Observer
-from tracker.evidence.view_evidence import SCENE_SPACING_PX, default_theta_px, view_evidence, with_accepted_segments
+from tracker.evidence.view_evidence import ACCEPTED_SHARE, SCENE_SPACING_PX, default_theta_px, with_segments
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
-from tracker.images.edge_segments import link_edges
+from tracker.images.edge_segments import accept_segments, link_edges
 from tracker.images.static_edges import StaticEdgeModel
 from tracker.images.working_view import WorkingView, region_around, working_scale
 from tracker.session.session import load_session
@@ -107,7 +107,7 @@ def test_scene_points_are_edges_one_to_a_cell():
     camera = camera_at("c", (4, 0, 0), size=(90, 60))
     edges = np.zeros((60, 90), dtype=bool)
     edges[10, 5:80] = edges[20:50, 40] = True
-    view = view_evidence(camera, 1.0, edges)
+    view = view_evidence(camera, edges)
     u, v = view.points_px.astype(int).T
     assert edges[v, u].all()
     cells = set(zip(u // SCENE_SPACING_PX, v // SCENE_SPACING_PX, strict=True))
@@ -316,6 +316,12 @@ def test_what_is_wrong_with_a_frame_read_ahead_is_told_when_it_is_asked_for():
 def visible_contours(real_frame, camera):
     seen = occluding_contours.trace([PosedBody(real_frame.model, real_frame.values)], camera)
     return seen.pieces_px[~seen.occluded]
+
+
+def with_accepted_segments(view, pieces_px, threshold_px=None):
+    """The view with only the segments near pieces of contour, in px of its camera."""
+    threshold_px = threshold_px or ACCEPTED_SHARE * view.theta_px
+    return with_segments(view, accept_segments(view.samples, pieces_px, threshold_px))
 
 
 def test_only_edges_near_the_prediction_are_accepted(sample, real_frame):

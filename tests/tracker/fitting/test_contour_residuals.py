@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from contour_oracle import MatchOracle, without_ties
-from staging import at, camera_at, cameras_around, edge_map, own_evidence, posed, shaken, solid
+from staging import at, camera_at, cameras_around, edge_map, own_evidence, posed, shaken, solid, view_evidence
 
 from tracker.body.model import PosedBody
-from tracker.evidence.view_evidence import SCENE_SPACING_PX, Silhouette, ViewEvidence, view_evidence
+from tracker.evidence.view_evidence import SCENE_SPACING_PX, Silhouette, ViewEvidence
 from tracker.fitting.contour_residuals import ContourResiduals, MatchSettings
 from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.formats.model_toml import PRESETS, load_model
@@ -233,7 +233,7 @@ def test_a_silhouette_pulls_as_far_as_it_is_trusted(trust):
 def test_views_without_edges_have_no_say(gavrila):
     views, body, _ = staged(gavrila)
     found = normal(ContourResiduals(views[1:], [body]), body)
-    blind = view_evidence(views[0].camera, 1.0, np.zeros((480, 640), dtype=bool))
+    blind = view_evidence(views[0].camera, np.zeros((480, 640), dtype=bool))
     for mixed in ((blind, *views[1:]), (views[1], blind, views[2]), (*views[1:], blind, blind)):
         match = ContourResiduals(mixed, [body])
         again = normal(match, body)
@@ -295,7 +295,7 @@ def cropped(view, bodies, region):
     """The same evidence seen through a region of its image, u0, v0, u1, v1."""
     u0, v0, u1, v1 = region
     edges = edge_map(bodies, view.camera)[v0:v1, u0:u1]
-    out = view_evidence(view.camera.cropped(region), 1.0, edges, region[:2], view.camera.size)
+    out = view_evidence(view.camera.cropped(region), edges, None, region[:2], view.camera.size)
     order = {tuple(p): n for p, n in zip(view.points_px.astype(int), view.normals, strict=True)}
     return replace(out, normals=np.array([order[tuple(p)] for p in np.add(out.points_px.astype(int), region[:2])]))
 

@@ -5,6 +5,7 @@ import pytest
 from staging import at, camera_at, cameras_around, own_evidence, posed, solid
 
 from tracker.body.model import PosedBody
+from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import Silhouette, ViewEvidence
 from tracker.fitting.match_points import N_COLUMNS, points_to_match
 from tracker.formats.model_toml import load_model
@@ -30,7 +31,8 @@ def shown(edges, outline, turned=0.0, trust=1.0):
 
 
 def found(*args, reach=np.inf, **kwargs):
-    return points_to_match(shown(*args, **kwargs), BALL, reach, EDGES, SILHOUETTE).tolist()
+    contour = None if np.isinf(reach) else occluding_contours.trace(BALL, FRONT)
+    return points_to_match(shown(*args, **kwargs), contour, reach, EDGES, SILHOUETTE).tolist()
 
 
 def test_a_point_of_the_silhouette_joins_the_edge_it_lies_on():
@@ -74,7 +76,7 @@ def test_joined_points_weigh_what_they_did_apart():
     told = Silhouette(
         np.zeros(view.distance.shape, bool), points, normals, 1.0, SilhouetteContour(points, normals), 40.0
     )
-    joined = points_to_match(replace(view, silhouette=told), bodies, np.inf, EDGES, SILHOUETTE)
+    joined = points_to_match(replace(view, silhouette=told), None, np.inf, EDGES, SILHOUETTE)
     assert joined.shape == (len(view.points_px), N_COLUMNS)  # all found their edges
     np.testing.assert_allclose(
         joined[:, 4:].sum(axis=0),

@@ -2,13 +2,13 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker.images.background_subtraction import smoothed
+from tracker.images.background_subtraction import smooth_image
 from tracker.images.edge_segments import MAX_LENGTH, Segments, accept_segments, link_edges, sample_segments
 from tracker.images.edges import Levels, detect_edges
 
 
 def linked(image):
-    edges = detect_edges(smoothed(image), Levels(60.0, 30.0))
+    edges = detect_edges(smooth_image(image), Levels(60.0, 30.0))
     return edges, link_edges(edges.found, edges.gradients)
 
 

@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker.images.background_subtraction import smoothed
+from tracker.images.background_subtraction import smooth_image
 from tracker.images.edges import Levels, detect_edges
 from tracker.images.image_statistics import SPACING_PX, SampleGrid
 
@@ -16,7 +16,7 @@ def test_probes_read_what_the_whole_image_holds_there():
     size = (320, 240)  # multiples of the spacing
     image = picture(size)
     statistics = SampleGrid(size, 1.0).measure(image)
-    smooth = smoothed(image)
+    smooth = smooth_image(image)
     gradients = np.abs(detect_edges(smooth, Levels(60, 30)).gradients.astype(int)).sum(axis=0)
     places = np.meshgrid(np.arange(SPACING_PX // 2, 240, SPACING_PX), np.arange(SPACING_PX // 2, 320, SPACING_PX))
     v, u = (p.T.ravel() for p in places)
@@ -30,7 +30,7 @@ def test_the_share_of_strong_gradients_is_that_of_the_image():
     image = picture(size, blur=2.0)
     image[:, 320:] = 100
     strengths = SampleGrid(size, 1.0).measure(image).strengths
-    everywhere = np.abs(detect_edges(smoothed(image), Levels(60, 30)).gradients.astype(int)).sum(axis=0)
+    everywhere = np.abs(detect_edges(smooth_image(image), Levels(60, 30)).gradients.astype(int)).sum(axis=0)
     for share in (0.6, 0.8, 0.92):
         assert np.quantile(strengths, share) == pytest.approx(np.quantile(everywhere, share), rel=0.1)
 

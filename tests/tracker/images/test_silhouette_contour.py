@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker.images.background_subtraction import smoothed
+from tracker.images.background_subtraction import smooth_image
 from tracker.images.edges import Levels, detect_edges
 from tracker.images.silhouette_contour import contour_trust, trace_silhouette
 
@@ -20,7 +20,7 @@ def picture(inside):
 
 
 def trusted(silhouette, image):
-    return contour_trust(trace_silhouette(silhouette), silhouette, detect_edges(smoothed(image), BOUNDS))
+    return contour_trust(trace_silhouette(silhouette), silhouette, detect_edges(smooth_image(image), BOUNDS))
 
 
 def test_points_lie_on_the_contour_and_normals_point_out():
@@ -49,7 +49,7 @@ def test_trust_is_the_share_of_the_outline_with_an_edge_along_it():
     rng = np.random.default_rng(4)
     blots = cv2.GaussianBlur(rng.normal(size=(120, 160)), (0, 0), 9) > 0.02
     seen = blots & (cv2.GaussianBlur(rng.normal(size=(120, 160)), (0, 0), 6) > -0.04)
-    edges, outline = detect_edges(smoothed(picture(seen)), BOUNDS), trace_silhouette(blots)
+    edges, outline = detect_edges(smooth_image(picture(seen)), BOUNDS), trace_silhouette(blots)
     u, v = outline.points_px.T.astype(int)
     near = cv2.dilate(edges.found, np.ones((5, 5), np.uint8))[v, u] > 0
     gradients = edges.gradients[:, v, u].T.astype(np.float32)

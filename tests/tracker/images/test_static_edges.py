@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
+from staging import view_evidence
 
-from tracker.evidence.view_evidence import view_evidence, with_all_segments
+from tracker.evidence.view_evidence import with_all_segments
 from tracker.geometry.cameras import Camera
 from tracker.images.edge_segments import Segments
 from tracker.images.static_edges import StaticEdgeModel
@@ -112,7 +113,7 @@ def test_edges_of_the_room_are_no_evidence(model):
     gradients[0] = 100
     learn(model, line(20))
     pieces = np.array([[u, y, u, y + 2] for u in (21, 49) for y in range(10, 40, 2)], np.float32)
-    view = view_evidence(camera, 1.0, edges, gradients=gradients, predicted_px=pieces, static_edges=model)
+    view = view_evidence(camera, edges, gradients, predicted_px=pieces, static_edges=model)
     assert set(view.points_px[:, 0]) == {50.0}
     assert view.distance[20, 20] == view.distance.max()
     everything = with_all_segments(view)

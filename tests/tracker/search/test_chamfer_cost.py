@@ -3,11 +3,11 @@ import cv2
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-from staging import at, camera_at, cameras_around, own_evidence, shaken, solid
+from staging import at, camera_at, cameras_around, own_evidence, posed, shaken, solid, view_evidence
 
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
-from tracker.evidence.view_evidence import ViewEvidence, default_theta_px, view_evidence
+from tracker.evidence.view_evidence import ViewEvidence, default_theta_px
 from tracker.formats.model_toml import load_model
 from tracker.search.chamfer_cost import ChamferCost
 
@@ -123,7 +123,7 @@ def test_view_without_edges_has_no_say(gavrila):
     values = gavrila.neutral()
     cameras = cameras_around(3)
     views = own_evidence([PosedBody(gavrila, values)], cameras)
-    blind = view_evidence(cameras[1], 1.0, np.zeros((480, 640), dtype=bool))
+    blind = view_evidence(cameras[1], np.zeros((480, 640), dtype=bool))
     moved = shaken(gavrila, values, np.random.default_rng(0), 0.2, 0.05)
     all_three = ChamferCost(views, [PosedBody(gavrila, values)])([moved])
     two = ChamferCost([views[0], blind, views[2]], [PosedBody(gavrila, values)])
@@ -292,3 +292,17 @@ def by_hand(cost, views, model, values, piece_px):
 def near_contour(view, contour_px, theta):
     """Edge points within theta of a contour given as points 1.5 px apart."""
     return view.points_px[cKDTree(contour_px).query(view.points_px)[0] <= theta]
+
+
+@both_modes
+def test_the_cost_at_the_prediction_is_that_of_its_poses(gavrila, outliers):
+    values = [posed(gavrila, 1), posed(gavrila, 2)]
+    bodies = [PosedBody(gavrila, v) for v in values]
+    cost = ChamferCost(own_evidence(bodies[:1], cameras_around()), bodies, outliers=outliers)
+    found, expected = cost.at_prediction(), cost(values)
+    assert found.total_px == pytest.approx(expected.total_px, rel=1e-6)
+    np.testing.assert_allclose(found.forward_px, expected.forward_px, rtol=1e-5)
+    np.testing.assert_allclose(found.backward_px, expected.backward_px, rtol=1e-5)
+    for camera, pieces in zip(cameras_around(), cost.predicted_pieces_px, strict=True):
+        contour = occluding_contours.trace(bodies, camera)
+        np.testing.assert_allclose(pieces, contour.pieces_px[~contour.occluded], atol=1e-3)

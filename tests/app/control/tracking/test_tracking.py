@@ -36,7 +36,7 @@ def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, sess
     wait_for(at(placed, 4))
     shown = placed.state.people[0]
     assert placed.state.frame == 4
-    assert (shown.source, shown.status, shown.remark) == ("tracked", "doubtful", "left arm searched anew")
+    assert (shown.source, shown.status, shown.remark) == ("tracked", "doubtful", "left arm relocated")
     assert shown.part_costs_px == (0.5,) * 9 + (None,)
     assert (placed.state.cost_px, placed.state.view_costs_px) == (pytest.approx(1.4), (1.0, None, 2.0, 3.0))
     assert x_of(placed) == pytest.approx(start + 2 * STEP_M)
@@ -292,7 +292,7 @@ def test_a_run_survives_a_restart(placed, tracker, opened):
     controller.navigation.seek(4)
     assert (controller.state.people[0].status, controller.state.people[0].remark) == (
         "doubtful",
-        "left arm searched anew",
+        "left arm relocated",
     )
     controller.history.undo()
     assert set(controller.stored_poses.timeline()) == {2}
@@ -308,7 +308,7 @@ def followed_back(tracker, steps):
             better = ()
             if i == steps - 1:
                 poses = tuple(p + STEP_M * (np.arange(len(p)) == 1) for p in found[4].poses)
-                better = (tracker.last[7]._replace(poses=poses, statuses=("good",), remarks=("followed back",)),)
+                better = (tracker.last[7]._replace(poses=poses, statuses=("good",), notes=("followed back",)),)
             yield BackwardStep(7, 0, i + 1, steps, better)
 
     tracker.back = back
