@@ -4,14 +4,17 @@ import json
 import shutil
 from contextlib import closing
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
 from command_line import SAMPLE, assert_refused, stored
 
+from app.cli.track import _SETTINGS, TrackArguments
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
+from tracker.pipeline.methods import METHODS
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange
@@ -90,6 +93,14 @@ def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
     assert store.undo() == "track frames 0:4"  # one entry, however many frames
     assert [row.frame for row in store.frames("person")] == [0, 2]
     store.close()
+
+
+def test_every_tracking_method_can_be_named():
+    choices = get_args(get_type_hints(TrackArguments)["method"])
+    assert set(choices) == METHODS.keys() == _SETTINGS.keys()
+    for method in choices:
+        arguments = TrackArguments(SAMPLE, method=method)
+        assert _SETTINGS[method](arguments).method == method
 
 
 @pytest.mark.parametrize("compiled", [False, True])
