@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import configuration, settings
 
+from tracker.formats.model_toml import load_model
+
 # No time limit: the first call of a numba kernel compiles. No files in the source tree.
 settings.register_profile("quadrille", deadline=None, database=None, derandomize=True)
 settings.load_profile("quadrille")
@@ -30,3 +32,8 @@ def data_folder() -> Callable[[str], Path]:
         return folder
 
     return find
+
+
+@pytest.fixture(scope="session")
+def gavrila():
+    return load_model("gavrila22")

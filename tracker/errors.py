@@ -1,13 +1,12 @@
-"""What the library raises when a user or a file gave it something it cannot use.
+"""The errors that the library raises for unusable input of users and files.
 
-Internal mistakes are asserted; these exceptions are for people. Every message says what was expected,
-what was found, and what to do. The command line prints the message and exits with status 1; the page
-shows it as a notice.
+Internal mistakes are asserted instead. Every message states what was expected, what was found, and what to do. The
+command line prints the message and exits with status 1; the page shows it as a notice.
 """
 
 
 class TrackerError(Exception):
-    """Something that a user or a file gave cannot be used; the message says what to do."""
+    """Input of a user or a file cannot be used; the message states what to do."""
 
 
 class CalibrationError(TrackerError):

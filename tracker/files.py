@@ -1,4 +1,4 @@
-"""Text files written whole or not at all, and TOML files read with errors that name the line."""
+"""Write text files atomically; read TOML files with errors that name the line."""
 
 import os
 import secrets
@@ -10,7 +10,7 @@ from tracker.errors import TrackerError
 
 
 def write_text_atomic(path: Path, text: str) -> None:
-    """Write UTF-8 text to a temporary sibling, then rename it onto `path`: a crash leaves the old file or the new.
+    """Write UTF-8 text to a temporary sibling, then rename it to `path`: a crash leaves the old file or the new one.
 
     Raises:
         OSError: the folder is missing or not writable, or the disk is full.
@@ -32,7 +32,7 @@ def read_toml(path: Path, what: str, error_type: type[TrackerError]) -> dict[str
 
     Args:
         path: the file.
-        what: what the file is to the user, for messages: `calibration`.
+        what: kind of file, for messages: `calibration`.
         error_type: kind of error to raise.
 
     Raises:
@@ -52,7 +52,7 @@ def parse_toml(text: str, where: str, error_type: type[TrackerError]) -> dict[st
 
     Args:
         text: the text.
-        where: what it is to the user, for messages: `calibration lab.toml`.
+        where: its kind and source, for messages: `calibration lab.toml`.
         error_type: kind of error to raise.
 
     Raises:
@@ -61,6 +61,6 @@ def parse_toml(text: str, where: str, error_type: type[TrackerError]) -> dict[st
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        # What is open at the end is reported without a line: give the last.
+        # The parser gives no line for a construct left open at the end: report the last line.
         place = str(error).replace("at end of document", f"at line {max(1, len(text.splitlines()))}, the last")
         raise error_type(f"{where} is not valid TOML: {place}; correct it") from error

@@ -106,8 +106,8 @@ def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool)
         if sizes:
             people = tuple(person if i == index else p for i, p in enumerate(session.people))
             save_session(replace(session, people=people))
-        _store_keyframe(session, person, frame, fit.values, "joints")
-    fitted = dict(zip(person.model.point_names, person.model.points_world(fit.values), strict=True))
+        _store_keyframe(session, person, frame, fit.pose, "joints")
+    fitted = dict(zip(person.model.point_names, person.model.points_world(fit.pose), strict=True))
     residuals = {n: float(1000 * np.linalg.norm(fitted[n] - p)) for n, p in limbs.items()}
     mean = float(np.mean(list(residuals.values())))
     return {"person": person.name, "frame": frame, "residual_mm": residuals, "mean_mm": mean}

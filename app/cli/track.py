@@ -145,7 +145,7 @@ def _work(run: "TrackSession", progress: Reporter) -> None:
     first = next(steps, None)
     if first is None:
         return
-    with progress.over(first.total, "following back") as tick:
+    with progress.over(first.total, "tracking back") as tick:
         run.take(first)
         tick()
         for step in steps:

@@ -16,8 +16,8 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera, epipolar_segment
 from tracker.images.background_subtraction import Mask
-from tracker.images.edge_segments import accept
-from tracker.posing.retarget import rebodied
+from tracker.images.edge_segments import accept_segments
+from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Person, Session
 
 CANDIDATE_COLOR = "#ffffff"
@@ -86,9 +86,9 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     state = state.drawn
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
-    tried = state.job.candidate if state.job.running or state.look.replay is not None else None
+    tried = state.search.candidate if state.search.running or state.search_view.replay is not None else None
     drafted, others = _with_draft(state, bodies), _alternatives(state, bodies)
-    ghosts = ((state.look.compared, COMPARED_COLOR), (state.look.preview, PREVIEW_COLOR))
+    ghosts = ((state.search_view.compared, COMPARED_COLOR), (state.search_view.preview, PREVIEW_COLOR))
     for index in sorted(view.cameras):
         camera = session.cameras[index].camera.pinhole
         if not view.layers.isdisjoint(("contours", "hidden")):
@@ -109,7 +109,7 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
             out += [s for s in _segments(bodies, views[index], index, view) if s.kind in view.layers]
     if state.drag is not None and "epipolar" in view.layers:
         out += [line for line in _epipolar_lines(session, state) if line.camera in view.cameras]
-    return [p for p in out if p.kind not in _PERSON_KINDS or p.person not in state.cast.hidden]
+    return [p for p in out if p.kind not in _PERSON_KINDS or p.person not in state.visibility.hidden]
 
 
 def handles(session: Session, state: State, cameras: Collection[int]) -> list[Handle]:
@@ -117,13 +117,13 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     points = [b.points_world for b in bodies]
     seen = {index: session.cameras[index].camera.pinhole for index in sorted(cameras)}
-    out, hidden_by_view = [], part_edges.points_hidden(bodies, list(seen.values()), np.concatenate(points))
+    out, hidden_by_view = [], part_edges.points_occluded(bodies, list(seen.values()), np.concatenate(points))
     for (index, camera), hidden in zip(seen.items(), hidden_by_view, strict=True):
         first = 0
         for person, body in enumerate(bodies):
             px = camera.project(points[person])
             for i, name in enumerate(body.model.point_names):
-                if person not in state.cast.hidden and np.all(np.isfinite(px[i])):
+                if person not in state.visibility.hidden and np.all(np.isfinite(px[i])):
                     u, v = float(px[i, 0]), float(px[i, 1])
                     out.append(Handle(index, person, name, u, v, not hidden[first + i]))
             first += len(px)
@@ -144,8 +144,8 @@ def _model(session: Session, bodies: Sequence[PosedBody], camera: Camera, index:
     contour = _traced(bodies, camera)
     out = []
     kinds: tuple[tuple[str, PathKind, Mask], ...] = (
-        ("hidden", "hidden", contour.hidden),
-        ("contours", "model", ~contour.hidden),
+        ("hidden", "hidden", contour.occluded),
+        ("contours", "model", ~contour.occluded),
     )
     for layer, kind, pieces in kinds:
         if layer in view.layers and view.by_part:
@@ -161,7 +161,7 @@ def _outlined(
     """Draw the visible contours of other poses of all people, in one colour."""
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, poses, strict=True)]
     contour = _traced(bodies, camera)
-    return _by_person(bodies, contour, ~contour.hidden, index, kind, [color] * len(bodies))
+    return _by_person(bodies, contour, ~contour.occluded, index, kind, [color] * len(bodies))
 
 
 def _with_draft(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
@@ -169,7 +169,7 @@ def _with_draft(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
     people, draft = list(bodies), state.draft
     if draft is not None:
         shown = people[draft.person]
-        people[draft.person] = PosedBody(draft.model, rebodied(shown.values, shown.model, draft.model))
+        people[draft.person] = PosedBody(draft.model, retarget_pose(shown.values, shown.model, draft.model))
     return people
 
 
@@ -183,7 +183,7 @@ def _alternatives(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
 def _ghosts(chosen: Collection[int], people: Sequence[PosedBody], camera: Camera, index: int, color: str) -> list[Path]:
     """Draw the visible contours of some people, given by index, among all people."""
     contour = _traced(people, camera)
-    found = _by_person(people, contour, ~contour.hidden, index, "ghost", [color] * len(people))
+    found = _by_person(people, contour, ~contour.occluded, index, "ghost", [color] * len(people))
     return [path for path in found if path.person in chosen]
 
 
@@ -217,7 +217,7 @@ def _segments(bodies: Sequence[PosedBody], view: ViewEvidence, index: int, shown
     if segments is None or samples is None or not len(segments.points_px):
         return []
     contour = occluding_contours.trace(bodies, view.camera)
-    chosen = accept(samples, contour.pieces_px[~contour.hidden], ACCEPTED_SHARE * view.theta_px)
+    chosen = accept_segments(samples, contour.pieces_px[~contour.occluded], ACCEPTED_SHARE * view.theta_px)
     lengths = np.diff(segments.firsts)
     owners = np.repeat(np.arange(len(lengths)), lengths)
     offsets = np.arange(len(owners)) - segments.firsts[owners]

@@ -31,15 +31,19 @@ def part_hulls(session: Session, state: State, view: View) -> list[PartHull]:
     delay the drag. A replayed step has none, because it is no stored pose.
     """
     drag = state.drag
-    if "joints" not in view.layers or state.look.replay is not None or (drag is not None and not drag.by_surface):
+    if (
+        "joints" not in view.layers
+        or state.search_view.replay is not None
+        or (drag is not None and not drag.by_surface)
+    ):
         return []
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
     seen = sorted(view.cameras)
-    found = picking.part_outlines(bodies, [session.cameras[index].camera.pinhole for index in seen])
+    found = picking.part_hulls(bodies, [session.cameras[index].camera.pinhole for index in seen])
     for index, parts in zip(seen, found, strict=True):
         for one in parts:
-            if one.body in state.cast.hidden:
+            if one.body in state.visibility.hidden:
                 continue
             if drag is None or (one.body, one.part) == (drag.person, drag.part):
                 out.append(PartHull(index, one.body, one.part, one.depth_m, _closed(one.polygon_px)))

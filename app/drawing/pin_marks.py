@@ -57,7 +57,7 @@ def pin_marks(session: Session, state: State) -> list[PinMark]:
     """Return all pins of the frame, of visible people."""
     out = []
     for person, (info, pins) in enumerate(zip(session.people, state.pins, strict=True)):
-        if not pins or person in state.cast.hidden:
+        if not pins or person in state.visibility.hidden:
             continue
         points = info.model.points_world(state.poses[person])
         for point, camera, position_px in pins:
@@ -105,6 +105,6 @@ def pin_lines(session: Session, state: State, view: View) -> list[Path]:
 
 def _of_joint(state: State) -> list[PointObservation]:
     """Return the pins of the joint worked on; none of a hidden person."""
-    if not state.pins or state.person in state.cast.hidden:
+    if not state.pins or state.person in state.visibility.hidden:
         return []
     return [p for p in state.pins[state.person] if p.point == state.point]

@@ -39,17 +39,17 @@ def check_indices(controller: Controller, message: wire.ClientMessage) -> None:
 
 
 def _drag(controller: Controller, page: int, message: wire.Drag) -> None:
-    hand, pointer_px = controller.hand, (message.u, message.v)
+    dragging, pointer_px = controller.dragging, (message.u, message.v)
     if message.phase == "start":
-        hand.begin_drag(
+        dragging.begin(
             page, message.camera, message.person, message.point, pointer_px, message.frame, message.part
         )  # fmt: skip
     if message.phase == "cancel":
-        hand.cancel_drag(page)
+        dragging.cancel(page)
     else:
-        hand.move_drag(page, pointer_px, message.seq, message.mode, is_last=message.phase == "end")
+        dragging.move(page, pointer_px, message.seq, message.mode, is_last=message.phase == "end")
     if message.phase == "end":
-        hand.end_drag(page)
+        dragging.end(page)
 
 
 def _pin(controller: Controller, page: int, message: wire.DragPin) -> None:
@@ -72,9 +72,9 @@ def _unpin(controller: Controller, _: int, message: wire.RemovePins) -> None:
 
 def _control_tracking(controller: Controller, _: int, message: wire.ControlTracking) -> None:
     actions: dict[str, Callable[[], None]] = {
-        "pause": controller.pause_tracking,
-        "resume": controller.go_on_tracking,
-        "stop": controller.stop,
+        "pause": controller.tracking.pause,
+        "resume": controller.tracking.resume,
+        "stop": controller.activities.stop,
     }
     actions[message.action]()
 
@@ -99,39 +99,39 @@ def _mark(controller: Controller, _: int, message: wire.ToggleMark) -> None:
 
 
 def _floor(controller: Controller, _: int, message: wire.EditFloor) -> None:
-    flooring = controller.flooring
+    floor = controller.floor
     actions: dict[str, Callable[[], None]] = {
-        "begin": flooring.begin,
-        "next": flooring.go_on,
-        "take_back": flooring.take_back,
-        "apply": flooring.apply,
-        "cancel": flooring.cancel,
-        "revert": flooring.revert,
+        "begin": floor.begin,
+        "next": floor.next_point,
+        "take_back": floor.take_back,
+        "apply": floor.apply,
+        "cancel": floor.cancel,
+        "revert": floor.revert,
     }
     actions[message.action]()
 
 
 COMMANDS: dict[type[wire.Message], Callable[[Controller, int, Any], None]] = {
-    wire.Seek: lambda controller, _, m: controller.seek(m.frame),
-    wire.Select: lambda controller, _, m: controller.select(m.person, m.point),
-    wire.ShowPerson: lambda controller, _, m: controller.casting.show(m.person, m.shown),
-    wire.Solo: lambda controller, _, m: controller.casting.solo(m.on),
+    wire.Seek: lambda controller, _, m: controller.navigation.seek(m.frame),
+    wire.Select: lambda controller, _, m: controller.navigation.select(m.person, m.point),
+    wire.ShowPerson: lambda controller, _, m: controller.visibility.show(m.person, m.shown),
+    wire.Solo: lambda controller, _, m: controller.visibility.solo(m.on),
     wire.LookThrough: lambda controller, _, m: controller.view_3d.snap(m.camera),
-    wire.Pause3d: lambda controller, page, m: controller.hold_3d(page, m.pause),
+    wire.Pause3d: lambda controller, page, m: controller.view_3d.pause(page, m.pause),
     wire.Drag: _drag,
     wire.DragPin: _pin,
     wire.RemovePins: _unpin,
     wire.FitPose: lambda controller, _, m: controller.pinning.fit(m.frame, m.person),
-    wire.StartTracking: lambda controller, _, m: controller.track(m.action == "backward", m.until),
+    wire.StartTracking: lambda controller, _, m: controller.tracking.start(m.action == "backward", m.until),
     wire.ControlTracking: _control_tracking,
     wire.EditRange: _range,
-    wire.StopRange: lambda controller, _, __: controller.ranges.halt(),
+    wire.StopRange: lambda controller, _, __: controller.ranges.stop(),
     wire.ToggleMark: _mark,
-    wire.FollowTracking: lambda controller, _, m: controller.follow(m.follow),
+    wire.FollowTracking: lambda controller, _, m: controller.tracking.follow(m.follow),
     wire.EditFloor: _floor,
-    wire.MarkFloor: lambda controller, _, m: controller.flooring.mark(m.camera, (m.u, m.v)),
-    wire.Undo: lambda controller, _, __: controller.undo(),
-    wire.Redo: lambda controller, _, __: controller.redo(),
+    wire.MarkFloor: lambda controller, _, m: controller.floor.mark(m.camera, (m.u, m.v)),
+    wire.Undo: lambda controller, _, __: controller.history.undo(),
+    wire.Redo: lambda controller, _, __: controller.history.redo(),
     wire.GoTo: lambda controller, _, m: controller.history.go_to(m.edit),
     wire.Save: lambda controller, _, __: controller.history.save(),
     **POSE_COMMANDS,

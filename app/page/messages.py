@@ -14,7 +14,9 @@ from app.page.binary_headers import CellsHeader, CurvesHeader, Outline, OverlayH
 from app.page.encoding import encode_binary
 from app.state.floor_picking import Picking
 from app.state.page_view import View
-from app.state.state import JobState, ReplayState, State, TrackState
+from app.state.progress import TrackState
+from app.state.search import ReplayState, SearchState
+from app.state.state import State
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import FloatArray
 from tracker.posing.drag import minor_points
@@ -62,7 +64,7 @@ def state(session: Session, state: State) -> wire.StateMessage:
     """Describe the texts and figures of the page."""
     shown, drawn = state.people[state.person], state.drawn
     people = tuple(
-        wire.PersonState(p.source, _status(p.status), i not in state.cast.hidden, len(p.others))
+        wire.PersonState(p.source, _status(p.status), i not in state.visibility.hidden, len(p.others))
         for i, p in enumerate(state.people)
     )
     return wire.StateMessage(
@@ -70,18 +72,18 @@ def state(session: Session, state: State) -> wire.StateMessage:
         person=state.person,
         point=state.point,
         people=people,
-        solo=state.cast.solo,
+        solo=state.visibility.solo,
         cost_px=drawn.cost_px,
         view_costs_px=drawn.view_costs_px,
         source=shown.source,
         status=_status(shown.status),
         remark=shown.remark,
-        part_costs_px=shown.parts_px,
+        part_costs_px=shown.part_costs_px,
         dofs=tuple(dof_labels.shown(session.people[state.person].model, shown.values)),
         locked=tuple(sorted(state.locked[state.person])),
         other_sizes=state.revisions[state.person] != state.present[state.person],
-        job=_job(state.job),
-        replay=_replay(state.look.replay),
+        job=_job(state.search),
+        replay=_replay(state.search_view.replay),
         track=_track(state.track),
         range=wire.RangeWork(
             state.ranges.running, state.ranges.what, state.ranges.done, state.ranges.total, state.ranges.message
@@ -125,11 +127,11 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         segments.append(hull.segments_px)
         first += count
     # A replayed step is no stored pose, so its joints cannot be dragged.
-    handles = overlays.handles(session, state, view.cameras) if state.look.replay is None else []
+    handles = overlays.handles(session, state, view.cameras) if state.search_view.replay is None else []
     header = OverlayHeader(
         frame=state.frame,
         seq=dict(state.drag_seqs).get(page, 0),
-        job=state.job.running,
+        job=state.search.running,
         paths=tuple(rows),
         outlines=tuple(hulls),
         handles=tuple(handles),
@@ -227,7 +229,7 @@ def _floor(picking: Picking | None) -> wire.FloorPicking | None:
     )
 
 
-def _job(job: JobState) -> wire.Job:
+def _job(job: SearchState) -> wire.Job:
     return wire.Job(
         running=job.running,
         kind=job.kind,

@@ -39,7 +39,7 @@ def _reset(controller: Controller, _: int, message: wire.ResetLimb) -> None:
 def _lock(controller: Controller, _: int, message: wire.LockDofs) -> None:
     for dof in message.dofs:
         _display_factor(controller, message.person, dof)
-    controller.locks.set(message.person, message.dofs, message.locked)
+    controller.dof_locks.set(message.person, message.dofs, message.locked)
 
 
 POSE_COMMANDS: dict[type[wire.Message], Callable[[Controller, int, Any], None]] = {
@@ -49,7 +49,7 @@ POSE_COMMANDS: dict[type[wire.Message], Callable[[Controller, int, Any], None]] 
     wire.Mirror: lambda controller, _, m: controller.pose_edits.mirror(m.person, m.frame),
     wire.CopyFrame: lambda controller, _, m: controller.pose_edits.copy_from(m.person, m.source, m.frame),
     wire.CopyPerson: _copy_person,
-    wire.TakeAlternative: lambda controller, _, m: controller.choosing.exchange(m.person, m.frame),
+    wire.TakeAlternative: lambda controller, _, m: controller.alternatives.take_alternative(m.person, m.frame),
     wire.ResetLimb: _reset,
     wire.LockDofs: _lock,
 }

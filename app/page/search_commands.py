@@ -13,20 +13,20 @@ from app.page import client_messages as wire
 def _search(controller: Controller, _: int, message: wire.RunSearch) -> None:
     match message.action:
         case "step":
-            controller.search_step(message.person)
+            controller.search.step(message.person)
         case "stage":
-            controller.search_stage(message.person)
+            controller.search.run_stage(message.person)
         case "frame":
-            controller.search_frame(message.person)
+            controller.search.run(message.person)
         case "stop":
-            controller.stop()
+            controller.activities.stop()
 
 
 def _settings(controller: Controller, _: int, message: wire.SetSearchSettings) -> None:
     before = controller.state.settings
     after = search_settings.changed(before, controller.models, msgspec.to_builtins(message.changes))
     if after != before:
-        controller.set_settings(after)
+        controller.search.set_settings(after)
 
 
 def _replay(controller: Controller, _: int, message: wire.ReplayStep) -> None:
@@ -38,13 +38,13 @@ def _replay(controller: Controller, _: int, message: wire.ReplayStep) -> None:
 
 SEARCH_COMMANDS: dict[type[wire.Message], Callable[[Controller, int, Any], None]] = {
     wire.RunSearch: _search,
-    wire.RepeatSearch: lambda controller, _, m: controller.search_again(m.run, m.person),
-    wire.SetSearchSpeed: lambda controller, _, m: controller.pace_search(m.per_second),
+    wire.RepeatSearch: lambda controller, _, m: controller.search.run_again(m.run, m.person),
+    wire.SetSearchSpeed: lambda controller, _, m: controller.search.set_speed(m.per_second),
     wire.SetSearchSettings: _settings,
     wire.ReplayStep: _replay,
     wire.CompareRun: lambda controller, _, m: controller.replay.compare(m.run),
     wire.PreviewCandidate: lambda controller, _, m: controller.replay.preview(m.run, m.candidate),
     wire.TakeCandidate: lambda controller, _, m: controller.replay.take(m.run, m.candidate),
-    wire.ShowLandscape: lambda controller, _, m: controller.landscape.choose(m.dof),
-    wire.SetLandscapeDof: lambda controller, _, m: controller.landscape.set_value(m.person, m.dof, m.value),
+    wire.ShowLandscape: lambda controller, _, m: controller.cost_landscape.choose(m.dof),
+    wire.SetLandscapeDof: lambda controller, _, m: controller.cost_landscape.set_value(m.person, m.dof, m.value),
 }

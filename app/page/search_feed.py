@@ -6,13 +6,14 @@ import numpy as np
 
 from app.control.controller import Controller
 from app.control.search import search_settings
-from app.control.search.search_runs import Run
+from app.control.search.search_runs import SearchRun
 from app.page import server_messages as wire
 from app.page.binary_headers import LandscapeHeader, SearchCandidatesHeader, SearchStepsHeader
 from app.page.client_messages import Tab
 from app.page.encoding import encode_binary
 from app.state.identity import Identity
-from app.state.state import Landscape, ReplayState, State, finite_or_none
+from app.state.search import CostLandscape, ReplayState
+from app.state.state import State, finite_or_none
 from tracker.session.session import Session
 
 _COLUMNS = 4
@@ -33,7 +34,7 @@ class SearchFeed:
         self._runs: wire.SearchRunsMessage | None = None
         self._steps: dict[int, tuple[int, int]] = {}  # by run: steps sent, times thinned
         self._candidates: dict[int, tuple[Identity, ...]] = {}
-        self._landscape: Landscape | None = None
+        self._landscape: CostLandscape | None = None
 
     def updates(self, controller: Controller, with_figures: bool = True) -> list[wire.Message | bytes]:
         """Return the messages that bring the page up to date; binary ones are encoded.
@@ -51,7 +52,7 @@ class SearchFeed:
         if self._tab != "search":
             return []
         out: list[wire.Message | bytes] = []
-        with controller.locked():  # runs and state of the same moment
+        with controller.lock:  # runs and state of the same moment
             found, state = controller.replay.runs(), controller.state
             listed = runs(found, state) if with_figures or self._runs is None else self._runs
             if listed != self._runs:
@@ -71,7 +72,7 @@ class SearchFeed:
             self._candidates = {n: sent for n, sent in self._candidates.items() if n in stored}
         return out
 
-    def _steps_of(self, run: Run) -> list[bytes]:
+    def _steps_of(self, run: SearchRun) -> list[bytes]:
         first, thinned = self._steps.get(run.number, (0, run.thinned))
         first = 0 if thinned != run.thinned else first
         if (run.number in self._steps and first == len(run.steps)) and thinned == run.thinned:
@@ -79,7 +80,7 @@ class SearchFeed:
         self._steps[run.number] = (len(run.steps), run.thinned)
         return [steps(run, first)]
 
-    def _candidates_of(self, session: Session, run: Run) -> list[bytes]:
+    def _candidates_of(self, session: Session, run: SearchRun) -> list[bytes]:
         key = tuple(map(Identity, run.candidates))
         if key == self._candidates.get(run.number, ()):
             return []
@@ -90,7 +91,7 @@ class SearchFeed:
 def setup(controller: Controller, state: State) -> wire.SearchSetupMessage:
     """Describe the decomposition and the settings of the search that the page edits."""
     settings, search = state.settings, state.settings.search
-    leaves = search_settings.leaves(controller.models, search, controller.free())
+    leaves = search_settings.leaves(controller.models, search, controller.active_dofs())
     return wire.SearchSetupMessage(
         theta_px=settings.theta_px,
         outliers=settings.outliers,
@@ -102,26 +103,26 @@ def setup(controller: Controller, state: State) -> wire.SearchSetupMessage:
         bound_m=search.bound_m,
         step_rad=search.step_rad,
         step_m=search.step_m,
-        speed=state.look.speed,
+        speed=state.search_view.speed,
         leaves=tuple(wire.SearchLeaf(**vars(leaf)) for leaf in leaves),
     )
 
 
-def runs(found: Sequence[Run], state: State) -> wire.SearchRunsMessage:
+def runs(found: Sequence[SearchRun], state: State) -> wire.SearchRunsMessage:
     """Describe the runs of the shown frame with their stages, and the step that is replayed."""
     differing = search_settings.differences([r.settings for r in found])
     listed = tuple(_run(run, differs, state) for run, differs in zip(found, differing, strict=True))
-    return wire.SearchRunsMessage(listed, _replay(state.look.replay), state.look.compared_run)
+    return wire.SearchRunsMessage(listed, _replay(state.search_view.replay), state.search_view.compared_run)
 
 
-def steps(run: Run, first: int) -> bytes:
+def steps(run: SearchRun, first: int) -> bytes:
     """Encode the figures of a run's recorded steps from one on."""
     rows = [(s.evaluations, s.candidate_px, s.best_px, s.stage) for s in run.steps[first:]]
     header = SearchStepsHeader(run.number, first, len(rows))
     return encode_binary(header, np.array(rows, dtype="<f4").reshape(-1, _COLUMNS).T.tobytes())
 
 
-def candidates(session: Session, run: Run) -> bytes:
+def candidates(session: Session, run: SearchRun) -> bytes:
     """Encode the best poses of a run as points in every view; NaN behind a camera."""
     n, cameras = len(run.candidates), [c.camera.pinhole for c in session.cameras]
     people = tuple(len(p.model.point_names) for p in session.people)
@@ -134,7 +135,7 @@ def candidates(session: Session, run: Run) -> bytes:
     return encode_binary(header, points.astype("<f4").tobytes())
 
 
-def landscape(session: Session, found: Landscape) -> bytes:
+def landscape(session: Session, found: CostLandscape) -> bytes:
     """Encode a landscape: its values, the mean costs, then the costs of each view."""
     model = session.people[found.person].model
     header = LandscapeHeader(
@@ -146,11 +147,13 @@ def landscape(session: Session, found: Landscape) -> bytes:
         current_px=finite_or_none(found.current_px),
         count=len(found.values),
     )
-    return encode_binary(header, np.vstack([found.values, found.totals_px, found.views_px.T]).astype("<f4").tobytes())
+    return encode_binary(
+        header, np.vstack([found.values, found.totals_px, found.view_costs_px.T]).astype("<f4").tobytes()
+    )
 
 
-def _run(run: Run, differs: dict[str, str], state: State) -> wire.SearchRun:
-    is_current = state.job.kind is not None and not run.over
+def _run(run: SearchRun, differs: dict[str, str], state: State) -> wire.SearchRun:
+    is_current = state.search.kind is not None and not run.over
     at = max((i for i, c in enumerate(run.counts) if c.expansions), default=-1)
     stages = tuple(
         wire.SearchStage(
@@ -166,7 +169,7 @@ def _run(run: Run, differs: dict[str, str], state: State) -> wire.SearchRun:
     )
     return wire.SearchRun(
         number=run.number,
-        state="over" if not is_current else "running" if state.job.running else "paused",
+        state="over" if not is_current else "running" if state.search.running else "paused",
         start_px=finite_or_none(run.start_px),
         best_px=finite_or_none(run.best_px),
         evaluations=run.evaluations,

@@ -96,10 +96,10 @@ class PageConnection:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            await asyncio.to_thread(self._controller.hand.end_drag, self._number)
+            await asyncio.to_thread(self._controller.dragging.end, self._number)
             await asyncio.to_thread(self._controller.pinning.end, self._number)
-            await asyncio.to_thread(self._controller.hold_3d, self._number, False)
-            self._controller.landscape.watch(self._number, False)
+            await asyncio.to_thread(self._controller.view_3d.pause, self._number, False)
+            self._controller.cost_landscape.watch(self._number, False)
 
     def _wake(self, _: State) -> None:
         """Wake the sender; called from any thread."""
@@ -152,7 +152,7 @@ class PageConnection:
                 self._curves = group
             case wire.WatchTab(tab=tab):
                 self._feed = SearchFeed(tab)
-                self._controller.landscape.watch(self._number, tab == "landscape")
+                self._controller.cost_landscape.watch(self._number, tab == "landscape")
             case wire.ShowHistory(limit=limit):
                 self._history_limit = min(limit, _MAX_HISTORY)
                 self._sent_history = None
@@ -190,13 +190,13 @@ class PageConnection:
                     await self._notice(state.track.message)
             except TrackerError as error:
                 await self._notice(str(error))
-            if state.job.running:
+            if state.search.running:
                 await asyncio.sleep(max(0.0, began + _WATCHABLE_S - self._loop.time()))
 
     def _figures_are_due(self, state: State) -> bool:
         """Return whether to send figures now; if not, this page is woken in time."""
         sent, now = self._sent_text, self._loop.time()
-        is_busy = state.in_hand or (state.job.running and sent is not None and sent.job.running)
+        is_busy = state.is_dragging or (state.search.running and sent is not None and sent.job.running)
         due = self._sent_text_at + _READABLE_S
         if sent is None or not is_busy or now >= due:
             self._sent_text_at = now
@@ -246,7 +246,7 @@ class PageConnection:
         """Return the cached evidence of the shown frame if the page shows any; request it if it is not cached."""
         if view.layers.isdisjoint(page_view.EVIDENCE):
             return None
-        frames, views = self._controller.frames, self._controller.frames.evidence_at_hand(state.frame)
+        frames, views = self._controller.frames, self._controller.frames.cached_evidence(state.frame)
         if views is None:
             frames.request(state.frame, lambda _: self._wake(state))
         return views
@@ -254,7 +254,7 @@ class PageConnection:
     async def _send_timeline(self, since: int) -> None:
         several = range(len(self._controller.models)) if len(self._controller.models) > 1 else ()
         for person in (None, *several):
-            cells = self._controller.timeline(since, person)
+            cells = self._controller.stored_poses.timeline(since, person)
             await self._send(await asyncio.to_thread(messages.timeline, cells, since == 0, person))
 
     async def _send_curves(self, state: State) -> None:
@@ -268,7 +268,7 @@ class PageConnection:
         self._sent_curves = wanted
         since = sent[2] if sent is not None and sent[:2] == wanted[:2] else 0
         group, person = wanted[:2]
-        frames, rows = await asyncio.to_thread(self._controller.numbers, person, since)
+        frames, rows = await asyncio.to_thread(self._controller.stored_poses.rows, person, since)
         message = await asyncio.to_thread(
             messages.curves, self._controller.session, person, group, frames, rows, since == 0
         )
@@ -319,12 +319,12 @@ def _drawn(state: State) -> tuple[object, ...]:
         tuple(Identity(p.values) for p in state.people),
         state.revisions,
         state.draft,
-        None if state.job.candidate is None else tuple(map(Identity, state.job.candidate)),
-        state.job.running,
-        state.look,
+        None if state.search.candidate is None else tuple(map(Identity, state.search.candidate)),
+        state.search.running,
+        state.search_view,
         state.drag,
         state.drag_seqs,
-        state.cast.hidden,
+        state.visibility.hidden,
     )
     return (*drawn, _pins(state), state.floor.picking)
 

@@ -22,7 +22,7 @@ class _Cell(Generic[T]):
         self.n_bytes = 0
 
 
-class Recent(Generic[K, T]):
+class ByteBoundedCache(Generic[K, T]):
     """The results of a function, those asked for last. Safe to use from several threads."""
 
     def __init__(self, compute: Callable[[K], T], most_bytes: int) -> None:

@@ -120,7 +120,7 @@ class Job(Generic[T]):
         return max(due + self._rest_s, time.monotonic() - self._rest_s)
 
 
-class Latest(Generic[T]):
+class LatestWinsWorker(Generic[T]):
     """Hands values to a slow consumer in a thread of its own: per key only the newest that waits, in order of offer."""
 
     def __init__(self, consume: Callable[[T], None], name: str, rest_s: float = 0.0) -> None:

@@ -10,7 +10,7 @@ import viser
 
 from app.control.controller import Controller
 from app.state.state import State
-from tracker.body.dimensions import PartDimensions, mirror_part, sizes_of
+from tracker.body.dimensions import PartDimensions, dimensions_of, mirror_part
 from tracker.body.limbs import display_name
 from tracker.errors import TrackerError
 
@@ -39,7 +39,7 @@ class BodyPanel:
 
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Build the folders."""
-        self._server, self._controller, self._sizing = server, controller, controller.sizing
+        self._server, self._controller, self._sizing = server, controller, controller.body_sizes
         self._folders = [self._add(i) for i in range(len(controller.session.people))]
 
     def show(self, state: State) -> None:
@@ -50,7 +50,10 @@ class BodyPanel:
                 self._show_one(person, controls, state)
 
     def _show_one(self, person: int, controls: _Folder, state: State) -> None:
-        sizes, drafted = sizes_of(self._sizing.model(person)), state.draft is not None and state.draft.person == person
+        sizes, drafted = (
+            dimensions_of(self._sizing.model(person)),
+            state.draft is not None and state.draft.person == person,
+        )
         _put(controls.height, _cm(sizes.height_m))
         _put(controls.alike, state.sides_alike)
         for name, row in controls.parts.items():
@@ -69,7 +72,7 @@ class BodyPanel:
         controls.note.visible = bool(note)
 
     def _add(self, person: int) -> _Folder:
-        gui, sizes = self._server.gui, sizes_of(self._controller.session.people[person].model)
+        gui, sizes = self._server.gui, dimensions_of(self._controller.session.people[person].model)
         folder = gui.add_folder(f"Body of {self._controller.session.people[person].name}", expand_by_default=False)
         with folder:
             height = gui.add_number(
@@ -118,7 +121,7 @@ class BodyPanel:
 
     def _set_part(self, person: int, part: str, row_cm: tuple[float, float, float]) -> None:
         """Set the sizes of a part. Numbers that were not changed keep the digits that the panel does not show."""
-        before = sizes_of(self._sizing.model(person)).parts[part]
+        before = dimensions_of(self._sizing.model(person)).parts[part]
         same = zip((before.length_m, *before.girths_m), _row(before), row_cm, strict=True)
         length, first, second = (own if shown == entered else entered / 100 for own, shown, entered in same)
         self._sizing.set_part(person, part, PartDimensions(length, (first, second)))

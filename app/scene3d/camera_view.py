@@ -10,7 +10,7 @@ import viser
 
 from app.control.controller import Controller
 from app.drawing.centred_image import centred, field_of_view
-from app.runtime.jobs import Latest
+from app.runtime.jobs import LatestWinsWorker
 from app.state.state import State
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, Image
@@ -75,7 +75,7 @@ class CameraView:
         self._cameras = [c.camera for c in controller.session.cameras]
         self._views: dict[int, _PageView] = {}
         # One thread for states and reports, so that neither overtakes the other.
-        self._latest: Latest[State | _Report] = Latest(self._take, "camera view")
+        self._latest: LatestWinsWorker[State | _Report] = LatestWinsWorker(self._take, "camera view")
         controller.subscribe(self._latest.offer)
         server.on_client_connect(self._connected)
         server.on_client_disconnect(self._disconnected)
@@ -125,7 +125,7 @@ class CameraView:
         seen = view.client.camera
         size = (seen.image_width, seen.image_height)
         wanted = (state.snapped, state.frame, size)
-        if wanted == view.shown or min(size) < _LEAST_PX or state.rests_3d:
+        if wanted == view.shown or min(size) < _LEAST_PX or state.is_3d_paused:
             return
         camera = self._cameras[state.snapped]
         # A slow page may still report the camera that it is returning from.

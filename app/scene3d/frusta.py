@@ -8,7 +8,7 @@ import viser
 
 from app.control.controller import Controller
 from app.drawing.centred_image import aspect_around, centred, field_of_view
-from app.runtime.jobs import Latest
+from app.runtime.jobs import LatestWinsWorker
 from app.state.state import State
 from tracker.geometry import rigid
 
@@ -30,7 +30,7 @@ class Frusta:
         self._shown: int | None = None  # the frame of the images
         self._handles = [self._add(index) for index in range(len(self._cameras))]
         self._labels = [server.scene.add_label(f"/cameras/{c.name}/name", c.name) for c in self._cameras]
-        latest = Latest(self._show_images, "frusta")
+        latest = LatestWinsWorker(self._show_images, "frusta")
         controller.subscribe(latest.offer)
 
     def show(self, state: State) -> None:
@@ -74,7 +74,7 @@ class Frusta:
             time.sleep(_REST_S)
             now = self._controller.state
             # A browser that renders in software has no time for them during a tracking run.
-            if now.frame != wanted or now.drag is not None or now.spares_3d:
+            if now.frame != wanted or now.drag is not None or now.is_3d_throttled:
                 return  # the next state asks again
         self._shown = wanted
         images = [None] * len(self._cameras) if wanted is None else self._controller.frames.images(wanted)

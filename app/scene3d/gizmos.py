@@ -7,7 +7,7 @@ import numpy as np
 import viser
 
 from app.control.controller import Controller
-from app.runtime.jobs import Latest
+from app.runtime.jobs import LatestWinsWorker
 from app.scene3d.throttle import Throttle
 from app.state.state import State
 from tracker.geometry import rigid
@@ -53,10 +53,10 @@ class Gizmos:
                 "/gizmos/joint", _JOINT_SCALE, disable_axes=True, disable_sliders=True, depth_test=False, visible=False
             ),
         }
-        self._pulls, self._throttle = Latest(self._apply, "gizmos"), Throttle(controller)
+        self._pulls, self._throttle = LatestWinsWorker(self._apply, "gizmos"), Throttle(controller)
         for which, handle in self._handles.items():
             self._listen(which, handle)
-        latest = Latest(self._show, "gizmo positions", _REST_S)
+        latest = LatestWinsWorker(self._show, "gizmo positions", _REST_S)
         controller.subscribe(latest.offer)
         latest.offer(controller.state)
 
@@ -88,8 +88,8 @@ class Gizmos:
         model, values = state.models[state.person], state.poses[state.person]
         joint = joint_of(model, state.point)
         Ts = model.kinematics(values).Ts_world_part
-        is_busy = state.track.running or state.job.running or state.look.replay is not None
-        shown = not is_busy and state.person not in state.cast.hidden
+        is_busy = state.track.running or state.search.running or state.search_view.replay is not None
+        shown = not is_busy and state.person not in state.visibility.hidden
         with self._server.atomic():
             for which, part in (("root", 0), ("joint", joint)):
                 handle = self._handles[which]  # type: ignore[index]

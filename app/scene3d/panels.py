@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from app.control.controller import Controller
-from app.runtime.jobs import Latest
+from app.runtime.jobs import LatestWinsWorker
 from app.scene3d.body_panel import BodyPanel
 from app.scene3d.settings_panel import SettingsPanel
 from app.scene3d.throttle import Throttle
@@ -39,7 +39,7 @@ class Panels:
         """Build the panels and follow the controller's state."""
         self._server, self._controller = server, controller
         self._throttle = Throttle(controller)
-        self._edits = Latest(self._apply, "sliders")
+        self._edits = LatestWinsWorker(self._apply, "sliders")
         self._sliders: list[list[viser.GuiSliderHandle[float]]] = []
         self._folders: list[viser.GuiFolderHandle] = []
         middle = controller.state.people[0].values[:3]
@@ -50,7 +50,7 @@ class Panels:
             self._folders.append(folder)
         self._body = BodyPanel(server, controller)
         self._settings = SettingsPanel(server, controller)
-        latest = Latest(self._show, "panels", _REST_S)
+        latest = LatestWinsWorker(self._show, "panels", _REST_S)
         controller.subscribe(latest.offer)
         latest.offer(controller.state)
 

@@ -8,7 +8,7 @@ import viser
 from app.control.controller import Controller
 from app.drawing.predicted_pose import prediction
 from app.drawing.trails import Trails
-from app.runtime.jobs import Latest
+from app.runtime.jobs import LatestWinsWorker
 from app.scene3d.camera_view import CameraView
 from app.scene3d.frusta import Frusta
 from app.scene3d.meshes import PeopleMeshes
@@ -54,7 +54,7 @@ class SceneView:
         self._present = controller.state.present
         self._trails = self._new_trails()
         self._frusta = Frusta(server, controller)
-        latest = Latest(self._show, "scene", _REST_S)
+        latest = LatestWinsWorker(self._show, "scene", _REST_S)
         controller.subscribe(latest.offer)
         latest.offer(controller.state)
         CameraView(server, controller)
@@ -101,15 +101,17 @@ class SceneView:
         return parts
 
     def _clicked(self, person: int, point: str, _: object) -> None:
-        self._controller.select(person, point)
+        self._controller.navigation.select(person, point)
 
     def _new_trails(self) -> list[Trails]:
         people = self._controller.session.people
-        return [Trails(p.model, partial(self._controller.poses, i)) for i, p in enumerate(people)]
+        return [
+            Trails(p.model, partial(self._controller.stored_poses.in_present_body, i)) for i, p in enumerate(people)
+        ]
 
     def _show_appearance(self, state: State) -> None:
         others = frozenset(range(len(state.people))) - {state.person}
-        appearance = (state.view_3d, state.cast.hidden, others if state.cast.solo else frozenset())
+        appearance = (state.view_3d, state.visibility.hidden, others if state.visibility.solo else frozenset())
         if appearance == self._appearance:
             return
         self._appearance = appearance
@@ -132,7 +134,7 @@ class SceneView:
 
     def _show_prediction(self, state: State) -> None:
         backward = state.track.running and (state.track.last or 0) < (state.track.first or 0)
-        hidden = state.cast.hidden
+        hidden = state.visibility.hidden
         wanted = (state.view_3d.ghost, state.frame, state.timeline_version, state.settings.predict, backward, hidden)
         if wanted == self._drawn_prediction or (not state.view_3d.ghost and self._predicted is None):
             return
@@ -144,7 +146,7 @@ class SceneView:
             return
         frame, settings = state.frame, state.settings.predict
         found = [
-            prediction(p.model, partial(self._controller.poses, i), frame, settings, backward)
+            prediction(p.model, partial(self._controller.stored_poses.in_present_body, i), frame, settings, backward)
             for i, p in enumerate(self._controller.session.people)
         ]
         several = len(found) > 1
@@ -160,13 +162,13 @@ class SceneView:
 
     def _show_trails(self, state: State) -> None:
         view, version = state.view_3d, state.timeline_version
-        hidden = state.cast.hidden
+        hidden = state.visibility.hidden
         wanted = (view.trail_points, view.trail_frames, state.frame, version, hidden)
         if wanted == self._drawn_trails or (not view.trail_points and not self._drawn_trails):
             return
         self._drawn_trails = wanted
         if version != self._trails_version:
-            changed = self._controller.timeline(self._trails_version)
+            changed = self._controller.stored_poses.timeline(self._trails_version)
             self._trails_version = version
             for trails in self._trails:
                 trails.forget(changed)

@@ -8,14 +8,13 @@ import viser
 
 from app.control.controller import Controller
 from tracker.errors import TrackerError
-from tracker.motion.prediction import MOST_ORDER, PredictSettings
+from tracker.motion.prediction import MAX_ORDER, PredictSettings
 from tracker.search.best_first import SearchSettings
-from tracker.tracking.chamfer.limb_recovery import RecoverSettings
-from tracker.tracking.chamfer.settings import Estimation, TrackSettings
+from tracker.tracking.chamfer.settings import Estimation, RecoverSettings, TrackSettings
 
 _METHODS: dict[Estimation, str] = {"refine": "refine, else search", "search": "search alone (paper)"}
 _ORDERS = ("stays", "constant velocity", "constant acceleration")
-assert len(_ORDERS) == MOST_ORDER + 1
+assert len(_ORDERS) == MAX_ORDER + 1
 
 
 @dataclass(frozen=True)
@@ -102,7 +101,7 @@ class SettingsPanel:
         async def changed(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:  # otherwise the program set it
                 try:
-                    self._controller.set_settings(self.read())
+                    self._controller.search.set_settings(self.read())
                 except TrackerError as error:
                     event.client.add_notification("Settings", str(error), color="red", auto_close_seconds=8.0)
 

@@ -26,11 +26,11 @@ class Throttle:
         """
         frame = state.frame
         # Through a camera, bodies and image are drawn together.
-        if state.holding_3d and state.snapped is None and frame != self._frame:
+        if state.pages_pausing_3d and state.snapped is None and frame != self._frame:
             time.sleep(_DELAY_S)
             state = self._controller.state
-        is_limited = state.spares_3d or state.frame != frame
-        if state.rests_3d or (is_limited and time.monotonic() < self._drawn_at + _LIMITED_S):
+        is_limited = state.is_3d_throttled or state.frame != frame
+        if state.is_3d_paused or (is_limited and time.monotonic() < self._drawn_at + _LIMITED_S):
             return None
         self._frame, self._drawn_at = state.frame, time.monotonic()
         return state

@@ -7,7 +7,7 @@ import numpy as np
 import viser
 
 from app.control.controller import Controller
-from app.runtime.jobs import Latest
+from app.runtime.jobs import LatestWinsWorker
 from app.state.floor_picking import FloorState
 from app.state.state import State
 from app.state.view_3d import MOST_TRAIL_FRAMES
@@ -25,7 +25,7 @@ class ViewPanel:
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Build the folder and follow the controller's state."""
         self._server, self._controller = server, controller
-        self._choices = Latest(self._choose, "view")
+        self._choices = LatestWinsWorker(self._choose, "view")
         view = controller.state.view_3d
         gui = server.gui
         with gui.add_folder("View", expand_by_default=False):
@@ -69,7 +69,7 @@ class ViewPanel:
             self._points = self._add_trails()
         self._shown: dict[str, object] = {}  # the last value of each control in the state
         self._listen()
-        latest = Latest(self._show, "view panel", _REST_S)
+        latest = LatestWinsWorker(self._show, "view panel", _REST_S)
         controller.subscribe(latest.offer)
         latest.offer(controller.state)
 
@@ -114,11 +114,11 @@ class ViewPanel:
 
         @self._set_floor.on_click
         async def _(event: viser.GuiEvent[Any]) -> None:
-            self._offer(event, self._controller.flooring.begin, "floor")
+            self._offer(event, self._controller.floor.begin, "floor")
 
         @self._previous_floor.on_click
         async def _(event: viser.GuiEvent[Any]) -> None:
-            self._offer(event, self._controller.flooring.revert, "floor")
+            self._offer(event, self._controller.floor.revert, "floor")
 
         def watch(field: str, control: Any) -> None:
             @control.on_update

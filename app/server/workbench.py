@@ -21,7 +21,7 @@ from app.server.access import access_for
 from app.server.private_viser import PrivateViser
 from app.server.server import create_app, serve_forever, static_folder
 from app.session import proxies
-from app.session.frame_cache import Frames
+from app.session.frame_cache import FrameCache
 from app.storage.saver import Saver
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
@@ -57,7 +57,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
     static = static_folder()
     with SessionLock(session.folder), Recording(session.cameras, indices=_indices(), in_background=True) as recording:
         store = AnnotationStore(session.annotations_path)
-        frames = Frames(Observer(session.cameras, recording), proxies.proxies(session))
+        frames = FrameCache(Observer(session.cameras, recording), proxies.proxies(session))
         controller = Controller(session, Saver(session, store, _author()), frames)
         viser = PrivateViser()
         try:

@@ -11,13 +11,13 @@ from functools import lru_cache
 import cv2
 
 from app.drawing import pictures
-from app.runtime.byte_bounded_cache import Recent
+from app.runtime.byte_bounded_cache import ByteBoundedCache
 from tracker.errors import RecordingError
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.footage.proxy import Proxy
 from tracker.geometry.arrays import Image
-from tracker.images.matching_view import MatchedView
+from tracker.images.working_view import WorkingView
 
 _LOG = logging.getLogger(__name__)
 _IMAGE_BYTES = 16 * 2**20
@@ -33,7 +33,7 @@ _WAIT_S = 1.0
 """Evidence waits no longer than this for pictures that are being made."""
 
 
-class Frames:
+class FrameCache:
     """What the page needs of a recording. Safe to use from several threads."""
 
     def __init__(self, observer: Observer, proxies: Sequence[Proxy | None] = ()) -> None:
@@ -45,10 +45,10 @@ class Frames:
                 footage.
         """
         self.observer, self._proxies = observer, proxies
-        self._images = Recent(self._look, _IMAGE_BYTES)
-        self._pictures = Recent(self._picture, _PICTURE_BYTES)
+        self._images = ByteBoundedCache(self._look, _IMAGE_BYTES)
+        self._pictures = ByteBoundedCache(self._picture, _PICTURE_BYTES)
         self._ways = lru_cache(_SIZES)(self._way)
-        self._evidence = Recent(observer.evidence, _EVIDENCE_BYTES)
+        self._evidence = ByteBoundedCache(observer.evidence, _EVIDENCE_BYTES)
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="evidence")
         self._wanted: int | None = None
         self._looking = 0  # how many pictures are being made
@@ -92,7 +92,7 @@ class Frames:
         recording = self.observer.recording
         return all(recording.listed(camera, frame) for camera in range(len(self.observer.cameras)))
 
-    def evidence_at_hand(self, frame: int) -> tuple[ViewEvidence, ...] | None:
+    def cached_evidence(self, frame: int) -> tuple[ViewEvidence, ...] | None:
         """Evidence of a frame if it has been computed."""
         return self._evidence.peek(frame)
 
@@ -146,8 +146,8 @@ class Frames:
         image, way = self._read(frame, camera), self._ways(camera, reduction)
         return pictures.footage(None if image is None else way.image(image, way.whole), way.camera.size)
 
-    def _way(self, camera: int, reduction: float) -> MatchedView:
-        return MatchedView(self.observer.cameras[camera].camera, 1 / reduction, cv2.BORDER_CONSTANT)
+    def _way(self, camera: int, reduction: float) -> WorkingView:
+        return WorkingView(self.observer.cameras[camera].camera, 1 / reduction, cv2.BORDER_CONSTANT)
 
     def _look(self, key: tuple[int, int]) -> Image | None:
         """Undistorted image of a frame and camera."""

@@ -25,7 +25,7 @@ class _Waiting:
     by_program: bool
 
 
-class Writing:
+class RetryQueue:
     """Writes edits to the store of one session. Not locked by itself: the controller's lock guards it."""
 
     def __init__(self, store: AnnotationStore, author: str) -> None:

@@ -7,16 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from app.state.state import Shown, State
-from app.storage.retry_queue import Writing
-from app.storage.timeline_cells import Cells
+from app.state.people import ShownPose
+from app.state.state import State
+from app.storage.retry_queue import RetryQueue
+from app.storage.timeline_cells import TimelineCells
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, parse_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
 from tracker.pipeline.tracked_changes import keyframes_of
-from tracker.posing.retarget import rebodied
+from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import (
@@ -51,13 +52,13 @@ class Saver:
             store: its annotations.
             author: who makes the edits, for the history.
         """
-        self._session, self._store, self._writing = session, store, Writing(store, author)
+        self._session, self._store, self._writing = session, store, RetryQueue(store, author)
         self._bodies: dict[int, BodyModel] = {}
         self._revisions: list[int] = []
-        self.embody(session)
-        self._cells = Cells(p.name for p in session.people)
+        self.set_body_models(session)
+        self._cells = TimelineCells(p.name for p in session.people)
         self._frames: list[list[int]] = [[] for _ in session.people]
-        self.passed: tuple[int, ...] = ()
+        self.moved_edits: tuple[int, ...] = ()
         """Entries of the history that the last undo, redo or walk took back or did again, in that order."""
         self._reload()
 
@@ -71,7 +72,7 @@ class Saver:
         """Why an edit is not on disk; None where all are."""
         return self._writing.error
 
-    def embody(self, session: Session) -> None:
+    def set_body_models(self, session: Session) -> None:
         """Keep the bodies of a session's people as revisions: new poses belong to them."""
         self._session = session
         self._revisions = [self._store.add_model_revision(p.name, format_model(p.model)) for p in session.people]
@@ -104,14 +105,16 @@ class Saver:
         """Keep a setting with the session; not part of the history."""
         self._store.set_setting(key, value)
 
-    def pose(self, person: int, frame: int) -> Shown | None:
+    def pose(self, person: int, frame: int) -> ShownPose | None:
         """The stored pose of a person on a frame."""
         record = self.record(person, frame)
         if record is None or not self.fits(person, record.model_revision):
             return None
         source, revision = _summary(record.sources), record.model_revision
         others = () if record.keyframe else tuple(a.values for a in self.alternatives(person, frame))
-        return Shown(record.values, source, record.status, record.remark, record.part_costs_px, (), revision, others)
+        return ShownPose(
+            record.values, source, record.status, record.remark, record.part_costs_px, (), revision, others
+        )
 
     def alternatives(self, person: int, frame: int) -> tuple[Alternative, ...]:
         """Poses about as good as the stored one, best first; those of a body of other joints are passed over."""
@@ -128,7 +131,7 @@ class Saver:
     def in_present_body(self, person: int, values: Array, revision: int | None) -> Array:
         """A pose of one of a person's bodies, (n_values,), taken over into the present one."""
         present = self._session.people[person].model
-        return values if revision is None else rebodied(values, self.body(revision), present)
+        return values if revision is None else retarget_pose(values, self.body(revision), present)
 
     def pins(self, person: int, frame: int) -> tuple[PointObservation, ...]:
         """The stored pins of a person on a frame, undistorted px; those of other cameras and bodies are passed over."""
@@ -167,7 +170,7 @@ class Saver:
         near = sorted(frames[max(0, at - 1) : at + 1], key=lambda f: (abs(f - frame), f))
         return self.pose_now(person, near[0]) if near else None
 
-    def numbers(self, person: int, frames: Sequence[int]) -> list[FramePose]:
+    def pose_rows(self, person: int, frames: Sequence[int]) -> list[FramePose]:
         """What is stored on those of some frames, ascending, that have a pose. Needs no lock of the controller."""
         name, found, first = self._session.people[person].name, [], 0
         for i, frame in enumerate(frames):
@@ -283,8 +286,8 @@ class Saver:
         return next((e for e in self._store.history(1) if e.undone), None)
 
     def _moved(self, edits: Iterable[int]) -> list[int]:
-        self.passed = tuple(edits)
-        frames = sorted({frame for edit in self.passed for frame in self._store.frames_of(edit)})
+        self.moved_edits = tuple(edits)
+        frames = sorted({frame for edit in self.moved_edits for frame in self._store.frames_of(edit)})
         self._note(frames)
         return frames
 

@@ -8,7 +8,7 @@ from tracker.store.records import SOURCES, FrameRow
 _WORST_FIRST = ("lost", "doubtful", "good", "")
 
 
-class Cells:
+class TimelineCells:
     """The cells of all frames that have poses. Not locked by itself: whoever changes them holds the screen's lock."""
 
     def __init__(self, names: Iterable[str]) -> None:

@@ -8,8 +8,8 @@
 /** @type {Record<import("../model/protocol.js").DragMode, string>} */
 const HINTS = {
   move: "Shift or Alt: turn · Ctrl: depth",
-  turn: "Turning about the line of sight",
-  push: "Depth: up is away",
+  turn: "Turn about the line of sight",
+  push: "Depth: drag up to move away",
 };
 
 export class DragHint {

@@ -28,9 +28,9 @@ export class ImageToneMenu {
     this.#store = store;
     this.#imageTones = imageTones;
     this.#panel.append(this.#title);
-    this.#row("Brightness", "Added to every gray level", "brightness");
-    this.#row("Contrast", "Stretches the gray levels about the middle", "contrast");
-    this.#row("Gamma", "Above 1 lifts the shadows, below 1 deepens them", "gamma");
+    this.#row("Brightness", "Offset of all gray levels", "brightness");
+    this.#row("Contrast", "Spread of the gray levels around the middle", "contrast");
+    this.#row("Gamma", "Above 1 brightens shadows, below 1 darkens them", "gamma");
     this.#buildFoot();
     this.#panel.addEventListener("toggle", () => {
       if (!this.#panel.matches(":popover-open")) this.#closedAt = performance.now();
@@ -95,11 +95,11 @@ export class ImageToneMenu {
     const all = document.createElement("button");
     all.type = "button";
     all.textContent = "All cameras";
-    all.title = "Give the images of all cameras this look";
+    all.title = "Apply these settings to all cameras";
     all.addEventListener("click", () => this.#imageTones.setAll(this.#tone));
     this.#reset.type = "button";
     this.#reset.textContent = "Reset";
-    this.#reset.title = "Show this image as it is";
+    this.#reset.title = "Show the original image";
     this.#reset.addEventListener("click", () => this.#imageTones.set(this.#camera, PLAIN));
     this.#show.push(() => (this.#reset.disabled = isPlain(this.#tone)));
     foot.append(all, this.#reset);

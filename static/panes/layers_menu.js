@@ -8,10 +8,10 @@ import { opensPopover, slider, togglePopover } from "../widgets/popovers.js";
 
 /** @type {{label: string, title: string, ids: Layer[]}[]} */
 const QUICK = [
-  { label: "Contours", title: "The model's visible contours", ids: ["contours"] },
-  { label: "Joints", title: "The joints, to be dragged", ids: ["joints"] },
-  { label: "Edges", title: "Edges: those that this pose explains in turquoise, the others in pink", ids: ["accepted", "rejected"] },
-  { label: "Distance", title: "The distance to the nearest edge, as the search sees it", ids: ["distance"] },
+  { label: "Contours", title: "Visible contours of the model", ids: ["contours"] },
+  { label: "Joints", title: "Joints, which can be dragged", ids: ["joints"] },
+  { label: "Edges", title: "Image edges: explained by the pose (turquoise) or not (pink)", ids: ["accepted", "rejected"] },
+  { label: "Distance", title: "Distance to the nearest edge, which the search minimizes", ids: ["distance"] },
 ];
 const GROUPS = ["Model", "Evidence", "Picture"];
 
@@ -86,7 +86,7 @@ export class LayersMenu {
     key.title = number ? `Shift+${number}` : "";
     const opacity = slider({
       label: `Opacity of ${label.toLowerCase()}`,
-      title: `How strongly ${label.toLowerCase()} are drawn`.replace("image are", "image is"),
+      title: `Opacity of ${label.toLowerCase()}`,
       least: 5,
       most: 100,
       step: 5,
@@ -109,8 +109,8 @@ export class LayersMenu {
     choice.className = "segmented popover-choice";
     choice.setAttribute("aria-label", "Colours of the contours");
     for (const [value, label, title] of /** @type {const} */ ([
-      ["person", "by person", "Contours in the colour of their person"],
-      ["part", "by part", "Contours in the colour of their part"],
+      ["person", "by person", "Colour contours by person"],
+      ["part", "by part", "Colour contours by body part"],
     ])) {
       const { element, input } = checkbox(label, title);
       Object.assign(input, { type: "radio", name: "contour-colors", value });
@@ -125,12 +125,12 @@ export class LayersMenu {
     const foot = document.createElement("div");
     foot.className = "popover-foot";
     const hint = document.createElement("span");
-    hint.textContent = "Kept in this browser for this session";
+    hint.textContent = "Saved in this browser for this session";
     const reset = document.createElement("button");
     reset.type = "button";
     reset.id = "reset-layers";
     reset.textContent = "Reset layers";
-    reset.title = "Show the usual layers at their usual strength";
+    reset.title = "Restore the default layers and opacities";
     foot.append(hint, reset);
     this.#panel.append(foot);
     button("reset-layers", () => this.#layers.reset());

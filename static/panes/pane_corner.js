@@ -11,9 +11,9 @@ const SCALE_FROM_PX = 230;
 /** As the joints are drawn: full where one sees them, hollow where something hides them. */
 const MARKS = { visible: "●", hidden: "○", outside: "⊘" };
 const MEANINGS = {
-  visible: "is seen by this camera",
-  hidden: "is behind something in this camera",
-  outside: "is outside this camera's image",
+  visible: "is visible in this view",
+  hidden: "is occluded in this view",
+  outside: "is outside this image",
 };
 
 export class PaneCorner {
@@ -45,19 +45,19 @@ export class PaneCorner {
     this.#joint.append(this.#mark, this.#word);
     this.#joint.hidden = true;
     this.#label.append(number, title, this.#joint);
-    this.#label.title = `Camera ${camera + 1}, ${name}: ${keysOf(camera)} or a double click fills the grid with it`;
+    this.#label.title = `Camera ${camera + 1}, ${name}: press ${keysOf(camera)} or double-click to fill the grid`;
 
     this.#cost.className = "pane-cost";
     this.#cost.title = "Chamfer cost of this view, in pixels";
 
     this.#placeholder.className = "pane-placeholder";
-    this.#placeholder.title = "The picture of the frame requested for is on its way; until it is here the nearest one at hand is shown";
+    this.#placeholder.title = "The requested frame is loading. Until it arrives, the nearest available frame is shown";
     this.#placeholder.hidden = true;
 
     this.#scale.className = "pane-scale";
     const bar = document.createElement("i");
     this.#scale.append("0", bar, this.#limit);
-    this.#scale.title = "Distance image: distance to the nearest edge, in pixels of the image";
+    this.#scale.title = "Distance image: distance to the nearest edge, in image pixels";
     this.#scale.hidden = true;
     this.#fit = toolButton("Fit", "Show the whole image (0)", `Show the whole image of ${name}`);
     this.#fit.classList.add("pane-reset");
@@ -129,7 +129,7 @@ export class PaneCorner {
 
 /** @param {number} camera */
 function keysOf(camera) {
-  return camera < 9 ? `key ${camera + 1}` : `keys ${[...String(camera + 1)].join(" ")}`;
+  return camera < 9 ? `${camera + 1}` : `${[...String(camera + 1)].join(" ")}`;
 }
 
 /**

@@ -10,11 +10,14 @@ const HOVERED = ["hover", "hoverPart", "pinHover", "heldPin"];
 /** What changes the pictures under the vectors. @type {(keyof import("../model/store.js").Facts)[]} */
 const PICTURED = ["shown", "placeholder", "layers", "imageTones"];
 
+/** @typedef {{watch: (pane: Pane, camera: number) => void}} PointerTarget handles the pointer in a pane */
+
 export class PaneGrid {
   /** @type {Pane[]} */
   panes = [];
   #store;
-  #gestures;
+  /** @type {PointerTarget[]} the last one added comes first */
+  #pointerTargets = [];
   #latency;
   #openToneMenu;
   #element;
@@ -25,20 +28,27 @@ export class PaneGrid {
   /**
    * @param {HTMLElement} element
    * @param {import("../model/store.js").Store} store
-   * @param {{watch: (pane: Pane, camera: number) => void}} gestures whoever takes the pointer in a pane
    * @param {import("../model/latency.js").Latency} latency
    * @param {(camera: number, button: HTMLElement) => void} openToneMenu opens brightness and contrast of a camera
    */
-  constructor(element, store, gestures, latency, openToneMenu) {
+  constructor(element, store, latency, openToneMenu) {
     this.#openToneMenu = openToneMenu;
     this.#element = element;
     this.#store = store;
-    this.#gestures = gestures;
     this.#latency = latency;
     store.subscribe((changed) => this.#update(changed));
     new ResizeObserver(() => this.#layOut()).observe(element);
     // Moving the window to another screen changes the size of a device pixel, not that of the element.
     addEventListener("resize", () => this.#layOut());
+  }
+
+  /**
+   * Let a target handle the pointer in all panes, before the targets that were added earlier.
+   *
+   * @param {PointerTarget} target
+   */
+  addPointerTarget(target) {
+    this.#pointerTargets.unshift(target);
   }
 
   /**
@@ -147,7 +157,7 @@ export class PaneGrid {
         viewChanged: () => this.#refine(),
         openToneMenu: this.#openToneMenu,
       });
-      this.#gestures.watch(pane, camera);
+      for (const target of this.#pointerTargets) target.watch(pane, camera);
       pane.element.addEventListener("dblclick", (event) => {
         if (!(event.target instanceof Element && event.target.closest("button"))) this.toggleFill(camera);
       });

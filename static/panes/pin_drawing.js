@@ -75,7 +75,7 @@ export function drawPins(context, view, facts, camera, paneWidth) {
   context.globalAlpha = 1;
   const named = placed.find(({ pin }) => isSame(pin, pinHover));
   if (named && !facts.heldPin) {
-    const hint = "drag to move, right-click or Delete removes";
+    const hint = "drag to move, right-click or Delete to remove";
     label(context, named.headX, named.headY, [describe(named.pin), hint], paneWidth);
   }
 }

@@ -49,7 +49,7 @@ export class CopyMenu {
     this.#menu.replaceChildren(...items);
     if (keyframes.length === 0) {
       const none = document.createElement("p");
-      none.textContent = "No other keyframe yet: a frame that you pose becomes one.";
+      none.textContent = "No other keyframes. A frame becomes a keyframe when you edit its pose.";
       this.#menu.append(none);
     }
     this.#menu.hidden = false;
@@ -78,7 +78,7 @@ export class CopyMenu {
    * @param {number} person
    */
   #ofPerson(name, person) {
-    const title = `Bend as ${name} does on this frame; place and turn stay`;
+    const title = `Copy the joint angles of ${name}; position and orientation stay`;
     return this.#entry(name, "this frame", title, () => this.#posing.copyPerson(person));
   }
 
@@ -124,5 +124,5 @@ export class CopyMenu {
 
 /** @param {number} frames */
 function away(frames) {
-  return frames < 0 ? `${-frames} back` : `${frames} on`;
+  return frames < 0 ? `${-frames} earlier` : `${frames} later`;
 }

@@ -39,7 +39,7 @@ export class FrameCard {
     this.#other.hidden = !people.some(({ alternatives, shown }) => alternatives > 0 && shown);
     this.#card.hidden = status === "" && part_costs_px.length === 0;
     this.#badge.className = `status-badge is-${status}`;
-    this.#badge.textContent = status || "not judged";
+    this.#badge.textContent = status || "not assessed";
     this.#remark.textContent = remark;
     if (this.#card.hidden || !this.#card.open) return;
     const names = session.people[person].parts;
@@ -78,6 +78,6 @@ function row(name, cost) {
   const bar = document.createElement("i");
   bar.style.setProperty("--filled", `${Math.min(100, (100 * (cost ?? 0)) / FULL_PX)}%`);
   const value = document.createElement("output");
-  value.textContent = cost === null ? "unseen" : px(cost);
+  value.textContent = cost === null ? "not visible" : px(cost);
   return [label, bar, value];
 }

@@ -48,8 +48,8 @@ export class Inspector {
       this.#joint.blur();
     });
     new CopyMenu(store, posing);
-    this.#addStep("step-cm", "cm", "Step of the arrow keys, in centimetres (Shift: ten times, Ctrl: a tenth)");
-    this.#addStep("step-deg", "deg", "Step of + and -, in degrees");
+    this.#addStep("step-cm", "cm", "Step of the arrow keys in centimetres (Shift: ×10, Ctrl: ×0.1)");
+    this.#addStep("step-deg", "deg", "Step of + and - in degrees");
     // A row of many fields goes sideways under the wheel.
     this.#list.addEventListener("wheel", (event) => {
       this.#list.scrollLeft += event.deltaY + event.deltaX;
@@ -110,7 +110,7 @@ export class Inspector {
     this.#joint.value = point;
     this.#joint.classList.toggle("is-nothing", state.point === null);
     for (const field of this.#fields) this.#fill(field, person.dofs[field.dof], state, field.dof === selected);
-    showLock(this.#lock, this.#posing.isLocked(dofs), `${displayName(point)} (O), its limb (Shift+O)`);
+    showLock(this.#lock, this.#posing.isLocked(dofs), `${displayName(point)} (O), the whole limb (Shift+O)`);
     this.#lock.disabled = dofs.length === 0;
     this.#reset.title = `Reset ${limb.name} to the neutral pose (R)`;
     this.#reset.setAttribute("aria-label", `Reset ${limb.name}`);
@@ -127,7 +127,7 @@ export class Inspector {
     const name = info.joint === point ? info.name : `${displayName(info.joint)} ${info.name}`;
     const row = document.createElement("div");
     row.className = isShort ? "dof is-short" : "dof";
-    row.title = `${displayName(info.joint)} ${info.name}, ${range(info)}. Draw its name sideways (Shift: finely), or U selects the next, + and - turn the selected one.`;
+    row.title = `${displayName(info.joint)} ${info.name}, ${range(info)}. Drag the name sideways to change it (Shift: fine steps). U selects the next, + and - change the selected one.`;
     const label = document.createElement("span");
     label.className = "dof-name";
     label.textContent = isShort ? info.name.slice(0, 3) : name;

@@ -40,15 +40,15 @@ export class PinBar {
     this.#mode.setAttribute("aria-pressed", String(pinning));
     this.#live.checked = livePins;
     const several = (session?.people.length ?? 1) > 1;
-    const fitted = several && scope === "all" ? "everybody who has been placed" : "the person worked on";
+    const fitted = several && scope === "all" ? "all placed people" : "the active person";
     this.#fit.title = pins.length
-      ? `Fit ${fitted} to pins and edges together (G)`
-      : `Fit ${fitted} to the edges (G); pins, where there are any, count as well`;
-    const [text, title] = joint === null ? ["", "No joint is selected"] : this.#figure(joint, ofPerson);
+      ? `Fit ${fitted} to pins and edges (G)`
+      : `Fit ${fitted} to the edges, and to pins if there are any (G)`;
+    const [text, title] = joint === null ? ["", "No joint selected"] : this.#figure(joint, ofPerson);
     this.#figures.textContent = text;
     this.#figures.title = title;
     this.#hint.hidden = !pinning || joint === null;
-    if (!this.#hint.hidden) this.#hint.textContent = `Pin ${joint}: click where each view shows it. Esc ends.`;
+    if (!this.#hint.hidden) this.#hint.textContent = `Pin ${joint}: click its position in each view. Esc to finish.`;
     this.#panes.classList.toggle("is-pinning", pinning);
   }
 
@@ -60,10 +60,10 @@ export class PinBar {
     const { overlay } = this.#store.facts;
     const all = `${counted(ofPerson)} of this person on this frame`;
     const triangulation = overlay?.triangulation;
-    if (!triangulation) return ["no pin", `No pin of ${joint}; ${all}`];
+    if (!triangulation) return ["no pins", `No pins of ${joint}; ${all}`];
     if (triangulation.error_px === null) return [counted(triangulation.pins), `${joint}: ${triangulation.why}; ${all}`];
     const error = `${triangulation.error_px.toFixed(triangulation.error_px < 10 ? 1 : 0)} px`;
-    return [`${counted(triangulation.pins)}, ${error}`, `The pins of ${joint} meet with an error of ${error}; ${all}`];
+    return [`${counted(triangulation.pins)}, ${error}`, `Triangulation error of the pins of ${joint}: ${error}; ${all}`];
   }
 }
 

@@ -44,7 +44,7 @@ export class Pinning {
   /** Let each click set a pin of the selected joint, or end that. */
   toggle() {
     const { pinning, state } = this.#store.facts;
-    if (!pinning && !state?.point) this.#say("Select a joint first: click it in a view, then X pins it.");
+    if (!pinning && !state?.point) this.#say("Select a joint first: click it in a view, then press X.");
     else this.#store.set({ pinning: !pinning, pinHover: null, hover: null, hoverPart: null });
   }
 
@@ -70,7 +70,7 @@ export class Pinning {
     if (pinHover) this.#unpin(pinHover.person, pinHover.point, pinHover.camera);
     else if (state?.point && overlay?.pins.some((p) => p.person === state.person && p.point === state.point)) {
       this.#unpin(state.person, state.point, null);
-    } else this.#say("There is no pin to remove: point at one, or select a joint that has pins.");
+    } else this.#say("No pin to remove. Point at a pin, or select a joint that has pins.");
   }
 
   /** Remove all pins of the person worked on, on this frame. */
@@ -78,7 +78,7 @@ export class Pinning {
     const { state, overlay } = this.#store.facts;
     if (!state) return;
     if (overlay?.pins.some((p) => p.person === state.person)) this.#unpin(state.person, null, null);
-    else this.#say("There is no pin of this person on this frame.");
+    else this.#say("This person has no pins on this frame.");
   }
 
   /** Fit everybody who has been placed, or the person worked on alone, to pins and edges. */
@@ -161,7 +161,7 @@ export class Pinning {
     if (event.button !== 0) return;
     const joint = state.point === null ? this.#joint(pane, at) : { person: state.person, point: state.point };
     if (!hit && !joint) {
-      this.#say("Select a joint first: click it in a view, then Ctrl and a click pin it.");
+      this.#say("Select a joint first: click it in a view, then Ctrl+click to pin it.");
       return;
     }
     // Where joints crowd, a click means the selected one, whatever pin of another stands there.

@@ -1,4 +1,6 @@
-/** The keys of posing without a drag. */
+/** Keys that edit poses and pins. */
+
+import { alt, inArea, plain } from "../widgets/key_matching.js";
 
 /** @type {[string, string, import("./posing.js").Way][]} */
 const WAYS = [
@@ -11,44 +13,73 @@ const WAYS = [
 /**
  * @param {import("./posing.js").Posing} posing
  * @param {import("./inspector.js").Inspector} inspector
- * @param {(key: string, code?: string, shift?: boolean) => (event: KeyboardEvent) => boolean} plain
- * @returns {import("../widgets/key_matching.js").Binding[]}
+ * @param {() => string | null} why why posing is unavailable
  */
-export function posingBindings(posing, inspector, plain) {
-  const alt = (/** @type {string} */ code) => (/** @type {KeyboardEvent} */ event) =>
-    event.altKey && !event.ctrlKey && !event.metaKey && !event.shiftKey && event.code === code;
+export function posingBindings(posing, inspector, why) {
   const sign = (/** @type {string[]} */ keys) => (/** @type {KeyboardEvent} */ event) =>
     keys.includes(event.key) && !event.ctrlKey && !event.metaKey && !event.altKey;
-  return [
+  const bindings = [
     { keys: ["J"], label: "Next joint", matches: plain("j"), run: () => posing.toJoint(1) },
     { keys: ["Shift J"], label: "Previous joint", matches: plain("j", undefined, true), run: () => posing.toJoint(-1) },
     ...WAYS.map(([arrow, name, way]) => ({
       keys: [arrow],
-      label: `Joint or body one step ${name} in the active view (Shift: ten, Ctrl: a tenth)`,
+      label: `Move the joint or body one step ${name} in the active view (Shift: ×10, Ctrl: ×0.1)`,
       matches: (/** @type {KeyboardEvent} */ event) =>
         event.key === `Arrow${name[0].toUpperCase()}${name.slice(1)}` && !event.altKey && !event.metaKey,
       run: (/** @type {KeyboardEvent} */ event) => posing.nudge(way, event.shiftKey ? 10 : event.ctrlKey ? 0.1 : 1),
     })),
     { keys: ["U"], label: "Next degree of freedom of the joint", matches: plain("u"), run: () => posing.nextDof() },
-    { keys: ["+"], label: "Selected degree of freedom: one step more", matches: sign(["+", "="]), run: () => posing.turn(1) },
-    { keys: ["-"], label: "Selected degree of freedom: one step less", matches: sign(["-", "_"]), run: () => posing.turn(-1) },
-    { keys: ["Enter"], label: "Type the selected degree of freedom in", matches: plain("enter"), run: () => inspector.type() },
-    { keys: ["O"], label: "Lock the joint, or unlock it", matches: plain("o"), run: () => posing.toggleLock(posing.dofs) },
+    { keys: ["+"], label: "Increase the selected degree of freedom by one step", matches: sign(["+", "="]), run: () => posing.turn(1) },
+    { keys: ["-"], label: "Decrease the selected degree of freedom by one step", matches: sign(["-", "_"]), run: () => posing.turn(-1) },
+    { keys: ["Enter"], label: "Type a value for the selected degree of freedom", matches: plain("enter"), run: () => inspector.type() },
+    { keys: ["O"], label: "Lock or unlock the joint", matches: plain("o"), run: () => posing.toggleLock(posing.dofs) },
     {
       keys: ["Shift O"],
-      label: "Lock the joint's limb, or unlock it",
+      label: "Lock or unlock the joint's limb",
       matches: plain("o", undefined, true),
       run: () => posing.toggleLock(posing.limb.dofs),
     },
     { keys: ["M"], label: "Mirror the pose left to right", matches: plain("m"), run: () => posing.mirror() },
     {
       keys: ["Shift X"],
-      label: "Take the other of two poses that are as good, or go back",
+      label: "Switch to the alternative pose, or back",
       matches: plain("x", undefined, true),
       run: () => posing.takeAlternative(),
     },
-    { keys: ["R"], label: "Reset the joint's limb to neutral", matches: plain("r"), run: () => posing.resetLimb() },
-    { keys: ["Alt ,"], label: "Copy the pose of the previous frame", matches: alt("Comma"), run: () => posing.copyNeighbour(-1) },
-    { keys: ["Alt ."], label: "Copy the pose of the next frame", matches: alt("Period"), run: () => posing.copyNeighbour(1) },
+    { keys: ["R"], label: "Reset the joint's limb to the neutral pose", matches: plain("r"), run: () => posing.resetLimb() },
+    { keys: ["Alt ,"], label: "Copy the pose from the previous frame", matches: alt("Comma", false), run: () => posing.copyNeighbour(-1) },
+    { keys: ["Alt ."], label: "Copy the pose from the next frame", matches: alt("Period", false), run: () => posing.copyNeighbour(1) },
   ];
+  return inArea("Posing", bindings, why);
+}
+
+/**
+ * @param {import("./pinning.js").Pinning} pinning
+ * @param {() => string | null} why why pins are unavailable
+ */
+export function pinBindings(pinning, why) {
+  const shift = (/** @type {string} */ key) => plain(key, undefined, true);
+  const bindings = [
+    { keys: ["X"], label: "Pin the selected joint by clicks (toggle)", matches: plain("x"), run: () => pinning.toggle() },
+    { keys: ["G"], label: "Fit to pins and edges", matches: plain("g"), run: () => pinning.fit() },
+    {
+      keys: ["Shift G"],
+      label: "Update the body while a pin is dragged (toggle)",
+      matches: shift("g"),
+      run: () => pinning.toggleLive(),
+    },
+    {
+      keys: ["Delete"],
+      label: "Remove the pin under the pointer, or else those of the selected joint",
+      matches: plain("delete"),
+      run: () => pinning.remove(),
+    },
+    {
+      keys: ["Shift Delete"],
+      label: "Remove all pins of the person on this frame",
+      matches: shift("delete"),
+      run: () => pinning.clear(),
+    },
+  ];
+  return inArea("Pins", bindings, why);
 }

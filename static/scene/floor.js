@@ -100,7 +100,7 @@ export class Floor {
     const text = `Floor, point ${floor.point} of ${POINTS}: ${said(floor)}`;
     if (this.#text.textContent !== text) this.#text.textContent = text;
     this.#next.textContent = isLast ? "Apply" : "Next point";
-    this.#next.title = isLast ? "Take this plane as the session's floor (Enter)" : "Go on to the next point (Enter)";
+    this.#next.title = isLast ? "Use this plane as the floor (Enter)" : "Continue with the next point (Enter)";
     this.#next.disabled = isLast ? !floor.ready : !floor.known;
     this.#back.disabled = !floor.marked;
   }
@@ -108,8 +108,8 @@ export class Floor {
 
 /** @param {import("../model/protocol.js").FloorPicking} floor */
 function said(floor) {
-  if (floor.views === 0) return "click a place on the floor";
+  if (floor.views === 0) return "click a point on the floor";
   if (!floor.known) return floor.why;
   if (floor.point === POINTS && !floor.ready) return floor.why;
-  return `${floor.views} views agree to ${px(floor.error_px)}; more make it surer`;
+  return `${floor.views} views agree within ${px(floor.error_px)}; more views improve the accuracy`;
 }

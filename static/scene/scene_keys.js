@@ -1,34 +1,37 @@
-/** The keys of the 3-D view, and of setting the floor. */
+/** Keys of the 3-D view and of the floor. */
+
+import { inArea, plain } from "../widgets/key_matching.js";
 
 /**
  * @param {import("./camera_view.js").CameraView} cameraView
  * @param {import("./floor.js").Floor} floor
- * @param {(key: string, code?: string, shift?: boolean) => (event: KeyboardEvent) => boolean} plain
- * @returns {import("../widgets/key_matching.js").Binding[]}
+ * @param {() => string | null} away why the 3-D view is unavailable
  */
-export function sceneBindings(cameraView, floor, plain) {
-  const why = () => (floor.isOn ? null : "The floor is not being set; Shift+Y begins that.");
-  return [
-    { keys: ["Y"], label: "3-D view: look through the camera pointed at, or let go", matches: plain("y"), run: () => cameraView.toggle() },
+export function sceneBindings(cameraView, floor, away) {
+  const why = () => (floor.isOn ? null : "The floor is not being set. Press Shift+Y to start.");
+  /** @type {import("../widgets/key_matching.js").Binding[]} */
+  const bindings = [
+    { keys: ["Y"], label: "3-D view: look through the active camera (toggle)", matches: plain("y"), run: () => cameraView.toggle() },
     {
       keys: ["Shift Y"],
-      label: "Set the floor from three clicked points, or leave that",
+      label: "Set the floor from three clicked points (toggle)",
       matches: plain("y", undefined, true),
       run: () => floor.toggle(),
     },
     {
       keys: ["Enter"],
-      label: "While the floor is set: next point, then apply",
+      label: "Setting the floor: next point, then apply",
       matches: (event) => floor.isOn && plain("enter")(event),
       why,
       run: () => floor.goOn(),
     },
     {
       keys: ["Backspace"],
-      label: "While the floor is set: take the last click back",
+      label: "Setting the floor: undo the last click",
       matches: (event) => floor.isOn && plain("backspace")(event),
       why,
       run: () => floor.takeBack(),
     },
   ];
+  return inArea("3-D view", bindings, away);
 }

@@ -32,13 +32,13 @@ export class CostLandscape {
   constructor(store, send) {
     this.#store = store;
     this.#send = send;
-    this.#choice.title = "The degree of freedom that varies; everything else stays as it is";
+    this.#choice.title = "Degree of freedom to vary; all others stay fixed";
     this.#choice.setAttribute("aria-label", "Degree of freedom");
     this.#choice.addEventListener("change", () => {
       send({ type: "landscape", dof: this.#choice.value });
       this.#choice.blur();
     });
-    this.#toLeast = makeButton("To minimum", "Set this degree of freedom where the cost is least", () => {
+    this.#toLeast = makeButton("To minimum", "Set this degree of freedom to the minimum of the cost", () => {
       const found = store.facts.landscape;
       if (found) this.#setTo(found.values[indexOfMin(found.total)]);
     });
@@ -185,7 +185,7 @@ export class CostLandscape {
     const outputs = this.#legend.querySelectorAll("output");
     const texts = [`${(value * factor).toFixed(1)}${sign}`, ...[found.total, ...found.views].map((c) => (Number.isFinite(c[at]) ? c[at].toFixed(2) : "–"))];
     outputs.forEach((output, index) => (output.textContent = texts[index] ?? ""));
-    this.#toLeast.title = `Set it to ${(found.values[least] * factor).toFixed(1)}${sign}, where the mean cost is least (${found.total[least].toFixed(2)} px); an edit, which can be undone`;
+    this.#toLeast.title = `Set it to ${(found.values[least] * factor).toFixed(1)}${sign}, the minimum of the mean cost (${found.total[least].toFixed(2)} px). Can be undone`;
     this.#element.title = hovered === null ? "" : "Click to set the value";
   }
 }
@@ -200,9 +200,9 @@ function legendEntry(label, color) {
     const swatch = document.createElement("i");
     swatch.style.background = `var(${colorName(color)})`;
     entry.append(swatch, label);
-    entry.title = color === 0 ? "Mean over the views, px" : `Cost in ${label}, px`;
+    entry.title = color === 0 ? "Mean of all views, px" : `Cost in ${label}, px`;
   } else {
-    entry.title = "The value under the pointer, else that of the pose";
+    entry.title = "Value under the pointer, or of the current pose";
   }
   entry.append(document.createElement("output"));
   return entry;

@@ -28,22 +28,22 @@ export class ReplayBar {
     this.#store = store;
     this.#send = send;
     const go = (/** @type {number} */ by) => () => this.#goTo(this.#at + by);
-    this.#play = iconButton("M5 3v10l8-5z", "Replay the search from here, or from its start", () => this.#togglePlay());
+    this.#play = iconButton("M5 3v10l8-5z", "Replay the search", () => this.#togglePlay());
     this.#buttons = [
       iconButton("M4 3.5v9M12.5 3.5 6.5 8l6 4.5z", "Start of the search", () => this.#goTo(-1)),
       iconButton("M10 3.5 5 8l5 4.5", "One step back", go(-1)),
       this.#play,
-      iconButton("m6 3.5 5 4.5-5 4.5", "One step on", go(1)),
+      iconButton("m6 3.5 5 4.5-5 4.5", "One step forward", go(1)),
       iconButton("M12 3.5v9M3.5 3.5l6 4.5-6 4.5z", "Last step of the search", () => this.#goTo(Infinity)),
     ];
     const slider = this.#slider;
     slider.type = "range";
     slider.min = "-1";
     slider.setAttribute("aria-label", "Step of the search");
-    slider.title = "Drag to replay the search; arrow keys go step by step";
+    slider.title = "Drag to replay the search; arrow keys move by one step";
     slider.addEventListener("input", () => this.#goTo(Number(slider.value)));
     this.#text.className = "replay-text";
-    this.#leave = makeButton("Leave", "Leave the replay: the true pose again (Esc)", () => {
+    this.#leave = makeButton("Exit", "Exit the replay and show the current pose (Esc)", () => {
       this.#pause();
       this.#send({ type: "replay", run: null, step: 0 });
     });
@@ -58,7 +58,7 @@ export class ReplayBar {
   #showBadge() {
     const replay = this.#store.facts.state?.replay;
     this.#badge.hidden = !replay;
-    if (replay) this.#badge.textContent = `Replay of run ${replay.run}, step ${replay.step + 1} of ${replay.steps} · Esc leaves`;
+    if (replay) this.#badge.textContent = `Replay of run ${replay.run}, step ${replay.step + 1} of ${replay.steps} · Esc to exit`;
   }
 
   /** @param {Set<keyof import("../model/store.js").Facts>} changed */
@@ -77,10 +77,10 @@ export class ReplayBar {
     if (replay) {
       const best = replay.best_px === null ? "" : ` · best ${replay.best_px.toFixed(2)} px`;
       this.#text.textContent = `${replay.step + 1} of ${run?.steps ?? 0}`;
-      this.#text.title = `${replay.stage ?? "the start"}, ${replay.evaluations} poses scored${best}`;
+      this.#text.title = `${replay.stage ?? "start"}, ${replay.evaluations} poses evaluated${best}`;
     } else {
       this.#text.textContent = run && isReady ? `${run.steps} steps` : "";
-      this.#text.title = run?.thinned ? "Steps that can be replayed; of so long a search not all are kept" : "Steps that can be replayed";
+      this.#text.title = run?.thinned ? "Steps that can be replayed. Long searches keep only some of their steps" : "Steps that can be replayed";
     }
   }
 

@@ -24,7 +24,7 @@ export class RunList {
     this.#send = send;
     const head = document.createElement("h3");
     head.textContent = "Runs";
-    head.title = "Searches of this frame. The first stays for comparison when another is run with other settings";
+    head.title = "Searches of this frame. Earlier runs are kept for comparison";
     this.#list.className = "run-rows";
     byId("search-runs", HTMLElement).append(head, this.#list);
   }
@@ -39,7 +39,7 @@ export class RunList {
       const former = this.#rows;
       this.#rows = new Map(numbers.map((number) => [number, former.get(number) ?? this.#makeRow(number)]));
       this.#list.replaceChildren(...[...this.#rows.values()].map(({ element }) => element));
-      if (numbers.length === 0) this.#list.textContent = "None yet";
+      if (numbers.length === 0) this.#list.textContent = "No runs";
     }
     for (const run of runs) this.#show(run);
   }
@@ -53,7 +53,7 @@ export class RunList {
     element.className = "run-row";
     const swatch = document.createElement("i");
     swatch.style.background = `var(${runColor(number)})`;
-    const look = makeButton(`Run ${number}`, `Look at run ${number}: its costs, stages and candidates`, () => {
+    const look = makeButton(`Run ${number}`, `Show costs, stages and candidates of run ${number}`, () => {
       this.#store.set({ searchRun: number });
     });
     look.className = "run-name";
@@ -62,11 +62,11 @@ export class RunList {
     figures.className = "run-figures";
     const differs = document.createElement("div");
     differs.className = "run-differs";
-    const compare = makeButton("Compare", `Draw the pose that run ${number} found over the views, dashed`, () => {
+    const compare = makeButton("Compare", `Show the pose found by run ${number} in the views, dashed`, () => {
       const isOn = this.#store.facts.searchRuns?.compared === number;
       this.#send({ type: "compare", run: isOn ? null : number });
     });
-    const take = makeButton("Take", `Take the pose that run ${number} found: an edit, which can be undone`, () =>
+    const take = makeButton("Apply", `Use the pose found by run ${number}. Can be undone`, () =>
       this.#send({ type: "take", run: number, candidate: null }),
     );
     element.append(look, figures, compare, take, differs);
@@ -79,13 +79,13 @@ export class RunList {
     if (!row) return;
     const { searchRuns } = this.#store.facts;
     row.element.classList.toggle("is-selected", selectedRun(this.#store.facts)?.number === run.number);
-    const state = run.state === "over" ? "" : run.state === "running" ? "running · " : "stands · ";
-    const thinned = run.thinned ? `; of its many steps ${count(run.steps)} are kept` : "";
+    const state = run.state === "over" ? "" : run.state === "running" ? "running · " : "paused · ";
+    const thinned = run.thinned ? `. ${count(run.steps)} of its steps are kept` : "";
     set(row.figures, `${state}${px(run.best_px)} · ${count(run.evaluations)} · ${run.seconds.toFixed(2)} s`);
-    row.figures.title = `Least cost (began at ${px(run.start_px)}), poses scored, seconds of work${thinned}`;
+    row.figures.title = `Lowest cost (at the start ${px(run.start_px)}), poses evaluated, computing time${thinned}`;
     const differs = Object.entries(run.differs).map(([label, value]) => `${label} ${value}`);
     set(row.differs, differs.join(" · "));
-    row.differs.title = differs.length ? `What this run was told that another was not:\n${differs.join("\n")}` : "";
+    row.differs.title = differs.length ? `Settings that differ between runs:\n${differs.join("\n")}` : "";
     row.compare.setAttribute("aria-pressed", String(searchRuns?.compared === run.number));
     row.compare.disabled = row.take.disabled = run.steps === 0 || run.state === "running";
   }

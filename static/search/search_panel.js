@@ -11,10 +11,10 @@ import { makeButton, makeNumber } from "./search_widgets.js";
 import { selectedRun } from "../model/search_runs.js";
 import { count, px } from "../widgets/text.js";
 
-/** Expansions a second that can be watched; 0 stands for as many as there can be. */
+/** Expansions per second that can be watched; 0 stands for as many as there can be. */
 const SPEEDS = [1, 2, 5, 10, 30, 0];
 /** Why the cost at the top is another once the search is over. */
-const MEASURED = "Measured on the edges near the pose it began from, as all its poses are: the cost of the found pose by itself may differ";
+const MEASURED = "The cost uses the edges near the start pose; the final cost in the top bar may differ";
 
 export class SearchPanel {
   #store;
@@ -40,7 +40,7 @@ export class SearchPanel {
     this.#buttons = this.#makeButtons();
     this.#theta = makeNumber({
       label: "θ, px",
-      title: "Outlier distance theta, px: edges farther away say nothing. Empty: 3% of the longer side of the image",
+      title: "Outlier distance theta in pixels: edges farther away are ignored. Empty: 3% of the longer image side",
       placeholder: "auto",
       change: (value) => this.#set({ theta_px: value }),
     });
@@ -69,14 +69,14 @@ export class SearchPanel {
     const search = (/** @type {"step" | "stage" | "frame" | "stop"} */ action) => () => actions.search(action);
     const track = () => (hasTrack(store.facts.state) ? actions.togglePause() : actions.track("forward"));
     return {
-      step: makeButton("Step", "One expansion of the search (S)", search("step")),
-      stage: makeButton("Stage", "To the end of the stage at hand (Shift+S)", search("stage")),
-      frame: makeButton("Frame", "Search this frame to the end (F)", search("frame")),
-      again: makeButton("Rerun", "Search again from where the run looked at began, by the settings of now (Shift+F)", () =>
+      step: makeButton("Step", "Run one expansion of the search (S)", search("step")),
+      stage: makeButton("Stage", "Run to the end of the current stage (Shift+S)", search("stage")),
+      frame: makeButton("Frame", "Run the whole search of this frame (F)", search("frame")),
+      again: makeButton("Rerun", "Repeat the selected run from its start pose with the current settings (Shift+F)", () =>
         actions.searchAgain(),
       ),
-      track: makeButton("Track", "Track forward from here (T); while it runs, pause or go on (Alt+P)", track),
-      stop: makeButton("Stop", "Stop what is at work, keep the best pose (Esc)", () =>
+      track: makeButton("Track", "Track forward from this frame (T); pause or continue (Alt+P)", track),
+      stop: makeButton("Stop", "Stop the search or tracking and keep the best pose (Esc)", () =>
         hasTrack(store.facts.state) ? actions.stopTracking() : actions.search("stop"),
       ),
     };
@@ -90,9 +90,9 @@ export class SearchPanel {
     group.append(...Object.values(this.#buttons));
     const speed = document.createElement("label");
     speed.className = "search-field";
-    speed.title = "How fast the search goes while you watch: expansions a second. A change takes effect at once";
+    speed.title = "Search speed in expansions per second. Changes take effect immediately";
     this.#speed.append(...SPEEDS.map((one) => new Option(one ? `${one}/s` : "full", String(one))));
-    this.#speed.setAttribute("aria-label", "Expansions a second");
+    this.#speed.setAttribute("aria-label", "Expansions per second");
     this.#speed.addEventListener("change", () => {
       this.#send({ type: "search_speed", per_second: Number(this.#speed.value) || null });
       this.#speed.blur();
@@ -135,7 +135,7 @@ export class SearchPanel {
       if (document.activeElement !== this.#speed) this.#speed.value = String(searchSetup.speed ?? 0);
     }
     const rate = run && run.seconds > 0 ? ` · ${count(run.evaluations / run.seconds)}/s` : "";
-    this.#figures.textContent = run ? `${count(run.evaluations)} poses${rate} · best ${px(run.best_px)}` : "No search yet";
-    this.#figures.title = run ? `Run ${run.number}: poses scored, poses a second of work, least cost. ${MEASURED}` : "";
+    this.#figures.textContent = run ? `${count(run.evaluations)} poses${rate} · best ${px(run.best_px)}` : "No search";
+    this.#figures.title = run ? `Run ${run.number}: poses evaluated, poses per second, lowest cost. ${MEASURED}` : "";
   }
 }

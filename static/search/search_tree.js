@@ -79,10 +79,10 @@ export class SearchTree {
 
   /** @param {import("../model/protocol.js").SearchSetupMessage} setup */
   #head(setup) {
-    const passes = setup.passes.map((factor) => cell("tree-head", `steps ×${factor}`, `Pass with the steps times ${factor}: poses scored, and what they lowered the cost by`));
+    const passes = setup.passes.map((factor) => cell("tree-head", `steps ×${factor}`, `Pass with steps ×${factor}: poses evaluated and reduction of the cost`));
     return [
-      cell("tree-head", "Stage", "The groups of degrees of freedom that are searched one after the other"),
-      cell("tree-head", "DOF", "How many degrees of freedom are searched together"),
+      cell("tree-head", "Stage", "Groups of degrees of freedom, searched one after the other"),
+      cell("tree-head", "DOF", "Number of degrees of freedom searched together"),
       ...FIELDS.map(({ head, title }) => cell("tree-head", head, title)),
       ...passes,
     ];
@@ -101,7 +101,7 @@ export class SearchTree {
       if (person > 0) return cell("", "", "");
       const field = makeNumber({
         label: "",
-        title: `${title}, of all that have none of their own`,
+        title: `${title}. Default for all stages`,
         change: (value) => value !== null && this.#change({ [key]: value / unit }),
       });
       this.#fields.push({ field, read: (now) => now[key] * unit });
@@ -129,7 +129,7 @@ export class SearchTree {
       if (leaf[has] === 0) return cell("", "", "");
       const field = makeNumber({
         label: "",
-        title: `${title}, of ${name}; empty it to follow the others`,
+        title: `${title}, for ${name}. Empty: default`,
         placeholder: "mixed",
         change: (value) => this.#change({ leaf: { person, name, [key]: value === null ? null : value / unit } }),
       });
@@ -154,18 +154,18 @@ export class SearchTree {
     line.className = "tree-rest";
     const patience = makeNumber({
       label: "Patience",
-      title: "A stage ends after so many expansions that found nothing better",
+      title: "A stage ends after this many expansions without improvement",
       change: (value) => value !== null && this.#change({ patience: Math.round(value) }),
     });
     const most = makeNumber({
-      label: "at most",
-      title: "A stage ends after so many expansions in any case",
+      label: "Max.",
+      title: "Maximum number of expansions per stage",
       change: (value) => value !== null && this.#change({ max_expansions: Math.round(value) }),
     });
     this.#fields.push({ field: patience, read: (now) => now.patience }, { field: most, read: (now) => now.max_expansions });
     const passes = document.createElement("label");
     passes.className = "search-field";
-    passes.title = "Factors on the steps: all stages are searched once per factor. The paper's mode is 1";
+    passes.title = "Step factors: all stages are searched once per factor. The paper uses 1";
     const text = document.createElement("input");
     text.type = "text";
     text.value = setup.passes.join(" ");
@@ -179,7 +179,7 @@ export class SearchTree {
     passes.append("Passes", text);
     const apart = document.createElement("label");
     apart.className = "search-field";
-    apart.title = "Search the limbs of a group one after the other, not together as in the paper";
+    apart.title = "Search the limbs of a group separately, not together as in the paper";
     const box = document.createElement("input");
     box.type = "checkbox";
     box.checked = setup.limbs_apart;
@@ -187,7 +187,7 @@ export class SearchTree {
       this.#change({ limbs_apart: box.checked });
       box.blur();
     });
-    apart.append(box, "limbs apart");
+    apart.append(box, "separate limbs");
     line.append(passes, patience.element, most.element, apart);
     return line;
   }
@@ -202,7 +202,7 @@ export class SearchTree {
       if (element.textContent !== text) element.textContent = text;
       element.classList.toggle("is-done", !!stage?.done);
       element.classList.toggle("is-running", !!stage?.running);
-      element.title = stage && text ? `${stage.name}, steps ×${stage.factor}: ${count(stage.evaluations)} poses scored, ${stage.gain_px.toFixed(3)} px less${stage.running ? "; at work" : ""}` : "Not searched yet";
+      element.title = stage && text ? `${stage.name}, steps ×${stage.factor}: ${count(stage.evaluations)} poses evaluated, cost reduced by ${stage.gain_px.toFixed(3)} px${stage.running ? "; running" : ""}` : "Not searched";
     }
   }
 }

@@ -39,7 +39,7 @@ export class Announcer {
       words.push(state.redo !== null && state.redo !== before.redo ? `undone: ${state.redo}` : (state.undo ?? "nothing to undo"));
     }
     if (state.frame !== before.frame) {
-      words.push(`frame ${state.frame}, ${[state.source ?? "no pose yet", state.status].filter(Boolean).join(", ")}`);
+      words.push(`frame ${state.frame}, ${[state.source ?? "no pose", state.status].filter(Boolean).join(", ")}`);
     }
     if (state.job.message && state.job.message !== before.job.message) words.push(state.job.message);
     if (state.track.message && state.track.message !== before.track.message) words.push(state.track.message);

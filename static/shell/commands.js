@@ -68,8 +68,8 @@ export function buttonCommands(table) {
       keys: [],
       words: title,
       why: () => {
-        if (control.closest("#range-bar[hidden]")) return "No range is marked: [ begins one, ] ends it.";
-        return input.matches(":disabled") ? `Not possible now: ${title}.` : null;
+        if (control.closest("#range-bar[hidden]")) return "No range is marked. Press [ and ] to mark its ends.";
+        return input.matches(":disabled") ? `Not available now: ${title}.` : null;
       },
       run: () => input.click(),
     });
@@ -110,10 +110,10 @@ export function contextCommands({ store, navigation, grid, posing, layers, actio
   if ((session?.people.length ?? 0) > 1) {
     session?.people.forEach(({ name }, index) => {
       const isShown = state?.people[index]?.shown ?? true;
-      add("Person", `Work on ${name}`, () => actions.selectPerson(index), "person");
+      add("Person", `Select ${name}`, () => actions.selectPerson(index), "person");
       add("Person", `${isShown ? "Hide" : "Show"} ${name}`, () => actions.showPerson(index, !isShown), "person show hide");
       commands[commands.length - 1].id = `shown ${name}`;
-      if (index !== state?.person) add("Person", `Copy the pose of ${name}`, () => posing.copyPerson(index), "person bend");
+      if (index !== state?.person) add("Person", `Copy the pose of ${name}`, () => posing.copyPerson(index), "person joint angles");
     });
   }
   const points = session?.people[state?.person ?? 0]?.points ?? [];

@@ -78,14 +78,14 @@ export class HistoryList {
     const [what, frame] = split(label);
     const where = [what, frame, author, displayTime(when)];
     const title = `${label}${author ? `, by ${author}` : ""}, ${when.toLocaleString()}${undone ? "; undone" : ""}. ${
-      isCurrent ? "This is where the history stands." : undone ? "Redo up to here." : "Undo down to here."
+      isCurrent ? "Current state." : undone ? "Redo up to here." : "Undo back to here."
     }`;
     return this.#entry(edit, where, title, isCurrent, undone);
   }
 
   /** @param {boolean} isCurrent */
   #beginning(isCurrent) {
-    const title = isCurrent ? "This is where the history stands." : "Undo everything, to where this session began.";
+    const title = isCurrent ? "Current state." : "Undo everything, back to the start of the session.";
     return this.#entry(null, ["Beginning", "", "", ""], title, isCurrent, false);
   }
 
@@ -123,7 +123,7 @@ export class HistoryList {
     row.type = "button";
     row.className = "is-more";
     const isLast = this.#limit >= MOST;
-    row.textContent = isLast ? `Only ${MOST.toLocaleString("en")} entries are listed; undo reaches the others` : text;
+    row.textContent = isLast ? `Only ${MOST.toLocaleString("en")} entries are listed. Undo and redo also reach the others` : text;
     row.title = row.textContent;
     row.disabled = isLast;
     row.addEventListener("click", () => this.#ask(Math.min(MOST, 4 * this.#limit)));

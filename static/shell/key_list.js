@@ -9,8 +9,14 @@ export class KeyList {
   #list = byId("key-areas", HTMLElement);
   #none = byId("key-none", HTMLElement);
 
+  constructor() {
+    this.#query.addEventListener("input", () => this.#search());
+    button("show-key-list", () => this.show());
+    this.#dialog.addEventListener("click", (event) => event.target === this.#dialog && this.#dialog.close());
+  }
+
   /** @param {import("../widgets/key_matching.js").Binding[]} table */
-  constructor(table) {
+  setBindings(table) {
     /** @type {Map<string, HTMLElement>} */
     const areas = new Map();
     for (const { keys, label, area = "More" } of table.filter((binding) => binding.keys.length > 0)) {
@@ -30,9 +36,6 @@ export class KeyList {
       section.querySelector("dl")?.append(row);
     }
     this.#list.replaceChildren(...areas.values());
-    this.#query.addEventListener("input", () => this.#search());
-    button("show-key-list", () => this.show());
-    this.#dialog.addEventListener("click", (event) => event.target === this.#dialog && this.#dialog.close());
   }
 
   show() {

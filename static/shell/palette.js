@@ -7,7 +7,7 @@ import { fitness } from "../widgets/fuzzy.js";
 const RECENT = "quadrille.palette.recent";
 const MAX_RECENT = 12;
 const MAX_SHOWN = 60;
-/** What was used lately comes a little before what fits as well. */
+/** What was recent comes a little before what fits as well. */
 const RECENT_BONUS = 6;
 
 /** @typedef {import("./commands.js").Command} Command */
@@ -18,18 +18,17 @@ export class Palette {
   #list = byId("palette-list", HTMLElement);
   #why = byId("palette-why", HTMLElement);
   #context;
-  #table;
+  /** @type {import("../widgets/key_matching.js").Binding[]} */
+  #table = [];
   /** @type {Command[]} what is shown, in order */
   #found = [];
   #at = 0;
 
   /**
    * @param {import("./commands.js").CommandContext} context
-   * @param {() => import("../widgets/key_matching.js").Binding[]} table
    */
-  constructor(context, table) {
+  constructor(context) {
     this.#context = context;
-    this.#table = table;
     this.#input.addEventListener("input", () => this.#search());
     this.#input.addEventListener("keydown", (event) => this.#onKey(event));
     this.#dialog.addEventListener("click", (event) => event.target === this.#dialog && this.#dialog.close());
@@ -37,6 +36,11 @@ export class Palette {
       const option = event.target instanceof Element ? event.target.closest("[role=option]") : null;
       if (option) this.#choose([...this.#list.children].indexOf(option));
     });
+  }
+
+  /** @param {import("../widgets/key_matching.js").Binding[]} table */
+  setBindings(table) {
+    this.#table = table;
   }
 
   toggle() {
@@ -51,9 +55,8 @@ export class Palette {
 
   #search() {
     const query = this.#input.value;
-    const table = this.#table();
     const recent = recentIds();
-    const commands = [...contextCommands(this.#context, query), ...keyCommands(table), ...buttonCommands(table)];
+    const commands = [...contextCommands(this.#context, query), ...keyCommands(this.#table), ...buttonCommands(this.#table)];
     const scored = commands.flatMap((command) => {
       const found = fitness(query, `${command.label} ${command.area} ${command.words} ${command.keys.join(" ")}`);
       if (found === null) return [];
@@ -62,14 +65,14 @@ export class Palette {
       const bonus = lately < 0 ? 0 : RECENT_BONUS * (query.trim() ? 1 : 1000) * (1 - lately / MAX_RECENT);
       return [{ command, isRecent: lately >= 0 && !query.trim(), score: found + inLabel + bonus }];
     });
-    // Without a query the order is that of the table, but for what was used lately.
+    // Without a query the order is that of the table, but for what was recent.
     scored.sort((a, b) => (query.trim() || a.isRecent || b.isRecent ? b.score - a.score : 0));
     const shown = scored.slice(0, MAX_SHOWN);
     this.#found = shown.map(({ command }) => command);
     this.#list.replaceChildren(...shown.map(({ command, isRecent }, index) => option(command, isRecent, index)));
     this.#list.scrollTop = 0;
     this.#show(0);
-    if (!shown.length) this.#why.textContent = `Nothing is called “${query}”. A number goes to that frame.`;
+    if (!shown.length) this.#why.textContent = `No results for “${query}”. Enter a number to go to that frame.`;
   }
 
   /** @param {KeyboardEvent} event */
@@ -137,7 +140,7 @@ function option({ area, label, keys, why }, isRecent, index) {
   const text = document.createElement("span");
   text.textContent = label;
   const where = document.createElement("small");
-  where.textContent = isRecent ? `${area}, used lately` : area;
+  where.textContent = isRecent ? `${area}, recent` : area;
   item.append(text, where, keyCaps(keys));
   return item;
 }

@@ -69,7 +69,7 @@ export class People {
    */
   #choice(within, name, info, person) {
     const label = document.createElement("label");
-    label.title = `Work on ${info.name} (P: the next person)`;
+    label.title = `Select ${info.name} (P: next person)`;
     const input = Object.assign(document.createElement("input"), { type: "radio", name, value: String(person) });
     input.addEventListener("change", () => {
       this.#actions.selectPerson(person);
@@ -96,7 +96,7 @@ export class People {
     model.textContent = `${info.model}, ${info.height_m.toFixed(2)} m`;
     const told = document.createElement("span");
     told.className = "quiet";
-    const bend = `Bend the person worked on as ${info.name}; place and turn stay`;
+    const bend = `Copy the joint angles of ${info.name}; position and orientation stay`;
     const copy = iconButton(COPY, bend, () => this.#posing.copyPerson(person));
     copy.setAttribute("aria-label", `Copy the pose of ${info.name}`);
     const eye = iconButton(EYE, `Show ${info.name}`, () =>
@@ -120,7 +120,7 @@ export class People {
       radio.checked = person === state.person;
       radio.disabled = eye.disabled = !connected;
       copy.disabled = !connected || person === state.person;
-      told.textContent = source === null ? "not placed here" : [source, status].filter(Boolean).join(", ");
+      told.textContent = source === null ? "not placed" : [source, status].filter(Boolean).join(", ");
       eye.setAttribute("aria-pressed", String(shown));
       eye.title = `${shown ? "Hide" : "Show"} ${session.people[person].name} in all views${person === state.person ? " (Shift+V)" : ""}`;
       eye.querySelector("path")?.setAttribute("d", shown ? EYE : SHUT);

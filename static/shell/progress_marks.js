@@ -27,6 +27,6 @@ function showListing(mark, footage) {
     mark.title = error;
   } else if (listed !== null) {
     mark.textContent = `Indexing ${Math.floor(100 * listed)}%`;
-    mark.title = "The footage is opened for the first time and its frames are being listed. Frames listed by now are shown, others as soon as they are.";
+    mark.title = "The footage is indexed when it is first opened. Frames can be shown as soon as they are indexed.";
   }
 }

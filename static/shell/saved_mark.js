@@ -41,9 +41,9 @@ export class SavedMark {
     const failed = save_error !== null;
     this.#mark.className = failed ? "is-failed" : saved ? "is-saved" : "is-saving";
     this.#mark.textContent = failed ? "Not saved" : saved ? "All saved" : "Saving";
-    this.#mark.title = failed ? `Not saved: ${save_error}. Press to try again.` : saved ? "Every edit is on disk" : "Saving";
+    this.#mark.title = failed ? `Not saved: ${save_error}. Click to try again.` : saved ? "All edits are saved" : "Saving";
     this.#mark.disabled = this.#retry.disabled = !failed || !connected;
     this.#bar.hidden = !failed;
-    this.#why.textContent = failed ? `Not saved: ${save_error}. What you do is kept in memory until then.` : "";
+    this.#why.textContent = failed ? `Not saved: ${save_error}. Edits are kept in memory until saving succeeds.` : "";
   }
 }

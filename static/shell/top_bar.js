@@ -57,7 +57,7 @@ export class TopBar {
     if (hasTrack(state) || state.track.message) this.#showTrack(state.track);
     else this.#showJob(state.job);
     const isToBegin = (state.track.running && state.track.done === 0) || (isRunning && state.job.evaluations === 0);
-    if (state.compiling && isToBegin) this.#figures.textContent = "waits for the compiler";
+    if (state.compiling && isToBegin) this.#figures.textContent = "waiting for compilation";
   }
 
   /** @param {import("../model/protocol.js").Job} job */
@@ -82,7 +82,7 @@ export class TopBar {
     const stands = first !== null;
     const [how, ...rest] = message.split(", ");
     const work = back ? "followed" : "tracked";
-    const way = back ? "Following back who was lost" : `Frame ${at ?? first}, on the way to frame ${last}`;
+    const way = back ? "Tracking lost people backward" : `Frame ${at ?? first}, tracking to frame ${last}`;
     this.#stage.textContent = stands ? `${running ? work : "paused"} ${done} of ${total}` : how;
     this.#stage.title = stands ? way : message;
     const counts = [doubtful && `${doubtful} doubtful`, lost && `${lost} lost`].filter(Boolean);

@@ -148,7 +148,7 @@ export class Curves {
     const person = data && people.length > 1 ? people[data.person] : null;
     this.#person.hidden = !person;
     this.#person.textContent = person?.name ?? "";
-    this.#person.title = person ? `The curves of ${person.name} (P: of the next person)` : "";
+    this.#person.title = person ? `Curves of ${person.name} (P: next person)` : "";
     this.#person.style.setProperty("--person", person?.color ?? "");
   }
 

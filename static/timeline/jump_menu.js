@@ -63,7 +63,7 @@ export class JumpMenu {
       number.setAttribute("aria-label", `Number of frames: ${label}`);
       const keyOf = (/** @type {boolean} */ back) => (key ? ` (${back ? previousKey(key) : key.replace(" ", "+")})` : "");
       const buttons = [
-        iconButton(PREVIOUS, `Former ${more}${keyOf(true)}`, () => this.#jumps.go(kind, -1)),
+        iconButton(PREVIOUS, `Previous ${more}${keyOf(true)}`, () => this.#jumps.go(kind, -1)),
         iconButton(NEXT, `Next ${more}${keyOf(false)}`, () => this.#jumps.go(kind, 1)),
       ];
       const group = document.createElement("div");
@@ -78,7 +78,7 @@ export class JumpMenu {
     this.#gap.type = "button";
     this.#gap.className = "jump-gap";
     this.#gap.textContent = "Longest gap between keyframes";
-    this.#gap.title = "Go to the middle of the longest stretch without a keyframe: the best place for the next one (Q)";
+    this.#gap.title = "Go to the middle of the longest gap between keyframes, the best place for a new one (Q)";
     this.#gap.addEventListener("click", () => this.#jumps.toLongestGap());
     this.#menu.append(...rows, this.#gap);
   }

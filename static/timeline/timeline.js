@@ -76,7 +76,7 @@ export class Timeline {
       const frame = this.#isOverview(event) ? null : this.#axis.frameUnder(event, element);
       if (frame === this.#hovered) return;
       this.#hovered = frame;
-      element.title = frame === null ? "The whole recording: drag to move what is shown" : this.#describeFrame(frame);
+      element.title = frame === null ? "Overview of the recording: drag to move the visible part" : this.#describeFrame(frame);
       requestAnimationFrame(() => this.#drawCursor());
     });
     for (const end of /** @type {const} */ (["pointerup", "pointercancel"])) {
@@ -215,9 +215,9 @@ export class Timeline {
     const cell = this.#store.facts.timeline.get(frame);
     if (!cell) return `Frame ${frame}: no pose`;
     const { source, keyframe, status, remark, cost_px, reviewed, ambiguous } = cell;
-    const seen = keyframe ? "keyframe" : ambiguous ? "another pose is as good" : reviewed && "reviewed";
+    const seen = keyframe ? "keyframe" : ambiguous ? "ambiguous" : reviewed && "reviewed";
     const parts = [source, seen, status, px(cost_px)].filter(Boolean).join(", ") + this.#describeLanes(frame);
-    const jumps = this.#store.facts.disagreeing.includes(frame) ? "\ndisagrees with the frames beside it" : "";
+    const jumps = this.#store.facts.disagreeing.includes(frame) ? "\ninconsistent with its neighbours" : "";
     return `Frame ${frame}: ${parts}${remark && `\n${remark}`}${jumps}`;
   }
 

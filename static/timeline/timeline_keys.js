@@ -1,68 +1,153 @@
-/** The keys of timeline, playback and ranges; `keys.js` takes them into its table. */
+/** Keys of navigation, tracking, timeline and drawer. */
 
+import { alt, inArea, plain } from "../widgets/key_matching.js";
 import { KINDS } from "./jumps.js";
-import { alt, plain } from "../widgets/key_matching.js";
-import { unavailableReasons } from "../model/unavailable_reasons.js";
 
 /**
- * @param {{store: import("../model/store.js").Store, actions: import("../model/actions.js").Actions,
- *   playback: import("./playback.js").Playback, jumps: import("./jumps.js").Jumps,
- *   frameWindow: import("./frame_window.js").FrameWindow}} parts
- * @returns {import("../widgets/key_matching.js").Binding[]}
+ * @typedef {import("../widgets/key_matching.js").Binding} Binding
+ * @typedef {import("../model/store.js").Store} Store
+ * @typedef {import("../model/actions.js").Actions} Actions
+ * @typedef {import("../model/unavailable_reasons.js").Reasons} Reasons
+ * @typedef {import("./playback.js").Playback} Playback
  */
-export function timelineBindings({ store, actions, playback, jumps, frameWindow }) {
+
+const shift = (/** @type {string} */ key) => plain(key, undefined, true);
+
+/**
+ * @param {import("../model/navigation.js").Navigation} navigation
+ * @param {Playback} playback
+ */
+export function frameBindings(navigation, playback) {
+  return inArea("Frames", [
+    { keys: [","], label: "Previous frame", matches: plain(",", "Comma"), run: () => navigation.step(-1) },
+    { keys: ["."], label: "Next frame", matches: plain(".", "Period"), run: () => navigation.step(1) },
+    { keys: ["Shift ,"], label: "Ten frames back", matches: plain("<", "Comma", true), run: () => navigation.step(-10) },
+    { keys: ["Shift ."], label: "Ten frames forward", matches: plain(">", "Period", true), run: () => navigation.step(10) },
+    { keys: ["Home"], label: "First frame", matches: plain("home"), run: () => navigation.first() },
+    { keys: ["End"], label: "Last frame", matches: plain("end"), run: () => navigation.last() },
+    { keys: ["Space"], label: "Play or pause", matches: plain(" "), run: () => playback.toggle() },
+  ]);
+}
+
+/**
+ * @param {Store} store
+ * @param {Actions} actions
+ * @param {Reasons} reasons
+ */
+export function trackBindings(store, actions, reasons) {
+  const track = (/** @type {"forward" | "backward"} */ way) => () => {
+    if (store.facts.connected && !store.facts.state?.track.running) actions.track(way);
+  };
+  const { track: why, tracking } = reasons;
+  return inArea("Tracking", [
+    { keys: ["T"], label: "Track forward", matches: plain("t"), why, run: track("forward") },
+    { keys: ["Shift T"], label: "Track backward", matches: shift("t"), why, run: track("backward") },
+    {
+      keys: ["Alt P"],
+      label: "Pause or continue tracking",
+      matches: alt("KeyP", false),
+      why: tracking,
+      run: () => actions.togglePause(),
+    },
+    { keys: ["L"], label: "Follow the tracker (toggle)", matches: plain("l"), why: tracking, run: () => actions.toggleFollow() },
+  ]);
+}
+
+/** @param {import("./drawer.js").Drawer} drawer */
+export function drawerBindings(drawer) {
+  return inArea("Views", [
+    { keys: ["C"], label: "Curves", matches: plain("c"), run: () => drawer.toggleCurves() },
+    { keys: ["B"], label: "Search panel", matches: plain("b"), run: () => drawer.toggle("search") },
+    { keys: ["V"], label: "Cost landscape", matches: plain("v"), run: () => drawer.toggle("landscape") },
+  ]);
+}
+
+/**
+ * @param {{store: Store, actions: Actions, playback: Playback, jumps: import("./jumps.js").Jumps,
+ *   frameWindow: import("./frame_window.js").FrameWindow, reasons: Reasons}} parts
+ */
+export function timelineBindings({ store, actions, playback, jumps, frameWindow, reasons }) {
+  return inArea("Timeline", [
+    ...playBindings(playback),
+    ...KINDS.filter(({ key }) => key).flatMap(({ kind, key, more }) => jumpKeys(jumps, kind, key, more)),
+    {
+      keys: ["Q"],
+      label: "Middle of the longest gap between keyframes",
+      matches: plain("q"),
+      run: () => jumps.toLongestGap(),
+    },
+    ...markBindings(store, actions, reasons),
+    { keys: ["Z"], label: "Timeline: zoom in", matches: plain("z"), run: () => frameWindow.zoomIn() },
+    { keys: ["Shift Z"], label: "Timeline: zoom out", matches: shift("z"), run: () => frameWindow.zoomOut() },
+    {
+      keys: ["Alt Z"],
+      label: "Timeline: show the marked range, or all frames",
+      matches: alt("KeyZ", false),
+      run: () => frameWindow.fit(),
+    },
+    ...rangeBindings(store),
+  ]);
+}
+
+/**
+ * @param {Playback} playback
+ * @returns {Binding[]}
+ */
+function playBindings(playback) {
+  return [
+    {
+      keys: ["Shift Space"],
+      label: "Loop playback, within the marked range if there is one (toggle)",
+      matches: shift(" "),
+      run: () => playback.toggleLoop(),
+    },
+    { keys: [";"], label: "Play slower", matches: plain(";", "Semicolon"), run: () => playback.changeRate(-1) },
+    { keys: ["'"], label: "Play faster", matches: plain("'", "Quote"), run: () => playback.changeRate(1) },
+  ];
+}
+
+/**
+ * @param {Store} store
+ * @param {Actions} actions
+ * @param {Reasons} reasons
+ * @returns {Binding[]}
+ */
+function markBindings(store, actions, reasons) {
   const interpolate = () => {
     if (store.facts.connected && store.facts.range) actions.onRange("interpolate", null);
   };
   return [
     {
-      keys: ["Shift Space"],
-      label: "Play in a loop, of the marked range where there is one, or not",
-      matches: plain(" ", undefined, true),
-      run: () => playback.toggleLoop(),
-    },
-    { keys: [";"], label: "Play slower", matches: plain(";", "Semicolon"), run: () => playback.changeRate(-1) },
-    { keys: ["'"], label: "Play faster", matches: plain("'", "Quote"), run: () => playback.changeRate(1) },
-    ...KINDS.filter(({ key }) => key).flatMap(({ kind, key, more }) => jumpKeys(jumps, kind, key, more)),
-    {
-      keys: ["Q"],
-      label: "Middle of the longest stretch without a keyframe",
-      matches: plain("q"),
-      run: () => jumps.toLongestGap(),
-    },
-    {
       keys: ["K"],
-      label: "Keyframe: vouch for this pose, or take that back",
+      label: "Keyframe: confirm this pose (toggle)",
       matches: plain("k"),
       run: () => actions.toggleMark("keyframe"),
     },
-    {
-      keys: ["Shift K"],
-      label: "Take the marks of this frame away",
-      matches: plain("k", undefined, true),
-      run: () => actions.unmark(),
-    },
-    { keys: ["E"], label: "Reviewed, or not", matches: plain("e"), run: () => actions.toggleMark("reviewed") },
+    { keys: ["Shift K"], label: "Remove the marks of this frame", matches: shift("k"), run: () => actions.unmark() },
+    { keys: ["E"], label: "Reviewed (toggle)", matches: plain("e"), run: () => actions.toggleMark("reviewed") },
     {
       keys: ["Shift I"],
       label: "Interpolate the marked range",
-      matches: plain("i", undefined, true),
-      why: unavailableReasons(store).range,
+      matches: shift("i"),
+      why: reasons.range,
       run: interpolate,
     },
-    { keys: ["Z"], label: "Timeline: see fewer frames", matches: plain("z"), run: () => frameWindow.zoomIn() },
-    {
-      keys: ["Shift Z"],
-      label: "Timeline: see more frames",
-      matches: plain("z", undefined, true),
-      run: () => frameWindow.zoomOut(),
-    },
-    {
-      keys: ["Alt Z"],
-      label: "Timeline: the marked range, or all frames",
-      matches: alt("KeyZ", false),
-      run: () => frameWindow.fit(),
-    },
+  ];
+}
+
+/**
+ * @param {Store} store
+ * @returns {Binding[]}
+ */
+function rangeBindings(store) {
+  const mark = (/** @type {"first" | "last"} */ end) => () => {
+    const { range, target } = store.facts;
+    const other = end === "first" ? (range?.last ?? target) : (range?.first ?? target);
+    store.set({ range: { first: Math.min(target, other), last: Math.max(target, other) } });
+  };
+  return [
+    { keys: ["["], label: "Mark the start of a range", matches: plain("[", "BracketLeft"), run: mark("first") },
+    { keys: ["]"], label: "Mark the end of a range", matches: plain("]", "BracketRight"), run: mark("last") },
   ];
 }
 
@@ -81,6 +166,6 @@ function jumpKeys(jumps, kind, key, what) {
   const former = key.startsWith("Alt ") ? `Alt Shift ${letter}` : `Shift ${letter}`;
   return [
     { keys: [key], label: `Next ${what}`, matches: match(false), why, run: () => jumps.go(kind, 1) },
-    { keys: [former], label: `Former ${what}`, matches: match(true), why, run: () => jumps.go(kind, -1) },
+    { keys: [former], label: `Previous ${what}`, matches: match(true), why, run: () => jumps.go(kind, -1) },
   ];
 }

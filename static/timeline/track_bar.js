@@ -37,11 +37,11 @@ export class TrackBar {
     this.#back.disabled = this.#forward.disabled = !connected || !state || isRunning;
     this.#pause.disabled = this.#stop.disabled = this.#follow.disabled = !connected || !stands;
     const to = range ? "to the end of the marked range" : "to the end of the recording";
-    this.#forward.title = `Track forward from this frame, ${to} (T)`;
-    this.#back.title = `Track backward from this frame, ${range ? to : "to its beginning"} (Shift+T)`;
+    this.#forward.title = `Track forward from this frame ${to} (T)`;
+    this.#back.title = `Track backward from this frame ${range ? to : "to its beginning"} (Shift+T)`;
     this.#pause.classList.toggle("is-paused", stands && !isRunning);
-    this.#pause.title = stands && !isRunning ? "Go on tracking (Alt+P)" : "Pause tracking (Alt+P)";
-    this.#pause.setAttribute("aria-label", stands && !isRunning ? "Go on tracking" : "Pause tracking");
+    this.#pause.title = stands && !isRunning ? "Continue tracking (Alt+P)" : "Pause tracking (Alt+P)";
+    this.#pause.setAttribute("aria-label", stands && !isRunning ? "Continue tracking" : "Pause tracking");
     this.#follow.checked = state?.follow ?? true;
   }
 }

@@ -91,9 +91,9 @@ export class Transport {
   #showSource() {
     const source = this.#store.facts.state?.source ?? null;
     const other = this.#store.facts.state?.other_sizes ?? false;
-    this.#source.textContent = source === null ? "No pose yet" : `Pose: ${source}${other ? ", former sizes" : ""}`;
+    this.#source.textContent = source === null ? "No pose" : `Pose: ${source}${other ? ", earlier body sizes" : ""}`;
     this.#source.title = other
-      ? "Made with other sizes than the body has now, and shown with them. To take keyframes over: the panel Body, Refit keyframes, Apply"
+      ? "This pose was made with other body sizes and is shown with them. To convert keyframes: panel Body, Refit keyframes, Apply"
       : "";
     const { timeline, target, connected, state } = this.#store.facts;
     const cell = timeline.get(target);

@@ -46,3 +46,15 @@ export function control(key, shift) {
 export function alt(code, shift) {
   return (event) => event.altKey && !event.ctrlKey && !event.metaKey && event.shiftKey === shift && event.code === code;
 }
+
+/**
+ * Set the area of some bindings, and a default reason why they are unavailable.
+ *
+ * @param {string} area
+ * @param {Binding[]} bindings
+ * @param {() => string | null} [why]
+ * @returns {Binding[]}
+ */
+export function inArea(area, bindings, why) {
+  return bindings.map((binding) => ({ area, why, ...binding }));
+}

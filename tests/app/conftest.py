@@ -11,7 +11,7 @@ from gestures import drag, wait_for
 
 from app import __main__
 from app.control.controller import Controller
-from app.session.frame_cache import Frames
+from app.session.frame_cache import FrameCache
 from app.storage.saver import Saver
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
@@ -59,7 +59,7 @@ def opened(session):
         loaded = load_session(session)
         recording = Recording(loaded.cameras)
         store = AnnotationStore(loaded.annotations_path)
-        controller = Controller(loaded, Saver(loaded, store), Frames(Observer(loaded.cameras, recording)))
+        controller = Controller(loaded, Saver(loaded, store), FrameCache(Observer(loaded.cameras, recording)))
         open_now.append((controller, recording, store))
         wait_for(lambda: controller.state.cost_px is not None)
         return controller
@@ -91,7 +91,7 @@ def tracker(monkeypatch):
 def placed(opened, tracker):
     """A controller whose body stands on frame 2."""
     controller = opened()
-    controller.seek(2)
+    controller.navigation.seek(2)
     drag(controller, "torso", (4.0, 0.0))
     yield controller
     tracker.let_go(1000)  # nobody waits at the end

@@ -20,7 +20,7 @@ sys.path[:0] = [str(ROOT / "tests" / "support")]
 from scripted_user import LIMBS, ScriptedUser
 
 from app.control.controller import Controller
-from app.session.frame_cache import Frames
+from app.session.frame_cache import FrameCache
 from app.storage.saver import Saver
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
@@ -53,7 +53,7 @@ class Annotator:
         return self.controller.session.cameras[camera].camera.pinhole.project(place)
 
     def drag(self, point: str, camera: int, by: np.ndarray) -> None:
-        start, hand = self.px(point, camera), self.controller.hand
+        start, hand = self.px(point, camera), self.controller.dragging
         hand.begin_drag(1, camera, 0, point, tuple(start))
         for k in range(1, 9):
             hand.move_drag(1, tuple(start + k / 8 * by), k)
@@ -116,9 +116,9 @@ def annotate(controller: Controller, truth: Path) -> None:
         counts.append(at.actions)
         print(f"frame {frame:3}: {found:4.0f} mm found, {at.actions:2} actions, {left:4.0f} mm left", flush=True)
         if frame + EVERY < session.n_frames:
-            controller.track(False, frame + EVERY)
+            controller.tracking.start(False, frame + EVERY)
             wait(controller, lambda state: not state.track.running)
-            controller.seek(frame + EVERY)
+            controller.navigation.seek(frame + EVERY)
             wait(controller, lambda state: state.cost_px is not None)
     print(f"first keyframe {counts[0]} actions; the {len(counts) - 1} others: median {np.median(counts[1:]):g}")
 
@@ -137,7 +137,7 @@ def main() -> None:
             closing(Recording(session.cameras)) as recording,
             closing(AnnotationStore(session.annotations_path)) as store,
         ):
-            controller = Controller(session, Saver(session, store), Frames(Observer(session.cameras, recording)))
+            controller = Controller(session, Saver(session, store), FrameCache(Observer(session.cameras, recording)))
             try:
                 wait(controller, lambda state: state.cost_px is not None)
                 annotate(controller, walk / "ground_truth.trc")

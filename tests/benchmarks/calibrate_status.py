@@ -21,12 +21,13 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from true_starts import read_simulated
 
+from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array
-from tracker.simulate import simulate
+from tracker.simulate import Simulation, simulate
 from tracker.simulate.motion.scenes import cast_of
 from tracker.tracking import confidence
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -101,7 +102,7 @@ class Limbs:
         for limb in quality.limbs:
             of_limb = _joints(model, limb.name)
             if of_limb.any():
-                self.evidence.append(confidence.evidence(quality, limb))
+                self.evidence.append(confidence.features(quality, limb))
                 self.lost.append(bool(off[of_limb].any()))
                 self.searched.append(searched)
                 self.frames.append((person, found.frame))
@@ -110,7 +111,7 @@ class Limbs:
 
 def _joints(model: BodyModel, limb: str) -> NDArray[np.bool_]:
     """Which of the limb joints belong to a limb."""
-    parts = next(x.parts for x in confidence.limbs(model) if x.name == limb)
+    parts = next(x.parts for x in limbs(model) if x.name == limb)
     return np.isin([model.point_parts[model.point_names.index(n)] for n in LIMB_JOINTS], parts)
 
 
@@ -167,7 +168,7 @@ def main() -> None:
             if not path.exists():
                 # Two people are two persons' frames, and take longer.
                 n_frames = words.frames // 2 if spec.of_several else words.frames
-                simulate(path, spec.name, spec.cameras, n_frames, spec.seed, spec.size)
+                simulate(path, Simulation(spec.name, spec.cameras, n_frames, spec.seed, spec.size))
             tracked[spec] = limbs = Limbs()
             limbs.add(path, TrackSettings())
             if spec in FIT:

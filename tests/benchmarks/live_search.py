@@ -38,7 +38,7 @@ WATCH = """() => {
 
 async def watched(page, speed: str, seconds: float) -> None:
     """Search one frame after another at a speed, and print what the page drew of it, in its two halves."""
-    await page.get_by_label("Expansions a second").select_option(speed)
+    await page.get_by_label("Expansions per second").select_option(speed)
     await page.evaluate(WATCH)
     left, frame = seconds, 4
     while left > 0:

@@ -33,7 +33,7 @@ from app.drawing import pictures
 from app.runtime.progress import Reporter
 from app.session.proxies import index
 from tracker.footage.recording import Recording
-from tracker.images.matching_view import MatchedView
+from tracker.images.working_view import WorkingView
 from tracker.session.session import load_session, save_session
 
 REDUCTION = 1.7
@@ -171,7 +171,7 @@ def steps(folder: Path, n: int) -> None:
     """Print what making the pictures of a frame takes on its thread, step by step, of all four views together."""
     session = load_session(folder)
     rng, spent = np.random.default_rng(7), {"decode": 0.0, "undistort": 0.0, "JPEG": 0.0}
-    ways = [MatchedView(c.camera, 1 / REDUCTION, cv2.BORDER_CONSTANT) for c in session.cameras]
+    ways = [WorkingView(c.camera, 1 / REDUCTION, cv2.BORDER_CONSTANT) for c in session.cameras]
     with Recording(session.cameras) as recording:
         for k in rng.integers(0, recording.n_frames, n):
             for i, source in enumerate(session.cameras):

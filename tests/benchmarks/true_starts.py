@@ -41,4 +41,4 @@ def start_of(model: BodyModel, reference: MarkerTable) -> Array:
     """The pose fitted to the limb joints of frame 0, (n_values,)."""
     row = reference.points[np.flatnonzero(reference.frames == 0)[0]]
     places = dict(zip(reference.names, row, strict=True))
-    return fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).values
+    return fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).pose

@@ -16,10 +16,10 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 from scripted_user import LIMBS, TRUNK, ScriptedUser
 
 from tracker.body.model import PosedBody
-from tracker.contours.part_edges import points_hidden
+from tracker.contours.part_edges import points_occluded
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
-from tracker.posing.default_pose import standing_pose
+from tracker.posing.default_pose import default_pose
 from tracker.posing.drag import drag, grab
 from tracker.session.session import load_session
 
@@ -59,7 +59,7 @@ def views_of(cameras, truths, person):
     points = dict(zip(model.point_names, model.points_world(values), strict=True))
     views = {}
     for name in LIMBS:
-        hidden = points_hidden(truths, cameras, points[name][None])[:, 0]
+        hidden = points_occluded(truths, cameras, points[name][None])[:, 0]
         rays = [(points[name] - camera.center_world) for camera in cameras]
         rays = [ray / np.linalg.norm(ray) for ray in rays]
         pairs = [(a, b) for a in range(len(cameras)) for b in range(a)]
@@ -72,7 +72,7 @@ def views_of(cameras, truths, person):
 def placed(user, cameras, views):
     """The pose after all drags."""
     model = user.model
-    values = standing_pose(model, cameras)
+    values = default_pose(model, cameras)
     for _ in range(2):
         values = trunk_moved(user, cameras, values)
         values = slid(user, values, "torso.twist", TRUNK)

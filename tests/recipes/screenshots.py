@@ -29,7 +29,7 @@ from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import Session, load_session, save_session
-from tracker.simulate.record import simulate
+from tracker.simulate.record import Simulation, simulate
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
 
@@ -90,7 +90,7 @@ async def layers(page: Page) -> None:
 async def searching(page: Page) -> None:
     """A search at a speed for watching."""
     await page.keyboard.press("b")
-    await page.select_option("select[aria-label='Expansions a second']", index=1)
+    await page.select_option("select[aria-label='Expansions per second']", index=1)
     await page.keyboard.press("f")
     await shows(page, "quadrille.state.state.job.evaluations > 50", 60)
 
@@ -198,7 +198,7 @@ def make_sessions(folder: Path, wanted: set[str]) -> dict[str, Path]:
     made = {name: folder / name for name in wanted}
     for name, at in made.items():
         if name == "eight":
-            simulate(at, "exercise", n_cameras=8, n_frames=4, size=(320, 240))
+            simulate(at, Simulation("exercise", n_cameras=8, n_frames=4, size=(320, 240)))
         else:
             shutil.copytree(SAMPLES / ("tango" if name == "tango" else "elbow_rotation"), at)
         session = load_session(at)
@@ -219,7 +219,7 @@ def place(session: Session, near: bool) -> None:
             values = read_pose_table(session.folder / f"first_pose_{person.name}.csv").values_for(model)[0]
         else:
             places = dict(zip(joints.names, joints.points[0], strict=True))
-            values = fit_to_points(model, {n: p for n, p in places.items() if n in model.point_names}).values
+            values = fit_to_points(model, {n: p for n, p in places.items() if n in model.point_names}).pose
         if near:
             values = model.retract(values, np.where(np.arange(model.n_dofs) >= 6, 0.12, 0.02))
             values = model.clip(values)

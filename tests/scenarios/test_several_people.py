@@ -8,12 +8,12 @@ from staging import at, cameras_around, filmed, own_evidence, posed, solid
 from tracking_runs import track
 
 from tracker.body.model import PosedBody
-from tracker.fitting.gauss_newton import solve
 from tracker.motion.prediction import PredictSettings
-from tracker.tracking.chamfer.frame_estimator import Scene
+from tracker.tracking.chamfer.frame_estimator import FrameEstimator
+from tracker.tracking.chamfer.frame_problem import FrameProblem
 from tracker.tracking.chamfer.limb_recovery import search_limbs
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.person_memory import Memory
+from tracker.tracking.person_memory import PersonMemory
 
 N_FRAMES = 3
 APART_M = 1.0
@@ -48,6 +48,12 @@ def test_people_a_metre_apart_stay_who_they_are(gavrila, n):
     assert all(o == () for o in found[-1].alternatives)
 
 
+def estimator_of(model, views, expected, settings):
+    """Of several people who have not been seen before."""
+    memories = [PersonMemory(model, v, alone=False) for v in expected]
+    return FrameEstimator(views, memories, [PosedBody(model, v) for v in expected], settings)
+
+
 @pytest.mark.parametrize(("off_m", "solves"), [(0.0, 2), (0.05, 4)])
 def test_people_are_refined_again_only_where_others_moved(monkeypatch, off_m, solves):
     """Two at rest, each refined once; where the second is found 5 cm off, both once more with it where it stands."""
@@ -57,14 +63,12 @@ def test_people_are_refined_again_only_where_others_moved(monkeypatch, off_m, so
     views = own_evidence([at(ball, *v[:3]) for v in values], cameras)
     expected = values.copy()
     expected[1, 0] += off_m
-    monkeypatch.setattr(
-        "tracker.tracking.chamfer.frame_estimator.solve", lambda *a, **k: done.append(a) or solve(*a, **k)
-    )
-    scene = Scene(
-        views, [Memory(ball, v, alone=False) for v in expected], expected, TrackSettings(recover=None, rounds=5)
-    )
-    scene.estimate([0, 1])
-    np.testing.assert_allclose(np.array(scene.poses)[:, :3], values[:, :3], atol=0.005)
+    solve = FrameProblem.solve
+    monkeypatch.setattr(FrameProblem, "solve", lambda *a, **k: done.append(a) or solve(*a, **k))
+    estimator = estimator_of(ball, views, expected, TrackSettings(recover=None, rounds=5))
+    estimator.estimate([0, 1])
+    found = np.array([b.values for b in estimator.bodies])
+    np.testing.assert_allclose(found[:, :3], values[:, :3], atol=0.005)
     assert len(done) == solves
 
 
@@ -78,12 +82,9 @@ def test_nothing_depends_on_who_is_done_first(gavrila, monkeypatch):
     searched = []
 
     def poses():
-        memories = [Memory(gavrila, v, alone=False) for v in expected]
-        scene = Scene(views, memories, expected, TrackSettings())
-        found = scene.estimate([0, 1])
-        for person, memory in enumerate(memories):
-            memory.update(scene.poses[person], scene.colors(person), found[person].status, given=False)
-        return np.array([*scene.poses, *(found[p].covariance.sum(axis=1) for p in (0, 1))])
+        estimator = estimator_of(gavrila, views, expected, TrackSettings())
+        found = estimator.estimate([0, 1])
+        return np.array([*(b.values for b in estimator.bodies), *(found[p].covariance.sum(axis=1) for p in (0, 1))])
 
     monkeypatch.setattr(
         "tracker.tracking.chamfer.frame_estimator.search_limbs", lambda *a: searched.append(a) or search_limbs(*a)
@@ -91,5 +92,5 @@ def test_nothing_depends_on_who_is_done_first(gavrila, monkeypatch):
     usual = poses()
     assert len(searched) == 2
     one_by_one = lambda work, items: [work(x) for x in items[::-1]][::-1]  # noqa: E731
-    monkeypatch.setattr("tracker.tracking.chamfer.frame_estimator.side_by_side", one_by_one)
+    monkeypatch.setattr("tracker.tracking.chamfer.frame_estimator.map_parallel", one_by_one)
     np.testing.assert_array_equal(poses(), usual)

@@ -40,7 +40,7 @@ def without_ties(views, bodies, settings, theta_px):
     out = []
     for view in views:
         seen = occluding_contours.trace(bodies, view.camera)
-        squared = np.sort(squared_distances(view, seen.pieces_px[~seen.hidden].astype(float), settings, theta_px)[0])
+        squared = np.sort(squared_distances(view, seen.pieces_px[~seen.occluded].astype(float), settings, theta_px)[0])
         clear = squared[:, 1] - squared[:, 0] > 1e-3 if squared.shape[1] > 1 else np.ones(len(squared), bool)
         out.append(replace(view, points_px=view.points_px[clear], normals=view.normals[clear]))
     return out
@@ -71,7 +71,7 @@ class MatchOracle:
             if not len(view.points_px):
                 continue
             seen = occluding_contours.trace(bodies, view.camera)
-            seen = occluding_contours.Contour(*(a[~seen.hidden].astype(float) for a in seen))
+            seen = occluding_contours.Contour(*(a[~seen.occluded].astype(float) for a in seen))
             own = (seen.parts >= first) & (seen.parts < first + len(T))
             ends = seen.pieces_px.reshape(-1, 2, 2)
             steps = ends[:, 1] - ends[:, 0]

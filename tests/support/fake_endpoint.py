@@ -65,7 +65,7 @@ PLOTS = {
     "torso": [("Angles", "deg", ANGLES[:3]), ("Position", "cm", ("x", "y", "z"))],
     "cost": [("Cost", "px", ("mean", *CAMERA_NAMES))],
 }
-REMARK = "left arm searched anew"
+REMARK = "left arm relocated"
 
 
 def encoded(message):

@@ -22,7 +22,7 @@ def pixel_of(controller, point, camera=FRONT, person=0):
 
 def drag(controller, point, by, camera=FRONT, person=0):
     start = pixel_of(controller, point, camera, person)
-    controller.hand.begin_drag(PAGE, camera, person, point, tuple(start))
+    controller.dragging.begin(PAGE, camera, person, point, tuple(start))
     for t in (0.5, 1.0):
-        controller.hand.move_drag(PAGE, tuple(start + t * np.array(by)), int(10 * t))
-    controller.hand.end_drag(PAGE)
+        controller.dragging.move(PAGE, tuple(start + t * np.array(by)), int(10 * t))
+    controller.dragging.end(PAGE)

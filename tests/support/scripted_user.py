@@ -29,7 +29,7 @@ class ScriptedUser:
         """Where the user finds the body: 40 cm and 30 degrees from where it belongs, upright, the arms down."""
         model, rng = self.model, self._rng
         known = {n: p for n, p in self._places.items() if n in model.point_names}
-        there = fit_to_points(model, known).values
+        there = fit_to_points(model, known).pose
         values = model.neutral()
         values[:6] = there[:6]
         way = rng.uniform(0, 2 * np.pi)

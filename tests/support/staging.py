@@ -9,11 +9,12 @@ from scipy.spatial import cKDTree
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.observer import Observer
-from tracker.evidence.view_evidence import view_evidence
+from tracker.evidence.view_evidence import RegionFeatures, select_evidence
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import parse_model
 from tracker.geometry.cameras import Camera
 from tracker.geometry.triangulation import PointObservation
+from tracker.images.edge_segments import link_edges
 
 SIZE = (640, 480)
 
@@ -68,21 +69,31 @@ def edge_map(bodies, camera):
     seen = occluding_contours.trace(bodies, camera)
     image = np.zeros((camera.height, camera.width), np.uint8)
     # Without the shift cv2.line would round the ends: half a pixel is much for what is measured here.
-    ends = np.round(seen.pieces_px[~seen.hidden] * 16).astype(int)
+    ends = np.round(seen.pieces_px[~seen.occluded] * 16).astype(int)
     for x0, y0, x1, y1 in ends:
         cv2.line(image, (x0, y0), (x1, y1), 255, shift=4)
     return image > 0
 
 
+def view_evidence(
+    camera, edge_map, gradients=None, corner_px=(0, 0), image_size=None, predicted_px=None, static_edges=None
+):
+    """Evidence at scale 1 from an edge map, (H, W); without gradients, (2, H, W), edges have no directions."""
+    found = edge_map.view(np.uint8)
+    segments = None if gradients is None else link_edges(found, gradients)
+    features = RegionFeatures(camera, 1.0, corner_px, image_size, found, segments)
+    return select_evidence(features, predicted_px, static_edges)
+
+
 def own_evidence(bodies, cameras):
     """Evidence that shows the visible contours of bodies and nothing else; edges run as the contours do."""
-    return tuple(_across(view_evidence(c, 1.0, edge_map(bodies, c)), bodies) for c in cameras)
+    return tuple(_across(view_evidence(c, edge_map(bodies, c)), bodies) for c in cameras)
 
 
 def _across(view, bodies):
     """The same view, the normal of each edge point across the piece of contour that it was drawn from."""
     seen = occluding_contours.trace(bodies, view.camera)
-    pieces = seen.pieces_px[~seen.hidden]
+    pieces = seen.pieces_px[~seen.occluded]
     if not len(pieces) or not len(view.points_px):
         return view
     steps = pieces[:, 2:] - pieces[:, :2]
@@ -178,13 +189,13 @@ class Shown:
 
     def __init__(self, views):
         self.views, self.asked = views, []
-        self.matched_cameras = [v.camera for v in views[0]]
+        self.working_cameras = [v.camera for v in views[0]]
 
-    def prefetch(self, k, regions=None, still=False):
+    def prefetch(self, k, regions=None, with_static_edges=False):
         pass
 
-    def evidence(self, k, regions, outlines=None, scenery=None):
-        assert len(regions) == len(self.matched_cameras)
+    def evidence(self, k, regions, outlines=None, static_edges=None):
+        assert len(regions) == len(self.working_cameras)
         self.asked.append(k)
         return self.views[k]
 

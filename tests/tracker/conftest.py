@@ -11,7 +11,6 @@ from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
-from tracker.formats.model_toml import load_model
 from tracker.geometry.arrays import Array
 from tracker.session.session import load_session
 
@@ -31,15 +30,10 @@ def sample_folder():
 
 
 @pytest.fixture(scope="session")
-def gavrila():
-    return load_model("gavrila22")
-
-
-@pytest.fixture(scope="session")
 def real_frame(sample_folder):
     session = load_session(sample_folder)
     with Recording(session.cameras) as recording:
         views = Observer(session.cameras, recording).evidence(25)
     joints = read_joints(sample_folder / "truth.trc", session.fps)
     model = session.people[0].model
-    return RealFrame(model, fit_to_points(model, dict(zip(joints.names, joints.points[25], strict=True))).values, views)
+    return RealFrame(model, fit_to_points(model, dict(zip(joints.names, joints.points[25], strict=True))).pose, views)

@@ -1,1 +1,4 @@
-"""Sizes of a body from data. Today from known joints; to come from contours, from voxels, over many frames."""
+"""Dimensions of a body from data: from known joints.
+
+Imports `geometry`, `body` and `formats`. Callers use `from_joints.fit_sizes`.
+"""

@@ -1,4 +1,4 @@
-"""Body sizes from known joints: segment lengths measured over a recording, shapes stretched along with them."""
+"""Measure a body's dimensions from known joints: segment lengths over a recording, shapes stretched along with them."""
 
 from dataclasses import replace
 
@@ -13,21 +13,21 @@ from tracker.geometry.arrays import Array
 _SIDES = ("left", "right")
 _SEGMENTS = (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
 _CREDIBLE = (0.6, 1.6)
-"""A segment this much shorter or longer than the model's is a mistake in the joints, not a body."""
+"""A measured segment outside this range of the model's length is an error in the joints."""
 
 
 def fit_sizes(model: BodyModel, joints: MarkerTable) -> BodyModel:
-    """Give a body the segment lengths of measured joints; girths stay, both sides come out alike.
+    """Give a body the segment lengths of measured joints; girths stay, and both sides become equal.
 
-    The length of a limb's segment is the median over the frames and both sides; so are the widths of shoulders and
-    hips and the distance between their middles, by which the trunk is stretched. Parts stretch along their segment.
+    The length of a limb's segment is the median over the frames and both sides. So are the widths of shoulders and
+    hips, and the distance between their middles, which sets the length of the trunk. Parts stretch along their segment.
 
     Args:
         model: the body to start from.
-        joints: joints under our names, metres.
+        joints: joints under the project's names, metres.
 
     Raises:
-        TrackerError: the joints lack a segment, or measure one that no body has.
+        TrackerError: the joints lack a segment, or give one an impossible length.
     """
     part_of = {m.name: m.part for m in model.landmarks} | {j.name: j.parent for j in model.joints}
     ends = _rest_points(model)

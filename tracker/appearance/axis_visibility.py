@@ -28,7 +28,7 @@ def unit_balls(shapes: Array) -> Array:
 
 
 @njit(**BORROW)
-def place_before(eye: Array, T: Array, shape: Array, sight: Array) -> None:
+def ray_transform(eye: Array, T: Array, shape: Array, ray: Array) -> None:
     """Fill what lines of sight ask of a part, (13,): what turns directions into the coordinates in which the part is
     the unit ball, the eye in these, and the square of its distance from the ball."""
     C = -1.0
@@ -36,33 +36,33 @@ def place_before(eye: Array, T: Array, shape: Array, sight: Array) -> None:
         o = -shape[i]
         for k in range(3):
             o += T[k, i] * (eye[k] - T[k, 3])
-            sight[3 * i + k] = T[k, i] / shape[3 + i]
+            ray[3 * i + k] = T[k, i] / shape[3 + i]
         o /= shape[3 + i]
-        sight[9 + i] = o
+        ray[9 + i] = o
         C += o * o
-    sight[12] = C
+    ray[12] = C
 
 
 @njit(**BORROW)
-def hides(sight: Array, x: float, y: float, z: float) -> bool:
+def occludes(ray: Array, x: float, y: float, z: float) -> bool:
     """Whether a part lies before a point, which is at (x, y, z) from the eye: the middle of the chord that the line of
     sight shares with it is nearer than the point."""
-    d0 = sight[0] * x + sight[1] * y + sight[2] * z
-    d1 = sight[3] * x + sight[4] * y + sight[5] * z
-    d2 = sight[6] * x + sight[7] * y + sight[8] * z
+    d0 = ray[0] * x + ray[1] * y + ray[2] * z
+    d1 = ray[3] * x + ray[4] * y + ray[5] * z
+    d2 = ray[6] * x + ray[7] * y + ray[8] * z
     A = d0 * d0 + d1 * d1 + d2 * d2
-    B = sight[9] * d0 + sight[10] * d1 + sight[11] * d2
-    return B < 0.0 and -B < A and B * B - A * sight[12] > 0.0
+    B = ray[9] * d0 + ray[10] * d1 + ray[11] * d2
+    return B < 0.0 and -B < A and B * B - A * ray[12] > 0.0
 
 
 @njit(**BORROW)
-def along_axis(shape: Array, sample: int) -> float:
+def axis_sample(shape: Array, sample: int) -> float:
     """Place of a sample along the axis of a part, from its centre, metres."""
     return shape[5] * 0.8 * (2.0 * sample / (ALONG - 1) - 1.0)
 
 
 @njit(**BORROW)
-def see_axis(P: Array, eye: Array, T: Array, shape: Array, axis: Array) -> None:
+def project_axis(P: Array, eye: Array, T: Array, shape: Array, axis: Array) -> None:
     """Fill where the axis of a part is from the eye and in the image, (4, 3): its centre from the eye, metres; its
     centre, the change for a metre along the axis and for a metre across axis and sight in homogeneous pixels."""
     for i in range(3):
@@ -78,24 +78,24 @@ def see_axis(P: Array, eye: Array, T: Array, shape: Array, axis: Array) -> None:
 
 
 @njit(**BORROW)
-def hidden(
-    T: Array, axis: Array, along_m: float, own: int, sights: Array, among: NDArray[np.int64], n_among: int
+def is_occluded(
+    T: Array, axis: Array, along_m: float, own: int, rays: Array, among: NDArray[np.int64], n_among: int
 ) -> bool:
     """Whether another part lies before a place along the axis of one.
 
     Args:
         T: pose of the part, (4, 4), metres.
-        axis: see `see_axis`.
+        axis: see `project_axis`.
         along_m: from the centre of the part, metres.
         own: index of the part.
-        sights: of all parts, see `place_before`, (P, 13).
+        rays: of all parts, see `ray_transform`, (P, 13).
         among: indices of the parts that may hide it, (room,).
         n_among: their number.
     """
     x, y, z = axis[0, 0] + along_m * T[0, 2], axis[0, 1] + along_m * T[1, 2], axis[0, 2] + along_m * T[2, 2]
     for i in range(n_among):
         p = among[i]
-        if p != own and hides(sights[p], x, y, z):
+        if p != own and occludes(rays[p], x, y, z):
             return True
     return False
 
@@ -103,7 +103,7 @@ def hidden(
 @njit(**BORROW)
 def pixel_on_axis(axis: Array, along_m: float) -> tuple[float, float, float, float]:
     """Where a place along the axis of a part is in an image, px, and how that changes to the side, px per metre; see
-    `see_axis`. So near the axis the image is as good as linear."""
+    `project_axis`. So near the axis the image is as good as linear."""
     near = 1.0 / (axis[1, 2] + along_m * axis[2, 2])
     u = (axis[1, 0] + along_m * axis[2, 0]) * near
     v = (axis[1, 1] + along_m * axis[2, 1]) * near

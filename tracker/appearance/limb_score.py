@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from tracker.appearance.axis_visibility import (
     ALONG,
-    along_axis,
-    hidden,
+    axis_sample,
+    is_occluded,
     pixel_on_axis,
-    place_before,
-    see_axis,
+    project_axis,
+    ray_transform,
 )
 from tracker.body.kinematics import Kinematics, chain_poses
 from tracker.body.model import BodyModel
@@ -28,7 +28,7 @@ from tracker.geometry.cameras import NEAR_PLANE_M
 from tracker.images.color_histogram import BINS, bin_of
 
 _STEP_PX = 2
-"""Size of a cell, matched px."""
+"""Size of a cell, working px."""
 _BESIDE_PX = 3.0
 """Room about all places that the limb may reach, px."""
 _OPEN = -1
@@ -43,18 +43,18 @@ class ColorView(NamedTuple):
     """What a look is told of one view."""
 
     P: Array
-    """Projection matrix of matched pixels, (3, 4)."""
+    """Projection matrix of working pixels, (3, 4)."""
     eye: Array
     """Centre of the camera in the world, (3,), metres."""
     image: Image
     """Colours, (H, W, 3)."""
     distance: FloatArray
-    """Distance to the nearest edge, (H, W), matched px."""
+    """Distance to the nearest edge, (H, W), working px."""
     theta_px: float
-    """Outlier distance, matched px."""
+    """Outlier distance, working px."""
 
 
-class Standing(NamedTuple):
+class StaticParts(NamedTuple):
     """Whatever may hide a limb or be seen without it."""
 
     Ts_world_unit: Array
@@ -74,11 +74,11 @@ class _Backdrop(NamedTuple):
     """Pixel at the middle of the first cell, u and v, (2,)."""
 
 
-class LimbLook:
+class LimbScorer:
     """A look at one limb of a body that stands still otherwise: prepared once, asked of many poses."""
 
     def __init__(
-        self, views: Sequence[ColorView], model: BodyModel, rest: Kinematics, limb: IntArray, standing: Standing,
+        self, views: Sequence[ColorView], model: BodyModel, rest: Kinematics, limb: IntArray, standing: StaticParts,
         shapes: Array, log_ratios: Array | None,
     ) -> None:  # fmt: skip
         """Draw what stands.
@@ -124,7 +124,7 @@ def _reach(model: BodyModel, limb: IntArray, shapes: Array) -> float:
     return float((np.cumsum(lengths) + np.linalg.norm(shapes[:, :3], axis=1) + shapes[:, 5]).max())
 
 
-def _backdrop(view: ColorView, standing: Standing, root: Array, reach: float) -> _Backdrop:
+def _backdrop(view: ColorView, standing: StaticParts, root: Array, reach: float) -> _Backdrop:
     """Draw what stands within reach, metres, of a place, (3,)."""
     bounds, ball = np.empty(4), np.diag([reach, reach, reach, 1.0])
     ball[:3, 3] = root
@@ -153,7 +153,7 @@ def _draw(
         to_px: from the coordinates in which each part is the unit ball to homogeneous pixels, (S, 3, 4).
         rays: from pixels to directions of depth 1 in these coordinates, (S, 3, 3).
         eyes: the eye in them, (S, 3).
-        own: owners of the parts, see `Standing`.
+        own: owners of the parts, see `StaticParts`.
         corner: see `_Backdrop`.
         depths: what is filled, see `_Backdrop`.
         owners: the same.
@@ -214,7 +214,7 @@ def _touch(to_px: Array, i: int, j: int) -> float:
 def _look_along(
     P: Array, eye: Array, image: Image, distance: FloatArray, theta_px: float,
     depths: NDArray[np.float32], owners: NDArray[np.int16], corner: IntArray,
-    Ts: Array, shapes: Array, limb: IntArray, ratios: Array, all_parts: IntArray, sights: Array,
+    Ts: Array, shapes: Array, limb: IntArray, ratios: Array, all_parts: IntArray, rays: Array,
     axis: Array, nats: Array,
 ) -> None:  # fmt: skip
     """Fill what one view says of the limb in each pose, (C,).
@@ -233,20 +233,20 @@ def _look_along(
         limb: their indices, (n,).
         ratios: log ratios of all parts of the body.
         all_parts: 0 to n - 1, (n,).
-        sights: room, (n, 13).
+        rays: room, (n, 13).
         axis: room, (4, 3).
         nats: what is filled.
     """
     for c in range(Ts.shape[0]):
         for i in range(limb.shape[0]):
-            place_before(eye, Ts[c, i], shapes[i], sights[i])
+            ray_transform(eye, Ts[c, i], shapes[i], rays[i])
         total = 0.0
         for i in range(limb.shape[0]):
-            see_axis(P, eye, Ts[c, i], shapes[i], axis)
+            project_axis(P, eye, Ts[c, i], shapes[i], axis)
             for sample in range(ALONG):
-                z = along_axis(shapes[i], sample)
+                z = axis_sample(shapes[i], sample)
                 depth = axis[1, 2] + z * axis[2, 2]
-                if depth < NEAR_PLANE_M or hidden(Ts[c, i], axis, z, i, sights, all_parts, limb.shape[0]):
+                if depth < NEAR_PLANE_M or is_occluded(Ts[c, i], axis, z, i, rays, all_parts, limb.shape[0]):
                     continue
                 behind = _OPEN
                 u, v, du, dv = pixel_on_axis(axis, z)

@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 
 from tracker.appearance.axis_visibility import (
     ALONG,
-    along_axis,
+    axis_sample,
     ellipsoids,
-    hidden,
+    is_occluded,
     pixel_on_axis,
-    place_before,
-    see_axis,
+    project_axis,
+    ray_transform,
     unit_balls,
 )
-from tracker.appearance.limb_score import ColorView, LimbLook, Standing
+from tracker.appearance.limb_score import ColorView, LimbScorer, StaticParts
 from tracker.body.kinematics import Kinematics, chain_poses
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.numba_options import BORROW
@@ -148,9 +148,9 @@ class Colors:
             _add_nats(v.P, v.eye, v.image, Ts, placed, first, self._shapes, ratios, found, *room, nats)
         return nats
 
-    def look(
+    def limb_scorer(
         self, values: Array, limb: NDArray[np.int64], known: PartColors | None, away: Sequence[int] = ()
-    ) -> LimbLook:
+    ) -> LimbScorer:
         """Prepare a quick look at one limb in many poses.
 
         Args:
@@ -164,9 +164,9 @@ class Colors:
         owners = np.full(len(self._shapes), -1)
         owners[self._own] = np.arange(len(model.parts))
         standing = ~np.isin(owners, [*limb, *away])
-        return LimbLook(
+        return LimbScorer(
             self._views, model, rest, limb,
-            Standing(self._Ts(rest)[standing] @ unit_balls(self._shapes[standing]), owners[standing]),
+            StaticParts(self._Ts(rest)[standing] @ unit_balls(self._shapes[standing]), owners[standing]),
             self._shapes[self._own], None if known is None else known.log_ratios,
         )  # fmt: skip
 
@@ -229,7 +229,7 @@ def _twins(model: BodyModel) -> NDArray[np.int64]:
 @njit(**BORROW)
 def _add_nats(
     P: Array, eye: Array, image: Image, Ts: Array, placed: Array, first: int, shapes: Array, log_ratios: Array,
-    found: NDArray[np.int64], sights: Array, cones: Array, near: NDArray[np.int64], axis: Array, nats: Array,
+    found: NDArray[np.int64], rays: Array, cones: Array, near: NDArray[np.int64], axis: Array, nats: Array,
 ) -> None:  # fmt: skip
     """Add what one view says of many poses, (C,), of the parts from first on, (C, n, 4, 4); see `_look`."""
     last = first + placed.shape[1]
@@ -238,14 +238,14 @@ def _add_nats(
             for i in range(3):
                 for k in range(4):
                     Ts[first + part, i, k] = placed[c, part, i, k]
-        for i in range(_look(P, eye, Ts, shapes, first, last, image, found, sights, cones, near, axis)):
+        for i in range(_look(P, eye, Ts, shapes, first, last, image, found, rays, cones, near, axis)):
             nats[c] += log_ratios[found[i, 0], found[i, 1]]
 
 
 @njit(**BORROW)
 def _look(
     P: Array, eye: Array, Ts: Array, shapes: Array, first: int, last: int, image: Image, out: NDArray[np.int64],
-    sights: Array, cones: Array, near: NDArray[np.int64], axis: Array,
+    rays: Array, cones: Array, near: NDArray[np.int64], axis: Array,
 ) -> int:  # fmt: skip
     """List part and colour of the visible samples of the parts from first to last in one view; their number.
 
@@ -258,23 +258,23 @@ def _look(
         last: index after the last.
         image: colours, (H, W, 3).
         out: part and colour of each sample, (room, 3); its last column is left alone.
-        sights: room, (P, 13).
+        rays: room, (P, 13).
         cones: room, (P, 4).
         near: room, (P,).
         axis: room, (4, 3).
     """
     height, width = image.shape[0], image.shape[1]
     for p in range(Ts.shape[0]):
-        place_before(eye, Ts[p], shapes[p], sights[p])
+        ray_transform(eye, Ts[p], shapes[p], rays[p])
         _cone(eye, Ts[p], shapes[p], cones[p])
     n = 0
     for part in range(first, last):
         radius = 0.45 * min(shapes[part, 3], shapes[part, 4])
-        n_near = _in_the_way(part, cones, near)
-        see_axis(P, eye, Ts[part], shapes[part], axis)
+        n_near = _possible_occluders(part, cones, near)
+        project_axis(P, eye, Ts[part], shapes[part], axis)
         for a in range(ALONG):
-            z = along_axis(shapes[part], a)
-            if axis[1, 2] + z * axis[2, 2] < NEAR_PLANE_M or hidden(Ts[part], axis, z, part, sights, near, n_near):
+            z = axis_sample(shapes[part], a)
+            if axis[1, 2] + z * axis[2, 2] < NEAR_PLANE_M or is_occluded(Ts[part], axis, z, part, rays, near, n_near):
                 continue
             u, v, du, dv = pixel_on_axis(axis, z)
             for s in range(_ACROSS):
@@ -300,7 +300,7 @@ def _cone(eye: Array, T: Array, shape: Array, cone: Array) -> None:
 
 
 @njit(**BORROW)
-def _in_the_way(part: int, cones: Array, near: NDArray[np.int64]) -> int:
+def _possible_occluders(part: int, cones: Array, near: NDArray[np.int64]) -> int:
     """List the parts that may hide some of a part; their number."""
     n = 0
     for p in range(cones.shape[0]):

@@ -1,1 +1,5 @@
-"""The articulated body: what it is made of, where a pose puts it, how large it is, which chains are limbs."""
+"""The articulated body: its parts and joints, forward kinematics, dimensions, limbs.
+
+Imports `compute` and `geometry`. Callers use `model.BodyModel` and `PosedBody`, the schema in `parts`, `dimensions`,
+`limbs`, and the kernels of `kinematics`.
+"""

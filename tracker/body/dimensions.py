@@ -1,7 +1,7 @@
-"""The sizes of a body as people measure and enter them: lengths and girths of its parts, the width of its hips.
+"""Dimensions of a body as people measure and enter them: lengths and girths of its parts, widths of shoulders and hips.
 
-A part has a main axis, along which the joints and landmarks on it lie farthest apart: its length is that distance, and
-with it everything on the part is stretched. Across it are two half girths, at the middle of the part's shape.
+A part's main axis is the one along which its joints and landmarks lie farthest apart. Their distance is the part's
+length; a new length stretches everything on the part. Across the axis are two half girths, at the middle of the shape.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,36 +16,36 @@ from tracker.body.parts import Joint, Landmark, Part
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 
-_LEAST_HEIGHT_M, _MOST_HEIGHT_M = 0.3, 3.0
-_LEAST_M, _MOST_SHARE = 0.005, 0.7
-"""Shortest size of a part, metres; longest, as a share of the body's height."""
+_MIN_HEIGHT_M, _MAX_HEIGHT_M = 0.3, 3.0
+_MIN_M, _MAX_SHARE = 0.005, 0.7
+"""Shortest dimension of a part, metres; longest, as a share of the body's height."""
 _SIDES = ("left_", "right_")
 _WIDTHS = ("shoulder", "hip")
-"""Joints, one on each side, whose distance is a size of its own where one part carries both."""
+"""Pairs of joints, left and right, whose distance is a dimension of its own if one part carries both."""
 
 
 class PartDimensions(NamedTuple):
-    """The sizes of one part."""
+    """The dimensions of one part."""
 
     length_m: float
-    """Between the joints and landmarks on it, or from its joint, metres."""
+    """Distance between the joints and landmarks on it, or from its own joint, metres."""
     girths_m: tuple[float, float]
-    """Half its thickness across, front to back and side to side (up and down where it lies across), metres."""
+    """Half its thickness across, front to back and side to side (up and down for a part that lies across), metres."""
 
 
 class BodyDimensions(NamedTuple):
-    """The sizes of a body."""
+    """The dimensions of a body."""
 
     height_m: float
-    """By which everything is scaled, metres."""
+    """Body height, by which everything is scaled, metres."""
     parts: Mapping[str, PartDimensions]
-    """By name of the part."""
+    """Dimensions of each part by name."""
     widths_m: Mapping[str, float]
-    """Distance of the two shoulders, or hips, by name (`hip`), where one part carries both, metres."""
+    """Distance of the two shoulders or hips by name (`hip`), if one part carries both, metres."""
 
 
-def sizes_of(model: BodyModel) -> BodyDimensions:
-    """Measure a body."""
+def dimensions_of(model: BodyModel) -> BodyDimensions:
+    """Measure the dimensions of a body."""
     parts = {}
     for index, part in enumerate(model.parts):
         axis = _main_axis(model, index)
@@ -57,19 +57,19 @@ def sizes_of(model: BodyModel) -> BodyDimensions:
     )
 
 
-def with_sizes(model: BodyModel, sizes: BodyDimensions) -> BodyModel:
-    """The same body of other sizes.
+def with_dimensions(model: BodyModel, sizes: BodyDimensions) -> BodyModel:
+    """Return the same body with other dimensions.
 
     Args:
         model: the body.
-        sizes: all of them, as `sizes_of` gives them.
+        sizes: all dimensions, as `dimensions_of` returns them.
 
     Raises:
-        TrackerError: a size is no length that a body can have.
+        TrackerError: a dimension is not possible for a body.
     """
-    if not _LEAST_HEIGHT_M <= sizes.height_m <= _MOST_HEIGHT_M:
+    if not _MIN_HEIGHT_M <= sizes.height_m <= _MAX_HEIGHT_M:
         raise TrackerError(
-            f"expected a height of {_LEAST_HEIGHT_M * 100:g} to {_MOST_HEIGHT_M * 100:g} cm, "
+            f"expected a height of {_MIN_HEIGHT_M * 100:g} to {_MAX_HEIGHT_M * 100:g} cm, "
             f"found {sizes.height_m * 100:g}; enter the person's own"
         )
     stretch = np.ones((len(model.parts), 3))  # of each part along its axes
@@ -100,7 +100,7 @@ def with_sizes(model: BodyModel, sizes: BodyDimensions) -> BodyModel:
 
 
 def scaled(sizes: BodyDimensions, height_m: float) -> BodyDimensions:
-    """The same proportions at another height."""
+    """Return the same proportions at another height."""
     by = height_m / sizes.height_m
     parts = {
         n: PartDimensions(p.length_m * by, (p.girths_m[0] * by, p.girths_m[1] * by)) for n, p in sizes.parts.items()
@@ -109,7 +109,7 @@ def scaled(sizes: BodyDimensions, height_m: float) -> BodyDimensions:
 
 
 def mirror_part(name: str) -> str | None:
-    """Name of the part or joint on the other side; None for one in the middle."""
+    """Return the name of the part or joint on the other side; None for one in the middle."""
     for own, other in (_SIDES, _SIDES[::-1]):
         if name.startswith(own):
             return other + name.removeprefix(own)
@@ -117,17 +117,17 @@ def mirror_part(name: str) -> str | None:
 
 
 def _check(what: str, size_m: float, height_m: float) -> None:
-    if not (np.isfinite(size_m) and _LEAST_M <= size_m <= _MOST_SHARE * height_m):
+    if not (np.isfinite(size_m) and _MIN_M <= size_m <= _MAX_SHARE * height_m):
         raise TrackerError(
-            f"expected the {what} to be {_LEAST_M * 100:g} to {_MOST_SHARE * height_m * 100:.0f} cm, "
+            f"expected the {what} to be {_MIN_M * 100:g} to {_MAX_SHARE * height_m * 100:.0f} cm, "
             f"found {size_m * 100:g}; enter a length of a body {height_m * 100:.0f} cm tall"
         )
 
 
 def _ends(model: BodyModel, part: int) -> Array:
-    """What lies on a part in its frame, (n, 3), fractions of height: its own joint, and the joints and landmarks on it.
+    """Collect the points on a part in its frame, (n, 3), fractions of height: its joint, further joints, landmarks.
 
-    Of two that are one on each side it is what lies between them: how far they are apart is a width, no length.
+    A left and right pair counts as its midpoint, because the distance of the pair is a width and not a length.
     """
     name = model.parts[part].name
     on_it: Sequence[Joint | Landmark] = [
@@ -140,19 +140,19 @@ def _ends(model: BodyModel, part: int) -> Array:
 
 def _main_axis(model: BodyModel, part: int) -> int:
     extents = np.ptp(_ends(model, part), axis=0)
-    # A part that carries nothing is as long as its shape.
+    # A part without further points is as long as its shape.
     return int(np.argmax(extents if extents.max() > 1e-6 else model.parts[part].half_axes))
 
 
 def _length(model: BodyModel, part: int) -> float:
-    """Length of a part, fraction of height."""
+    """Return the length of a part, fraction of height."""
     axis = _main_axis(model, part)
     extent = float(np.ptp(_ends(model, part)[:, axis]))
     return extent if extent > 1e-6 else 2 * model.parts[part].half_axes[axis]
 
 
 def _girdles(model: BodyModel) -> list[str]:
-    """Those pairs of joints that one part carries, and whose distance is not its length."""
+    """List the pairs of joints on one part whose distance is not the part's length."""
     by_name = {j.name: j for j in model.joints}
     out = []
     for width in _WIDTHS:

@@ -1,4 +1,4 @@
-"""Where the parts of a joint tree are: the compiled kernel under `BodyModel.kinematics`."""
+"""Forward kinematics of a joint tree: the compiled kernels of `BodyModel.kinematics`."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from tracker.compute.numba_options import BORROW
 from tracker.geometry.arrays import Array, IntArray
 
 TRANSLATE, REVOLVE, BALL = 0, 1, 2
-"""What an operation of a joint does."""
+"""Kinds of operations of a joint."""
 
 
 class Tree(NamedTuple):
@@ -19,15 +19,15 @@ class Tree(NamedTuple):
     parents: IntArray
     """Index of each part's parent, -1 for the root, (n_parts,)."""
     offsets: Array
-    """Where each part's joint sits in its parent's frame, (n_parts, 3), metres."""
+    """Position of each part's joint in its parent's frame, (n_parts, 3), metres."""
     ops: IntArray
-    """What the joints do, in order: kind (translate, revolve, ball) and index of the joint, (n_ops, 2)."""
+    """Operations of the joints in order: kind (translate, revolve, ball) and index of the joint, (n_ops, 2)."""
     axes: Array
-    """Unit axis of each operation that revolves, (n_ops, 3)."""
+    """Unit axis of each operation of kind revolve, (n_ops, 3)."""
 
 
 class Kinematics(NamedTuple):
-    """Where a pose puts everything."""
+    """The poses of all parts, and the axes of all degrees of freedom."""
 
     Ts_world_part: Array
     """Part poses, (n_parts, 4, 4), metres."""
@@ -48,11 +48,11 @@ def forward_kinematics(values: Array, tree: Tree, Ts: Array, axes: Array, origin
 
 
 def chain_poses(tree: Tree, rest: Kinematics, chain: IntArray, poses: Array) -> Array:
-    """Place one chain of parts in many poses that differ in its joints alone; nothing else is computed anew.
+    """Place one chain of parts in many poses that differ only in its joints.
 
     Args:
         tree: the joint tree.
-        rest: where one of the poses, or another with the same rest, puts everything.
+        rest: kinematics of any pose that agrees with these outside the chain.
         chain: indices of the parts, each the child of the one before, (n,).
         poses: (C, n_values).
 
@@ -69,7 +69,7 @@ def chain_poses(tree: Tree, rest: Kinematics, chain: IntArray, poses: Array) -> 
 def _place_chain(
     poses: Array, tree: Tree, starts: IntArray, Ts: Array, unread: Array, chain: IntArray, out: Array
 ) -> None:
-    """Fill the poses of the parts of a chain; see `chain_poses`. Its rows of `Ts` (n_parts, 4, 4) are worked in."""
+    """Fill the poses of the parts of a chain; see `chain_poses`. Its rows of `Ts` (n_parts, 4, 4) are overwritten."""
     for c in range(poses.shape[0]):
         for i in range(chain.shape[0]):
             p = chain[i]
@@ -84,7 +84,7 @@ def _place_chain(
 
 @njit(nogil=True, cache=True)
 def _starts(tree: Tree) -> IntArray:
-    """The first operation, degree of freedom and value of each part's joint, (n_parts, 3)."""
+    """Return the first operation, degree of freedom and value of each part's joint, (n_parts, 3)."""
     out = np.zeros((tree.parents.shape[0], 3), np.int64)
     op, dof, value = 0, 0, 0
     for part in range(out.shape[0]):
@@ -102,10 +102,10 @@ def _place_part(  # noqa: C901
     part: int, op: int, dof: int, value: int, values: Array, parents: IntArray, offsets: Array, ops: IntArray,
     op_axes: Array, Ts: Array, axes: Array, origins: Array,
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Place a part whose parent stands, and the axes of its joint.
+    """Place a part whose parent is placed, and the axes of its joint.
 
     Args:
-        part: which.
+        part: index of the part.
         op: index of the first operation of its joint.
         dof: index of its first degree of freedom.
         value: index of its first value.
@@ -171,7 +171,7 @@ def _place_part(  # noqa: C901
 
 @njit(inline="always", **BORROW)
 def _turn(T: Array, w: float, x: float, y: float, z: float) -> None:
-    """Multiply the rotation of a pose (4, 4) with that of a unit quaternion, from the right."""
+    """Multiply the rotation of a pose (4, 4) from the right by the rotation of a unit quaternion."""
     xx, xy, xz = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
     yx, yy, yz = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
     zx, zy, zz = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)

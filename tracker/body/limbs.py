@@ -1,4 +1,4 @@
-"""The limbs of a body: chains of parts that are judged and searched as one."""
+"""The limbs of a body: chains of parts that are assessed and searched together."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from tracker.body.model import BodyModel
 
 
 class Limb(NamedTuple):
-    """A chain of parts that can be lost by itself."""
+    """A chain of parts that can be lost independently of the rest."""
 
     name: str
     """Name of its last part."""
@@ -22,7 +22,7 @@ class Limb(NamedTuple):
 
 @lru_cache(maxsize=32)
 def limbs(model: BodyModel) -> tuple[Limb, ...]:
-    """The chains from the leaves of the joint tree up to where it branches."""
+    """Return the chains from the leaves of the joint tree up to where it branches."""
     children = np.bincount(np.array(model.parents)[1:], minlength=len(model.parts))
     out = []
     for leaf in np.flatnonzero(children == 0):

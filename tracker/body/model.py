@@ -1,8 +1,8 @@
 """Articulated bodies: a tree of joints that carry parts, and the kinematics of a pose.
 
-A pose is a flat array of *values* (one per revolute axis or translation, four per ball joint: a unit quaternion
-w, x, y, z). Steps, Jacobians and limits live in the *degrees of freedom* (dofs), of which a ball joint has three:
-a rotation vector in the frame of its child part. Where a model has no ball joint, values and dofs coincide.
+A pose is a flat array of *values*: one per revolute axis or translation, four per ball joint (a unit quaternion
+w, x, y, z). Steps, Jacobians and limits are in *degrees of freedom* (dofs). A ball joint has three of them: a rotation
+vector in the frame of its child part. Without ball joints, values and dofs coincide.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ from tracker.geometry.shapes import Shape
 
 
 class _Ball(NamedTuple):
-    """A ball joint's place in the arrays of a pose."""
+    """The position of a ball joint in the arrays of a pose."""
 
     joint: Joint
     dofs: slice
@@ -124,7 +124,7 @@ class BodyModel:
 
     @cached_property
     def spreads(self) -> Array:
-        """Usual distance of each degree of freedom from 0, (n_dofs,), rad; infinite where nothing is known."""
+        """Standard deviation of each degree of freedom from 0, (n_dofs,), rad; infinite if unknown."""
         rows = []
         for j in self.joints:
             rows += [np.inf] * (len(j.dof_names) - len(j.axes)) + [a.spread for a in j.axes]
@@ -179,7 +179,7 @@ class BodyModel:
         )
 
     def neutral(self) -> Array:
-        """Values of the standing pose at the world's origin, arms hanging; angles are put within limits."""
+        """Return the values of the default pose: upright at the world's origin, arms hanging, angles within limits."""
         values = np.zeros(len(self.value_names))
         for i, name in enumerate(self.value_names):
             if name.endswith(".qw"):
@@ -187,25 +187,25 @@ class BodyModel:
         return self.clip(values)
 
     def kinematics(self, values: Array) -> Kinematics:
-        """Place the parts for the values of a pose, (n_values,)."""
+        """Compute the kinematics of a pose, (n_values,)."""
         n_parts, n_dofs = len(self.parts), self.n_dofs
         out = Kinematics(np.empty((n_parts, 4, 4)), np.empty((n_dofs, 3)), np.empty((n_dofs, 3)))
         forward_kinematics(np.asarray(values, dtype=np.float64), self.tree, *out)
         return out
 
     def points_world(self, values: Array) -> Array:
-        """Positions of the body's points (see `point_names`), (n_points, 3), metres."""
+        """Return the positions of the body's points (see `point_names`), (n_points, 3), metres."""
         return PosedBody(self, values).points_world
 
     def points_at(self, kinematics: Kinematics, points: IntArray) -> Array:
-        """Positions of some of the points, given by index (N,), where the parts are known, (N, 3), metres."""
+        """Return the positions of some points, given by index (N,), from known kinematics, (N, 3), metres."""
         T = kinematics.Ts_world_part[self.point_parts[points]]
         return np.einsum("nij,nj->ni", T[:, :3, :3], self.points_part[points]) + T[:, :3, 3]
 
     def point_jacobian(self, kinematics: Kinematics, parts: IntArray, points_world: Array) -> Array:
-        """Derivative of points fixed to parts by the degrees of freedom.
+        """Differentiate points fixed to parts by the degrees of freedom.
 
-        A rotation by axis a through o moves x at `a x (x - o)`, a translation at `a` (the columns of the
+        A rotation about axis a through o moves x at `a x (x - o)`, a translation at `a` (the columns of the
         geometric Jacobian; cf. KRH08 Eq. 24 with spatial twists).
 
         Args:
@@ -223,7 +223,7 @@ class BodyModel:
     def retract(self, values: Array, step: Array) -> Array:
         """Move a pose, (n_values,), by steps in its degrees of freedom, (..., n_dofs), to (..., n_values).
 
-        Angles and lengths add, balls turn.
+        Angles and lengths add; ball joints rotate.
         """
         out = np.empty((*step.shape[:-1], len(values)))
         out[:] = values
@@ -235,7 +235,7 @@ class BodyModel:
         return out
 
     def difference(self, values_to: Array, values_from: Array) -> Array:
-        """Step in the degrees of freedom, (n_dofs,), that `retract` needs from one pose to the other."""
+        """Return the step in the degrees of freedom, (n_dofs,), by which `retract` gets from one pose to the other."""
         to, start = np.asarray(values_to, dtype=np.float64), np.asarray(values_from, dtype=np.float64)
         step = np.empty(self.n_dofs)
         dofs, at = self._plain
@@ -246,7 +246,7 @@ class BodyModel:
         return step
 
     def clip(self, values: Array) -> Array:
-        """Put poses, (..., n_values), within the joint limits: angles to their range, balls to their cone and twist."""
+        """Clip poses, (..., n_values), to the joint limits: angles to a range, ball joints to a cone and a twist."""
         out = np.array(values, dtype=np.float64)
         low, high = self._plain_limits
         if not self._balls:  # then the values are the degrees of freedom
@@ -268,13 +268,13 @@ class BodyModel:
 
     @cached_property
     def _plain_limits(self) -> tuple[Array, Array]:
-        """The lower and upper limits of these."""
+        """Lower and upper limits of the degrees of freedom of `_plain`."""
         low, high = self.limits[self._plain[0]].T
         return low.copy(), high.copy()
 
     @cached_property
     def _balls(self) -> tuple["_Ball", ...]:
-        """Where the ball joints are in the degrees of freedom and in the values."""
+        """The positions of the ball joints in the degrees of freedom and in the values."""
         out = []
         for i, joint in enumerate(self.joints):
             if joint.kind == "ball":
@@ -286,7 +286,7 @@ class BodyModel:
 
 @dataclass(frozen=True, eq=False)
 class PosedBody:
-    """A body model in a pose. Everything that synthesizes, hides or scores takes a list of these."""
+    """A body model in a pose. Synthesis, occlusion and scoring take lists of these."""
 
     model: BodyModel
     values: Array
@@ -294,7 +294,7 @@ class PosedBody:
 
     @cached_property
     def kinematics(self) -> Kinematics:
-        """Where its parts are."""
+        """The poses of its parts."""
         return self.model.kinematics(self.values)
 
     @cached_property
@@ -304,6 +304,6 @@ class PosedBody:
 
 
 def parts_of(models: Sequence[BodyModel], person: int) -> slice:
-    """Which of everybody's parts, one body after the other, are one person's."""
+    """Return the slice of one person's parts among the parts of all people, concatenated."""
     first = sum(len(m.parts) for m in models[:person])
     return slice(first, first + len(models[person].parts))

@@ -1,4 +1,4 @@
-"""What a body is made of: joints, the parts that they carry, and named points on these."""
+"""The schema of a body: joints, the parts that they carry, and named points on the parts."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -17,15 +17,15 @@ class Axis:
     direction: tuple[float, float, float]
     """Unit axis in the joint's frame, after the rotations listed before it."""
     limits: tuple[float, float]
-    """Lowest and highest angle, rad; infinite where the angle may wind."""
+    """Lowest and highest angle, rad; infinite for an unlimited angle."""
     spread: float = np.inf
-    """How far people usually bend it from 0 (one standard deviation), rad; infinite where nothing is known. What the
-    image hardly shows, such as the bending of a trunk, a fit keeps near 0 by this."""
+    """Standard deviation of people's angles from 0, rad; infinite if unknown. The prior keeps a degree of freedom near
+    0 that the image hardly shows, such as the bending of a trunk."""
 
 
 @dataclass(frozen=True)
 class Joint:
-    """What moves a part against its parent."""
+    """The joint that moves a part relative to its parent."""
 
     name: str
     parent: str
@@ -33,7 +33,7 @@ class Joint:
     child: str
     """Name of the part that the joint moves; its frame sits at the joint."""
     position: tuple[float, float, float]
-    """Where the joint sits in the parent's frame, as a fraction of body height."""
+    """Position of the joint in the parent's frame, fraction of body height."""
     kind: Literal["revolute", "ball"]
     axes: tuple[Axis, ...]
     """Rotations in order for a revolute joint; none makes it rigid. Empty for a ball joint."""
@@ -67,10 +67,10 @@ class Part:
     color: str
     """Colour in which the part is drawn, `#rrggbb`."""
     kind: Literal["superquadric", "cone", "ellipsoid"] = "superquadric"
-    """What family the shape is of."""
+    """Family of the shape."""
 
     def shape(self, height_m: float) -> Shape:
-        """The shape at a body height, metres."""
+        """Return the shape at a body height, metres."""
         a1, a2, a3 = self.half_axes
         half_axes = (a1 * height_m, a2 * height_m, a3 * height_m)
         if self.kind == "cone":

@@ -19,12 +19,12 @@ from tracker.body.model import PosedBody
 from tracker.compute.numba_options import FAST
 from tracker.contours.generator import MAX_POINTS, grid_outline, revolved_outline
 from tracker.contours.surfaces import Surfaces, surfaces_of
-from tracker.contours.visibility import JOINT_MARGIN_M, LANES, hide
+from tracker.contours.visibility import JOINT_MARGIN_M, LANES, mark_occluded
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 
 PIECE_PX = 4.0
-"""Longest piece of contour that is scored or hidden as a whole, px."""
+"""Longest piece of contour that is scored or occluded as a whole, px."""
 MAX_PIECES = 6000
 """Room for the pieces of one view; a 22-DOF body that fills a 640x480 image has some 600."""
 _SAG_PX = 0.2
@@ -40,7 +40,7 @@ class Contour(NamedTuple):
     """End points x0, y0, x1, y1, (N, 4), undistorted px."""
     parts: NDArray[np.int32]
     """Index of the part of each piece, counted through all bodies, (N,)."""
-    hidden: NDArray[np.bool_]
+    occluded: NDArray[np.bool_]
     """Whether another part hides the piece, (N,)."""
     points_world: FloatArray
     """Middle of each piece on the surface, (N, 3), metres."""
@@ -55,7 +55,7 @@ class Pieces(NamedTuple):
     """Middle of each piece in the unit coordinates of its part, (3, room + LANES)."""
     edges: NDArray[np.int32]
     """Number of the straight edge that each piece is cut from, (room,)."""
-    hidden: NDArray[np.bool_]
+    occluded: NDArray[np.bool_]
     """Whether another part hides the piece, (room,)."""
     firsts: NDArray[np.int64]
     """Index of the first piece of each part, and the number of all, (P + 1,)."""
@@ -83,8 +83,8 @@ class Pieces(NamedTuple):
     """The eye in unit coordinates of one part, (3,)."""
     shared: FloatArray
     """What lines of sight share with a part, (2, room + LANES)."""
-    stands: NDArray[np.bool_]
-    """Whether each part stands where its pieces were kept, (P,): what stands has hidden them already, see `kept`."""
+    is_static: NDArray[np.bool_]
+    """Whether the pieces of each part come from the cache of static contours, (P,); see `static_cache`."""
 
 
 def part_poses(bodies: Sequence[PosedBody]) -> Array:
@@ -93,7 +93,7 @@ def part_poses(bodies: Sequence[PosedBody]) -> Array:
 
 
 def trace(bodies: Sequence[PosedBody], camera: Camera, piece_px: float = PIECE_PX) -> Contour:
-    """Trace the occluding contours of all bodies in a view, hidden pieces included and marked.
+    """Trace the occluding contours of all bodies in a view, occluded pieces included and marked.
 
     Args:
         bodies: everybody in the scene; they hide one another.
@@ -103,7 +103,7 @@ def trace(bodies: Sequence[PosedBody], camera: Camera, piece_px: float = PIECE_P
     surfaces = surfaces_of(tuple(b.model for b in bodies))
     out = contour_buffer(camera, len(bodies), piece_px)
     n = trace_view(camera.projection, camera.center_world, part_poses(bodies), surfaces, piece_px, out)
-    return Contour(out.pieces_px[:n], out.parts[:n], out.hidden[:n], out.points_world[:n])
+    return Contour(out.pieces_px[:n], out.parts[:n], out.occluded[:n], out.points_world[:n])
 
 
 def contour_room(camera: Camera, n_bodies: int, piece_px: float = PIECE_PX) -> int:
@@ -136,12 +136,12 @@ def piece_buffer(surfaces: Surfaces, room: int) -> Pieces:
 
 
 # The kernels below take the arrays they need one by one: handing over a tuple of thirty costs more than the work is.
-# Those called once for each part or pair of parts are inlined, with `hide` and `revolved_outline`: even half a dozen
-# arrays take as long to hand over as the work does.
+# Those called once for each part or pair of parts are inlined, with `mark_occluded` and `revolved_outline`: even half
+# a dozen arrays take as long to hand over as the work does.
 
 
 @njit(inline="always", **FAST)
-def place(Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
+def place_parts(Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
     """Fill the motions between the parts' unit coordinates and the world, which are the same in all views."""
     to_world, to_unit = out.Ts_world_unit, out.Ts_unit_world
     centers, half_axes = surfaces.centers, surfaces.half_axes
@@ -162,7 +162,7 @@ def place(Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
 
 
 @njit(inline="always", **FAST)
-def face(eye: Array, out: Pieces) -> None:
+def place_eye(eye: Array, out: Pieces) -> None:
     """Fill where the eye is in the unit coordinates of parts that are placed, and how far it is from them."""
     to_world, to_unit = out.Ts_world_unit, out.Ts_unit_world
     for part in range(to_world.shape[0]):
@@ -190,7 +190,7 @@ def _project(
         image[0, k] = (a0 * x + b0 * y + c0 * z + d0) * inverse
         image[1, k] = (a1 * x + b1 * y + c1 * z + d1) * inverse
         image[2, k] = w
-    kept = last = 0
+    n_kept = last = 0
     u0 = u1 = u = image[0, 0]
     v0 = v1 = v = image[1, 0]
     for k in range(1, n + 1):
@@ -200,14 +200,14 @@ def _project(
             off = (uk - u) * bv - (vk - v) * bu
             if off * off <= _THIN2 * (bu * bu + bv * bv):
                 continue
-        kept, last = kept + 1, k
+        n_kept, last = n_kept + 1, k
         u, v = uk, vk
         u0, u1, v0, v1 = min(u0, u), max(u1, u), min(v0, v), max(v1, v)
-        image[0, kept], image[1, kept], image[2, kept] = u, v, image[2, k]
+        image[0, n_kept], image[1, n_kept], image[2, n_kept] = u, v, image[2, k]
         for i in range(3):
-            outline[i, kept] = outline[i, k]
+            outline[i, n_kept] = outline[i, k]
     boxes[part, 0], boxes[part, 1], boxes[part, 2], boxes[part, 3] = u0, v0, u1, v1
-    return kept
+    return n_kept
 
 
 @njit(**FAST)
@@ -263,7 +263,7 @@ def _cut(
 
 
 @njit(inline="always", **FAST)
-def hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
+def mark_all_occluded(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
     """Mark what parts hide of one another: those whose boxes in the image meet, and that are not all behind.
 
     What two parts that both stand hide of each other is marked already.
@@ -275,17 +275,22 @@ def hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
         out.firsts,
         surfaces.adjoining,
     )
-    to_unit, to_world, middles, shared, hidden = (
-        out.Ts_unit_world, out.Ts_world_unit, out.middles, out.shared, out.hidden
+    to_unit, to_world, middles, shared, occluded = (
+        out.Ts_unit_world, out.Ts_world_unit, out.middles, out.shared, out.occluded
     )  # fmt: skip
-    solids, stands, related = surfaces.solids, out.stands, out.related
+    solids, is_static, related = surfaces.solids, out.is_static, out.related
     for a in range(n_parts):
         if firsts[a] == firsts[a + 1]:
             continue
         u0, v0, u1, v1 = boxes[a, 0], boxes[a, 1], boxes[a, 2], boxes[a, 3]
         behind = distances[a] + radii[a] + JOINT_MARGIN_M
         for b in range(n_parts):
-            if b == a or firsts[b] == firsts[b + 1] or distances[b] - radii[b] > behind or (stands[a] and stands[b]):
+            if (
+                b == a
+                or firsts[b] == firsts[b + 1]
+                or distances[b] - radii[b] > behind
+                or (is_static[a] and is_static[b])
+            ):
                 continue
             if boxes[b, 0] > u1 or boxes[b, 2] < u0 or boxes[b, 1] > v1 or boxes[b, 3] < v0:
                 continue
@@ -300,7 +305,7 @@ def hide_all(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
             for i in range(3):
                 Q[i, 4] = to_unit[b, i, 4]
             margin = JOINT_MARGIN_M / distances[a] if adjoining[a, b] else 0.0
-            hide(b, solids, Q, margin, middles, firsts[a], firsts[a + 1], shared, hidden)
+            mark_occluded(b, solids, Q, margin, middles, firsts[a], firsts[a + 1], shared, occluded)
 
 
 @njit(inline="always", **FAST)
@@ -341,14 +346,14 @@ def trace_pieces(P: Array, eye: Array, surfaces: Surfaces, piece_px: float, out:
     """Fill the pieces of parts that are placed in one view; returns their number. See `trace_view`."""
     n_parts, focal = surfaces.radii.shape[0], focal_px(P)
     n = edge = 0
-    face(eye, out)
+    place_eye(eye, out)
     for part in range(n_parts):
-        out.firsts[part], out.stands[part] = n, False
+        out.firsts[part], out.is_static[part] = n, False
         n, edge = trace_part(part, P, focal, surfaces, piece_px, n, edge, out)
     out.firsts[n_parts] = n
     for i in range(n):
-        out.hidden[i] = False
-    hide_all(n_parts, surfaces, out)
+        out.occluded[i] = False
+    mark_all_occluded(n_parts, surfaces, out)
     return n
 
 
@@ -365,12 +370,12 @@ def trace_view(P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: fl
         out: room for the pieces; what does not fit is left out.
     """
     pieces = piece_buffer(surfaces, out.parts.shape[0])
-    place(Ts, surfaces, pieces)
+    place_parts(Ts, surfaces, pieces)
     n = trace_pieces(P, eye, surfaces, piece_px, pieces)
     points, W = out.points_world, pieces.Ts_world_unit
     for part in range(Ts.shape[0]):
         for i in range(pieces.firsts[part], pieces.firsts[part + 1]):
-            out.parts[i], out.hidden[i] = part, pieces.hidden[i]
+            out.parts[i], out.occluded[i] = part, pieces.occluded[i]
             x, y, z = pieces.middles[0, i], pieces.middles[1, i], pieces.middles[2, i]
             for k in range(4):
                 out.pieces_px[i, k] = pieces.ends[k, i]

@@ -10,7 +10,7 @@ from tracker.body.model import PosedBody
 from tracker.compute.numba_options import FAST
 from tracker.contours import occluding_contours
 from tracker.contours.surfaces import N_RINGS, N_SECTORS
-from tracker.contours.visibility import LANES, hide
+from tracker.contours.visibility import LANES, mark_occluded
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera
 
@@ -18,7 +18,7 @@ _LIFT_M = 0.012
 """How far a curve is lifted off the surfaces to see whether they hide it, metres."""
 
 
-def points_hidden(bodies: Sequence[PosedBody], cameras: Sequence[Camera], points_world: Array) -> NDArray[np.bool_]:
+def points_occluded(bodies: Sequence[PosedBody], cameras: Sequence[Camera], points_world: Array) -> NDArray[np.bool_]:
     """Whether a part hides each point, (V, n); parts that hold the point itself, as around a joint, do not count.
 
     Args:
@@ -35,8 +35,8 @@ def points_hidden(bodies: Sequence[PosedBody], cameras: Sequence[Camera], points
             for shape, T, center in zip(shapes, Ts, surfaces.centers, strict=True)
         ]
     )
-    hidden = [_blocked(c, Ts, surfaces, points_world, holds) for c in cameras]
-    return np.array(hidden, dtype=bool).reshape(len(cameras), len(points_world))
+    occluded = [_occluded_points(c, Ts, surfaces, points_world, holds) for c in cameras]
+    return np.array(occluded, dtype=bool).reshape(len(cameras), len(points_world))
 
 
 def part_edges(bodies: Sequence[PosedBody], camera: Camera) -> FloatArray:
@@ -68,7 +68,7 @@ def part_edges(bodies: Sequence[PosedBody], camera: Camera) -> FloatArray:
             towards = camera.center_world - points
             lifted = points + _LIFT_M * towards / np.linalg.norm(towards, axis=-1, keepdims=True)
             nothing = np.zeros((len(shapes), len(points)), dtype=bool)
-            shown.append(pieces[~_blocked(camera, Ts, surfaces, lifted, nothing)])
+            shown.append(pieces[~_occluded_points(camera, Ts, surfaces, lifted, nothing)])
     return np.concatenate(shown)
 
 
@@ -123,28 +123,28 @@ def _zero_line(f: FloatArray, g: FloatArray, segments: FloatArray) -> int:
     return n
 
 
-def _blocked(
+def _occluded_points(
     camera: Camera, Ts: Array, surfaces: occluding_contours.Surfaces, points: Array, ignored: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """Whether some part lies before each point (n, 3), but for the parts ignored for it, (P, n)."""
     n = len(points)
     room = np.zeros((3, n + LANES), np.float32)
     room[:, :n] = points.T
-    hidden, by_part = np.zeros(n + LANES, dtype=bool), np.empty(n + LANES, dtype=bool)
+    occluded, by_part = np.zeros(n + LANES, dtype=bool), np.empty(n + LANES, dtype=bool)
     shared, Q = np.empty((2, n + LANES), np.float32), np.empty((3, 5), np.float32)
-    _mark_blocked(
+    _mark_occluded_points(
         camera.center_world, Ts, surfaces.centers, surfaces.half_axes, surfaces.solids, ignored, Q, shared, by_part,
-        room, hidden,
+        room, occluded,
     )  # fmt: skip
-    return hidden[:n]
+    return occluded[:n]
 
 
 @njit(**FAST)
-def _mark_blocked(
+def _mark_occluded_points(
     eye: Array, Ts: Array, centers: Array, half_axes: Array, solids: FloatArray, ignored: NDArray[np.bool_],
-    Q: FloatArray, shared: FloatArray, by_part: NDArray[np.bool_], points: FloatArray, hidden: NDArray[np.bool_],
+    Q: FloatArray, shared: FloatArray, by_part: NDArray[np.bool_], points: FloatArray, occluded: NDArray[np.bool_],
 ) -> None:  # fmt: skip
-    """Mark the points, (3, n and `LANES` more), before which a part lies; see `hide` for Q and shared."""
+    """Mark the points, (3, n and `LANES` more), before which a part lies; see `mark_occluded` for Q and shared."""
     n = ignored.shape[1]
     for part in range(Ts.shape[0]):
         for i in range(3):
@@ -156,7 +156,7 @@ def _mark_blocked(
             Q[i, 3] = offset / half_axes[part, i]
             Q[i, 4] = sight / half_axes[part, i]
         for j in range(n):
-            by_part[j] = hidden[j] or ignored[part, j]
-        hide(part, solids, Q, 0.0, points, 0, n, shared, by_part)
+            by_part[j] = occluded[j] or ignored[part, j]
+        mark_occluded(part, solids, Q, 0.0, points, 0, n, shared, by_part)
         for j in range(n):
-            hidden[j] |= by_part[j] and not ignored[part, j]
+            occluded[j] |= by_part[j] and not ignored[part, j]

@@ -29,7 +29,7 @@ def _meet_quadric(
     part: int, solids: FloatArray, Q: FloatArray, margin: float, points: FloatArray, first: int, last: int,
     shared: FloatArray,
 ) -> None:  # fmt: skip
-    """Cut lines of sight with the quadric around a part, between its ends, the point and the eye; see `hide`."""
+    """Cut lines of sight with the quadric around a part, between its ends, the point and the eye."""
     gx, gy, k, bulge = solids[part, 0], solids[part, 1], solids[part, 2], solids[part, 3]
     q00, q01, q02, q03, ex = Q[0, 0] * gx, Q[0, 1] * gx, Q[0, 2] * gx, Q[0, 3] * gx, Q[0, 4] * gx
     q10, q11, q12, q13, ey = Q[1, 0] * gy, Q[1, 1] * gy, Q[1, 2] * gy, Q[1, 3] * gy, Q[1, 4] * gy
@@ -66,7 +66,7 @@ def _meet_quadric(
 
 
 @njit(**FAST)
-def _fills(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: np.float32) -> bool:
+def _is_inside(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: np.float32) -> bool:
     """Whether a point in unit coordinates is within a superquadric, by the tables of its shape."""
     at = abs(z) * np.float32(N_ALONG)
     k = np.uint64(at)  # a signed index might count from the end
@@ -91,9 +91,9 @@ def _fills(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: np.fl
 
 
 @njit(inline="always", **FAST)
-def hide(
+def mark_occluded(
     part: int, solids: FloatArray, Q: FloatArray, margin: float, points: FloatArray, first: int, last: int,
-    shared: FloatArray, hidden: NDArray[np.bool_],
+    shared: FloatArray, occluded: NDArray[np.bool_],
 ) -> None:  # fmt: skip
     """Mark the points that a part hides: exactly, but for lines that graze a superquadric.
 
@@ -106,13 +106,13 @@ def hide(
         first: index of the first point.
         last: index after the last.
         shared: room for where each line of sight is inside the quadric, from and to, (2, room) too.
-        hidden: what is marked, (room,).
+        occluded: what is marked, (room,).
     """
     _meet_quadric(part, solids, Q, margin, points, first, last, shared)
     if solids[part, 4] > 0:  # the quadric is the part
         for j in range(np.uint64(last - first)):
             i = np.uint64(first) + j
-            hidden[i] |= shared[0, i] < shared[1, i]
+            occluded[i] |= shared[0, i] < shared[1, i]
         return
     # Read once: for all the compiler knows, marking a point might change them.
     q00, q01, q02, q03, ex = Q[0, 0], Q[0, 1], Q[0, 2], Q[0, 3], Q[0, 4]
@@ -121,7 +121,7 @@ def hide(
     for j in range(np.uint64(last - first)):
         i = np.uint64(first) + j
         far, near = shared[0, i], shared[1, i]
-        if far >= near or hidden[i]:
+        if far >= near or occluded[i]:
             continue
         a, b, c = points[0, i], points[1, i], points[2, i]
         x = q00 * a + q01 * b + q02 * c + q03
@@ -130,6 +130,6 @@ def hide(
         dx, dy, dz = ex - x, ey - y, ez - z
         for share in _TRIES:
             s = far + np.float32(share) * (near - far)
-            if _fills(part, solids, x + s * dx, y + s * dy, z + s * dz):
-                hidden[i] = True
+            if _is_inside(part, solids, x + s * dx, y + s * dy, z + s * dz):
+                occluded[i] = True
                 break

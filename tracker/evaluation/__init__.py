@@ -1,1 +1,5 @@
-"""Errors against a reference."""
+"""Errors of estimated poses against a reference.
+
+Imports `geometry`, `body`, `formats`, `session` and `store`. Callers use `metrics.evaluate_joints`,
+`metrics.evaluate_poses` and `references.read_reference`.
+"""

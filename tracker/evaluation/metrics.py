@@ -1,4 +1,4 @@
-"""Errors of an estimated motion against a reference: joints, and angles where the reference has poses."""
+"""Errors of an estimated motion against a reference: of joints, and of angles if the reference has poses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,9 +15,9 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 
 LOST_M = 0.15
-"""A frame with a limb joint farther off than this is lost, metres."""
+"""A frame with a limb joint off by more is lost, metres."""
 BENT_RAD = float(np.radians(20.0))
-"""An elbow or knee bent by less than this does not show its limb's twist."""
+"""An elbow or knee bent by less does not determine the twist of its limb."""
 
 Alignment = Literal["none", "rigid-all"]
 
@@ -26,39 +26,39 @@ _RATE_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class Evaluation:
-    """How far an estimated motion is from its reference."""
+    """The errors of an estimated motion against its reference."""
 
     frames: int
-    """Number of frames looked at."""
+    """Number of frames compared."""
     missing_frames: int
-    """How many of them have no estimate."""
+    """Number of frames without an estimate."""
     missing_reference_values: int
-    """How many positions of limb joints the reference lacks in them; skipped."""
+    """Number of positions of limb joints that the reference lacks in these frames; skipped."""
     lost_frames: int
-    """How many have no estimate, or a limb joint off by more than 150 mm."""
+    """Number of frames without an estimate, or with a limb joint off by more than 150 mm."""
     mpjpe_mm: float
     """Mean distance over frames and limb joints."""
     pa_mpjpe_mm: float | None
-    """The same after the best rotation and translation of each frame (no scale); None where no frame has 3 joints."""
+    """The same after the best rotation and translation of each frame (no scale); None if no frame has 3 joints."""
     median_mm: float
     """Median distance over frames and limb joints."""
     p95_mm: float
     """95th percentile of the distance over frames and limb joints."""
     per_joint_mm: Mapping[str, float]
-    """Mean distance of each joint that both have, head and neck too."""
+    """Mean distance of each joint that both have, including head and neck."""
     axis_error_deg: float | None = None
-    """Mean angle between true and estimated part axes, over frames and parts, with the twist where the truth shows it;
-    None without true poses."""
+    """Mean angle between true and estimated part axes, over frames and parts. It includes the twist where the truth
+    determines it. None without true poses."""
     long_axis_error_deg: float | None = None
-    """The same without any twist: the parts' long axes alone, as KRH08 measured; None without true poses."""
+    """The same without twist: the parts' long axes alone, as KRH08 measured; None without true poses."""
     worst_axis_error_deg: float | None = None
     """The largest mean over the parts of one frame; None without true poses."""
     worst_axis_frame: int | None = None
-    """The frame that has it; None without true poses."""
+    """The frame with this mean; None without true poses."""
     per_part_axis_deg: Mapping[str, float] | None = None
     """Mean angle of each part that both bodies have, over the frames; None without true poses."""
     angle_error_deg: Mapping[str, float] | None = None
-    """Mean size of each angle's error by degree of freedom; None without true poses of the same model."""
+    """Mean absolute error of each angle by degree of freedom; None without true poses of the same model."""
 
 
 class Motion(NamedTuple):
@@ -73,16 +73,16 @@ class Motion(NamedTuple):
 def evaluate_joints(
     estimated: MarkerTable, reference: MarkerTable, frames: Sequence[int], align: Alignment = "none"
 ) -> Evaluation:
-    """Compare joints frame by frame. Both tables have our names (see `joint_maps.joints_of`) and frame numbers.
+    """Compare joints frame by frame. Both tables have the project's names (`joint_maps.joints_of`) and frame numbers.
 
     Args:
-        estimated: what was tracked; a frame may be missing.
-        reference: what is taken for true; a frame or a position may be missing.
-        frames: the frames to look at.
+        estimated: the estimate; a frame may be missing.
+        reference: the truth; a frame or a position may be missing.
+        frames: the frames to compare.
         align: `rigid-all` first moves the estimate as a whole by the best rotation and translation over all frames.
 
     Raises:
-        FormatError: nothing can be compared.
+        FormatError: there is nothing to compare.
     """
     joints = tuple(j for j in JOINTS if j in estimated.names and j in reference.names)
     estimate, truth = _gather(estimated, joints, frames), _gather(reference, joints, frames)  # (n, m, 3), NaN: none
@@ -118,21 +118,21 @@ def evaluate_joints(
 
 
 def evaluate_poses(result: Evaluation, estimated: Motion, true: Motion, frames: Sequence[int]) -> Evaluation:
-    """Compare the parts of two bodies by name, over the frames that both have; their models and sizes may differ.
+    """Compare the parts of two bodies by name, over the frames that both have; their models and dimensions may differ.
 
-    A part's error is the angle between its true and estimated long axis (z). The parts next to an elbow or knee
-    count their twist as well, as the angle of the whole rotation, where that joint is bent by more than 20 degrees in
-    the truth; the root and what hangs rigidly on it always do. Bodies with the same degrees of freedom are compared
+    A part's error is the angle between its true and estimated long axis (z). For the parts next to an elbow or knee
+    that is bent by more than 20 degrees in the truth, it is the angle of the whole rotation, including the twist. The
+    same holds for the root and the parts rigidly attached to it. Bodies with the same degrees of freedom are compared
     angle by angle too.
 
     Args:
-        result: what is known of the joints; the angles are added.
-        estimated: what was tracked.
-        true: what is taken for true.
-        frames: the frames to look at.
+        result: the errors of the joints; the angles are added.
+        estimated: the estimate.
+        true: the truth.
+        frames: the frames to compare.
 
     Raises:
-        FormatError: no frame or no part in common.
+        FormatError: there is no frame or no part in common.
     """
     common = [f for f in frames if f in estimated.poses and f in true.poses]
     if not common:
@@ -159,7 +159,7 @@ def evaluate_poses(result: Evaluation, estimated: Motion, true: Motion, frames: 
 
 
 def joints_of_poses(model: BodyModel, poses: Mapping[int, Array], rate: float) -> MarkerTable:
-    """Joints of a person's poses under our names, one row per frame.
+    """Return the joints of a person's poses under the project's names, one row per frame.
 
     Args:
         model: body model of all poses.
@@ -196,13 +196,13 @@ def remap_axes(table: MarkerTable, axes: str) -> MarkerTable:
 
 
 def at_rate(table: MarkerTable, fps: float) -> MarkerTable:
-    """Bring a file to the frames of a session, by time where its rate is another, linearly between its rows.
+    """Resample a file to the frames of a session, linearly by time, if its rate differs.
 
-    A position between two rows is missing where either is.
+    A position is missing if it is missing in either of the two rows around it.
     """
     if abs(table.rate / fps - 1) < _RATE_TOLERANCE:
         return table
-    rows = table.frames * (fps / table.rate)  # the session's frame, not whole, of each row
+    rows = table.frames * (fps / table.rate)  # fractional frame of the session of each row
     frames = np.arange(int(np.floor(rows[-1] + 1e-6)) + 1)
     after = np.clip(np.searchsorted(rows, frames - 1e-6), 1, len(rows) - 1) if len(rows) > 1 else np.zeros_like(frames)
     before = np.maximum(after - 1, 0)
@@ -214,7 +214,7 @@ def at_rate(table: MarkerTable, fps: float) -> MarkerTable:
 
 
 def best_rigid(source: Array, target: Array) -> Array:
-    """Rotation and translation, (4, 4), that bring points (n, 3) nearest to others (Kabsch 1976, no scale)."""
+    """Return the rigid motion, (4, 4), that aligns points (n, 3) best with others (Kabsch 1976, no scale)."""
     center_source, center_target = source.mean(axis=0), target.mean(axis=0)
     U, _, Vt = np.linalg.svd((target - center_target).T @ (source - center_source))
     R = U @ np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))]) @ Vt
@@ -222,7 +222,7 @@ def best_rigid(source: Array, target: Array) -> Array:
 
 
 def _gather(table: MarkerTable, joints: Sequence[str], frames: Sequence[int]) -> Array:
-    """Positions of joints in frames, (n_frames, n_joints, 3); NaN where missing."""
+    """Collect the positions of joints in frames, (n_frames, n_joints, 3); NaN where missing."""
     out = np.full((len(frames), len(joints), 3), np.nan)
     rows: NDArray[np.int64] = np.searchsorted(table.frames, frames)
     there = np.isin(frames, table.frames)
@@ -232,14 +232,14 @@ def _gather(table: MarkerTable, joints: Sequence[str], frames: Sequence[int]) ->
 
 
 def _procrustes_error(estimate: Array, truth: Array) -> Array:
-    """Distances (k,) after the best rigid motion; none where fewer than 3 points fix no rotation."""
+    """Return distances (k,) after the best rigid motion; empty for fewer than 3 points, which fix no rotation."""
     if len(estimate) < 3:
         return np.zeros(0)
     return np.linalg.norm(rigid.apply(best_rigid(estimate, truth), estimate) - truth, axis=-1)
 
 
 def _part_errors(estimated: Motion, true: Motion, parts: Sequence[str], frame: int) -> Array:
-    """Angle of the error of each named part on a frame, without twist and with it where it shows, (2, n_parts), rad."""
+    """Return the angular error of each named part on a frame, without and with twist, (2, n_parts), rad."""
     R_estimated, R_true = (m.model.kinematics(m.poses[frame]).Ts_world_part[:, :3, :3] for m in (estimated, true))
     shows = _shows_twist(true.model, R_true)
     in_estimated, in_true = ([m.model.part_index[p] for p in parts] for m in (estimated, true))
@@ -250,7 +250,7 @@ def _part_errors(estimated: Motion, true: Motion, parts: Sequence[str], frame: i
 
 
 def _dof_errors(estimated: Motion, true: Motion, frames: Sequence[int]) -> dict[str, float]:
-    """Mean size of each angle's error by degree of freedom, by the shorter way round, degrees."""
+    """Return the mean absolute error of each angle by degree of freedom, the shorter way round, degrees."""
     model = true.model
     steps = np.array([model.difference(estimated.poses[f], true.poses[f]) for f in frames])
     mean = np.degrees(np.abs(np.arctan2(np.sin(steps), np.cos(steps))).mean(axis=0))
@@ -258,7 +258,7 @@ def _dof_errors(estimated: Motion, true: Motion, frames: Sequence[int]) -> dict[
 
 
 def _shows_twist(model: BodyModel, R_world_part: Array) -> NDArray[np.bool_]:
-    """Whether a pose shows how each part is turned about its long axis, (n_parts,)."""
+    """Return whether a pose determines how each part is rotated about its long axis, (n_parts,)."""
     shows = np.zeros(len(model.parts), dtype=bool)
     for part, (joint, parent) in enumerate(zip(model.joints, model.parents, strict=True)):
         if parent < 0 or (shows[parent] and not joint.dof_names):
@@ -270,5 +270,5 @@ def _shows_twist(model: BodyModel, R_world_part: Array) -> NDArray[np.bool_]:
 
 
 def _angle(a: Array, b: Array) -> Array:
-    """Angle between unit vectors, (..., 3) to (...), rad; exact for small ones too."""
+    """Return the angle between unit vectors, (..., 3) to (...), rad; accurate for small angles."""
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(a * b, axis=-1))

@@ -1,4 +1,4 @@
-"""What an estimate can be held against: joints of a TRC file, poses of our CSV, or another session."""
+"""References for an evaluation: joints of a TRC file, poses of a CSV table, or another session."""
 
 from collections.abc import Sequence
 from contextlib import closing
@@ -23,13 +23,13 @@ class Reference(NamedTuple):
     """A motion to compare with, in the session's frames and axes."""
 
     joints: MarkerTable
-    """Joints under our names."""
+    """Joints under the project's names."""
     motion: Motion | None
-    """Poses where they are known, of whatever body."""
+    """Poses of any body; None if unknown."""
 
 
 def read_joints(path: Path, fps: float, joint_map: Path | None = None, axes: str = "x,y,z") -> MarkerTable:
-    """Joints of a TRC file under our names, in a session's frames and axes, metres.
+    """Read the joints of a TRC file under the project's names, in a session's frames and axes, metres.
 
     Args:
         path: the file.
@@ -47,13 +47,14 @@ def read_joints(path: Path, fps: float, joint_map: Path | None = None, axes: str
 def read_reference(
     path: Path, session: Session, person: int, joint_map: Path | None = None, axes: str = "x,y,z"
 ) -> Reference:
-    """Read whatever a path holds: a TRC file, a pose table (CSV), or a session folder.
+    """Read a reference of any kind: a TRC file, a pose table (CSV), or a session folder.
 
-    A pose table belongs to the body model in `NAME_model.toml` beside `NAME.csv` (as `simulate` writes it), or to the
-    preset it names at its height, or else to the person's own model: then only its angles can be trusted.
+    The poses of a table belong to the body model in `NAME_model.toml` beside `NAME.csv`, as `simulate` writes it.
+    Without that file they belong to the preset that the table names, at its height. Otherwise the person's own model is
+    used, and only the angles are reliable.
 
     Raises:
-        FormatError: the file is malformed or of an unknown kind, or the body of its poses is not known.
+        FormatError: the file is malformed or of an unknown kind, or the body of its poses is unknown.
         SessionError: the reference session has no such person.
     """
     model = session.people[person].model
@@ -68,9 +69,9 @@ def read_reference(
 
 
 def stored_motion(session: Session, person: int) -> Reference:
-    """The stored poses of a person, and the joints of each in the body that it was made with.
+    """Return the stored poses of a person, and the joints of each pose in the body that it was made with.
 
-    The sizes of a body may have changed since: a pose is angles, and belongs to the model revision that it names.
+    The dimensions of a body may have changed since: a pose belongs to the model revision that it names.
     """
     name, model = session.people[person].name, session.people[person].model
     by_revision: dict[int, dict[int, Array]] = {}
@@ -88,7 +89,7 @@ def stored_motion(session: Session, person: int) -> Reference:
 
 
 def _merged(tables: Sequence[MarkerTable]) -> MarkerTable:
-    """Rows of several tables of the same joints, by frame."""
+    """Merge the rows of several tables of the same joints, by frame."""
     frames = np.concatenate([t.frames for t in tables])
     order = np.argsort(frames)
     times, points = (np.concatenate([getattr(t, part) for t in tables])[order] for part in ("times", "points"))
@@ -105,7 +106,7 @@ def _of_session(folder: Path, session: Session, person: int) -> Reference:
 
 
 def _of_table(table: PoseTable, path: Path, own: BodyModel) -> Motion:
-    """The poses of a table, and their body; `own` is the body of the person to compare."""
+    """Return the poses of a table with their body; `own` is the body of the person to compare."""
     beside = path.with_name(f"{path.stem}_model.toml")
     if beside.is_file():
         model = load_model(beside, table.height_m)

@@ -1,2 +1,6 @@
-"""Footage to what poses are scored against: per view the edges, the distance image, the silhouette, the colours;
-one frame ahead."""
+"""Turn footage into the evidence that poses are scored against: edges, distance images, silhouettes and colours per
+view.
+
+The room imports `geometry`, `footage` and `images`, and knows no body. Callers use `observer.Observer` and
+`view_evidence`.
+"""

@@ -1,4 +1,4 @@
-"""One view of a frame made ready, then of a region its smoothed image, and what in it is new."""
+"""Prepare one view of a frame, then extract a region's smoothed image and its foreground."""
 
 from concurrent.futures import Executor
 from typing import NamedTuple
@@ -12,77 +12,82 @@ from tracker.geometry.arrays import FloatArray, Image
 from tracker.geometry.cameras import Region
 from tracker.images import background_subtraction
 from tracker.images.background_subtraction import Changes
-from tracker.images.image_statistics import Probes, Readings
-from tracker.images.matching_view import MatchedView
+from tracker.images.image_statistics import ImageStatistics, SampleGrid
+from tracker.images.working_view import WorkingView
 
 
 class Prepared(NamedTuple):
-    """A view of a frame, and what of it does not depend on a region."""
+    """One view of a frame, with the measurements that depend on no region."""
 
     frame: Image
     """As filmed, (H, W, 3) RGB."""
     mask: NDArray[np.uint8] | None
-    """As filmed, (H, W); None where there is none."""
+    """As filmed, (H, W); None without a mask."""
     strengths: FloatArray
-    """Strengths of the gradient all over the image, which set the thresholds of edges, (n,)."""
+    """Gradient strengths over the whole image, from which the edge thresholds follow, (n,)."""
     threshold: float
-    """Difference from the background that is a change, gray levels."""
+    """Difference from the background above which a pixel has changed, gray levels."""
     gain: FloatArray
-    """How much brighter than the background the camera shows each channel, (3,)."""
+    """Gain of each channel over the background, (3,)."""
 
 
 class _Empty(NamedTuple):
     """The empty scene of a view."""
 
     smooth: Image
-    """Smoothed, in matched pixels, (H, W, 3)."""
-    readings: Readings
-    """What the probes show of it."""
+    """Smoothed image, in working pixels, (H, W, 3)."""
+    statistics: ImageStatistics
+    """Measurements at the sample grid."""
     usable: NDArray[np.intp]
-    """Which of them tell the exposure, (m,)."""
+    """Indices of the samples that measure exposure, (m,)."""
 
 
 class Foreground:
-    """What is new in the frames of one view. Safe to use from several threads."""
+    """The foreground of one view. Thread-safe."""
 
     def __init__(self, source: CameraSource, executor: Executor) -> None:
         """Read the background.
 
         Args:
             source: the view, with its side files.
-            executor: where the empty scene is made meanwhile: the first kernel of a program takes a third of a second
-                to load.
+            executor: pool in which the empty scene is computed meanwhile; loading the first kernel of a program is
+                slow.
 
         Raises:
             RecordingError: the background is missing, unreadable or of the wrong size.
         """
-        self.view = MatchedView(source.camera)
-        """The way from footage to matched pixels."""
-        self._source, self._probes = source, Probes(source.camera.size, self.view.scale)
+        self.view = WorkingView(source.camera)
+        """Conversion of footage to working pixels."""
+        self._source, self._grid = source, SampleGrid(source.camera.size, self.view.scale)
         self._empty = executor.submit(self._empty_scene, read_background(source))
 
     def prepare(self, frame: Image, k: int) -> Prepared:
-        """Do with frame k, as filmed, what needs no region.
+        """Prepare frame k, as filmed, as far as no region is needed.
 
         Raises:
             RecordingError: its mask cannot be used.
         """
         empty, mask = self._empty.result(), read_mask(self._source, k)
-        readings = self._probes.read(frame)
+        statistics = self._grid.measure(frame)
         if empty is None:
-            return Prepared(frame, mask, readings.strengths, 0.0, np.ones(3, np.float32))
-        gain = background_subtraction.exposure_gain(readings.colors[empty.usable], empty.readings.colors[empty.usable])
-        differences = np.abs(readings.colors - gain * empty.readings.colors).max(axis=-1)
-        return Prepared(frame, mask, readings.strengths, background_subtraction.change_threshold(differences), gain)
+            return Prepared(frame, mask, statistics.strengths, 0.0, np.ones(3, np.float32))
+        gain = background_subtraction.exposure_gain(
+            statistics.colors[empty.usable], empty.statistics.colors[empty.usable]
+        )
+        differences = np.abs(statistics.colors - gain * empty.statistics.colors).max(axis=-1)
+        return Prepared(frame, mask, statistics.strengths, background_subtraction.change_threshold(differences), gain)
 
-    def smoothed(self, prepared: Prepared, box: Region) -> Image:
-        """A region of the frame, smoothed, in matched pixels, (H, W, 3)."""
-        return background_subtraction.smoothed(self.view.image(prepared.frame, box))
+    def smooth_region(self, prepared: Prepared, box: Region) -> Image:
+        """Return a region of the frame, smoothed, in working pixels, (H, W, 3)."""
+        return background_subtraction.smooth_image(self.view.image(prepared.frame, box))
 
     def changes(self, prepared: Prepared, smooth: Image, box: Region) -> Changes | None:
-        """What is new in a region, whose smoothed image is given, by its mask or before its background.
+        """Return the foreground of a region by its mask, else by its background; None without either.
 
-        None where nothing tells it.
+        Args:
+            prepared: the view.
+            smooth: smoothed image of the region.
+            box: the region, working px.
         """
         u0, v0, u1, v1 = box
         empty = self._empty.result()
@@ -91,12 +96,12 @@ class Foreground:
             return Changes(inside, inside)
         if empty is None:
             return None
-        background = background_subtraction.brightened(empty.smooth[v0:v1, u0:u1], prepared.gain)
+        background = background_subtraction.apply_gain(empty.smooth[v0:v1, u0:u1], prepared.gain)
         return background_subtraction.subtract_background(smooth, background, prepared.threshold)
 
     def _empty_scene(self, background: Image | None) -> _Empty | None:
         if background is None:
             return None
-        smooth = background_subtraction.smoothed(self.view.image(background, self.view.whole))
-        readings = self._probes.read(background)
-        return _Empty(smooth, readings, np.flatnonzero(background_subtraction.tells_exposure(readings.colors)))
+        smooth = background_subtraction.smooth_image(self.view.image(background, self.view.whole))
+        statistics = self._grid.measure(background)
+        return _Empty(smooth, statistics, np.flatnonzero(background_subtraction.has_usable_exposure(statistics.colors)))

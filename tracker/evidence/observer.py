@@ -1,7 +1,7 @@
-"""Frames of a recording turned into evidence.
+"""Compute the evidence of the frames of a recording.
 
-The observer works only in the regions asked for, on several views at a time, and one frame ahead: it decodes that
-frame, and where it is told the region in time it finds there what does not depend on the prediction.
+The observer processes only the requested regions, several views at a time and one frame ahead. It decodes the next
+frame. If that frame's regions are known in time, it also extracts the features that do not depend on the prediction.
 """
 
 import threading
@@ -14,36 +14,42 @@ import cv2
 import numpy as np
 
 from tracker.evidence.foreground import Foreground, Prepared
-from tracker.evidence.view_evidence import Look, ViewEvidence, default_theta_px, expecting, silhouette_evidence
+from tracker.evidence.view_evidence import (
+    RegionFeatures,
+    ViewEvidence,
+    default_theta_px,
+    select_evidence,
+    silhouette_evidence,
+)
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import FloatArray
 from tracker.geometry.cameras import Camera, Region
 from tracker.images import background_subtraction
-from tracker.images.edge_segments import link_edges, sampled
+from tracker.images.edge_segments import link_edges, sample_segments
 from tracker.images.edges import detect_edges, levels
-from tracker.images.matching_view import fit_region
-from tracker.images.static_edges import Scenery
+from tracker.images.static_edges import StaticEdgeModel
+from tracker.images.working_view import fit_region
 
 FOREGROUND_MARGIN = 0.012
-"""How far around the silhouette edges are kept, as a fraction of the longer side of the image."""
+"""Width of the margin around the silhouette in which edges count, as a fraction of the longer side of the image."""
 _WORKERS = 2
 _FRAMES_AHEAD = 2
 
 
 class _Ahead(NamedTuple):
-    """A frame as far as it is looked at before its evidence is asked for."""
+    """A frame that is prefetched."""
 
     prepared: Future[list[Prepared | None]]
-    """Each view; None where it is damaged."""
-    looks: Future[list[Look]] | None = None
-    """A region of each view; None where no regions are known."""
-    still: bool = False
-    """Whether what stands still is going to be known."""
+    """Each view; None where the frame is damaged."""
+    features: Future[list[RegionFeatures]] | None = None
+    """Features of a region of each view; None while no regions are known."""
+    with_static_edges: bool = False
+    """Whether static edges will be refused, which lowers the edge thresholds."""
 
 
 class Observer:
-    """Turns the frames of a recording into evidence. Safe to use from several threads."""
+    """Computes evidence from the frames of a recording. Thread-safe."""
 
     def __init__(self, cameras: Sequence[CameraSource], recording: Recording) -> None:
         """Read the backgrounds.
@@ -57,39 +63,40 @@ class Observer:
         """
         self.cameras = tuple(cameras)
         self.recording = recording
-        """Their footage."""
-        # OpenCV's own threads would only be in the way of those that work on other views.
+        """Footage of the views."""
+        # OpenCV's own threads would compete with the threads of other views.
         self._pool, self._pool_ahead = (
             ThreadPoolExecutor(_WORKERS, name, initializer=cv2.setNumThreads, initargs=(1,))
             for name in ("observe", "observe ahead")
         )
         self._views = [Foreground(c, self._pool) for c in self.cameras]
-        self._reader, self._looker = (ThreadPoolExecutor(1, name) for name in ("read ahead", "look ahead"))
+        self._reader, self._finder = (ThreadPoolExecutor(1, name) for name in ("read ahead", "find ahead"))
         self._ahead: OrderedDict[int, _Ahead] = OrderedDict()
         self._lock = threading.Lock()
 
     @property
-    def matched_cameras(self) -> tuple[Camera, ...]:
-        """The views as they are matched, whole: without lens distortion, at the scale of matching."""
+    def working_cameras(self) -> tuple[Camera, ...]:
+        """Cameras of the whole views in working pixels: without lens distortion, at working scale."""
         return tuple(v.view.camera for v in self._views)
 
-    def prefetch(self, k: int, regions: Sequence[Region | None] | None = None, still: bool = False) -> None:
-        """Begin to decode frame k, and to do with it what needs no prediction; `evidence` will find it done.
+    def prefetch(self, k: int, regions: Sequence[Region | None] | None = None, with_static_edges: bool = False) -> None:
+        """Begin to decode frame k and to extract its features; `evidence` uses the result.
 
-        At most two frames are kept so. To be called again when the regions are known. A frame that cannot be read is
-        reported when its evidence is asked for.
+        At most two frames are prefetched. Call again once the regions are known. A frame that cannot be read raises in
+        `evidence`, not here.
 
         Args:
-            k: the frame.
-            regions: where `evidence` is going to look, if it is known; asked for others it looks anew, so that what it
-                gives does not depend on what was told here.
-            still: whether it will be told what stands still.
+            k: frame number.
+            regions: regions that `evidence` will be asked for, if known. Other regions are processed again, so that the
+                result never depends on this hint.
+            with_static_edges: whether `evidence` will be given static edges.
         """
         with self._lock:
             ahead = self._ahead.get(k) or _Ahead(self._reader.submit(self._prepare, k))
-            if regions is not None and ahead.looks is None:
+            if regions is not None and ahead.features is None:
                 ahead = ahead._replace(
-                    looks=self._looker.submit(self._look_ahead, ahead.prepared, list(regions), still), still=still
+                    features=self._finder.submit(self._find_ahead, ahead.prepared, list(regions), with_static_edges),
+                    with_static_edges=with_static_edges,
                 )
             self._ahead[k] = ahead
             while len(self._ahead) > _FRAMES_AHEAD:
@@ -100,39 +107,43 @@ class Observer:
         k: int,
         regions: Sequence[Region | None] | None = None,
         predicted_px: Sequence[FloatArray | None] | None = None,
-        scenery: Sequence[Scenery] | None = None,
+        static_edges: Sequence[StaticEdgeModel] | None = None,
     ) -> tuple[ViewEvidence, ...]:
-        """The edges of frame k in each view, kept to the foreground where masks or a background tell it.
+        """Return the evidence of frame k in each view, restricted to the foreground where masks or a background exist.
 
-        A damaged frame has no edges: the view has no say in the cost.
+        A damaged frame has no edges, so its view does not count in the cost.
 
         Args:
-            k: the frame.
-            regions: where to look in each view, matched px, see `matched.region_around`; None is the whole image.
-            predicted_px: visible pieces of the predicted contours in each view, (M, 4), px of `matched_cameras`, by
-                which segments of edges are accepted; None keeps all edges.
-            scenery: what is known to stand still in each view; asked where neither masks nor a background tell.
+            k: frame number.
+            regions: region of each view, working px, see `working_view.region_around`; None is the whole image.
+            predicted_px: visible pieces of the predicted contours in each view, (M, 4), px of `working_cameras`, by
+                which segments are accepted; None keeps all edges.
+            static_edges: static edges of each view, refused where neither masks nor a background exist.
         """
         with self._lock:
             ahead = self._ahead.pop(k, None)
         prepared = self._prepare(k) if ahead is None else ahead.prepared.result()
-        everywhere, still, looks = [None] * len(self.cameras), scenery is not None, list[Look]()
-        if ahead is not None and ahead.looks is not None and ahead.still == still:
-            looks = ahead.looks.result()
+        everywhere, with_static_edges, features = (
+            [None] * len(self.cameras),
+            static_edges is not None,
+            list[RegionFeatures](),
+        )
+        if ahead is not None and ahead.features is not None and ahead.with_static_edges == with_static_edges:
+            features = ahead.features.result()
 
         def observe(
-            i: int, region: Region | None, predicted_px: FloatArray | None, room: Scenery | None
+            i: int, region: Region | None, predicted_px: FloatArray | None, model: StaticEdgeModel | None
         ) -> ViewEvidence:
-            known = looks and looks[i].box == self._box(i, region)
-            look = looks[i] if known else self._look(i, prepared[i], region, still)
+            known = features and features[i].box == self._box(i, region)
+            seen = features[i] if known else self._find_features(i, prepared[i], region, with_static_edges)
             if predicted_px is not None:
-                predicted_px = predicted_px - np.array([*look.corner_px, *look.corner_px], np.float32)
-            return expecting(look, predicted_px, room if look.silhouette is None else None)
+                predicted_px = predicted_px - np.array([*seen.corner_px, *seen.corner_px], np.float32)
+            return select_evidence(seen, predicted_px, model if seen.silhouette is None else None)
 
         return tuple(
             self._pool.map(
                 observe, range(len(self.cameras)), regions or everywhere, predicted_px or everywhere,
-                scenery or everywhere,
+                static_edges or everywhere,
             )
         )  # fmt: skip
 
@@ -140,33 +151,41 @@ class Observer:
         frames = self.recording.read(k)
         return [None if f is None else view.prepare(f, k) for view, f in zip(self._views, frames, strict=True)]
 
-    def _look_ahead(
-        self, prepared: Future[list[Prepared | None]], regions: Sequence[Region | None], still: bool
-    ) -> list[Look]:
+    def _find_ahead(
+        self, prepared: Future[list[Prepared | None]], regions: Sequence[Region | None], with_static_edges: bool
+    ) -> list[RegionFeatures]:
         views = range(len(self._views))
-        return list(self._pool_ahead.map(self._look, views, prepared.result(), regions, [still] * len(views)))
+        return list(
+            self._pool_ahead.map(
+                self._find_features, views, prepared.result(), regions, [with_static_edges] * len(views)
+            )
+        )
 
     def _box(self, i: int, region: Region | None) -> Region:
         view = self._views[i].view
         return view.whole if region is None else fit_region(region, view.camera.size)
 
-    def _look(self, i: int, prepared: Prepared | None, region: Region | None, still: bool) -> Look:
+    def _find_features(
+        self, i: int, prepared: Prepared | None, region: Region | None, with_static_edges: bool
+    ) -> RegionFeatures:
         view, box = self._views[i], self._box(i, region)
-        matched = view.view.camera
-        camera, scale = matched.cropped(box), view.view.scale
+        working = view.view.camera
+        camera, scale = working.cropped(box), view.view.scale
         if prepared is None:
             nothing = np.zeros((camera.height, camera.width), np.uint8)
-            return Look(camera, scale, box[:2], matched.size, nothing)
-        smooth = view.smoothed(prepared, box)
+            return RegionFeatures(camera, scale, box[:2], working.size, nothing)
+        smooth = view.smooth_region(prepared, box)
         changes = view.changes(prepared, smooth, box)
-        margin_px = FOREGROUND_MARGIN * max(matched.size)
-        foreground = None if changes is None else background_subtraction.grow(changes.anything, margin_px)
-        # Texture that stands still need not be kept out by thresholds, which would keep out the weaker edges of bodies.
-        edges = detect_edges(smooth, levels(prepared.strengths, restricted=changes is not None or still), foreground)
+        margin_px = FOREGROUND_MARGIN * max(working.size)
+        foreground = None if changes is None else background_subtraction.dilate(changes.anything, margin_px)
+        # The model of static edges refuses texture, so low thresholds can keep the weaker edges of bodies.
+        edges = detect_edges(
+            smooth, levels(prepared.strengths, restricted=changes is not None or with_static_edges), foreground
+        )
         segments = link_edges(edges.found, edges.gradients)
         silhouette = (
-            None if changes is None else silhouette_evidence(changes.inside, edges, 2 * default_theta_px(matched))
+            None if changes is None else silhouette_evidence(changes.inside, edges, 2 * default_theta_px(working))
         )
-        return Look(
-            camera, scale, box[:2], matched.size, edges.found, segments, sampled(segments), smooth, silhouette
+        return RegionFeatures(
+            camera, scale, box[:2], working.size, edges.found, segments, sample_segments(segments), smooth, silhouette
         )  # fmt: skip

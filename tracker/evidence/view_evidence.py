@@ -1,6 +1,7 @@
-"""What a frame shows: per view the edges that poses are scored against, and their distance image.
+"""Evidence of one view: the edges that poses are scored against, and their distance image.
 
-What an image shows does not depend on what is expected there (`Look`); which of its edges are kept does.
+The features of a region do not depend on a prediction (`RegionFeatures`). Which of its edges count does
+(`select_evidence`).
 """
 
 from dataclasses import dataclass, field, replace
@@ -17,81 +18,78 @@ from tracker.geometry.cameras import Camera, Region
 from tracker.images.background_subtraction import Mask
 from tracker.images.color_histogram import BINS, count_colors
 from tracker.images.distance_transform import distance_image
-from tracker.images.edge_segments import Samples, Segments, accept, link_edges, sampled
+from tracker.images.edge_segments import Samples, Segments, accept_segments, sample_segments
 from tracker.images.edges import Edges
-from tracker.images.silhouette_outline import Outline, trace_outline, trust_outline
-from tracker.images.static_edges import Scenery
+from tracker.images.silhouette_contour import SilhouetteContour, contour_trust, trace_silhouette
+from tracker.images.static_edges import StaticEdgeModel
 
 SCENE_SPACING_PX = 4
-"""Scene edges are thinned to one point per cell of this many pixels a side."""
+"""Size of the cells in which edges are thinned to one point each, px."""
 
 ACCEPTED_SHARE = 0.5
-"""Mean distance to the predicted contours up to which a segment of edges is accepted, as a share of theta."""
+"""Largest mean distance of an accepted segment to the predicted contours, as a share of theta."""
 
 
 @dataclass(frozen=True, eq=False)
 class Silhouette:
-    """Everybody's silhouette in a region of a view, as far as masks or a background tell it."""
+    """Silhouette of all people in a region of a view, from masks or a background."""
 
     inside: Mask
-    """The silhouette, shadows left out, (H, W)."""
+    """The silhouette without shadows, (H, W)."""
     points_px: FloatArray
-    """Points of its contour, thinned, (N, 2), matched px of the region."""
+    """Thinned points of its contour, (N, 2), working px of the region."""
     normals: FloatArray
-    """Unit normals at these, out of the silhouette, (N, 2)."""
+    """Unit normals at these points, out of the silhouette, (N, 2)."""
     trust: float
-    """How far it can be trusted, 0 to 1; see `silhouette_contour.trust_outline`."""
-    outline: Outline
+    """How far to trust it, 0 to 1; see `silhouette_contour.contour_trust`."""
+    contour: SilhouetteContour
     """All pixels of its contour."""
     limit_px: float
-    """Where `distance` is cut off, matched px."""
+    """Largest value of `distance`, working px."""
 
     @cached_property
     def distance(self) -> FloatArray:
-        """Distance to the contour, (H, W), matched px."""
+        """Distance to the contour, (H, W), working px."""
         on_contour = np.zeros(self.inside.shape, np.uint8)
-        u, v = self.outline.points_px.T.astype(np.intp)
+        u, v = self.contour.points_px.T.astype(np.intp)
         on_contour[v, u] = 1
         return distance_image(on_contour, self.limit_px)
 
 
 @dataclass(frozen=True, eq=False)
 class ViewEvidence:
-    """The edges of one view, or of a region of it, as they are matched."""
+    """The edges of one view, or of a region of it, in working pixels."""
 
     camera: Camera
-    """The view without lens distortion, at the scale of matching, of the region: pixels count from its corner."""
+    """Camera of the region: without lens distortion, at working scale, with pixels counted from the region's corner."""
     scale: float
-    """Matched pixels per pixel of the footage, at most 1."""
+    """Working pixels per pixel of the footage, at most 1."""
     points_px: FloatArray
-    """Edge points for the image-to-model direction, thinned, (N, 2), matched px of the region."""
+    """Thinned edge points for the image-to-model direction, (N, 2), working px of the region."""
     distance: FloatArray
-    """Distance to the nearest edge, cut off at the limit it was made with, (H, W), matched px."""
+    """Distance to the nearest edge, cut off at twice theta, (H, W), working px."""
     corner_px: tuple[int, int] = (0, 0)
-    """Where the region's first pixel lies in the whole image, matched px."""
+    """First pixel of the region in the whole image, working px."""
     image_size: tuple[int, int] | None = None
-    """Width and height of the whole image, matched px; None where the region is all of it."""
+    """Width and height of the whole image, working px; None if the region is the whole image."""
     normals: FloatArray = field(default_factory=lambda: np.empty((0, 2), np.float32))
-    """Unit gradient at each of `points_px`, from dark to light, (N, 2); zero where the edge's direction is unknown."""
+    """Unit gradient at each of `points_px`, from dark to light, (N, 2); zero where the direction is unknown."""
     colors: Image | None = None
-    """The region of the frame itself, smoothed, (H, W, 3) RGB; None where it is damaged or was not kept."""
+    """Smoothed image of the region, (H, W, 3) RGB; None if the frame is damaged or the image was not kept."""
     segments: Segments | None = None
-    """All edges found, linked, in px of the region; None where the directions of the edges are unknown."""
+    """All edges, linked, in px of the region; None if their directions are unknown."""
+    samples: Samples | None = None
+    """Samples of the segments, for distances to contours; None without segments."""
     accepted: NDArray[np.bool_] | None = None
-    """Which segments the prediction accepts, (S,); `points_px` and `distance` hold only those. None: all of them."""
-    still: NDArray[np.bool_] | None = None
-    """Which segments are edges of the room, (S,), and never accepted; None where nothing is known of it."""
+    """Which segments the prediction accepts, (S,); only these are in `points_px` and `distance`. None: all segments."""
+    is_static: NDArray[np.bool_] | None = None
+    """Which segments are static edges, (S,), and never accepted; None if unknown."""
     silhouette: Silhouette | None = None
-    """The silhouette in the region; None where neither a mask nor a background tells it."""
-
-    @cached_property
-    def samples(self) -> Samples | None:
-        """Pixels of the segments, to be asked how far they are from contours."""
-        return None if self.segments is None else sampled(self.segments)
+    """Silhouette in the region; None without masks and background."""
 
     @cached_property
     def color_counts(self) -> NDArray[np.int64]:
-        """Pixels of each colour, (BINS^3,); see `sights.bin_of`; all 0 where there is no image."""
+        """Histogram of the colours, (BINS^3,); see `color_histogram.bin_of`. All 0 without an image."""
         counts = np.zeros(BINS**3, np.int64)
         if self.colors is not None:
             count_colors(self.colors, counts)
@@ -99,16 +97,16 @@ class ViewEvidence:
 
     @property
     def theta_px(self) -> float:
-        """Distance beyond which an edge says nothing, matched px; that of the whole image, whatever the region."""
+        """Outlier distance, working px: beyond it an edge does not count. It follows the size of the whole image."""
         return _theta_px(self.image_size or self.camera.size)
 
     def outlier_px(self, theta_px: float | None) -> float:
-        """An outlier distance in px of the footage as matched px; `theta_px` of the view for None."""
+        """Convert an outlier distance from px of the footage to working px; None gives `theta_px` of the view."""
         return self.theta_px if theta_px is None else theta_px * self.scale
 
 
 def default_theta_px(camera: Camera) -> float:
-    """Distance beyond which an edge says nothing: 3% of the longer side of the image (20 px at 640x480)."""
+    """Return the outlier distance of a camera: 3% of the longer side of its image (20 px at 640x480)."""
     return _theta_px(camera.size)
 
 
@@ -116,47 +114,22 @@ def _theta_px(size: tuple[int, int]) -> float:
     return 0.03 * max(size)
 
 
-def view_evidence(
-    camera: Camera,
-    scale: float,
-    edge_map: NDArray[np.bool_] | NDArray[np.uint8],
-    corner_px: tuple[int, int] = (0, 0),
-    image_size: tuple[int, int] | None = None,
-    gradients: NDArray[np.int16] | None = None,
-    colors: Image | None = None,
-    predicted_px: FloatArray | None = None,
-    scenery: Scenery | None = None,
-) -> ViewEvidence:
-    """Make the evidence of a view from its edge map.
+def silhouette_evidence(inside: Mask, edges: Edges, limit_px: float) -> Silhouette:
+    """Build the evidence of a silhouette.
 
     Args:
-        camera: the view without lens distortion at the scale of the edge map.
-        scale: pixels of the edge map per pixel of the footage.
-        edge_map: (H, W), edges are not 0.
-        corner_px: see `ViewEvidence`.
-        image_size: see `ViewEvidence`.
-        gradients: of the image along u and v, (2, H, W); None where the directions of the edges are unknown.
-        colors: see `ViewEvidence`.
-        predicted_px: see `accepted`; None keeps all edges. Without gradients no edges are refused.
-        scenery: what is known to stand still in the view; such edges are refused.
+        inside: the silhouette in a region, (H, W).
+        edges: edges of the same region.
+        limit_px: largest distance to its contour, working px.
     """
-    assert edge_map.shape == (camera.height, camera.width), (edge_map.shape, camera.size)
-    found = edge_map.view(np.uint8)
-    segments = None if gradients is None else link_edges(found, gradients)
-    look = Look(camera, scale, corner_px, image_size, found, segments, colors=colors)
-    return expecting(look, predicted_px, scenery)
+    contour = trace_silhouette(inside)
+    first = _first_in_cells(contour.points_px, *inside.shape)
+    trust = contour_trust(contour, inside, edges)
+    return Silhouette(inside, contour.points_px[first], contour.normals[first], trust, contour, limit_px)
 
 
-def silhouette_evidence(inside: Mask, edges: Edges, limit_px: float) -> Silhouette:
-    """A silhouette, (H, W), in a region whose edges are known, with its distance cut off at a limit, matched px."""
-    outline = trace_outline(inside)
-    first = _first_in_cells(outline.points_px, *inside.shape)
-    trust = trust_outline(outline, inside, edges)
-    return Silhouette(inside, outline.points_px[first], outline.normals[first], trust, outline, limit_px)
-
-
-class Look(NamedTuple):
-    """What a region of a view shows, whatever is expected there; see `ViewEvidence`."""
+class RegionFeatures(NamedTuple):
+    """Features of a region of a view that do not depend on a prediction; see `ViewEvidence`."""
 
     camera: Camera
     scale: float
@@ -166,66 +139,65 @@ class Look(NamedTuple):
     """Edges are not 0, (H, W)."""
     segments: Segments | None = None
     samples: Samples | None = None
-    """Of the segments, where they have been taken."""
+    """Samples of the segments; None if not yet taken."""
     colors: Image | None = None
     silhouette: Silhouette | None = None
 
     @property
     def box(self) -> Region:
-        """The region, matched px of the whole image."""
+        """The region, working px of the whole image."""
         (u0, v0), (width, height) = self.corner_px, self.camera.size
         return u0, v0, u0 + width, v0 + height
 
 
-def expecting(look: Look, predicted_px: FloatArray | None, scenery: Scenery | None) -> ViewEvidence:
-    """What of a region's edges is kept where something is expected and something stands still; see `view_evidence`."""
-    segments, theta = look.segments, _theta_px(look.image_size or look.camera.size)
-    chosen = still = None
-    if segments is not None:
-        if predicted_px is not None:
-            chosen = accept(look.samples or sampled(segments), predicted_px, ACCEPTED_SHARE * theta)
-        if scenery is not None:
-            still = scenery.holds(segments, look.corner_px)
-            chosen = ~still if chosen is None else chosen & ~still
-    points, normals, found = _matched_edges(segments, chosen, look.found)
-    # Beyond twice theta nothing asks for the distance any more.
-    distance = distance_image(found, 2 * theta)
-    seen = ViewEvidence(
-        look.camera, look.scale, points, distance, look.corner_px, look.image_size, normals, look.colors, segments,
-        chosen, still, look.silhouette,
-    )  # fmt: skip
-    if look.samples is not None:
-        seen.__dict__["samples"] = look.samples  # taken once
-    return seen
-
-
-def accepted(view: ViewEvidence, predicted_px: FloatArray, threshold_px: float | None = None) -> ViewEvidence:
-    """The same view with only the edges that the prediction explains, segment by segment (GD96 Sect. 4.2, Fig. 6).
+def select_evidence(
+    features: RegionFeatures, predicted_px: FloatArray | None, static_edges: StaticEdgeModel | None
+) -> ViewEvidence:
+    """Select the edges of a region that the prediction accepts and that are not static.
 
     Args:
-        view: with directions of edges.
-        predicted_px: visible pieces of the predicted contours, x0, y0, x1, y1, (M, 4), px of the view's camera.
-        threshold_px: mean distance of a segment to them up to which it is accepted, px; by default half of theta.
+        features: features of the region.
+        predicted_px: visible pieces of the predicted contours, x0, y0, x1, y1, (M, 4), px of the region; None accepts
+            all edges. Without segments all edges are accepted.
+        static_edges: static edges of the view, which are refused; None if unknown.
     """
-    assert view.samples is not None
-    return with_segments(view, accept(view.samples, predicted_px, threshold_px or ACCEPTED_SHARE * view.theta_px))
+    segments, samples, theta = (
+        features.segments,
+        features.samples,
+        _theta_px(features.image_size or features.camera.size),
+    )
+    chosen = is_static = None
+    if segments is not None:
+        samples = samples or sample_segments(segments)
+        if predicted_px is not None:
+            chosen = accept_segments(samples, predicted_px, ACCEPTED_SHARE * theta)
+        if static_edges is not None:
+            is_static = static_edges.contains(segments, features.corner_px)
+            chosen = ~is_static if chosen is None else chosen & ~is_static
+    points, normals, found = _matched_edges(segments, chosen, features.found)
+    # Distances beyond twice theta are never used.
+    distance = distance_image(found, 2 * theta)
+    return ViewEvidence(
+        features.camera, features.scale, points, distance, features.corner_px, features.image_size, normals,
+        features.colors, segments, samples, chosen, is_static, features.silhouette,
+    )  # fmt: skip
 
 
-def unfiltered(view: ViewEvidence) -> ViewEvidence:
-    """The same view with all edges but the room's: a wrong prediction may have refused what it missed."""
+def with_all_segments(view: ViewEvidence) -> ViewEvidence:
+    """Return a view with all edges that are not static, because a wrong prediction may have refused the right ones."""
     if view.segments is None or view.accepted is None or view.accepted.all():
         return view
-    seen = with_segments(view, findable(view.segments, view.still))
-    return replace(seen, accepted=None) if view.still is None else seen
+    seen = with_segments(view, foreground_segments(view.segments, view.is_static))
+    return replace(seen, accepted=None) if view.is_static is None else seen
 
 
-def findable(segments: Segments, still: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
-    """Which segments may be a person's, (S,): all but those that are known to stand `still`, (S,)."""
-    return np.ones(len(segments.firsts) - 1, np.bool_) if still is None else ~still
+def foreground_segments(segments: Segments, is_static: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+    """Return which segments may belong to a person, (S,): all that are not static, (S,)."""
+    return np.ones(len(segments.firsts) - 1, np.bool_) if is_static is None else ~is_static
 
 
 def with_segments(view: ViewEvidence, chosen: NDArray[np.bool_]) -> ViewEvidence:
-    """The same view with only the edges of some segments, (S,); its segments must be known."""
+    """Return a view with only the edges of the chosen segments, (S,)."""
     assert view.segments is not None
     points, normals, found = _edges_of(view.segments, chosen, (view.camera.height, view.camera.width))
     distance = distance_image(found, 2 * view.theta_px)
@@ -235,7 +207,8 @@ def with_segments(view: ViewEvidence, chosen: NDArray[np.bool_]) -> ViewEvidence
 def _matched_edges(
     segments: Segments | None, chosen: NDArray[np.bool_] | None, found: NDArray[np.uint8]
 ) -> tuple[FloatArray, FloatArray, NDArray[np.uint8]]:
-    """Thinned points (N, 2) and normals (N, 2) of chosen segments, and the map of all their pixels."""
+    """Return the thinned points (N, 2) and normals (N, 2) of chosen segments, and the map of all their pixels, (H,
+    W)."""
     if segments is not None and chosen is not None:
         return _edges_of(segments, chosen, found.shape)
     if segments is None:
@@ -251,7 +224,7 @@ def _matched_edges(
 def _edges_of(
     segments: Segments, chosen: NDArray[np.bool_], shape: tuple[int, ...]
 ) -> tuple[FloatArray, FloatArray, NDArray[np.uint8]]:
-    """The same of chosen segments, (S,), in an image of a height and width."""
+    """Return the same for chosen segments, (S,), in an image of a height and width."""
     found = np.zeros(shape, np.uint8)
     cells = np.zeros((shape[0] // SCENE_SPACING_PX + 1, shape[1] // SCENE_SPACING_PX + 1), np.bool_)
     first = np.empty(len(segments.points_px), np.int64)
@@ -264,7 +237,8 @@ def _mark_chosen(
     points: FloatArray, firsts: NDArray[np.int64], chosen: NDArray[np.bool_], found: NDArray[np.uint8],
     cells: NDArray[np.bool_], first: NDArray[np.int64],
 ) -> int:  # fmt: skip
-    """Mark the pixels (N, 2) of chosen segments in a map, and list the first of them in each cell; their number."""
+    """Mark the pixels (N, 2) of chosen segments in a map, and list the first pixel in each cell; return their
+    number."""
     n = 0
     for segment in range(len(chosen)):
         if not chosen[segment]:
@@ -282,7 +256,7 @@ def _mark_chosen(
 
 @njit(nogil=True, cache=True)
 def _first_in_cells(points: FloatArray, height: int, width: int) -> NDArray[np.int64]:
-    """Index of the first of the points (N, 2) in each cell of the scene spacing, (M,)."""
+    """Return the index of the first of the points (N, 2) in each cell of `SCENE_SPACING_PX`, (M,)."""
     columns = width // SCENE_SPACING_PX + 1
     taken = np.zeros((height // SCENE_SPACING_PX + 1) * columns, np.bool_)
     first = np.empty(points.shape[0], np.int64)

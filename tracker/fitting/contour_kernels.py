@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from tracker.compute.numba_options import FAST
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import (
-    Kept,
-    keep_pieces,
-    mark_covered,
-    remember,
-    still_stands,
-    trace_moving,
-    trace_standing,
+    StaticContours,
+    copy_poses,
+    is_static_unchanged,
+    mark_covered_segments,
+    store_pieces,
+    trace_moving_parts,
+    trace_static,
 )
 from tracker.evidence.view_evidence import SCENE_SPACING_PX
 from tracker.fitting.twists import add_twists
@@ -29,8 +29,8 @@ _JOINED = 10
 """Most pieces of a segment: longer ones would reach too many points."""
 
 
-class Scene(NamedTuple):
-    """The evidence of all views as arrays, for the kernel; lengths in matched px."""
+class ViewArrays(NamedTuple):
+    """The evidence of all views as arrays, for the kernel; lengths in working px."""
 
     P: Array
     """Projection matrices, (V, 3, 4)."""
@@ -75,12 +75,12 @@ class Scratch(NamedTuple):
     best: FloatArray
     """Squared distance of each edge point to its segment, with the turn between them, (room,)."""
     nearest: NDArray[np.int32]
-    """Index of that segment, (room,); -1 for what stands as it was kept (see `kept`)."""
+    """Index of that segment, (room,); -1 for what stands as it was static (see `static`)."""
     pull: FloatArray
     """What each edge point's residual weighs, (room,)."""
 
 
-def scratch_for(surfaces: occluding_contours.Surfaces, room: int, n_points: int) -> Scratch:
+def scratch_buffer(surfaces: occluding_contours.Surfaces, room: int, n_points: int) -> Scratch:
     """Uninitialized room for as many pieces in a view and points in all."""
     return Scratch(
         occluding_contours.piece_buffer(surfaces, room), np.empty((8, room), np.float32),
@@ -99,12 +99,12 @@ class Sums(NamedTuple):
     """Gradient by each part's twist, (P, 6)."""
     parts: Array
     """Per view and part: visible length, its summed cut-off distance, explained points, (V, P, 3)."""
-    outline: Array
+    silhouette: Array
     """Points of each view's silhouette that are explained, (V,)."""
 
 
 @njit(**FAST)
-def nearest_alike(
+def nearest_oriented_segment(
     u: FloatArray, v: FloatArray, nu: FloatArray, nv: FloatArray, rows: IntArray, segments: FloatArray, n: int,
     wanted: NDArray[np.bool_], turn: float, reach: float, best: FloatArray, nearest: NDArray[np.int32],
 ) -> None:  # fmt: skip
@@ -137,57 +137,57 @@ def nearest_alike(
 
 
 @njit(**FAST)
-def _visible(n_parts: int, scratch: Scratch) -> int:
+def _pack_visible(n_parts: int, scratch: Scratch) -> int:
     """Pack the visible pieces, and join them to segments; returns the number of those."""
     traced, pieces, segments, of_segment = scratch.traced, scratch.pieces, scratch.segments, scratch.of_segment
-    ends, middles, edges, hidden, firsts = traced.ends, traced.middles, traced.edges, traced.hidden, traced.firsts
-    half, kept, n, edge, one = np.float32(0.5), np.uint64(0), np.uint64(0), -1, np.uint64(1)
+    ends, middles, edges, occluded, firsts = traced.ends, traced.middles, traced.edges, traced.occluded, traced.firsts
+    half, packed, n, edge, one = np.float32(0.5), np.uint64(0), np.uint64(0), -1, np.uint64(1)
     for part in range(n_parts):
-        scratch.firsts[part] = kept
+        scratch.firsts[part] = packed
         for i in range(np.uint64(firsts[part]), np.uint64(firsts[part + 1])):
-            if hidden[i]:
+            if occluded[i]:
                 edge = -1
                 continue
             x, y, x1, y1 = ends[0, i], ends[1, i], ends[2, i], ends[3, i]
             dx, dy = x1 - x, y1 - y
             length = np.sqrt(max(dx * dx + dy * dy, np.float32(1e-12)))
             nx, ny = -dy / length, dx / length
-            pieces[0, kept], pieces[1, kept], pieces[2, kept] = half * (x + x1), half * (y + y1), length
-            pieces[3, kept], pieces[4, kept] = nx, ny
-            pieces[5, kept], pieces[6, kept], pieces[7, kept] = middles[0, i], middles[1, i], middles[2, i]
+            pieces[0, packed], pieces[1, packed], pieces[2, packed] = half * (x + x1), half * (y + y1), length
+            pieces[3, packed], pieces[4, packed] = nx, ny
+            pieces[5, packed], pieces[6, packed], pieces[7, packed] = middles[0, i], middles[1, i], middles[2, i]
             if edges[i] != edge or of_segment[1, n - one] == _JOINED:
                 edge = edges[i]
                 segments[0, n], segments[1, n], segments[5, n], segments[6, n] = x, y, nx, ny
-                of_segment[0, n], of_segment[1, n], of_segment[2, n] = kept, 0, part
+                of_segment[0, n], of_segment[1, n], of_segment[2, n] = packed, 0, part
                 n += one
             k = n - one
             of_segment[1, k] += 1
             dx, dy = x1 - segments[0, k], y1 - segments[1, k]
             segments[2, k], segments[3, k] = dx, dy
             segments[4, k] = _ONE / max(dx * dx + dy * dy, np.float32(1e-12))
-            kept += one
-    scratch.firsts[n_parts] = kept
+            packed += one
+    scratch.firsts[n_parts] = packed
     return int(n)
 
 
 @njit(**FAST)
 def _model_to_image(
-    view: int, first: int, last: int, pixel: int, scene: Scene, scale: float, derive: bool, kept: Kept,
-    scratch: Scratch, sums: Sums,
+    view: int, first: int, last: int, pixel: int, views: ViewArrays, scale: float, with_jacobian: bool,
+    static: StaticContours, scratch: Scratch, sums: Sums,
 ) -> float:  # fmt: skip
     """Add the residuals of the visible pieces of the parts from first to last; their cost."""
-    width, height = scene.sizes[view, 0], scene.sizes[view, 1]
-    theta, weight = np.float32(scene.thetas[view]), np.float32(scene.weights[view, 0])
+    width, height = views.sizes[view, 0], views.sizes[view, 1]
+    theta, weight = np.float32(views.thetas[view]), np.float32(views.weights[view, 0])
     q, pulls, firsts = scratch.pieces, scratch.pulls, scratch.firsts
     image, right, bottom = (
-        scene.distances[pixel : pixel + width * height],
+        views.distances[pixel : pixel + width * height],
         np.float32(width - 1),
         np.float32(height - 1),
     )
     s2, cost = np.float32((scale * theta) ** 2), 0.0
     for part in range(first, last):
         seen = far = 0.0
-        pulled = derive and kept.moves[part]
+        pulled = with_jacobian and static.moves[part]
         for k in range(np.uint64(firsts[part]), np.uint64(firsts[part + 1])):
             x, y, length = q[0, k], q[1, k], q[2, k]
             # What lies outside the image is neither explained nor refuted: a body may be cut off at the border.
@@ -210,46 +210,48 @@ def _model_to_image(
 
 
 @njit(**FAST)
-def _hold_against(
-    view: int, n: int, scene: Scene, turn: float, scratch: Scratch, best: FloatArray, nearest: NDArray[np.int32]
+def _match_segments(
+    view: int, n: int, views: ViewArrays, turn: float, scratch: Scratch, best: FloatArray, nearest: NDArray[np.int32]
 ) -> None:  # fmt: skip
     """Hold the points of a view against those of n segments that are wanted."""
-    start, stop, theta = scene.firsts[view], scene.firsts[view + 1], scene.thetas[view]
+    start, stop, theta = views.firsts[view], views.firsts[view + 1], views.thetas[view]
     # Rows first: a slice of both would be of numbers that need not lie side by side, which is not vectorized.
-    u, v, nu, nv = scene.points[0], scene.points[1], scene.points[2], scene.points[3]
-    nearest_alike(
-        u[start:stop], v[start:stop], nu[start:stop], nv[start:stop], scene.rows[view], scratch.segments, n,
+    u, v, nu, nv = views.points[0], views.points[1], views.points[2], views.points[3]
+    nearest_oriented_segment(
+        u[start:stop], v[start:stop], nu[start:stop], nv[start:stop], views.rows[view], scratch.segments, n,
         scratch.wanted, turn * np.float32(theta * theta), theta, best, nearest,
     )  # fmt: skip
 
 
 @njit(**FAST)
-def _find_nearest(view: int, n_segments: int, scene: Scene, turn: float, kept: Kept, scratch: Scratch) -> None:
+def _match_points(
+    view: int, n_segments: int, views: ViewArrays, turn: float, static: StaticContours, scratch: Scratch
+) -> None:
     """Fill the nearest segment of each point of a view, and how far it is."""
-    start, stop = scene.firsts[view], scene.firsts[view + 1]
+    start, stop = views.firsts[view], views.firsts[view + 1]
     best, nearest, wanted, of, n = scratch.best, scratch.nearest, scratch.wanted, scratch.of_segment, stop - start
-    if kept.best.shape[0] == 0:
+    if static.best.shape[0] == 0:
         best[:n], wanted[:n_segments] = _FAR2, True
     else:
         for j in range(np.uint64(n)):
-            best[j], nearest[j] = kept.best[np.uint64(start) + j], np.int32(-1)
+            best[j], nearest[j] = static.best[np.uint64(start) + j], np.int32(-1)
         for k in range(n_segments):
-            wanted[k] = kept.moves[of[2, k]]
-        if mark_covered(view, scratch.traced, kept):
-            _uncover(view, n_segments, scene, kept, scratch)
-    _hold_against(view, n_segments, scene, turn, scratch, best, nearest)
+            wanted[k] = static.moves[of[2, k]]
+        if mark_covered_segments(view, scratch.traced, static):
+            _rematch_covered(view, n_segments, views, static, scratch)
+    _match_segments(view, n_segments, views, turn, scratch, best, nearest)
 
 
 @njit(**FAST)
-def _uncover(view: int, n_segments: int, scene: Scene, kept: Kept, scratch: Scratch) -> None:
+def _rematch_covered(view: int, n_segments: int, views: ViewArrays, static: StaticContours, scratch: Scratch) -> None:
     """Let the points whose nearest segment something that moves covers be held against whatever is in reach of them."""
-    start, stop, reach = scene.firsts[view], scene.firsts[view + 1], np.float32(scene.thetas[view])
-    best, segments, before, limit = scratch.best, scratch.segments, kept.nearest[start:stop], reach * reach
-    us, vs = scene.points[0][start:stop], scene.points[1][start:stop]
+    start, stop, reach = views.firsts[view], views.firsts[view + 1], np.float32(views.thetas[view])
+    best, segments, before, limit = scratch.best, scratch.segments, static.nearest[start:stop], reach * reach
+    us, vs = views.points[0][start:stop], views.points[1][start:stop]
     u0 = v0 = _FAR2
     u1 = v1 = -_FAR2
     for j in range(np.uint64(stop - start)):
-        if best[j] < limit and kept.covered[before[j]]:
+        if best[j] < limit and static.covered[before[j]]:
             u0, u1, v0, v1 = min(u0, us[j]), max(u1, us[j]), min(v0, vs[j]), max(v1, vs[j])
             best[j] = _FAR2
     u0, u1, v0, v1 = u0 - reach, u1 + reach, v0 - reach, v1 + reach
@@ -262,25 +264,25 @@ def _uncover(view: int, n_segments: int, scene: Scene, kept: Kept, scratch: Scra
 
 @njit(**FAST)
 def _image_to_model(
-    view: int, n_segments: int, scene: Scene, scale: float, turn: float, derive: bool, kept: Kept,
-    scratch: Scratch, sums: Sums,
+    view: int, n_segments: int, views: ViewArrays, scale: float, turn: float, with_jacobian: bool,
+    static: StaticContours, scratch: Scratch, sums: Sums,
 ) -> float:  # fmt: skip
     """Add the residuals of the view's edge points whose nearest piece is of a part that moves; the cost of all.
 
     The points are the same at every pose, so that their costs compare like with like: one that no piece is near, or
     that is nearest to somebody else, costs what a point at the outlier distance does.
     """
-    theta, weight = scene.thetas[view], np.float32(scene.weights[view, 1] * SCENE_SPACING_PX)
+    theta, weight = views.thetas[view], np.float32(views.weights[view, 1] * SCENE_SPACING_PX)
     s2, limit, cost = np.float32((scale * theta) ** 2), np.float32(theta * theta), 0.0
-    start, stop = scene.firsts[view], scene.firsts[view + 1]
-    us, vs, q, of = scene.points[0][start:stop], scene.points[1][start:stop], scratch.segments, scratch.of_segment
+    start, stop = views.firsts[view], views.firsts[view + 1]
+    us, vs, q, of = views.points[0][start:stop], views.points[1][start:stop], scratch.segments, scratch.of_segment
     weights, counts, of_silhouette = (
-        scene.points[4][start:stop],
-        scene.points[5][start:stop],
-        scene.points[6][start:stop],
+        views.points[4][start:stop],
+        views.points[5][start:stop],
+        views.points[6][start:stop],
     )
     best, nearest, pulls = scratch.best, scratch.nearest, scratch.pulls
-    _find_nearest(view, n_segments, scene, turn, kept, scratch)
+    _match_points(view, n_segments, views, turn, static, scratch)
     n, pull, explained = np.uint64(stop - start), scratch.pull, 0.0
     for j in range(n):
         squared = min(best[j], limit)
@@ -290,16 +292,16 @@ def _image_to_model(
     for j in range(n):
         if best[j] >= limit:
             continue
-        if not derive:  # who asks for the costs of the parts counts what they explain
+        if not with_jacobian:  # who asks for the costs of the parts counts what they explain
             explained += of_silhouette[j]
         if nearest[j] < 0:
             continue
         k = np.uint64(nearest[j])
         part = of[2, k]
-        if not derive:
+        if not with_jacobian:
             sums.parts[view, part, 2] += counts[j]
             continue
-        if not kept.moves[part]:
+        if not static.moves[part]:
             continue
         w, u, v, dx, dy, count = pull[j], us[j] - q[0, k], vs[j] - q[1, k], q[2, k], q[3, k], of[1, k]
         t = (u * dx + v * dy) * q[4, k]
@@ -320,34 +322,35 @@ def _image_to_model(
         pulls[4, i] += w * gv * gv
         pulls[5, i] += w * d * gu
         pulls[6, i] += w * d * gv
-    sums.outline[view] = explained
+    sums.silhouette[view] = explained
     return 0.5 * float(weight) * cost
 
 
 @njit(**FAST)
-def _keep(
-    view: int, surfaces: occluding_contours.Surfaces, scene: Scene, turn: float, kept: Kept, scratch: Scratch
+def _store_static(
+    view: int, surfaces: occluding_contours.Surfaces, views: ViewArrays, turn: float, static: StaticContours,
+    scratch: Scratch,
 ) -> None:  # fmt: skip
     """Keep the contours of what stands in a view, and what they are nearest to."""
-    trace_standing(scene.P[view], scene.eyes[view], surfaces, occluding_contours.PIECE_PX, kept, scratch.traced)
-    keep_pieces(view, scratch.traced, kept)
-    n_segments, segment, visible = _visible(kept.moves.shape[0], scratch), -1, 0
-    at = kept.firsts[view, 0]
+    trace_static(views.P[view], views.eyes[view], surfaces, occluding_contours.PIECE_PX, static, scratch.traced)
+    store_pieces(view, scratch.traced, static)
+    n_segments, segment, visible = _pack_visible(static.moves.shape[0], scratch), -1, 0
+    at = static.firsts[view, 0]
     for i in range(scratch.traced.firsts[-1]):
-        if scratch.traced.hidden[i]:
+        if scratch.traced.occluded[i]:
             continue
         if segment + 1 < n_segments and scratch.of_segment[0, segment + 1] == visible:
             segment += 1
-        kept.segments[at + i] = segment
+        static.segments[at + i] = segment
         visible += 1
-    start, stop = scene.firsts[view], scene.firsts[view + 1]
-    best, nearest = kept.best[start:stop], kept.nearest[start:stop]
+    start, stop = views.firsts[view], views.firsts[view + 1]
+    best, nearest = static.best[start:stop], static.nearest[start:stop]
     best[:], scratch.wanted[:n_segments] = _FAR2, True
-    _hold_against(view, n_segments, scene, turn, scratch, best, nearest)
+    _match_segments(view, n_segments, views, turn, scratch, best, nearest)
 
 
-class Work(NamedTuple):
-    """All that `gather` needs."""
+class ContourTerm(NamedTuple):
+    """All that `accumulate_normal_equations` needs."""
 
     Ts: Array
     """World poses of all parts, (P, 4, 4), metres."""
@@ -356,57 +359,58 @@ class Work(NamedTuple):
     last: int
     """Index after the last of them; the others hide, and draw the points that are nearer to them."""
     surfaces: occluding_contours.Surfaces
-    scene: Scene
+    views: ViewArrays
     scale: float
     """See `refine.MatchSettings`."""
     turn: float
     """The same."""
-    kept: Kept
+    static: StaticContours
     scratch: Scratch
     sums: Sums
     """What it fills."""
 
 
-DERIVE, SUM_UP = np.bool_(True), np.bool_(False)
-"""What kernels ask of `gather`. It would be compiled anew for each True and False that a kernel names."""
+WITH_JACOBIAN, COST_ONLY = np.bool_(True), np.bool_(False)
+"""Values of `with_jacobian`. Literals in a kernel would have `accumulate_normal_equations` compiled once for each."""
 
 
 @njit(**FAST)
-def gather(work: Work, derive: bool) -> float:
+def accumulate_normal_equations(term: ContourTerm, with_jacobian: bool) -> float:
     """Fill the sums for one pose of the parts from first to last, the other parts fixed; returns the cost.
 
-    Without `derive` the normal matrices stay empty; with it those of parts that do not move (see `kept`) do.
+    Without `with_jacobian` the normal matrices stay empty; with it those of parts that do not move (see `static`) do.
     """
-    Ts, first, last, surfaces, scene, scale, turn, kept, scratch, sums = work
+    Ts, first, last, surfaces, views, scale, turn, static, scratch, sums = term
     sums.M[:] = 0.0
     sums.b[:] = 0.0
     sums.parts[:] = 0.0
-    sums.outline[:] = 0.0
-    pixel, cost, keeps = np.int64(0), 0.0, kept.best.shape[0] > 0  # a bare 0 is a type of its own to the compiler
-    anew = keeps and not still_stands(Ts, kept.moves, kept.Ts)
-    occluding_contours.place(Ts, surfaces, scratch.traced)
-    for view in range(scene.P.shape[0]):
-        if anew:
-            _keep(view, surfaces, scene, turn, kept, scratch)
-        if scene.weights[view, 0] > 0.0 or scene.weights[view, 1] > 0.0:
-            P, eye, traced = scene.P[view], scene.eyes[view], scratch.traced
-            if keeps:
-                trace_moving(view, P, eye, surfaces, occluding_contours.PIECE_PX, kept, traced)
+    sums.silhouette[:] = 0.0
+    pixel, cost, caches = np.int64(0), 0.0, static.best.shape[0] > 0  # a bare 0 is a type of its own to the compiler
+    stale = caches and not is_static_unchanged(Ts, static.moves, static.Ts)
+    occluding_contours.place_parts(Ts, surfaces, scratch.traced)
+    for view in range(views.P.shape[0]):
+        if stale:
+            _store_static(view, surfaces, views, turn, static, scratch)
+        if views.weights[view, 0] > 0.0 or views.weights[view, 1] > 0.0:
+            P, eye, traced = views.P[view], views.eyes[view], scratch.traced
+            if caches:
+                trace_moving_parts(view, P, eye, surfaces, occluding_contours.PIECE_PX, static, traced)
             else:
                 occluding_contours.trace_pieces(P, eye, surfaces, occluding_contours.PIECE_PX, traced)
-            n_segments = _visible(Ts.shape[0], scratch)
+            n_segments = _pack_visible(Ts.shape[0], scratch)
             scratch.pulls[:, : scratch.firsts[-1]] = 0.0
-            if scene.weights[view, 0] > 0.0 or not derive:  # whoever asks for the costs of the parts asks for both
-                cost += _model_to_image(view, first, last, pixel, scene, scale, derive, kept, scratch, sums)
-            if scene.weights[view, 1] > 0.0:
-                cost += _image_to_model(view, n_segments, scene, scale, turn, derive, kept, scratch, sums)
-            if derive:
+            # The costs of the parts need both directions.
+            if views.weights[view, 0] > 0.0 or not with_jacobian:
+                cost += _model_to_image(view, first, last, pixel, views, scale, with_jacobian, static, scratch, sums)
+            if views.weights[view, 1] > 0.0:
+                cost += _image_to_model(view, n_segments, views, scale, turn, with_jacobian, static, scratch, sums)
+            if with_jacobian:
                 for part in range(first, last):
-                    if not kept.moves[part]:
+                    if not static.moves[part]:
                         continue
                     span, W = scratch.firsts[part : part + 2], scratch.traced.Ts_world_unit[part]
-                    add_twists(span, scratch.pieces, scratch.pulls, scene.P[view], W, sums.M[part], sums.b[part])
-        pixel += scene.sizes[view, 0] * scene.sizes[view, 1]
-    if anew:
-        remember(Ts, kept.Ts)
+                    add_twists(span, scratch.pieces, scratch.pulls, views.P[view], W, sums.M[part], sums.b[part])
+        pixel += views.sizes[view, 0] * views.sizes[view, 1]
+    if stale:
+        copy_poses(Ts, static.Ts)
     return cost

@@ -30,7 +30,7 @@ _PLACE_M = 0.02
 """How well joints go with the places they are known at (one standard deviation): a body is of other sizes, metres."""
 
 
-class Normal(NamedTuple):
+class NormalEquations(NamedTuple):
     """The normal equations of some residuals at a pose."""
 
     cost: float
@@ -41,21 +41,21 @@ class Normal(NamedTuple):
     """Gauss-Newton's second derivative, (n_dofs, n_dofs), positive semi-definite."""
 
 
-class Block(Protocol):
+class ResidualBlock(Protocol):
     """One kind of evidence for the pose of one person.
 
     A block hands over its normal equations and not its residuals, so that thousands of image residuals can be summed
     where they arise.
     """
 
-    def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
+    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
         """Linearize the weighted residuals at a pose."""
         ...
 
 
-def normal_of(residuals: Array, jacobian: Array) -> Normal:
+def normal_equations(residuals: Array, jacobian: Array) -> NormalEquations:
     """Normal equations of weighted residuals (N,) with their derivative by the degrees of freedom, (N, n_dofs)."""
-    return Normal(0.5 * float(residuals @ residuals), jacobian.T @ residuals, jacobian.T @ jacobian)
+    return NormalEquations(0.5 * float(residuals @ residuals), jacobian.T @ residuals, jacobian.T @ jacobian)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,17 +69,17 @@ class PointTargets:
     weights: Array
     """Weight of each point's distance, (N,), per metre."""
 
-    def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
-        """See `Block`."""
+    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+        """See `ResidualBlock`."""
         parts = model.point_parts[self.points]
         points_world = model.points_at(kinematics, self.points)
         J = model.point_jacobian(kinematics, parts, points_world) * self.weights[:, None, None]
         r = (points_world - self.targets_world) * self.weights[:, None]
-        return normal_of(r.ravel(), J.reshape(-1, model.n_dofs))
+        return normal_equations(r.ravel(), J.reshape(-1, model.n_dofs))
 
 
 @dataclass(frozen=True, eq=False)
-class StayNear:
+class PosePrior:
     """A prior that keeps a pose near another one; what the evidence leaves open stays as it was."""
 
     values: Array
@@ -87,11 +87,11 @@ class StayNear:
     weights: Array
     """Weight of each degree of freedom, (n_dofs,), per radian or metre."""
 
-    def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
-        """See `Block`."""
+    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+        """See `ResidualBlock`."""
         # d(difference)/d(step) is the identity to first order, for balls up to the curvature of the rotation.
         r = model.difference(values, self.values) * self.weights
-        return Normal(0.5 * float(r @ r), self.weights * r, self._hessian)
+        return NormalEquations(0.5 * float(r @ r), self.weights * r, self._hessian)
 
     @cached_property
     def _hessian(self) -> Array:
@@ -101,7 +101,7 @@ class StayNear:
 class Fit(NamedTuple):
     """What the solver found."""
 
-    values: Array
+    pose: Array
     """Pose, (n_values,), within the joint limits."""
     cost: float
     """Half the sum of squared residuals."""
@@ -113,7 +113,7 @@ class Fit(NamedTuple):
 def solve(
     model: BodyModel,
     values: Array,
-    blocks: Sequence[Block],
+    blocks: Sequence[ResidualBlock],
     free: NDArray[np.bool_] | None = None,
     max_iterations: int = 50,
     tolerance: float = 1e-6,
@@ -133,7 +133,7 @@ def solve(
     """
     may_move = np.ones(model.n_dofs, dtype=bool) if free is None else free
     start = values  # what may not move stays as it is there, even outside of the limits
-    values = held(model, model.clip(start), start, free)
+    values = with_locked_dofs(model, model.clip(start), start, free)
     here = _sum(model, values, blocks)
     damping, iterations = FIRST_DAMPING, 0
     while iterations < max_iterations:
@@ -149,7 +149,7 @@ def solve(
             worth = -(g + 0.5 * H @ step) @ step > gain
             change = np.zeros(model.n_dofs)
             change[moving] = step
-            trial = held(model, model.clip(model.retract(values, change)), start, free)
+            trial = with_locked_dofs(model, model.clip(model.retract(values, change)), start, free)
             moved = float(np.abs(model.difference(trial, values)).max())
             there = _sum(model, trial, blocks) if worth else here
             if there.cost < here.cost or not worth or moved < tolerance or damping > MOST_DAMPING:
@@ -165,12 +165,12 @@ def solve(
     return Fit(values, here.cost, iterations, here.hessian)
 
 
-def held(model: BodyModel, values: Array, still: Array, free: NDArray[np.bool_] | None) -> Array:
+def with_locked_dofs(model: BodyModel, values: Array, still: Array, free: NDArray[np.bool_] | None) -> Array:
     """A pose, (n_values,), but for what is not `free`, (n_dofs,), to move: that is as in another pose."""
-    return values if free is None else np.where(of_values(model, ~free), still, values)
+    return values if free is None else np.where(value_mask(model, ~free), still, values)
 
 
-def of_values(model: BodyModel, of_dofs: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def value_mask(model: BodyModel, of_dofs: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """What is said of degrees of freedom, (n_dofs,), said of the values; of a quaternion where any turn of it is."""
     out = np.zeros(len(model.value_names), dtype=bool)
     np.logical_or.at(out, model.dof_value, of_dofs)
@@ -235,19 +235,19 @@ def fit_to_points(model: BodyModel, targets_world: dict[str, Array], near: Array
             step[turns[0]], step[turns[-1]] = tilt * np.pi / 2, turn * np.pi / 4
             starts.append(model.retract(base, step))
     # Where a body of other sizes could reach the places better by a bend that people do not make, it is not bent so.
-    usual = StayNear(model.neutral(), 1 / model.spreads)
+    usual = PosePrior(model.neutral(), 1 / model.spreads)
     # A weak pull to the start decides what the points leave open, such as the twist of a straight arm.
     rest = np.full(model.n_dofs, 1e-3 / _PLACE_M)
 
     def fitted(start: Array) -> Fit:
-        return solve(model, start, [block, usual, StayNear(start if near is None else near, rest)], max_iterations=100)
+        return solve(model, start, [block, usual, PosePrior(start if near is None else near, rest)], max_iterations=100)
 
     best = min(map(fitted, starts), key=lambda f: f.cost)
     # Descent cannot lead a limb that is pressed against a limit around to where it belongs: begin again from there.
     # Measured on random poses: one in eight was 1 to 10 cm off without; a second round mends the last.
     limbs = [i for i, j in enumerate(model.joints) if len(j.axes) == 3 and not j.free]
     for joint in 2 * limbs:
-        best = min(best, fitted(_by_other_angles(model, best.values, joint)), key=lambda f: f.cost)
+        best = min(best, fitted(_by_other_angles(model, best.pose, joint)), key=lambda f: f.cost)
     return best
 
 
@@ -264,10 +264,10 @@ def _by_other_angles(model: BodyModel, values: Array, joint: int) -> Array:
     return model.clip(out)
 
 
-def _sum(model: BodyModel, values: Array, blocks: Sequence[Block]) -> Normal:
+def _sum(model: BodyModel, values: Array, blocks: Sequence[ResidualBlock]) -> NormalEquations:
     kinematics = model.kinematics(values)
-    parts = [b.normal(model, values, kinematics) for b in blocks]
-    return Normal(sum(p.cost for p in parts), sum(p.gradient for p in parts), sum(p.hessian for p in parts))  # type: ignore[arg-type]
+    parts = [b.linearize(model, values, kinematics) for b in blocks]
+    return NormalEquations(sum(p.cost for p in parts), sum(p.gradient for p in parts), sum(p.hessian for p in parts))  # type: ignore[arg-type]
 
 
 def _pressed_against_limit(model: BodyModel, values: Array, gradient: Array) -> NDArray[np.bool_]:

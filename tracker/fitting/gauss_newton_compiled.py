@@ -1,8 +1,8 @@
-"""`fit.solve` in one compiled call, where all that speaks for a pose is the tracker's own blocks.
+"""`gauss_newton.solve` in one compiled call, where all that speaks for a pose is the tracker's own blocks.
 
 A descent takes a dozen steps of a tenth of a millisecond. Taken one by one, what leads from kernel to kernel takes as
-long as the kernels, and keeps the interpreter's lock from the threads that work on other poses. `fit.solve` is the
-readable version of what is done here, and solves what this does not know.
+long as the kernels, and keeps the interpreter's lock from the threads that work on other poses.
+`gauss_newton.solve` is the readable version of what is done here, and solves what this does not know.
 """
 
 from collections.abc import Sequence
@@ -16,23 +16,29 @@ from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
 from tracker.body.model import BodyModel
 from tracker.compute.numba_options import BORROW
 from tracker.fitting import gauss_newton
-from tracker.fitting.contour_kernels import DERIVE, Work, gather
-from tracker.fitting.contour_residuals import ContourMatch
+from tracker.fitting.contour_kernels import WITH_JACOBIAN, ContourTerm, accumulate_normal_equations
+from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import (
     AT_LIMIT,
     FELT_DAMPING,
     FIRST_DAMPING,
     LEAST_DAMPING,
     MOST_DAMPING,
-    Block,
     Fit,
-    StayNear,
+    PosePrior,
+    ResidualBlock,
 )
-from tracker.fitting.interpenetration import NOTHING_APART, Apart, KeepApart, KeepBodiesApart, push_apart
-from tracker.fitting.twists import to_dofs
+from tracker.fitting.interpenetration import (
+    NO_PENETRATION,
+    BodyPenetration,
+    PenetrationTerm,
+    SelfPenetration,
+    add_penetration,
+)
+from tracker.fitting.twists import twists_to_dofs
 from tracker.geometry.arrays import Array, IntArray
 
-_KNOWN = (ContourMatch, StayNear, KeepApart, KeepBodiesApart)
+_KNOWN = (ContourResiduals, PosePrior, SelfPenetration, BodyPenetration)
 
 
 class _Blocks(NamedTuple):
@@ -47,15 +53,15 @@ class _Blocks(NamedTuple):
     """(n_dofs, n_parts)."""
     limits: Array
     """(n_dofs, 2)."""
-    work: Work
+    contours: ContourTerm
     """The residuals of the contours."""
     expected: Array
     """Poses to stay near, (S, n_dofs)."""
     weights: Array
-    """Their weights, see `StayNear`, (S, n_dofs)."""
-    within: Apart
+    """Their weights, see `PosePrior`, (S, n_dofs)."""
+    within: PenetrationTerm
     """What keeps the parts of the body apart."""
-    between: Apart
+    between: PenetrationTerm
     """What keeps several bodies apart."""
 
 
@@ -72,16 +78,16 @@ class _Linear(NamedTuple):
     """(n_dofs, 3)."""
 
 
-def solve(
+def solve_compiled(
     model: BodyModel,
     values: Array,
-    blocks: Sequence[Block],
+    blocks: Sequence[ResidualBlock],
     free: NDArray[np.bool_] | None = None,
     max_iterations: int = 50,
     tolerance: float = 1e-6,
     gain: float = 0.0,
 ) -> Fit:
-    """Minimize the summed cost of all blocks within the joint limits, as `fit.solve` does, to rounding."""
+    """Minimize the summed cost of all blocks within the joint limits, as `gauss_newton.solve` does, to rounding."""
     compiled = _compiled(model, blocks)
     if compiled is None:
         return gauss_newton.solve(model, values, blocks, free, max_iterations, tolerance, gain)
@@ -91,21 +97,21 @@ def solve(
     return Fit(found, cost, iterations, hessian)
 
 
-def _compiled(model: BodyModel, blocks: Sequence[Block]) -> _Blocks | None:
+def _compiled(model: BodyModel, blocks: Sequence[ResidualBlock]) -> _Blocks | None:
     """The blocks as arrays; None where they or the body are of other kinds."""
     if any(type(b) not in _KNOWN for b in blocks) or len(model.value_names) != model.n_dofs:
         return None
-    works = [b.work(model) for b in blocks if isinstance(b, ContourMatch)]
-    priors = [b for b in blocks if isinstance(b, StayNear)]
-    within = [b.compiled(model) for b in blocks if isinstance(b, KeepApart)]
-    between = [b.compiled(model) for b in blocks if isinstance(b, KeepBodiesApart)]
-    if len(works) != 1 or len(within) > 1 or len(between) > 1:
+    contours = [b.term(model) for b in blocks if isinstance(b, ContourResiduals)]
+    priors = [b for b in blocks if isinstance(b, PosePrior)]
+    within = [b.term(model) for b in blocks if isinstance(b, SelfPenetration)]
+    between = [b.term(model) for b in blocks if isinstance(b, BodyPenetration)]
+    if len(contours) != 1 or len(within) > 1 or len(between) > 1:
         return None
     return _Blocks(
-        model.tree, model.dof_is_length, model.dof_joint, model.moves, model.limits, works[0],
+        model.tree, model.dof_is_length, model.dof_joint, model.moves, model.limits, contours[0],
         np.array([p.values for p in priors], np.float64).reshape(-1, model.n_dofs),
         np.array([p.weights for p in priors], np.float64).reshape(-1, model.n_dofs),
-        within[0] if within else NOTHING_APART, between[0] if between else NOTHING_APART,
+        within[0] if within else NO_PENETRATION, between[0] if between else NO_PENETRATION,
     )  # fmt: skip
 
 
@@ -116,7 +122,7 @@ def _descend(
 ) -> tuple[float, int]:  # fmt: skip
     """Move a pose, (n_dofs,), to where the cost is least and fill the Hessian there; the cost and the iterations.
 
-    The same step by step as `fit.solve`.
+    The same step by step as `gauss_newton.solve`.
     """
     n, damping, iterations = values.shape[0], FIRST_DAMPING, 0
     here, there = _room(n), _room(n)
@@ -155,12 +161,12 @@ def _room(n: int) -> _Linear:
 @njit(inline="always", nogil=True, cache=True)
 def _linearize(blocks: _Blocks, values: Array, out: _Linear) -> float:
     """Fill the normal equations of all blocks at a pose, (n_dofs,); returns the cost."""
-    work, n = blocks.work, values.shape[0]
-    first, last, sums = work.first, work.last, work.sums
-    Ts = work.Ts[first:last]
+    term, n = blocks.contours, values.shape[0]
+    first, last, sums = term.first, term.last, term.sums
+    Ts = term.Ts[first:last]
     forward_kinematics(values, blocks.tree, Ts, out.axes, out.origins)
-    cost = gather(work, DERIVE)
-    to_dofs(
+    cost = accumulate_normal_equations(term, WITH_JACOBIAN)
+    twists_to_dofs(
         sums.M[first:last], sums.b[first:last], out.axes, out.origins, blocks.is_length, blocks.parts,
         blocks.tree.parents, blocks.moves, out.gradient, out.hessian,
     )  # fmt: skip
@@ -173,7 +179,7 @@ def _linearize(blocks: _Blocks, values: Array, out: _Linear) -> float:
             out.hessian[k, k] += w * w
     kinematics = Kinematics(Ts, out.axes, out.origins)
     for apart in (blocks.within, blocks.between):
-        cost += push_apart(apart, kinematics, blocks.is_length, blocks.moves, out.gradient, out.hessian)
+        cost += add_penetration(apart, kinematics, blocks.is_length, blocks.moves, out.gradient, out.hessian)
     return cost
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours.surfaces import surfaces_of
-from tracker.fitting.gauss_newton import Normal
+from tracker.fitting.gauss_newton import NormalEquations
 from tracker.geometry.arrays import Array, IntArray
 
 _SAMPLES = 5
@@ -28,26 +28,26 @@ SOFTNESS = 0.6
 
 
 @dataclass(frozen=True, eq=False)
-class KeepApart:
-    """Pushes points on the axes of parts out of the other parts that do not adjoin theirs; see `fit.Block`."""
+class SelfPenetration:
+    """Pushes points on the axes of parts out of the other parts that do not adjoin theirs; see `ResidualBlock`."""
 
     sigma_m: float = SIGMA_M
     """Depth that is as unlikely as one standard deviation, metres."""
     softness: float = SOFTNESS
     """Share of a part's radius that may be pressed in without cost."""
 
-    def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
-        """See `fit.Block`."""
-        return _pushed(self.compiled(model), model, kinematics)
+    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+        """See `ResidualBlock`."""
+        return _linearized(self.term(model), model, kinematics)
 
-    def compiled(self, model: BodyModel) -> "Apart":
-        """What `push_apart` needs for a body."""
-        Ts, apart = np.empty((len(model.parts), 4, 4)), may_touch(model, self.softness)
-        return _apart((model,), Ts, apart, self.softness, 0, _weight(self.sigma_m))
+    def term(self, model: BodyModel) -> "PenetrationTerm":
+        """What `add_penetration` needs for a body."""
+        Ts, apart = np.empty((len(model.parts), 4, 4)), separable_parts(model, self.softness)
+        return _penetration_term((model,), Ts, apart, self.softness, 0, _weight(self.sigma_m))
 
 
-class KeepBodiesApart:
-    """Pushes one person's parts out of those of the others, who stand where they are; see `fit.Block`.
+class BodyPenetration:
+    """Pushes one person's parts out of those of the others, who stand where they are; see `ResidualBlock`.
 
     Points on the axes of both count: a thin part may lie within a thick one whoever's it is.
     """
@@ -77,19 +77,19 @@ class KeepBodiesApart:
         self._apart = mine[:, None] != mine
         self._weight, self._softness = np.sqrt(weight) * _weight(sigma_m), softness
 
-    def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
-        """See `fit.Block`."""
-        return _pushed(self.compiled(model), model, kinematics)
+    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+        """See `ResidualBlock`."""
+        return _linearized(self.term(model), model, kinematics)
 
-    def compiled(self, model: BodyModel) -> "Apart":
-        """What `push_apart` needs for the person, whose model is given."""
+    def term(self, model: BodyModel) -> "PenetrationTerm":
+        """What `add_penetration` needs for the person, whose model is given."""
         assert model is self._models[self._person]
         Ts = self._Ts.copy()  # several threads may ask
-        return _apart(self._models, Ts, self._apart, self._softness, self._own.start, self._weight)
+        return _penetration_term(self._models, Ts, self._apart, self._softness, self._own.start, self._weight)
 
 
-class Apart(NamedTuple):
-    """What `push_apart` needs."""
+class PenetrationTerm(NamedTuple):
+    """What `add_penetration` needs."""
 
     Ts: Array
     """World poses of all parts, (P, 4, 4), metres; those of the body that is fitted are filled in."""
@@ -102,7 +102,7 @@ class Apart(NamedTuple):
     apart: NDArray[np.bool_]
     """Which parts are to be apart, (P, P)."""
     softness: float
-    """See `KeepApart`."""
+    """See `SelfPenetration`."""
     weight: float
     """Of the depth of one point, per metre."""
     rows: Array
@@ -112,7 +112,7 @@ class Apart(NamedTuple):
     """Index of the part of each such point, and that of the other, (room, 2)."""
 
 
-NOTHING_APART = Apart(
+NO_PENETRATION = PenetrationTerm(
     np.empty((0, 4, 4)), 0, np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 0), np.bool_), 0.0, 0.0,
     np.empty((0, 7)), np.empty((0, 2), np.int64),
 )  # fmt: skip
@@ -124,29 +124,29 @@ def _weight(sigma_m: float) -> float:
     return float(1 / (sigma_m * np.sqrt(_SAMPLES)))
 
 
-def _apart(
+def _penetration_term(
     models: tuple[BodyModel, ...], Ts: Array, apart: NDArray[np.bool_], softness: float, first: int, weight: float
-) -> Apart:
+) -> PenetrationTerm:
     """Put together what is said of all bodies, with room for all contacts there may be."""
     room, surfaces = int(np.count_nonzero(apart)) * _SAMPLES, surfaces_of(models)
     rows, parts = np.empty((room, 7)), np.empty((room, 2), np.int64)
-    return Apart(Ts, first, surfaces.centers, surfaces.half_axes, apart, softness, weight, rows, parts)
+    return PenetrationTerm(Ts, first, surfaces.centers, surfaces.half_axes, apart, softness, weight, rows, parts)
 
 
-def _pushed(apart: Apart, model: BodyModel, kinematics: Kinematics) -> Normal:
+def _linearized(term: PenetrationTerm, model: BodyModel, kinematics: Kinematics) -> NormalEquations:
     """Normal equations of the depths for a body."""
     n = model.n_dofs
     gradient, hessian = np.zeros(n), np.zeros((n, n))
-    cost = push_apart(apart, kinematics, model.dof_is_length, model.moves, gradient, hessian)
-    return Normal(cost, gradient, hessian)
+    cost = add_penetration(term, kinematics, model.dof_is_length, model.moves, gradient, hessian)
+    return NormalEquations(cost, gradient, hessian)
 
 
 @lru_cache(maxsize=32)
-def may_touch(model: BodyModel, softness: float) -> NDArray[np.bool_]:
+def separable_parts(model: BodyModel, softness: float) -> NDArray[np.bool_]:
     """Which parts are apart in a body that stands at ease: neither adjoining nor overlapping then, (P, P)."""
     everything = ~np.eye(len(model.parts), dtype=bool)
-    at_ease = _apart((model,), model.kinematics(model.neutral()).Ts_world_part, everything, softness, 0, 0.0)
-    own, other = at_ease.parts[: _touch(at_ease)].T
+    at_ease = _penetration_term((model,), model.kinematics(model.neutral()).Ts_world_part, everything, softness, 0, 0.0)
+    own, other = at_ease.parts[: _list_contacts(at_ease)].T
     for part, parent in enumerate(model.parents):
         if parent >= 0:
             everything[part, parent] = everything[parent, part] = False
@@ -155,7 +155,7 @@ def may_touch(model: BodyModel, softness: float) -> NDArray[np.bool_]:
 
 
 @njit(nogil=True, cache=True)
-def _touch(bodies: Apart) -> int:
+def _list_contacts(bodies: PenetrationTerm) -> int:
     """List the contacts: depth, point, outward normal of the other part; the part of the point and the other one.
 
     A part counts as the elliptic cylinder about its axis, the distance to it along the line from the axis.
@@ -198,22 +198,22 @@ def _touch(bodies: Apart) -> int:
 
 
 @njit(nogil=True, cache=True)
-def push_apart(
-    apart: Apart, kinematics: Kinematics, is_length: NDArray[np.bool_], moves: NDArray[np.bool_], gradient: Array,
-    hessian: Array,
+def add_penetration(
+    term: PenetrationTerm, kinematics: Kinematics, is_length: NDArray[np.bool_], moves: NDArray[np.bool_],
+    gradient: Array, hessian: Array,
 ) -> float:  # fmt: skip
     """Add the normal equations of the weighted depths, (n_dofs,) and (n_dofs, n_dofs); returns half their squares."""
-    if apart.Ts.shape[0] == 0:
+    if term.Ts.shape[0] == 0:
         return 0.0
     own = kinematics.Ts_world_part
-    apart.Ts[apart.first : apart.first + own.shape[0]] = own
-    n = _touch(apart)
-    rows, parts = apart.rows[:n], apart.parts[:n]
-    return _push(rows, parts, apart.first, apart.weight, kinematics, is_length, moves, gradient, hessian)
+    term.Ts[term.first : term.first + own.shape[0]] = own
+    n = _list_contacts(term)
+    rows, parts = term.rows[:n], term.parts[:n]
+    return _accumulate(rows, parts, term.first, term.weight, kinematics, is_length, moves, gradient, hessian)
 
 
 @njit(nogil=True, cache=True)
-def _push(
+def _accumulate(
     rows: Array, parts: IntArray, first: int, weight: float, kinematics: Kinematics, is_length: NDArray[np.bool_],
     moves: NDArray[np.bool_], gradient: Array, hessian: Array,
 ) -> float:  # fmt: skip

@@ -4,13 +4,10 @@ Where a silhouette ends there mostly is an edge as well. One point then speaks f
 as much as they do together, which pulls at a pose as they both do.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.body.model import PosedBody
 from tracker.compute.numba_options import BORROW
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import SCENE_SPACING_PX, ViewEvidence
@@ -25,33 +22,32 @@ _SAME_PX, _SAME_COS = 2.0, 0.9
 
 
 def points_to_match(
-    view: ViewEvidence, bodies: Sequence[PosedBody], reach_px: float, edges: float, silhouette: float
+    view: ViewEvidence, contour: occluding_contours.Contour | None, reach_px: float, edges: float, silhouette: float
 ) -> FloatArray:
     """Points of a view within reach of the visible contours, (N, N_COLUMNS).
 
     Args:
         view: what the view shows.
-        bodies: everybody in the scene.
-        reach_px: how far from their contours points are kept, matched px; all may be.
+        contour: of everybody in the scene; None keeps all points.
+        reach_px: how far from the visible contour points are kept, working px.
         edges: weight of a point of an edge.
         silhouette: weight of a point of the silhouette, where it is fully trusted.
     """
-    outline, n_edges = view.silhouette, len(view.points_px)
-    weight = 0.0 if outline is None else silhouette * outline.trust
-    n_outline = len(outline.points_px) if outline is not None and weight > 0 else 0
-    points = np.empty((n_edges + n_outline, N_COLUMNS), np.float32)
+    shown, n_edges = view.silhouette, len(view.points_px)
+    weight = 0.0 if shown is None else silhouette * shown.trust
+    n_silhouette = len(shown.points_px) if shown is not None and weight > 0 else 0
+    points = np.empty((n_edges + n_silhouette, N_COLUMNS), np.float32)
     points[:n_edges, :2], points[:n_edges, 2:4], points[:n_edges, 4:] = view.points_px, view.normals, (edges, 1.0, 0.0)
     n = n_edges
-    if outline is not None and n_outline:
+    if shown is not None and n_silhouette:
         own = points[n_edges:]
-        own[:, :2], own[:, 2:4], own[:, 4:] = outline.points_px, outline.normals, (weight, 1.0, 1.0)
+        own[:, :2], own[:, 2:4], own[:, 4:] = shown.points_px, shown.normals, (weight, 1.0, 1.0)
         cells = (view.camera.height // SCENE_SPACING_PX + 1, view.camera.width // SCENE_SPACING_PX + 1)
         n = _merge(points, n_edges, np.full(cells, -1, np.int64))
-    if np.isinf(reach_px):
+    if contour is None:
         return points[:n]
-    contour = occluding_contours.trace(bodies, view.camera)
     near = np.zeros((view.camera.height // _AREA_PX + 1, view.camera.width // _AREA_PX + 1), np.bool_)
-    _mark(contour.pieces_px, contour.hidden, int(np.ceil(reach_px / _AREA_PX)), near)
+    _mark(contour.pieces_px, contour.occluded, int(np.ceil(reach_px / _AREA_PX)), near)
     return points[: _pack(points[:n], near)]
 
 
@@ -97,13 +93,13 @@ def _merge(points: FloatArray, n_edges: int, cells: IntArray) -> int:
 
 
 @njit(nogil=True, cache=True)
-def _mark(pieces: FloatArray, hidden: NDArray[np.bool_], reach: int, near: NDArray[np.bool_]) -> None:
+def _mark(pieces: FloatArray, occluded: NDArray[np.bool_], reach: int, near: NDArray[np.bool_]) -> None:
     """Mark the areas around the middles of visible pieces, in steps of one for all areas within reach."""
     rows, columns = near.shape
     for i in range(pieces.shape[0]):
         c = int(0.5 * (pieces[i, 0] + pieces[i, 2])) // _AREA_PX
         r = int(0.5 * (pieces[i, 1] + pieces[i, 3])) // _AREA_PX
-        if hidden[i] or c < -reach or r < -reach or c >= columns + reach or r >= rows + reach:
+        if occluded[i] or c < -reach or r < -reach or c >= columns + reach or r >= rows + reach:
             continue
         near[max(0, r - reach) : max(0, r + reach + 1), max(0, c - reach) : max(0, c + reach + 1)] = True
 

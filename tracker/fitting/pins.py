@@ -11,7 +11,7 @@ import numpy as np
 
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import Normal, normal_of
+from tracker.fitting.gauss_newton import NormalEquations, normal_equations
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera, project_with_jacobian
 from tracker.geometry.triangulation import PointObservation, sigma_px
@@ -19,7 +19,7 @@ from tracker.geometry.triangulation import PointObservation, sigma_px
 
 @dataclass(frozen=True, eq=False)
 class PinBlock:
-    """Points of the body drawn to their pins; a block for `fit.solve`.
+    """Points of the body drawn to their pins; a block for `gauss_newton.solve`.
 
     The residual of a pin is the distance in the image, in standard deviations, component by component. No robust
     function bends it: a hand's word counts, and one that is wrong is best seen.
@@ -34,15 +34,15 @@ class PinBlock:
     sigmas_px: Array
     """Standard deviation of each pin, (N,), px."""
 
-    def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
-        """See `fit.Block`."""
+    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+        """See `ResidualBlock`."""
         parts = model.point_parts[self.points]
         points_world = model.points_at(kinematics, self.points)
         points_px, px_by_point = project_with_jacobian(*self._projections, points_world)
         r = (points_px - self.positions_px) / self.sigmas_px[:, None]
         point_by_dofs = model.point_jacobian(kinematics, parts, points_world)  # (N, 3, n_dofs)
         rows = px_by_point @ point_by_dofs / self.sigmas_px[:, None, None]
-        return normal_of(r.ravel(), rows.reshape(-1, model.n_dofs))
+        return normal_equations(r.ravel(), rows.reshape(-1, model.n_dofs))
 
     @cached_property
     def _projections(self) -> tuple[Array, Array]:

@@ -89,7 +89,7 @@ def add_twists(span: IntArray, pieces: FloatArray, pulls: Array, P: Array, W: Ar
 
 
 @njit(nogil=True, cache=True)
-def to_dofs(
+def twists_to_dofs(
     M: Array, b: Array, axes: Array, origins: Array, is_length: NDArray[np.bool_], parts: IntArray, parents: IntArray,
     moves: NDArray[np.bool_], gradient: Array, hessian: Array,
 ) -> None:  # fmt: skip

@@ -1,2 +1,5 @@
-"""Frame k of every camera, bit-identical however it is reached: decoding, packet lists, proxies, backgrounds and
-masks."""
+"""Footage: random access to frame k of every camera, packet lists, proxies, backgrounds and masks.
+
+A frame is bit-identical however it is reached. Imports `geometry`. Callers use `recording.Recording`,
+`camera_source.CameraSource`, `video.open_footage` and `proxy.Proxy`.
+"""

@@ -1,4 +1,4 @@
-"""One camera of a session: calibration and where its images are."""
+"""One camera of a session: its calibration and the paths of its images."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +8,7 @@ from tracker.geometry.cameras import Camera
 
 @dataclass(frozen=True, eq=False)
 class CameraSource:
-    """A camera and what it saw."""
+    """A camera with its footage, background and masks."""
 
     camera: Camera
     footage: Path

@@ -1,4 +1,4 @@
-"""Where the frames of a video are, and keeping that between openings: listing a long video's packets takes seconds."""
+"""The index of a video's frames, cached on the disk: listing the packets of a long video takes seconds."""
 
 import hashlib
 import os
@@ -14,7 +14,7 @@ VERSION = 1
 
 
 class Index(NamedTuple):
-    """What the packets of a video say, without decoding them."""
+    """The frames of a video according to its packets, without decoding."""
 
     pts: NDArray[np.int64]
     """Presentation time stamps of the frames that are shown, ascending, (n_frames,)."""
@@ -25,17 +25,17 @@ class Index(NamedTuple):
 
 
 def stamp_of(path: Path) -> str:
-    """What tells a file from another, and from itself once it is changed: its path, size and time of change."""
+    """Return a text that identifies a version of a file: its path, size and time of change."""
     stat = path.stat()
     return f"{path.resolve()}|{stat.st_size}|{stat.st_mtime_ns}"
 
 
 def load(video: Path, folder: Path | None) -> Index | None:
-    """The index of a video as it was kept; None where there is none, or the video is another by now.
+    """Load the cached index of a video; None if there is none, or the video has changed since.
 
     Args:
         video: the file.
-        folder: where indices are kept; None for nowhere.
+        folder: where indices are cached; None for no cache.
     """
     if folder is None:
         return None
@@ -45,12 +45,12 @@ def load(video: Path, folder: Path | None) -> Index | None:
                 return None
             every = kept["every"].tolist()
             return Index(kept["pts"], {pts: i for i, pts in enumerate(every)}, kept["key_pts"])
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # none, or half of one: list the packets again
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # missing or incomplete: list the packets again
         return None
 
 
 def save(video: Path, folder: Path | None, index: Index) -> None:
-    """Keep the index of a video; where that is not possible it is listed again the next time."""
+    """Cache the index of a video. If that fails, the video is listed again next time."""
     if folder is None:
         return
     place = _place(video, folder)

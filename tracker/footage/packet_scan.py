@@ -1,4 +1,4 @@
-"""The frames of a video, listed from its packets alone, which takes a hundredth of the time of decoding."""
+"""List the frames of a video from its packets, a hundred times faster than decoding."""
 
 import time
 from collections.abc import Callable
@@ -13,31 +13,31 @@ from tracker.errors import RecordingError
 from tracker.footage.frame_index import Index
 
 _EVERY_PACKETS = 4000
-"""Packets between two reports."""
+"""Number of packets between two reports."""
 _BREATH_PACKETS = 100
-"""After so many packets others have a turn: who waits for the page holds the same interpreter."""
+"""Number of packets after which other threads get a turn: the page's requests need the same interpreter."""
 _BREATH_S = 0.0005
 
 
 class PacketScan(NamedTuple):
-    """How far the listing of a video has come."""
+    """The progress of listing a video."""
 
     frames: Index
-    """The frames listed: all that are shown up to the last of them, so the number of each is final."""
+    """The frames listed: all that are shown up to the last of them, so that their numbers are final."""
     share: float
-    """How much of the file has been read, 0 to 1."""
+    """Share of the file that has been read, 0 to 1."""
 
 
 def list_frames(container: InputContainer, where: str, report: Callable[[PacketScan], None] | None = None) -> Index:
     """List the frames of the first video stream.
 
-    A packet holds no frame that is shown before its decoding time, and packets come in the order of decoding: what is
-    shown before the packet at hand is decoded has been listed. That much is reported on the way.
+    A packet holds no frame that is shown before its decoding time, and packets come in decoding order. All frames shown
+    before the current packet's decoding time are therefore known, and are reported on the way.
 
     Args:
         container: of the video, at its beginning.
         where: names the video in messages.
-        report: told now and then how far it has come; what it raises ends the listing.
+        report: called regularly with the progress; an exception that it raises ends the listing.
 
     Raises:
         RecordingError: the video is truncated, or has no usable time stamps.
@@ -57,8 +57,8 @@ def list_frames(container: InputContainer, where: str, report: Callable[[PacketS
             keys.append(packet.pts)
         position[packet.pts] = count
         count += 1
-        # Frames cut off by an edit list are needed to decode others, but never shown; nor are frames before the
-        # first key frame, in the order of the file or of display, because they need what is not there.
+        # Frames cut off by an edit list are needed to decode others, but never shown. Frames before the first key
+        # frame, in the order of the file or of display, are not shown either: they depend on missing frames.
         if keys and not packet.is_discard and packet.pts >= keys[0]:
             shown.append(packet.pts)
         end = max(end, packet.pts + (packet.duration or 0))
@@ -82,7 +82,7 @@ def list_frames(container: InputContainer, where: str, report: Callable[[PacketS
 
 
 def _sorted(shown: list[int], keys: list[int], position: dict[int, int], before: int | None) -> Index:
-    """The index of the frames shown before a time stamp; of all for None."""
+    """Build the index of the frames shown before a time stamp; of all frames for None."""
     pts, key_pts = np.array(sorted(shown), dtype=np.int64), np.array(sorted(keys), dtype=np.int64)
     if before is not None:
         pts, key_pts = pts[pts < before], key_pts[key_pts < before]
@@ -90,9 +90,9 @@ def _sorted(shown: list[int], keys: list[int], position: dict[int, int], before:
 
 
 def _promises_more(container: InputContainer, stream: VideoStream, end: int) -> bool:
-    """Whether the header speaks of frames that the file does not hold; `end` is where the last one ends, ticks."""
+    """Return whether the header lists frames that the file lacks; `end` is the end of the last one, ticks."""
     if "mp4" in container.format.name:
-        # The durations here are of no use, because an edit list may rightly skip frames.
+        # The durations here do not help, because an edit list may skip frames.
         return any(e.pos + e.size > container.size for e in stream.index_entries)
     if container.duration is None or len(container.streams) > 1:
         return False  # the file's duration may be that of its sound

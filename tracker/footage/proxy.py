@@ -1,13 +1,13 @@
-"""Intra-frame proxies of footage: every frame a picture of its own, so that any of them is at hand at once.
+"""Intra-frame proxies of footage: every frame is a picture of its own, so that any frame is shown at once.
 
-A proxy serves eyes alone: what is matched always comes from the footage. It is a folder with, for each camera,
+A proxy is for display only; matching always uses the footage. A proxy folder has for each camera:
 
     NAME.mjpeg   the frames as JPEG, one after the other
     NAME.index   where each ends, uint64 little-endian; a frame that is damaged in the footage ends where it begins
-    NAME.json    what it was made of: path, size and time of change of the footage, and how many frames it has
+    NAME.json    its source: path, size and time of change of the footage, and the number of frames
 
-The index is written after the picture that it speaks of, so whatever a program that died has left is consistent: what
-lies beyond the last end is cut off, and the work goes on from there.
+Each index entry is written after its picture, so that an interrupted program leaves a consistent proxy. The next run
+cuts off what lies beyond the last entry and continues there.
 """
 
 import json
@@ -34,33 +34,33 @@ _END = np.dtype("<u8")
 
 
 class Proxy:
-    """The proxy of one camera, whole or as far as it goes. Safe to use from several threads."""
+    """The proxy of one camera, complete or not. Safe to use from several threads."""
 
     def __init__(self, folder: Path, camera: str) -> None:
-        """Name a proxy; nothing is read yet."""
+        """Name a proxy without reading it."""
         self._pictures, self._index = folder / f"{camera}.mjpeg", folder / f"{camera}.index"
         self._about, self._camera = folder / f"{camera}.json", camera
         self._ends = np.empty(0, _END)
 
     def fits(self, footage: Path) -> bool:
-        """Whether it was made of this footage as it is now."""
+        """Return whether it was made from this footage in its present version."""
         about = self._read_about()
         return about is not None and about.get("version") == VERSION and about.get("stamp") == stamp_of(footage)
 
     def exists(self) -> bool:
-        """Whether there is one, of whatever footage."""
+        """Return whether there is a proxy, of any footage."""
         return self._about.is_file()
 
     @property
     def n_frames(self) -> int:
-        """How many frames it has so far."""
+        """Number of frames written so far."""
         try:
             return self._index.stat().st_size // _END.itemsize
         except OSError:
             return 0
 
     def read(self, k: int) -> Image | None:
-        """Frame k of the footage, (H, W, 3) RGB; None where it is damaged.
+        """Read frame k of the footage, (H, W, 3) RGB; None if it is damaged.
 
         Raises:
             RecordingError: there is no such frame, or the proxy cannot be read.
@@ -84,17 +84,17 @@ class Proxy:
         return np.asarray(image, dtype=np.uint8)
 
     def make(self, path: Path, footage: Footage) -> Iterator[int]:
-        """Write the frames that are missing, from the first one on; what was made of other footage is thrown away.
+        """Write the missing frames, from the first one on. Pictures of other footage are discarded.
 
         Args:
             path: of the footage.
             footage: gives its frames.
 
         Yields:
-            The number of frames that there are, after each. May be closed at any time.
+            The number of frames written, after each. May be closed at any time.
 
         Raises:
-            RecordingError: the proxy cannot be written, or the footage not be read.
+            RecordingError: the proxy cannot be written, or the footage cannot be read.
         """
         try:
             self._about.parent.mkdir(parents=True, exist_ok=True)
@@ -119,7 +119,7 @@ class Proxy:
                         pictures.flush()
                         os.fsync(pictures.fileno())
                     else:
-                        pictures.flush()  # before the index speaks of it
+                        pictures.flush()  # before the index entry
                     index.write(np.array(at, _END).tobytes())
                     index.flush()
                     yield k + 1
@@ -129,7 +129,7 @@ class Proxy:
             ) from error
 
     def remove(self) -> None:
-        """Delete it."""
+        """Delete the proxy."""
         for path in (self._about, self._index, self._pictures):
             path.unlink(missing_ok=True)
 
@@ -141,7 +141,7 @@ class Proxy:
         return about if isinstance(about, dict) else None
 
     def _read_ends(self) -> Any:
-        """Where the frames end that are there whole."""
+        """Read the ends of the frames that are complete."""
         try:
             ends = np.frombuffer(self._index.read_bytes()[: self.n_frames * _END.itemsize], _END)
             return ends[: int(np.searchsorted(ends, self._pictures.stat().st_size, side="right"))]

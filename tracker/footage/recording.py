@@ -1,4 +1,4 @@
-"""Frame k of every camera of a session, by random access, and the side files of its cameras."""
+"""Random access to frame k of every camera of a session, and to the side files of its cameras."""
 
 import threading
 from collections import OrderedDict
@@ -23,7 +23,7 @@ class Recording:
     """The footage of all cameras, with a cache of frames bounded in bytes. Safe to use from several threads."""
 
     fps: float | None
-    """Frame rate of the videos, 1/s; None where all cameras are folders of images."""
+    """Frame rate of the videos, 1/s; None if all cameras are folders of images."""
 
     def __init__(
         self,
@@ -35,10 +35,10 @@ class Recording:
         """Open the footage of all cameras, which lists the frames of every video.
 
         Args:
-            cameras: where each camera's footage lies, and what its offset is.
-            cache_bytes: how much memory decoded frames may keep; the frames in use come on top.
-            indices: folder in which the lists of frames are kept between openings; None for nowhere.
-            in_background: do not wait for lists that are not kept; see `listed_share`.
+            cameras: footage and offset of each camera.
+            cache_bytes: size of the cache of decoded frames, bytes; the frames in use come on top.
+            indices: folder in which the lists of frames are cached; None for no cache.
+            in_background: do not wait for lists that are not cached; see `listed_share`.
 
         Raises:
             RecordingError: footage is missing, unreadable, truncated or empty, or its size is not the camera's.
@@ -57,28 +57,28 @@ class Recording:
 
     @property
     def n_frames(self) -> int:
-        """Number of frames that all cameras have; of those listed so far while they are being listed."""
+        """Number of frames that all cameras have; while frames are being listed, the number listed so far."""
         return min(f.n_frames - c.offset for c, f in zip(self._cameras, self._footage, strict=True))
 
     @property
     def listed_share(self) -> float | None:
-        """How far the footage has been listed, 0 to 1, of the camera that is behind; None when all is.
+        """Progress of listing the footage, 0 to 1, of the slowest camera; None when all is listed.
 
-        What is not listed yet can be read, but has to be waited for; frame numbers are the same then as ever.
+        Frames that are not listed yet can be read, but `read` waits for them. Frame numbers do not change.
 
         Raises:
-            RecordingError: what was wrong with a file came out on the way.
+            RecordingError: listing a file has failed.
         """
         shares = [f.listed_share for f in self._footage]
         return min((s for s in shares if s is not None), default=None)
 
     def listed(self, camera: int, k: int) -> bool:
-        """Whether frame k of a camera, by its index, can be read without waiting for the list of frames."""
+        """Return whether frame k of a camera, by its index, can be read without waiting for the list of frames."""
         footage = self._footage[camera]
         return k + self._cameras[camera].offset < footage.n_frames or footage.listed_share is None
 
     def read(self, k: int) -> tuple[Image | None, ...]:
-        """Frame k of each camera as filmed, (H, W, 3) RGB, not writable; None where it is damaged.
+        """Read frame k of each camera as filmed, (H, W, 3) RGB, not writable; None if it is damaged.
 
         Raises:
             RecordingError: k is out of range, or a file cannot be read any more.
@@ -87,17 +87,17 @@ class Recording:
         return tuple(self._pool.map(lambda i: self._read_one(i, k), range(len(self._cameras))))
 
     def read_view(self, camera: int, k: int) -> Image | None:
-        """Frame k of one camera, by its index; otherwise as `read`."""
+        """Read frame k of one camera, by its index; otherwise as `read`."""
         self._check(k)
         return self._read_one(camera, k)
 
     def cached(self, k: int) -> bool:
-        """Whether frame k of every camera is at hand without decoding."""
+        """Return whether frame k of every camera is in the cache."""
         with self._cache_lock:
             return all((i, k) in self._cache for i in range(len(self._cameras)))
 
     def close(self) -> None:
-        """Release all files; reading is over."""
+        """Release all files."""
         for footage in self._footage:
             footage.close()  # first: a reader may wait for the list of frames
         self._pool.shutdown()
@@ -136,10 +136,10 @@ class Recording:
 
 
 def check_size(camera: str, path: Path, found: tuple[int, int], calibrated: tuple[int, int]) -> None:
-    """Check that a picture has the size that its camera was calibrated for; sizes are width, height, px.
+    """Check that an image has the size that its camera was calibrated for; sizes are width, height, px.
 
     Raises:
-        RecordingError: it has not.
+        RecordingError: the sizes differ.
     """
     if found != calibrated:
         turned = "; the picture may be rotated" if found == calibrated[::-1] else ""
@@ -150,7 +150,7 @@ def check_size(camera: str, path: Path, found: tuple[int, int], calibrated: tupl
 
 
 def read_background(source: CameraSource) -> Image | None:
-    """The empty scene as filmed, (H, W, 3) RGB: an image, or the mean of a video; None where there is none.
+    """Read the empty scene as filmed, (H, W, 3) RGB: an image, or the mean of a video; None if there is none.
 
     Raises:
         RecordingError: the file is missing, unreadable or of another size than the camera.
@@ -181,7 +181,7 @@ def _mean_frame(path: Path, camera: str) -> Image:
 
 
 def read_mask(source: CameraSource, k: int) -> NDArray[np.uint8] | None:
-    """The mask of frame k as filmed, (H, W): 0 background, 255 anyone, 1..K person K; None where there is none.
+    """Read the mask of frame k as filmed, (H, W): 0 background, 255 anyone, 1..K person K; None if there is none.
 
     Raises:
         RecordingError: the file is not a gray 8-bit image, or of another size than the camera.

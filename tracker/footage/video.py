@@ -1,8 +1,8 @@
 """The footage of one camera: a video file or a folder of images, with random access to frame k.
 
-Frame k is the k-th frame that decoding from the start would show. All video is decoded here and nowhere else: two
-decoders disagree on rotation, colour and frame numbers. Videos are turned as their display rotation says, and images as
-their EXIF orientation says, which is how OpenCV reads them and so how calibration tools see them.
+Frame k is the k-th frame that decoding from the start would show. All video is decoded here, because two decoders
+disagree on rotation, colour and frame numbers. Videos are rotated by their display rotation and images by their EXIF
+orientation, as OpenCV and therefore calibration tools read them.
 """
 
 import re
@@ -26,24 +26,24 @@ from tracker.geometry.arrays import Image
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
-# Time stamps are compared with the decoder's over this many frames, enough for any order of B-frames to show.
+# Number of frames whose time stamps are compared with the decoder's, enough for any order of B-frames to show.
 _CHECKED_FRAMES = 16
-# Intervals between frames that differ by more than this part of the usual one make the rate variable.
+# The rate is variable if intervals between frames differ by more than this share of the median interval.
 _RATE_JITTER = 0.2
-# As the number of the next frame that the decoder gives: not known, so that the next frame is sought.
+# As the number of the next frame that the decoder gives: unknown, so that the next read seeks.
 _NOWHERE = 2**62
 
 
 class VideoFile:
-    """A video file, whose frames are listed when it is opened or soon after. Safe to use from several threads."""
+    """A video file whose frames are listed on opening or in the background. Safe to use from several threads."""
 
     path: Path
     size: tuple[int, int]
     """Width and height as displayed, px."""
     fps: float
-    """Mean frame rate, 1/s; what the header says while frames are being listed."""
+    """Mean frame rate, 1/s; the header's rate while frames are being listed."""
     has_constant_rate: bool
-    """Whether all frames follow each other at the same interval; true while frames are being listed."""
+    """Whether all intervals between frames are equal; true while frames are being listed."""
 
     def __init__(self, path: Path, camera: str, indices: Path | None = None, in_background: bool = False) -> None:
         """Open a video and list its frames.
@@ -51,8 +51,8 @@ class VideoFile:
         Args:
             path: the file.
             camera: name of its camera, for messages.
-            indices: folder in which indices of videos are kept between openings; None for nowhere.
-            in_background: do not wait for the list where none is kept: `read` waits until the frame is in it.
+            indices: folder in which indices of videos are cached; None for no cache.
+            in_background: do not wait for a list that is not cached: `read` waits until the frame is in it.
 
         Raises:
             RecordingError: the file is missing, unreadable, truncated, or has no usable time stamps.
@@ -86,19 +86,19 @@ class VideoFile:
         self.size = (first.width, first.height) if first.rotation % 180 == 0 else (first.height, first.width)
         if not self._is_listed:
             self.fps, self.has_constant_rate = float(self._stream.average_rate or 1.0), True
-            threading.Thread(target=self._list_beside, name="list frames", daemon=True).start()
+            threading.Thread(target=self._list_in_background, name="list frames", daemon=True).start()
 
     @property
     def n_frames(self) -> int:
-        """Number of frames; of those listed so far while they are being listed."""
+        """Number of frames; while frames are being listed, the number listed so far."""
         return len(self._listed.frames.pts)
 
     @property
     def listed_share(self) -> float | None:
-        """How much of the file has been listed, 0 to 1; None when all is.
+        """Share of the file that has been listed, 0 to 1; None when all is.
 
         Raises:
-            RecordingError: what was wrong with the file came out on the way.
+            RecordingError: listing the file has failed.
         """
         with self._grown:
             if self._failure:
@@ -106,7 +106,7 @@ class VideoFile:
             return None if self._is_listed else self._listed.share
 
     def read(self, k: int) -> Image | None:
-        """Decode frame k, (H, W, 3) RGB; None where the frame is damaged.
+        """Decode frame k, (H, W, 3) RGB; None if the frame is damaged.
 
         Raises:
             RecordingError: k is out of range, or the file cannot be read any more.
@@ -118,7 +118,7 @@ class VideoFile:
             if self._closed:
                 raise RecordingError(f"{self._where} has been closed")
             if self._index is not self._listed.frames:
-                # Where the decoder stands was told by the shorter list.
+                # The decoder's position refers to the shorter list.
                 self._index, self._next = self._listed.frames, _NOWHERE
             try:
                 frame = self._decode_frame(k)
@@ -129,7 +129,7 @@ class VideoFile:
             return None if frame is None else self._to_rgb(frame)
 
     def close(self) -> None:
-        """Release the file; reading is over."""
+        """Release the file."""
         with self._grown:
             self._closed = True
             self._grown.notify_all()
@@ -138,45 +138,45 @@ class VideoFile:
             self._container.close()
 
     def _open(self) -> None:
-        """Stand before the first frame."""
+        """Move the decoder before the first frame."""
         self._container = av.open(str(self.path))
         if not self._container.streams.video:
             raise RecordingError(f"{self._where}: expected a video, found a file without a video stream")
         self._stream = self._container.streams.video[0]
-        # Threads by frame would hold back as many frames as there are; cameras are decoded side by side anyway.
+        # Frame threads would delay the output by as many frames; cameras are decoded in parallel anyway.
         self._stream.thread_type = "SLICE"
         self._tick_s = float(self._stream.time_base or 0)
         self._frames = self._decode(self._container.demux(self._stream))
         self._next = 0
 
     def _to_rgb(self, frame: VideoFrame) -> Image:
-        # One converter for all frames: to prepare one takes longer than to convert.
+        # One converter for all frames: preparing one takes longer than a conversion.
         image = self._converter.reformat(frame, format="rgb24").to_ndarray()
-        # The display rotation is counter-clockwise, as rot90 turns.
+        # The display rotation is counter-clockwise, like that of rot90.
         return np.ascontiguousarray(np.rot90(image, frame.rotation // 90))
 
     def _decode_frame(self, k: int) -> VideoFrame | None:
-        """Frame k, or None where it is damaged."""
+        """Decode frame k; None if it is damaged."""
         if not self._reaches_soon(k):
             self._seek(self._best_key(k))
             frame = self._decode_until(k)
             if frame is not None:
                 return frame
-            # Some containers (MPEG program streams) lose the first time stamps after a seek: take a longer run.
+            # Some containers (MPEG program streams) lose the first time stamps after a seek: start earlier.
             self._seek(max(0, self._best_key(k) - 2))
         return self._decode_until(k)
 
     def _decode_until(self, k: int) -> VideoFrame | None:
         target = int(self._index.pts[k])
         for frame in self._frames:
-            assert frame.pts is not None  # the index knows no frame without
+            assert frame.pts is not None  # the index has no frame without one
             self._next = int(np.searchsorted(self._index.pts, frame.pts, side="right"))
             if frame.pts >= target:
                 return frame if frame.pts == target and not frame.is_corrupt else None
         return None
 
     def _decode(self, packets: Iterable[Packet]) -> Generator[VideoFrame, None, None]:
-        """Decode packets to frames in the order of display; damaged packets yield nothing."""
+        """Decode packets to frames in display order; damaged packets yield nothing."""
         for packet in packets:
             try:
                 yield from packet.decode()
@@ -184,14 +184,14 @@ class VideoFile:
                 continue
 
     def _list(self, report: Callable[[PacketScan], None] | None = None) -> None:
-        """List the frames, by a decoder of its own."""
+        """List the frames with a decoder of its own."""
         with av.open(str(self.path)) as container:
             index = packet_scan.list_frames(container, self._where, report)
         frame_index.save(self.path, self._indices, index)
         self._finish(index)
 
-    def _list_beside(self) -> None:
-        """List the frames while others read what is listed by now."""
+    def _list_in_background(self) -> None:
+        """List the frames while others read those listed so far."""
         try:
             self._list(self._grow)
         except av.FFmpegError as error:
@@ -222,7 +222,7 @@ class VideoFile:
             self._grown.notify_all()
 
     def _wait_for(self, k: int) -> None:
-        """Wait until frame k is listed, or the list has come to its end."""
+        """Wait until frame k is listed, or the list is complete."""
         with self._grown:
             self._grown.wait_for(
                 lambda: k < len(self._listed.frames.pts) or self._is_listed or self._failure or self._closed
@@ -256,28 +256,28 @@ class VideoFile:
             return declared or 1.0, True
         mean = float(1 / (intervals.mean() * self._tick_s))
         usual = np.median(intervals)
-        # Coarse ticks (a millisecond in Matroska) move single frames by up to one of them.
+        # Coarse ticks (a millisecond in Matroska) shift single frames by up to one tick.
         constant = bool(np.all(np.abs(intervals - usual) <= max(_RATE_JITTER * usual, 1)))
-        # The header's rate is exact where the mean over a short clip is rounded to ticks.
+        # The header's rate is exact; the mean over a short clip is rounded to ticks.
         return (declared if constant and abs(declared / mean - 1) < 0.005 else mean), constant
 
     def _best_key(self, k: int) -> int:
-        """Index of the last key frame from which frame k decodes whole.
+        """Return the index of the last key frame from which frame k decodes completely.
 
-        That is the last one shown no later: a frame that is stored after a key frame but shown before it may need
-        what was stored before the key frame.
+        That is the last one shown no later. A frame stored after a key frame but shown before it may depend on frames
+        stored before the key frame.
         """
         return int(np.searchsorted(self._index.key_pts, self._index.pts[k], side="right")) - 1
 
     def _reaches_soon(self, k: int) -> bool:
-        """Whether decoding on from here is the shortest way to frame k."""
+        """Return whether decoding on from the current position is the shortest way to frame k."""
         if k < self._next:
             return False
         return self._next == k or self._index.key_pts[self._best_key(k)] <= self._index.pts[self._next]
 
     def _seek(self, best: int) -> None:
-        """Stand at a key frame, given by its index, or before it."""
-        # Some containers land after the time asked for; then ask for an earlier key frame.
+        """Move the decoder to a key frame, given by its index, or before it."""
+        # Some containers land after the requested time; then request an earlier key frame.
         latest = self._index.position[int(self._index.key_pts[best])]
         for pts in self._index.key_pts[max(0, best - 2) : best + 1][::-1].tolist():
             try:
@@ -301,7 +301,7 @@ class ImageFolder:
     """Width and height, px."""
     n_frames: int
     fps: None = None
-    """Images do not say when they were taken."""
+    """Images have no frame rate."""
     has_constant_rate: bool = True
     listed_share: None = None
 
@@ -330,7 +330,7 @@ class ImageFolder:
         self.size = (width, height)
 
     def read(self, k: int) -> Image | None:
-        """Decode frame k, (H, W, 3) RGB; None where the image is damaged.
+        """Decode frame k, (H, W, 3) RGB; None if the image is damaged.
 
         Raises:
             RecordingError: k is out of range, or the image is missing or of another size.
@@ -375,7 +375,7 @@ def read_image(path: Path, where: str) -> Image:
 
 def _read_image_or_none(path: Path, where: str) -> Image | None:
     try:
-        # Not cv2.imread: it cannot open every path on every system, and prints.
+        # Not cv2.imread, which cannot open every path on every system and prints.
         data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
     except OSError as error:
         raise RecordingError(f"{where}: cannot read {path}: {error.strerror}; check the path") from error
@@ -384,5 +384,5 @@ def _read_image_or_none(path: Path, where: str) -> Image | None:
 
 
 def _natural(path: Path) -> list[tuple[int, int | str]]:
-    """Sorting key that takes runs of digits as numbers."""
+    """Return a sort key that compares runs of digits as numbers."""
     return [(0, int(t)) if t.isdigit() else (1, t) for t in re.split(r"(\d+)", path.name) if t]

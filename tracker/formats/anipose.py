@@ -2,7 +2,7 @@
 
 One section per camera: `name`, `size` (width, height), `matrix` (3x3), `distortions` (OpenCV's order), `rotation`
 (Rodrigues vector, or a 3x3 matrix) and `translation` with `X_camera = R X_world + t`, `fisheye`. A section
-`metadata` is not a camera. The file does not say whether its lengths are metres or millimetres: the reader must know.
+`metadata` is not a camera. The file does not state whether its lengths are metres or millimetres; the caller does.
 """
 
 from collections.abc import Sequence
@@ -57,7 +57,7 @@ def read_calibration(path: str | Path, units: Units = "m") -> tuple[Camera, ...]
 
 
 def write_calibration(path: str | Path, cameras: Sequence[Camera]) -> None:
-    """Write cameras, in metres, so that `read_calibration` reads them back to 12 digits and in the same order."""
+    """Write cameras, in metres. `read_calibration` reads them back to 12 digits and in the same order."""
     data: dict[str, Any] = {}
     for c in cameras:
         data[c.name] = {
@@ -133,7 +133,7 @@ def _matrix(value: Any, where: str) -> Array:
 
 
 def _rotation(value: Any, where: str) -> Array:
-    """Rotation matrix (3, 3) of a Rodrigues vector, or of a matrix that is one within rounding."""
+    """Convert a Rodrigues vector, or a matrix that is a rotation within rounding, to a rotation matrix (3, 3)."""
     rotation = _numbers(value, where, "rotation")
     if rotation.shape == (3,):
         return rigid.so3_exp(rotation)
@@ -148,7 +148,7 @@ def _rotation(value: Any, where: str) -> Array:
             f"{where}: 'rotation' is not a rotation: expected orthonormal rows and determinant 1, "
             f"found rows off by {error:.2g} and determinant {determinant:.3g}; calibrate again"
         )
-    # The nearest rotation: kept as printed, its rounding would shear what it maps.
+    # Use the nearest rotation: a rounded matrix would shear what it maps.
     U, _, V = np.linalg.svd(rotation)
     return U @ V
 
@@ -162,7 +162,7 @@ def _check_units(cameras: tuple[Camera, ...], path: Path, units: Units) -> None:
             f"calibration {path}: camera '{name}' would stand {farthest:.0f} m from the origin, so its translations "
             "look like millimetres and metres were expected; say --units mm"
         )
-    # All at the origin is one camera that defines the world: nothing can be told from it.
+    # All at the origin is one camera that defines the world, which has no scale to check.
     if units == "mm" and 0 < farthest < MIN_STUDIO_M:
         raise CalibrationError(
             f"calibration {path}: read as millimetres all cameras would stand within {farthest * 1000:.2g} mm of the "

@@ -1,4 +1,4 @@
-"""Which marker of a foreign file is which joint of the body.
+"""Map the markers of a foreign file to the joints of the body.
 
 The project's own names are those of `BodyModel.point_names`: `left_shoulder`, `left_wrist`, `neck`, ...
 """
@@ -15,7 +15,7 @@ from tracker.formats.trc import MarkerTable
 LIMB_JOINTS = tuple(
     f"{side}_{j}" for side in ("left", "right") for j in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
 )
-"""The joints that errors are averaged over."""
+"""The joints over which errors are averaged."""
 JOINTS = (*LIMB_JOINTS, "neck", "head")
 
 
@@ -28,7 +28,7 @@ class JointMap(NamedTuple):
 
 
 def _sided(**parts: str) -> dict[str, str]:
-    """Markers of both sides from patterns in which `{long}` is Left or Right, `{short}` L or R."""
+    """Expand patterns in which `{long}` is Left or Right, `{short}` L or R, to the markers of both sides."""
     sides = {"left": ("Left", "L"), "right": ("Right", "R")}
     return {
         f"{side}_{joint}": pattern.format(long=long, short=short)
@@ -68,21 +68,21 @@ BODY_25 = JointMap(
         "head": "Head",
     },
 )
-# COCO's own names of the limbs are ours; tools that write COCO joints as TRC take the names of BODY_25.
+# COCO's own names of the limbs equal the project's; tools that write COCO joints as TRC use the names of BODY_25.
 KNOWN = (OWN, CMU, BODY_25)
 
-# A file with fewer limb joints than this under a convention's names hardly follows it.
-_FEWEST = 4
+# A file with fewer limb joints under a convention's names does not follow it.
+_MIN_JOINTS = 4
 
 
 def guess_joint_map(markers: Sequence[str], source: str) -> JointMap:
-    """Tell the naming convention of a file by its markers; `source` names it in messages.
+    """Guess the naming convention of a file from its markers; `source` names the file in messages.
 
     Raises:
-        FormatError: the markers are of no known convention.
+        FormatError: the markers follow no known convention.
     """
     present = [sum(m.markers[j] in markers for j in LIMB_JOINTS) for m in KNOWN]
-    if max(present) < _FEWEST:
+    if max(present) < _MIN_JOINTS:
         raise FormatError(
             f"the markers of {source} follow no known convention (our own, COCO, CMU, BODY_25): found "
             f"{', '.join(markers[:8])}{', ...' if len(markers) > 8 else ''}; name the joints with --joint-map FILE.toml"
@@ -110,7 +110,7 @@ def read_joint_map(path: str | Path) -> JointMap:
 
 
 def joints_of(table: MarkerTable, source: str, joint_map: JointMap | None = None) -> MarkerTable:
-    """Keep the body's joints of a file, under our names, in the order of `JOINTS`.
+    """Select the body's joints of a file, under the project's names, in the order of `JOINTS`.
 
     Args:
         table: the file's markers.

@@ -1,7 +1,7 @@
-"""Body models as TOML files: read, checked, written.
+"""Read, check and write body models as TOML files.
 
-Positions and sizes are fractions of body height, angles are in degrees; `height_m` is written with a fitted model
-and left out of a preset. See `tracker/body/models/gavrila22.toml` for an example.
+Positions and sizes are fractions of body height, angles are in degrees. A fitted model has a `height_m`, a preset has
+none. See `tracker/body/models/gavrila22.toml` for an example.
 """
 
 from fnmatch import fnmatchcase
@@ -91,7 +91,7 @@ def parse_model(text: str, source: str, height_m: float | None = None) -> BodyMo
 
 
 def format_model(model: BodyModel) -> str:
-    """Write a model with its height as TOML text that `parse_model` reads back the same."""
+    """Write a model with its height as TOML text. `parse_model` reads back the same model."""
     joints = []
     for j in model.joints:
         row: dict[str, Any] = {"name": j.name, "child": j.child, "position": list(j.position)}
@@ -222,7 +222,7 @@ def _order(joints: tuple[Joint, ...], source: str) -> tuple[Joint, ...]:
     placed: dict[str, Joint] = {}
     waiting = list(joints)
     while waiting:
-        # The first that is ready, not all of them: a file that is parent first keeps its order.
+        # Place only the first ready joint: a file that is parent first keeps its order.
         ready = next((j for j in waiting if not j.parent or j.parent in placed), None)
         if ready is None:
             names = ", ".join(j.name for j in waiting)
@@ -235,7 +235,7 @@ def _order(joints: tuple[Joint, ...], source: str) -> tuple[Joint, ...]:
 
 
 def _search_groups(model: BodyModel, groups: list[tuple[str, list[str]]], source: str) -> tuple[SearchGroup, ...]:
-    """Expand `joint.*` patterns; without any group, one group holds everything."""
+    """Expand `joint.*` patterns; without any group, one group has all degrees of freedom."""
     if not groups:
         return (SearchGroup("whole body", model.dof_names),)
     out = []

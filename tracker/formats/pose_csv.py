@@ -1,4 +1,4 @@
-"""Our own tables of poses: CSV with one row per frame and one column per value of the pose.
+"""The project's tables of poses: CSV with one row per frame and one column per value of the pose.
 
     # quadrille poses, version 1
     # model = gavrila22
@@ -45,7 +45,7 @@ class PoseTable:
     """Poses, (n, n_values), radians and metres."""
 
     def values_for(self, model: BodyModel) -> Array | None:
-        """The poses in the order of a model's values, (n, n_values); None where its values are others."""
+        """Return the poses in the order of a model's values, (n, n_values); None if the model has other values."""
         if set(self.value_names) != set(model.value_names):
             return None
         return self.values[:, [self.value_names.index(n) for n in model.value_names]]
@@ -54,7 +54,7 @@ class PoseTable:
 def write_pose_table(
     path: str | Path, model: BodyModel, values: Array, frames: Sequence[int] | NDArray[np.int64] | None = None
 ) -> None:
-    """Write poses, which `read_pose_table` reads back, exact to a nanometre and a billionth of a degree.
+    """Write poses, exact to a nanometre and a billionth of a degree; `read_pose_table` reads them back.
 
     Args:
         path: the file.
@@ -107,7 +107,7 @@ def read_pose_table(path: str | Path) -> PoseTable:
 
 
 def _units(model: BodyModel) -> list[str]:
-    """Unit of each value as its column's suffix."""
+    """Return the unit of each value as its column's suffix."""
     lengths = {
         model.value_names[v] for v, is_length in zip(model.dof_value, model.dof_is_length, strict=True) if is_length
     }

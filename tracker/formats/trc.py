@@ -1,9 +1,8 @@
 """TRC files (OpenSim, Pose2Sim, Cortex): the tracks of named points in 3-D.
 
 Tab-separated: three lines of header, one of point names (each above its X, Y, Z), one of X1 Y1 Z1 ..., and rows of
-Frame#, Time and coordinates. Lengths are in the header's Units. Blank coordinates are missing points, whether written
-as empty fields, spaces or NaN. Some writers leave a blank line below the header, some none; some drop the tabs at a
-row's end.
+Frame#, Time and coordinates. Lengths are in the header's Units. Blank coordinates are missing points, written as empty
+fields, spaces or NaN. Some writers leave a blank line below the header; some drop the tabs at the end of a row.
 """
 
 from collections.abc import Sequence
@@ -28,13 +27,13 @@ class MarkerTable:
     names: tuple[str, ...]
     """Names of the points, (m,)."""
     frames: NDArray[np.int64]
-    """Frame of each row, counted from the first row's as 0, (n,)."""
+    """Frame of each row, relative to the first row, (n,)."""
     times: Array
     """Time of each row, s, (n,)."""
     points: Array
     """Positions, (n, m, 3), metres; NaN where missing."""
     rate: float
-    """Rows per second by the header."""
+    """Rows per second according to the header."""
 
     def __post_init__(self) -> None:
         n, m = len(self.frames), len(self.names)
@@ -70,7 +69,7 @@ def read_trc(path: str | Path) -> MarkerTable:
     if np.any(np.diff(frames) <= 0):
         raise FormatError(f"TRC file {path}: expected Frame# to rise from row to row; sort the rows and remove doubles")
     points = table[:, 2:].reshape(len(rows), len(names), 3) * scale
-    # A point of which one coordinate is missing is of no use.
+    # A point with a missing coordinate is missing.
     points[np.isnan(points).any(axis=-1)] = np.nan
     return MarkerTable(names, frames - frames[0], table[:, 1], points, _rate(header, path))
 
@@ -84,15 +83,15 @@ def write_trc(
     frames: Sequence[int] | NDArray[np.int64] | None = None,
     units: Literal["m", "mm"] = "m",
 ) -> None:
-    """Write a TRC file that `read_trc` reads back, exact to a tenth of a micrometre.
+    """Write a TRC file, exact to a tenth of a micrometre; `read_trc` reads it back.
 
     Args:
         path: the file.
         names: names of the points, (m,).
         points: positions, (n, m, 3), metres; NaN where missing.
         rate: frames per second.
-        frames: frame of each row, from 0, ascending; by default every frame from 0. Frame# is one more. Where the
-            first is not 0, a blank row for frame 0 comes first: readers count from the first row.
+        frames: frame of each row, from 0, ascending; by default every frame from 0. Frame# is one more. If the first is
+            not 0, a blank row for frame 0 comes first, because readers count from the first row.
         units: of the lengths in the file.
     """
     path = Path(path)

@@ -15,7 +15,7 @@ from tracker.geometry.arrays import Array
 DISTORTION_COUNTS = (0, 4, 5, 8)
 
 Region = tuple[int, int, int, int]
-"""A box in an image: first column, first row, and those after the last, px."""
+"""A box in an image, px: first column, first row, column after the last, row after the last."""
 
 NEAR_PLANE_M = 0.05
 """Depth of the near plane, metres: nothing closer to a camera is drawn or matched."""
@@ -26,8 +26,8 @@ class Camera:
     """One calibrated camera.
 
     Pixel centres lie at integers; axes are OpenCV's (x right, y down, z forward). *Original* pixels are those
-    of the footage as filmed; *undistorted* pixels are those of `pinhole`, the same camera without its lens
-    distortion, in which everything is drawn and matched.
+    of the footage as filmed. *Undistorted* pixels are those of `pinhole`, the same camera without lens distortion;
+    everything is drawn and matched in them.
     """
 
     name: str
@@ -77,7 +77,7 @@ class Camera:
 
     @property
     def is_pinhole(self) -> bool:
-        """Whether there is no lens distortion, so that original and undistorted pixels are the same."""
+        """Whether there is no lens distortion, so that original and undistorted pixels coincide."""
         return not np.any(self.distortion)
 
     @cached_property
@@ -88,8 +88,8 @@ class Camera:
     def scaled(self, scale: float) -> "Camera":
         """Return the camera of the image resized by `scale`, pixel areas (not centres) kept aligned."""
         size = (round(self.width * scale), round(self.height * scale))
-        # OpenCV's resize keeps pixel borders aligned: u' + 1/2 = s (u + 1/2), with centres at integers, and s is
-        # the ratio of the whole sizes.
+        # OpenCV's resize keeps pixel borders aligned: u' + 1/2 = s (u + 1/2), with centres at integers. Here s is the
+        # ratio of the rounded sizes.
         s = np.array([size[0] / self.width, size[1] / self.height])
         K = self.K.copy()
         K[:2] *= s[:, None]
@@ -106,7 +106,7 @@ class Camera:
         return replace(self, size=(u1 - u0, v1 - v0), K=K)
 
     def depths(self, points_world: Array) -> Array:
-        """Distances along the optical axis, `(..., 3)` to `(...)`, metres; positive in front of the camera."""
+        """Return distances along the optical axis, `(..., 3)` to `(...)`, metres; positive in front of the camera."""
         return rigid.apply(self.T_camera_world, points_world)[..., 2]
 
     def project(self, points_world: Array) -> Array:
@@ -118,11 +118,11 @@ class Camera:
         return self._normalized_to_px(xy)
 
     def project_with_jacobian(self, points_world: Array) -> tuple[Array, Array]:
-        """Project world points `(N, 3)` to undistorted pixels, with derivatives; see `project_with_jacobian`."""
+        """Project world points `(N, 3)` to undistorted pixels, with derivatives, as the function of this name does."""
         return project_with_jacobian(self.T_camera_world, self.K, points_world)
 
     def rays(self, points_px: Array) -> Array:
-        """Unit directions in the world, `(..., 3)`, of the lines of sight of original pixels `(..., 2)`.
+        """Return unit directions in the world, `(..., 3)`, of the viewing rays of original pixels `(..., 2)`.
 
         The rays start at `center_world`.
         """
@@ -132,7 +132,7 @@ class Camera:
         return directions_camera @ self.T_world_camera[:3, :3].T
 
     def back_project(self, points_px: Array, depths_m: Array | float) -> Array:
-        """World points `(..., 3)` seen at original pixels `(..., 2)` at the given depths (see `depths`)."""
+        """Return world points `(..., 3)` seen at original pixels `(..., 2)` at the given depths (see `depths`)."""
         xy = self._px_to_normalized(np.asarray(points_px, dtype=np.float64))
         z = np.broadcast_to(np.asarray(depths_m, dtype=np.float64), xy.shape[:-1])[..., None]
         return rigid.apply(self.T_world_camera, np.concatenate([xy * z, z], axis=-1))
@@ -189,9 +189,9 @@ class Camera:
 
 
 def project_with_jacobian(Ts_camera_world: Array, K: Array, points_world: Array) -> tuple[Array, Array]:
-    """Project points to undistorted pixels, and differentiate the pixels by the points.
+    """Project points to undistorted pixels and differentiate the pixels by the points.
 
-    A depth below `NEAR_PLANE_M` counts as `NEAR_PLANE_M`, with derivative 0: the image of a point stays finite.
+    A depth below `NEAR_PLANE_M` is replaced by `NEAR_PLANE_M`, with derivative 0, so that the pixel stays finite.
 
     Args:
         Ts_camera_world: inverse pose of one camera, (4, 4), or of each point's camera, (N, 4, 4).
@@ -212,9 +212,9 @@ def project_with_jacobian(Ts_camera_world: Array, K: Array, points_world: Array)
 
 
 def viewed_point(cameras: Sequence[Camera]) -> Array:
-    """Point that the cameras look at: nearest to all optical axes in the least squares sense, (3,), metres.
+    """Return the point nearest to all optical axes in the least squares sense, (3,), metres.
 
-    One camera, or parallel ones, leave the depth open: then it is some 4 m in front of the first.
+    For one camera, or parallel ones, the depth is undetermined; the point is then 4 m in front of the first.
     """
     axes = np.stack([c.T_world_camera[:3, 2] for c in cameras])
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
@@ -225,17 +225,17 @@ def viewed_point(cameras: Sequence[Camera]) -> Array:
 
 
 def epipolar_segment(source: Camera, target: Camera, point_px: Array, near_m: float = 0.1) -> Array | None:
-    """Where the line of sight of a pixel of `source` appears in the image of `target`.
+    """Project the viewing ray of a pixel of `source` into the image of `target`.
 
     Args:
         source: the camera in which the point was seen.
         target: the camera in which to draw.
         point_px: the point in undistorted pixels of `source`, (2,).
-        near_m: how far before the target camera the visible part of the line of sight begins.
+        near_m: depth in the target camera at which the visible part of the ray begins, metres.
 
     Returns:
         The end points of the visible segment in undistorted pixels of `target`, (2, 2), clipped to its image,
-        or None where the line of sight does not cross the image.
+        or None if the ray does not cross the image.
     """
     direction = target.T_camera_world[:3, :3] @ source.pinhole.rays(point_px)
     origin = rigid.apply(target.T_camera_world, source.center_world)

@@ -1,4 +1,4 @@
-"""The floor: a plane in the calibration's world, and the direction that points up from it."""
+"""The ground plane in the calibration's world, and the up direction."""
 
 from dataclasses import dataclass
 
@@ -8,8 +8,8 @@ from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.geometry.rigid import so3_exp
 
-_LEAST_HEIGHT_M = 0.2
-"""Three points whose triangle is flatter than this do not say how a floor lies: a click a few cm off would tilt it."""
+_MIN_HEIGHT_M = 0.2
+"""Three points whose triangle is flatter do not determine a plane: a click a few cm off would tilt it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,20 +27,20 @@ class GroundPlane:
         return self.offset_m * self.normal
 
     def turned(self, R_world_up: Array) -> Array:
-        """Turn a rotation whose z axis points roughly up, (3, 3), by the least angle that lets it point up."""
+        """Rotate a rotation whose z axis points roughly up, (3, 3), by the smallest angle that makes it point up."""
         axis = np.cross(R_world_up[:, 2], self.normal)
         sine, cosine = float(np.linalg.norm(axis)), float(R_world_up[:, 2] @ self.normal)
-        # Upside down there is no least turn: any axis across will do.
+        # Upside down, all axes across are equally good.
         direction = axis / sine if sine > 1e-9 else R_world_up[:, 0]
         return np.asarray(so3_exp(np.arctan2(sine, cosine) * direction) @ R_world_up)
 
 
 def floor_through(points_world: Array, centers_world: Array) -> GroundPlane:
-    """The plane through three points, its upper side towards the cameras.
+    """Fit a plane to three points, with its upper side towards the cameras.
 
     Args:
         points_world: (3, 3), metres.
-        centers_world: centres of the cameras, (N, 3), metres; on the whole they stand above the floor.
+        centers_world: centres of the cameras, (N, 3), metres; their mean lies above the floor.
 
     Raises:
         TrackerError: the points lie almost on a line.
@@ -49,7 +49,7 @@ def floor_through(points_world: Array, centers_world: Array) -> GroundPlane:
     sides = np.linalg.norm([b - a, c - b, a - c], axis=1)
     across = np.cross(b - a, c - a)
     height_m = float(np.linalg.norm(across) / max(sides.max(), 1e-9))
-    if height_m < _LEAST_HEIGHT_M:
+    if height_m < _MIN_HEIGHT_M:
         raise TrackerError(
             f"expected three points of the floor that span a wide triangle, found them within {100 * height_m:.0f} cm "
             "of a line; choose one farther to the side"
@@ -61,7 +61,7 @@ def floor_through(points_world: Array, centers_world: Array) -> GroundPlane:
 
 
 def nearest_axis(normal: Array) -> str:
-    """The world axis nearest to a direction: x, y or z, with a minus sign where it points the other way."""
+    """Return the world axis nearest to a direction: x, y or z, with a minus sign for the opposite direction."""
     index = int(np.argmax(np.abs(normal)))
     return ("-" if normal[index] < 0 else "") + "xyz"[index]
 
@@ -74,14 +74,14 @@ UP_ROTATIONS = {
     "x": np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]]),
     "-x": np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]]),
 }
-"""Rotations that turn the body's z axis to the world axis that points up."""
+"""Rotations from the body's z axis to the world axis that points up."""
 
 
 def up_rotation(up: str, floor: GroundPlane | None) -> Array:
-    """Rotation whose z axis points up from the floor, (3, 3).
+    """Return a rotation whose z axis points up from the floor, (3, 3).
 
     Args:
         up: world axis that points up, or is nearest to it.
-        floor: as a person has set it; None for the plane through the world's origin.
+        floor: the plane set by a person; None for the plane through the world's origin.
     """
     return UP_ROTATIONS[up] if floor is None else floor.turned(UP_ROTATIONS[up])

@@ -19,7 +19,7 @@ def skew(v: Array) -> Array:
 
 
 def so3_exp(rotvec: Array) -> Array:
-    """Rotation matrix of a rotation vector in radians (Rodrigues' formula); `(..., 3)` to `(..., 3, 3)`."""
+    """Return the rotation matrix of a rotation vector in radians (Rodrigues' formula); `(..., 3)` to `(..., 3, 3)`."""
     rotvec = np.asarray(rotvec, dtype=np.float64)
     theta2 = np.sum(rotvec**2, axis=-1)[..., None, None]
     theta = np.sqrt(theta2)
@@ -33,15 +33,15 @@ def so3_exp(rotvec: Array) -> Array:
 
 
 def so3_log(R: Array) -> Array:
-    """Rotation vector in radians, of length at most pi, of a rotation matrix; `(..., 3, 3)` to `(..., 3)`."""
+    """Return the rotation vector in radians, length at most pi, of a rotation matrix; `(..., 3, 3)` to `(..., 3)`."""
     return quaternion_log(quaternion_from_matrix(R))
 
 
 def quaternion_from_matrix(R: Array) -> Array:
-    """Unit quaternion (w, x, y, z) with w >= 0 of a rotation matrix; `(..., 3, 3)` to `(..., 4)`."""
+    """Return the unit quaternion (w, x, y, z) with w >= 0 of a rotation matrix; `(..., 3, 3)` to `(..., 4)`."""
     R = np.asarray(R, dtype=np.float64)
     m00, m11, m22 = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
-    # Shepperd: of the four equivalent forms take the one with the largest pivot.
+    # Shepperd's method: of the four equivalent forms use the one with the largest pivot.
     pivots = np.stack([1 + m00 + m11 + m22, 1 + m00 - m11 - m22, 1 - m00 + m11 - m22, 1 - m00 - m11 + m22], axis=-1)
     x_w, y_w, z_w = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
     xy, xz, yz = R[..., 0, 1] + R[..., 1, 0], R[..., 0, 2] + R[..., 2, 0], R[..., 1, 2] + R[..., 2, 1]
@@ -61,7 +61,7 @@ def quaternion_from_matrix(R: Array) -> Array:
 
 
 def matrix_from_quaternion(wxyz: Array) -> Array:
-    """Rotation matrix of a quaternion (w, x, y, z), normalized first; `(..., 4)` to `(..., 3, 3)`."""
+    """Return the rotation matrix of a quaternion (w, x, y, z), normalized first; `(..., 4)` to `(..., 3, 3)`."""
     q = np.asarray(wxyz, dtype=np.float64)
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     w, V = q[..., 0][..., None, None], skew(q[..., 1:])
@@ -69,7 +69,7 @@ def matrix_from_quaternion(wxyz: Array) -> Array:
 
 
 def quaternion_log(wxyz: Array) -> Array:
-    """Rotation vector in radians of a unit quaternion (w, x, y, z); `(..., 4)` to `(..., 3)`."""
+    """Return the rotation vector in radians of a unit quaternion (w, x, y, z); `(..., 4)` to `(..., 3)`."""
     q = np.asarray(wxyz, dtype=np.float64)
     q = np.where(q[..., :1] < 0, -q, q)
     s = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
@@ -79,14 +79,14 @@ def quaternion_log(wxyz: Array) -> Array:
 
 
 def quaternion_exp(rotvec: Array) -> Array:
-    """Unit quaternion (w, x, y, z) of a rotation vector in radians; `(..., 3)` to `(..., 4)`."""
+    """Return the unit quaternion (w, x, y, z) of a rotation vector in radians; `(..., 3)` to `(..., 4)`."""
     rotvec = np.asarray(rotvec, dtype=np.float64)
     half = np.linalg.norm(rotvec, axis=-1, keepdims=True) / 2.0
     return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * rotvec], axis=-1)
 
 
 def quaternion_multiply(a: Array, b: Array) -> Array:
-    """Product `a b` of quaternions (w, x, y, z): rotate by b, then by a; `(..., 4)`."""
+    """Multiply quaternions (w, x, y, z): the product `a b` rotates by b, then by a; `(..., 4)`."""
     a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
     aw, av, bw, bv = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
     w = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
@@ -94,7 +94,7 @@ def quaternion_multiply(a: Array, b: Array) -> Array:
 
 
 def clip_swing_twist(wxyz: Array, cone: float, twist: float) -> Array:
-    """Split a rotation into swing times twist about z, bound both, rad, and put them together again; `(4,)`."""
+    """Limit the swing and the twist about z of a rotation, rad; quaternion `(4,)` to quaternion `(4,)`."""
     q = wxyz / np.linalg.norm(wxyz)
     norm = np.hypot(q[0], q[3])
     turn = np.array([q[0], 0.0, 0.0, q[3]]) / norm if norm > 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
@@ -108,7 +108,7 @@ def clip_swing_twist(wxyz: Array, cone: float, twist: float) -> Array:
 
 
 def transform(R: Array | None = None, t: Array | None = None) -> Array:
-    """Homogeneous transform from a rotation `(3, 3)` and a translation `(3,)`; identity where missing."""
+    """Build a homogeneous transform from a rotation `(3, 3)` and a translation `(3,)`; identity for a missing one."""
     T = np.eye(4)
     if R is not None:
         T[:3, :3] = R
@@ -118,7 +118,7 @@ def transform(R: Array | None = None, t: Array | None = None) -> Array:
 
 
 def inverse(T: Array) -> Array:
-    """Inverse of rigid transforms `(..., 4, 4)`: `inverse(T_a_b)` is `T_b_a`."""
+    """Invert rigid transforms `(..., 4, 4)`: `inverse(T_a_b)` is `T_b_a`."""
     R_t = np.swapaxes(T[..., :3, :3], -1, -2)
     out = np.zeros_like(T)
     out[..., :3, :3] = R_t
@@ -128,5 +128,5 @@ def inverse(T: Array) -> Array:
 
 
 def apply(T_a_b: Array, points_b: Array) -> Array:
-    """Map points `(..., 3)` from frame b to frame a by `(4, 4)`."""
+    """Map points `(..., 3)` from frame b to frame a by a transform `(4, 4)`."""
     return points_b @ T_a_b[:3, :3].T + T_a_b[:3, 3]

@@ -1,7 +1,7 @@
-"""How far points are from the nearest of many line segments, as far as that matters.
+"""Distances from points to the nearest of many line segments, up to a maximum distance.
 
-Points are kept sorted by upright strips of the image and, in each strip, by row, so that a segment is held only
-against those that come within reach of it: whole vectors of points, one after the other in memory.
+Points are sorted by vertical strips of the image and by row within each strip. A segment is compared only with the
+points within its reach, which are contiguous in memory and processed as whole vectors.
 """
 
 from collections.abc import Sequence
@@ -18,31 +18,31 @@ _ZERO, _HALF, _ONE = (
     np.float32(0.0),
     np.float32(0.5),
     np.float32(1.0),
-)  # plain numbers would turn the kernel's arithmetic into float64
+)  # literals would make the kernel's arithmetic float64
 _FAR, _FAR2 = np.float32(1e6), np.float32(1e12)
 _SHORT = np.float32(1e-6)
 """A shorter segment has no direction, px."""
 LANES = 16
-"""Points that are worked on together."""
+"""Points processed together."""
 STRIP_PX = 128
-"""Width of the strips. Narrower ones hold fewer points out of reach, and fewer whole vectors of points within."""
+"""Width of the strips. Narrower strips hold fewer points out of reach, but fill fewer vectors with points within."""
 
 
 class Segments(NamedTuple):
-    """Line segments, as many as there is room for."""
+    """Line segments, in buffers of a fixed size."""
 
     u: FloatArray
-    """Where each begins, (room,), px."""
+    """Start point, (room,), px."""
     v: FloatArray
     """(room,), px."""
     du: FloatArray
-    """The way to its end, (room,), px."""
+    """Vector from start to end, (room,), px."""
     dv: FloatArray
     """(room,), px."""
 
 
 def segment_buffer(room: int) -> Segments:
-    """Uninitialized room for segments."""
+    """Allocate uninitialized segments."""
     return Segments(*(np.empty(room, np.float32) for _ in range(4)))
 
 
@@ -50,11 +50,11 @@ class RowSortedPoints(NamedTuple):
     """Points sorted by strip of the image, then by row."""
 
     points: FloatArray
-    """u and v, px, and whatever else was given with each point, (2 + more, N); N is a whole number of `LANES`, and at
-    least `LANES` points at the end are far away, of which all else is 0."""
+    """u and v, px, and any further values of each point, (2 + more, N). N is a multiple of `LANES`. At least `LANES`
+    points at the end are padding: far away, with further values 0."""
     rows: IntArray
-    """Index of the first point of each strip in each row or below, (strips, height + 1); the last of a strip is where
-    the next one begins, the very last the number of points."""
+    """Index of the first point of each strip in each row or below, (strips, height + 1). The last entry of a strip is
+    the start of the next strip, that of the last strip the number of points."""
 
     @property
     def n_points(self) -> int:
@@ -63,7 +63,7 @@ class RowSortedPoints(NamedTuple):
 
 
 def sort_points(points: FloatArray, size: tuple[int, int]) -> RowSortedPoints:
-    """Sort points (N, 2 + more) of an image of a width and height; those beside it count to its border."""
+    """Sort points (N, 2 + more) of an image of the given width and height; points outside count as on its border."""
     n_strips = -(-size[0] // STRIP_PX)
     filled = np.zeros((points.shape[1], _room_for(len(points))), np.float32)
     filled[:2] = _FAR
@@ -73,13 +73,13 @@ def sort_points(points: FloatArray, size: tuple[int, int]) -> RowSortedPoints:
 
 
 def _room_for(n: int) -> int:
-    """Room for sorted points, see `RowSortedPoints`."""
+    """Size of the buffer of sorted points, see `RowSortedPoints`."""
     return (n // LANES + 2) * LANES
 
 
 @njit(nogil=True, cache=True)
 def _sort(points: FloatArray, cells: IntArray, begins: IntArray, out: FloatArray) -> None:
-    """Sort points (N, n) into out (n, N or more) by counting; cells is room for N numbers, begins holds zeros."""
+    """Sort points (N, n) into out (n, N or more) by counting. `cells` is a buffer of N numbers; `begins` is zero."""
     n_strips, height = begins.shape[0], begins.shape[1] - 1
     flat = begins.reshape(-1)
     for i in range(points.shape[0]):
@@ -94,7 +94,7 @@ def _sort(points: FloatArray, cells: IntArray, begins: IntArray, out: FloatArray
         for k in range(points.shape[1]):
             out[k, flat[cells[i]]] = points[i, k]
         flat[cells[i]] += 1
-    for k in range(flat.shape[0] - 1, 0, -1):  # each cell has moved on to where the next one begins
+    for k in range(flat.shape[0] - 1, 0, -1):  # each cell has advanced to the start of the next one
         flat[k] = flat[k - 1]
     flat[0] = 0
 
@@ -102,7 +102,7 @@ def _sort(points: FloatArray, cells: IntArray, begins: IntArray, out: FloatArray
 def within_reach(
     everything: RowSortedPoints, pieces_px: FloatArray, hidden: NDArray[np.bool_], reach: float
 ) -> RowSortedPoints:
-    """Those of some points that come within reach, px, of a visible piece, x0, y0, x1, y1, (M, 4); hidden is (M,)."""
+    """Select the points within reach, px, of a visible piece, x0, y0, x1, y1, (M, 4); hidden is (M,)."""
     points, rows = everything.points.copy(), everything.rows.copy()
     n = _keep_within(
         points, rows, pieces_px, hidden, reach, segment_buffer(len(hidden)), np.empty(points.shape[1], np.float32)
@@ -115,9 +115,9 @@ def _keep_within(
     points: FloatArray, rows: IntArray, pieces: FloatArray, hidden: NDArray[np.bool_], reach: float,
     segments: Segments, distances: FloatArray,
 ) -> int:  # fmt: skip
-    """Move the points, (n, N), within reach of a visible piece to the front, where they stay sorted; their number.
+    """Move the points, (n, N), within reach of a visible piece to the front in sorted order, and return their number.
 
-    Segments and distances are room, (M,) and (N,).
+    Segments and distances are buffers, (M,) and (N,).
     """
     n = 0
     for i in range(pieces.shape[0]):
@@ -141,9 +141,9 @@ def _keep_within(
 
 
 def stack_rows(rows: Sequence[IntArray]) -> IntArray:
-    """The `RowSortedPoints.rows` of several images in one array, (n, most strips, largest height + 1).
+    """Stack the `RowSortedPoints.rows` of several images in one array, (n, most strips, largest height + 1).
 
-    A smaller image ends in empty rows and in its last strip again; its points must lie within it.
+    A smaller image is padded with empty rows and copies of its last strip; its points must lie within it.
     """
     out = np.empty((len(rows), max(r.shape[0] for r in rows), max(r.shape[1] for r in rows)), np.int64)
     for into, given in zip(out, rows, strict=True):
@@ -158,7 +158,7 @@ def stack_rows(rows: Sequence[IntArray]) -> IntArray:
 def cells_within(
     u0: np.float32, v0: np.float32, u1: np.float32, v1: np.float32, reach: np.float32, rows: IntArray
 ) -> tuple[int, int, int, int]:
-    """The first and last strip, and the first row and the one after the last, that come within reach of a segment."""
+    """Return the first and last strip, the first row and the row after the last within reach of a segment."""
     last_strip, last_row = rows.shape[0] - 1, rows.shape[1] - 2
     left, right = int(min(u0, u1) - reach) // STRIP_PX, int(max(u0, u1) + reach) // STRIP_PX
     top, bottom = int(min(v0, v1) - reach) - 1, int(max(v0, v1) + reach) + 1
@@ -172,7 +172,7 @@ def cells_within(
 def nearest_segment(
     u: FloatArray, v: FloatArray, rows: IntArray, segments: Segments, n: int, reach: float, out: FloatArray
 ) -> None:
-    """Distance of each point to the nearest of n segments; exact up to the reach, beyond it at least the reach.
+    """Compute the distance of each point to the nearest of n segments; beyond the reach it is at least the reach.
 
     Args:
         u: of the points (see `RowSortedPoints`), (N,), px.
@@ -180,7 +180,7 @@ def nearest_segment(
         rows: index of the first point of each strip and row, (strips, height + 1).
         segments: the segments.
         n: their number.
-        reach: up to where distances matter, px.
+        reach: largest distance of interest, px.
         out: the distances, (N,), px.
     """
     out[: u.shape[0]] = _FAR2
@@ -188,14 +188,14 @@ def nearest_segment(
     for k in range(n):
         x, y, dx, dy = segments.u[k], segments.v[k], segments.du[k], segments.dv[k]
         left, right, top, bottom = cells_within(x, y, x + dx, y + dy, far, rows)
-        # Measured from its middle, along and across.
+        # Coordinates along and across the segment, from its middle.
         length = np.sqrt(dx * dx + dy * dy)
         along_u, along_v = (dx / length, dy / length) if length > _SHORT else (_ONE, _ZERO)
         half = _HALF * length
         x, y = x + _HALF * dx, y + _HALF * dy
         for strip in range(left, right + 1):
             first, last = np.uint64(rows[strip, top]), np.uint64(rows[strip, bottom])
-            # Whole vectors, of points nearby at worst. Unsigned: an index that may be negative is not vectorized.
+            # Round up to whole vectors; the extra points are nearby at worst. Unsigned indices let it vectorize.
             for j in range((last - first + np.uint64(LANES - 1)) // np.uint64(LANES) * np.uint64(LANES)):
                 i = first + j
                 from_u, from_v = u[i] - x, v[i] - y

@@ -1,8 +1,8 @@
 """Part shapes: tapered superquadrics (GD96 Sect. 3), truncated elliptical cones (KRH08 Sect. 3) and ellipsoids.
 
-A shape lives in its own frame, z along its axis, its half-axes along x, y, z. Divided by them it is a solid about as
-large as the unit ball; in these *unit coordinates* cones, ellipsoids and superquadrics with an elliptic cross-section
-are solids of revolution, told by their profile alone.
+A shape has its own frame: z along its axis, half-axes along x, y, z. *Unit coordinates* are divided by the half-axes,
+so that the solid is about as large as the unit ball. In them cones, ellipsoids and superquadrics with an elliptic
+cross-section are solids of revolution, determined by their profile.
 """
 
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     import trimesh
 
 _FLAT = 1e-6
-"""How far the normal of a flat end points away from the axis: all but not at all, so that its slope is a number."""
+"""Component away from the axis of the normal of a flat end: almost 0, so that its slope is finite."""
 
 
 class Triangles(NamedTuple):
-    """A surface of triangles."""
+    """A triangle mesh."""
 
     vertices: Array
     """(N, 3), metres."""
@@ -31,7 +31,7 @@ class Triangles(NamedTuple):
 
 
 class Profile(NamedTuple):
-    """The outline of a solid of revolution in unit coordinates, from its -z to its +z end.
+    """The profile of a solid of revolution in unit coordinates, from its -z to its +z end.
 
     The first and last point are flat ends: a disc that meets the surface in a rim.
     """
@@ -39,7 +39,7 @@ class Profile(NamedTuple):
     radii: Array
     """Distance from the axis, (n,)."""
     heights: Array
-    """Place along the axis, (n,)."""
+    """Position along the axis, (n,)."""
     outward: Array
     """The normal's component away from the axis, (n,)."""
     along: Array
@@ -56,7 +56,7 @@ class Enclosure(NamedTuple):
     bulge: float
     """b."""
     exact: bool
-    """Whether it is the solid itself."""
+    """Whether the quadric is the solid itself."""
 
 
 @dataclass(frozen=True)
@@ -76,13 +76,13 @@ class TaperedSuperquadric:
 
     @property
     def degree(self) -> float:
-        """Power of the distance from the centre as which `inside_outside` grows."""
+        """The degree with which `inside_outside` grows with the distance from the centre."""
         return 2 / self.exponents[0]
 
     def inside_outside(self, points: Array) -> Array:
         """Evaluate the solid's implicit function at points `(..., 3)` in its frame: below 1 inside."""
         (a1, a2, a3), (e1, e2), (kx, ky) = self.half_axes, self.exponents, self.taper
-        # Outside the slab |z| <= a3 the taper could turn negative; there the point is outside anyway.
+        # Outside the slab |z| <= a3 the taper could become negative; such points are outside anyway.
         zn = points[..., 2] / a3
         zc = np.clip(zn, -1.0, 1.0)
         x = np.abs(points[..., 0] / (a1 * (1 + kx * zc)))
@@ -90,14 +90,14 @@ class TaperedSuperquadric:
         return (x ** (2 / e2) + y ** (2 / e2)) ** (e2 / e1) + np.abs(zn) ** (2 / e1)
 
     def surface(self, eta: Array, omega: Array) -> tuple[Array, Array]:
-        """Points and outward unit normals `(..., 3)` at latitudes `eta` in [-pi/2, pi/2], longitudes `omega`."""
+        """Return points and outward unit normals `(..., 3)` at latitudes `eta` in [-pi/2, pi/2], longitudes `omega`."""
         (a1, a2, a3), (e1, e2), (kx, ky) = self.half_axes, self.exponents, self.taper
         ce, se = _signed_power(np.cos(eta), e1), _signed_power(np.sin(eta), e1)
         co, so = _signed_power(np.cos(omega), e2), _signed_power(np.sin(omega), e2)
         z = se
         sx, sy = 1 + kx * z, 1 + ky * z
         points = np.stack([a1 * sx * ce * co, a2 * sy * ce * so, np.broadcast_to(a3 * z, (ce * co).shape)], -1)
-        # Normal of the untapered solid, carried through the inverse transpose of the taper's Jacobian.
+        # Normal of the untapered solid, transformed by the inverse transpose of the taper's Jacobian.
         nx = _signed_power(np.cos(eta), 2 - e1) * _signed_power(np.cos(omega), 2 - e2) / a1
         ny = _signed_power(np.cos(eta), 2 - e1) * _signed_power(np.sin(omega), 2 - e2) / a2
         nz = _signed_power(np.sin(eta), 2 - e1) / a3 * np.ones_like(nx)
@@ -106,7 +106,7 @@ class TaperedSuperquadric:
         return points, normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 
     def grid(self, n_rings: int, n_sectors: int) -> tuple[Array, Array]:
-        """Points and normals `(n_rings, n_sectors, 3)` on closed rings from the -z to the +z end.
+        """Return points and normals `(n_rings, n_sectors, 3)` on closed rings from the -z to the +z end.
 
         The first and last ring lie close to the poles, where the normals point along the axis. Rings and sectors
         are spread so that the normal turns evenly: bends get more of them than straight sides.
@@ -116,11 +116,11 @@ class TaperedSuperquadric:
         return self.surface(*np.meshgrid(eta, omega, indexing="ij"))
 
     def triangles(self, n_rings: int = 24, n_sectors: int = 32) -> Triangles:
-        """Closed surface in the shape's frame."""
+        """Return a closed surface in the shape's frame."""
         return _closed(self.grid(n_rings, n_sectors)[0], self.half_axes[2])
 
     def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> "trimesh.Trimesh":
-        """The same as a mesh of trimesh."""
+        """Return the closed surface as a mesh of trimesh."""
         return _mesh(self.triangles(n_rings, n_sectors))
 
     @cached_property
@@ -129,7 +129,7 @@ class TaperedSuperquadric:
         return float(2 ** ((1 - self.exponents[1]) / 2))
 
     def profile(self, tolerance_m: float) -> Profile | None:
-        """The profile in unit coordinates, thinned to chords within a tolerance; None for no solid of revolution."""
+        """Return the profile in unit coordinates, thinned within a tolerance; None if not a solid of revolution."""
         (a1, a2, a3), e1, (k, ky) = self.half_axes, self.exponents[0], self.taper
         if self.exponents[1] != 1.0 or k != ky:
             return None
@@ -143,7 +143,7 @@ class TaperedSuperquadric:
 
     @property
     def enclosure(self) -> Enclosure:
-        """A cone around the solid, or a cylinder where the taper differs along x and y."""
+        """Return a cone around the solid, or a cylinder if the taper differs along x and y."""
         (kx, ky), g = self.taper, self.girth_bound
         if kx == ky:
             return Enclosure((g, g), kx, 0.0, False)
@@ -169,7 +169,7 @@ class EllipticalCone:
         return np.maximum((x**2 + y**2) / (1 + self.taper * np.clip(z, -1.0, 1.0)) ** 2, z**2)
 
     def grid(self, n_rings: int, n_sectors: int) -> tuple[Array, Array]:
-        """Points and normals `(n_rings, n_sectors, 3)` on closed rings from the -z to the +z end, ends included."""
+        """Return points and normals `(n_rings, n_sectors, 3)` on closed rings from the -z to the +z end, with ends."""
         k, n_end = self.taper, max(1, n_rings // 5)
         inner = (np.arange(n_end) + 0.5) / n_end
         side = np.linspace(-1.0, 1.0, n_rings - 2 * n_end)
@@ -187,21 +187,21 @@ class EllipticalCone:
         return turned(radii, heights) * self.half_axes, normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 
     def triangles(self, n_rings: int = 24, n_sectors: int = 32) -> Triangles:
-        """Closed surface in the shape's frame."""
+        """Return a closed surface in the shape's frame."""
         return _closed(self.grid(n_rings, n_sectors)[0], self.half_axes[2])
 
     def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> "trimesh.Trimesh":
-        """The same as a mesh of trimesh."""
+        """Return the closed surface as a mesh of trimesh."""
         return _mesh(self.triangles(n_rings, n_sectors))
 
     def profile(self, tolerance_m: float) -> Profile:
-        """The profile in unit coordinates: two points of one slope, so that the contour has two straight rulings."""
+        """Return the profile in unit coordinates: two points of one slope, which give two straight rulings."""
         k = self.taper
         return _with_ends(np.array([1 - k, 1 + k]), np.array([-1.0, 1.0]), np.ones(2), np.full(2, -k))
 
     @property
     def enclosure(self) -> Enclosure:
-        """The cone itself."""
+        """Return the cone itself."""
         return Enclosure((1.0, 1.0), self.taper, 0.0, True)
 
 
@@ -218,24 +218,24 @@ class Ellipsoid:
         return np.sum((points / self.half_axes) ** 2, axis=-1)
 
     def grid(self, n_rings: int, n_sectors: int) -> tuple[Array, Array]:
-        """Points and normals `(n_rings, n_sectors, 3)` on closed rings from the -z to the +z end."""
+        """Return points and normals `(n_rings, n_sectors, 3)` on closed rings from the -z to the +z end."""
         return self._superquadric.grid(n_rings, n_sectors)
 
     def triangles(self, n_rings: int = 24, n_sectors: int = 32) -> Triangles:
-        """Closed surface in the shape's frame."""
+        """Return a closed surface in the shape's frame."""
         return self._superquadric.triangles(n_rings, n_sectors)
 
     def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> "trimesh.Trimesh":
-        """The same as a mesh of trimesh."""
+        """Return the closed surface as a mesh of trimesh."""
         return _mesh(self.triangles(n_rings, n_sectors))
 
     def profile(self, tolerance_m: float) -> Profile | None:
-        """The profile in unit coordinates, thinned to chords within a tolerance."""
+        """Return the profile in unit coordinates, thinned to chords within a tolerance."""
         return self._superquadric.profile(tolerance_m)
 
     @property
     def enclosure(self) -> Enclosure:
-        """The ellipsoid itself."""
+        """Return the ellipsoid itself."""
         return Enclosure((1.0, 1.0), 0.0, 1.0, True)
 
     @property
@@ -251,7 +251,7 @@ def _signed_power(base: Array, exponent: float) -> Array:
 
 
 def _with_ends(radii: Array, heights: Array, outward: Array, along: Array) -> Profile:
-    """Close a profile by flat ends, and bring its normals to unit length."""
+    """Close a profile by flat ends, and normalize its normals."""
     norms = np.hypot(outward, along)
     return Profile(
         np.concatenate([radii[:1], radii, radii[-1:]]),
@@ -262,7 +262,7 @@ def _with_ends(radii: Array, heights: Array, outward: Array, along: Array) -> Pr
 
 
 def _chords(curve: Array, tolerance: float) -> list[int]:
-    """Indices of points of a curve (n, 2) between which chords stray from it by at most the tolerance; few of them."""
+    """Thin a curve (n, 2) to chords that deviate from it by at most the tolerance; return the indices of their ends."""
     kept, last = [0], 1
     while kept[-1] < len(curve) - 1:
         while last + 1 < len(curve):
@@ -278,7 +278,7 @@ def _chords(curve: Array, tolerance: float) -> list[int]:
 
 
 def _closed(rings: Array, end: float) -> Triangles:
-    """Surface through closed rings of points (n_rings, n_sectors, 3) with a pole at z = -end and z = end."""
+    """Build the surface through closed rings of points (n_rings, n_sectors, 3) with a pole at z = -end and z = end."""
     n_rings, n_sectors, _ = rings.shape
     vertices = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, -end], [0.0, 0.0, end]]])
     ring, sector = np.meshgrid(np.arange(n_rings - 1), np.arange(n_sectors), indexing="ij")
@@ -299,6 +299,6 @@ def _closed(rings: Array, end: float) -> Triangles:
 
 
 def _mesh(triangles: Triangles) -> "trimesh.Trimesh":
-    import trimesh  # takes half a second, which who asks for no mesh need not wait
+    import trimesh  # imported lazily: takes 0.5 s to load
 
     return trimesh.Trimesh(*triangles, process=False)

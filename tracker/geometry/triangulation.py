@@ -1,4 +1,4 @@
-"""Find the point that several views observe."""
+"""Triangulate a point from its observations in several views."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -9,61 +9,61 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera, project_with_jacobian
 
 _SIGMA_SHARE = 0.001
-"""Standard deviation of a pin against the longer side of the image: 0.64 px of 640. A hand is off by three times as
-much; but where edges and a pin disagree the edges of a body of another shape are wrong together, and the hand is to
-win. Large pictures are shown smaller, so that a hand is off by more of their pixels."""
+"""Standard deviation of a pin as a share of the longer side of the image: 0.64 px of 640. The true error of a hand is
+about three times as large. The smaller value lets pins win over edges, whose errors all agree if the body's shape is
+wrong. It is relative because large images are displayed smaller."""
 
 
-_LEAST_ANGLE_RAD = np.radians(1.0)
-"""Lines of sight that differ less than this say nothing of the depth at which they meet: with pins 2 px off in images
-of 640 px, a point 4 m away would be uncertain by more than 1 m."""
+_MIN_ANGLE_RAD = np.radians(1.0)
+"""Viewing rays that differ by less do not determine a depth: with pins 2 px off in images of 640 px, a point 4 m away
+would be uncertain by more than 1 m."""
 
 
 class PointObservation(NamedTuple):
-    """Where one view shows a point of the body, as a person says."""
+    """The observed position of a body point in one view, set by a person."""
 
     point: str
     """One of the body model's `point_names`."""
     camera: int
     """Index of the view."""
     position_px: tuple[float, float]
-    """Where the point is seen, undistorted px."""
+    """Position of the point in the image, undistorted px."""
 
 
 def sigma_px(camera: Camera) -> float:
-    """Standard deviation of a pin in a view, px: how far off a hand is."""
+    """Return the standard deviation of a pin in a view, px."""
     return _SIGMA_SHARE * max(camera.size)
 
 
 class Triangulation(NamedTuple):
-    """Where in space the pins of one point meet."""
+    """The point in space observed by the pins of one body point."""
 
     point_world: Array | None
-    """The point, (3,), metres; None where the pins do not tell."""
+    """The point, (3,), metres; None if the pins do not determine it."""
     errors_px: Array
-    """Distance of each pin from the image of the point, (N,), px; NaN where there is no point."""
+    """Reprojection error of each pin, (N,), px; NaN without a point."""
     why: str
-    """Why there is no point, and what to do; empty where there is one."""
+    """Why there is no point, and what to do; empty if there is one."""
 
 
 def triangulate(cameras: Sequence[Camera], positions_px: Array) -> Triangulation:
-    """Find the point in space whose images are nearest to where it was seen.
+    """Find the point in space with the smallest reprojection error.
 
-    It starts where the lines of sight come nearest to each other and minimizes the squared distances in the images,
-    in standard deviations of a pin, by Gauss-Newton.
+    The start is the point nearest to the viewing rays. Gauss-Newton then minimizes the squared distances in the images,
+    in standard deviations of a pin.
 
     Args:
         cameras: the camera of each pin.
-        places_px: where the point is seen, undistorted px, (N, 2).
+        positions_px: observed position of the point, undistorted px, (N, 2).
     """
     positions_px = np.asarray(positions_px, dtype=np.float64).reshape(-1, 2)
     views = [c.pinhole for c in cameras]
     rays = np.array([c.rays(p) for c, p in zip(views, positions_px, strict=True)]).reshape(-1, 3)
     if len(views) < 2:
-        return _nowhere(views, "one view does not tell the depth: pin the joint in another view too")
-    # Two views that face each other are as bad as two that stand side by side.
+        return _nowhere(views, "one view does not determine the depth: pin the joint in another view too")
+    # Two views that face each other are as bad as two side by side.
     sines = np.linalg.norm(np.cross(rays[:, None], rays[None]), axis=-1)
-    if sines.max() < np.sin(_LEAST_ANGLE_RAD):
+    if sines.max() < np.sin(_MIN_ANGLE_RAD):
         return _nowhere(views, "the lines of sight are almost parallel: pin the joint in a view from another side")
     across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
     centers = np.stack([c.center_world for c in views])
@@ -80,14 +80,14 @@ def _nowhere(views: Sequence[Camera], why: str) -> Triangulation:
 
 
 def _residuals(views: Sequence[Camera], positions_px: Array, point: Array) -> tuple[Array, Array]:
-    """Image minus pin in each view, (N, 2), px, and its derivative by the point, (N, 2, 3)."""
+    """Return projection minus pin in each view, (N, 2), px, and its derivative by the point, (N, 2, 3)."""
     Ts_camera_world, K = np.stack([c.T_camera_world for c in views]), np.stack([c.K for c in views])
     points_px, J = project_with_jacobian(Ts_camera_world, K, np.broadcast_to(point, (len(views), 3)))
     return points_px - positions_px, J
 
 
 def _nearest_in_the_images(views: Sequence[Camera], positions_px: Array, point: Array) -> Array:
-    """Gauss-Newton on the distances in the images, from a point on; it stays where a step would go behind a camera."""
+    """Minimize the reprojection error by Gauss-Newton; stop before a step that would lead behind a camera."""
     weights = 1 / np.array([sigma_px(c) for c in views])[:, None]
     if min(c.depths(point) for c in views) < NEAR_PLANE_M:
         return point

@@ -1,2 +1,6 @@
-"""Pixels to features, no body and no footage: undistortion, background subtraction, edges, segments, distance
-transforms, colour histograms."""
+"""Turn pixels into features: undistortion, background subtraction, edges, segments, distance transforms, histograms.
+
+The room knows neither bodies nor footage and imports only `compute` and `geometry`. Callers use `working_view`,
+`background_subtraction`, `image_statistics`, `edges`, `edge_segments`, `silhouette_contour`, `static_edges`,
+`distance_transform` and `color_histogram`.
+"""

@@ -1,4 +1,4 @@
-"""Frame and background to silhouette: where the image shows something that the empty scene does not."""
+"""Find the silhouette: the pixels in which a frame differs from the empty scene."""
 
 from typing import NamedTuple
 
@@ -13,78 +13,82 @@ from tracker.geometry.arrays import Image
 Mask = NDArray[np.bool_]
 
 SMOOTHING_PX = 1.0
-"""Standard deviation of the Gaussian that images are smoothed with before they are compared or derived, px."""
+"""Standard deviation of the Gaussian that smooths images before they are compared or differentiated, px."""
 MIN_DIFFERENCE = 12.0
-"""Least difference of any colour channel (of 255) that counts as a change; video noise stays below."""
+"""Smallest difference in any colour channel (of 255) that counts as a change. It lies above video noise."""
 MIN_SHADE = 0.5
-"""What is left of the light in the deepest shadow that is taken for one."""
+"""Brightness of the darkest shadow, as a share of the unshaded background."""
 MAX_HUE_SHIFT = 7.0
-"""How far a channel may be from the darkened background in a shadow, gray levels."""
-_DARK, _BRIGHT = 20.0, 235.0  # beyond, a ratio of colours says little
-_LEAST_PLACES = 50
-_LEAST_GAIN = 0.01
-_SAME, _SHADOW, _NEW = 0, 1, 2  # what becomes of a pixel
+"""Largest deviation of a channel from the darkened background within a shadow, gray levels."""
+_DARK, _BRIGHT = 20.0, 235.0  # gray levels between which a ratio of colours is reliable
+_MIN_SAMPLES = 50
+_MIN_GAIN_CHANGE = 0.01
+_SAME, _SHADOW, _NEW = 0, 1, 2  # classes of a pixel
 
 
-def smoothed(image: Image) -> Image:
+def smooth_image(image: Image) -> Image:
     """Smooth an image, (H, W, 3), against the noise of single pixels."""
     return np.asarray(cv2.GaussianBlur(image, (0, 0), SMOOTHING_PX), dtype=np.uint8)
 
 
 def change_threshold(differences: NDArray[np.float32]) -> float:
-    """Difference beyond which a pixel has changed, gray levels.
+    """Return the difference above which a pixel has changed, gray levels.
 
-    It follows the noise of the view: most pixels show the background, so the median difference tells how far an
-    unchanged pixel strays.
+    The threshold follows the noise of the view. Most pixels show the background, so the median difference measures the
+    noise of an unchanged pixel.
 
     Args:
-        differences: of the smoothed frame to the smoothed background, largest over the channels, at places spread
-            over the whole image, (n,).
+        differences: largest difference over the channels between smoothed frame and smoothed background, at samples
+            spread over the whole image, (n,).
     """
     return max(MIN_DIFFERENCE, 5.0 * float(median(differences)))
 
 
-def tells_exposure(empty_colors: NDArray[np.float32]) -> Mask:
-    """Where an empty scene is neither too dark nor too bright to tell the exposure by its smoothed colours, (n, 3)."""
+def has_usable_exposure(empty_colors: NDArray[np.float32]) -> Mask:
+    """Return which samples of an empty scene are neither too dark nor too bright to measure exposure, (n,).
+
+    Args:
+        empty_colors: smoothed colours of the samples, (n, 3).
+    """
     return np.asarray(np.all((empty_colors > _DARK) & (empty_colors < _BRIGHT), axis=-1))
 
 
 def exposure_gain(colors: NDArray[np.float32], empty_colors: NDArray[np.float32]) -> NDArray[np.float32]:
-    """How much brighter each channel of a frame is than the empty scene, (3,), as automatic exposure makes it.
+    """Return the gain of each channel of a frame over the empty scene, (3,), as automatic exposure causes it.
 
     Args:
-        colors: smoothed colours at places spread over the whole frame, (n, 3), of which most show the scene.
-        empty_colors: those of the empty scene at the same places, which all tell it (`tells_exposure`), (n, 3).
+        colors: smoothed colours at samples spread over the whole frame, (n, 3); most of them show the background.
+        empty_colors: colours of the empty scene at the same samples, (n, 3), all usable (`has_usable_exposure`).
     """
-    return np.ones(3, np.float32) if len(colors) < _LEAST_PLACES else median(colors / empty_colors).astype(np.float32)
+    return np.ones(3, np.float32) if len(colors) < _MIN_SAMPLES else median(colors / empty_colors).astype(np.float32)
 
 
-def brightened(image: Image, gain: NDArray[np.float32]) -> Image:
+def apply_gain(image: Image, gain: NDArray[np.float32]) -> Image:
     """Multiply the channels of an image, (H, W, 3), by a gain, (3,)."""
-    if np.abs(gain - 1.0).max() < _LEAST_GAIN:
+    if np.abs(gain - 1.0).max() < _MIN_GAIN_CHANGE:
         return image
     table = np.clip(np.round(np.arange(256)[:, None] * gain), 0, 255).astype(np.uint8)
     return np.asarray(cv2.LUT(np.ascontiguousarray(image), table[None]), dtype=np.uint8)
 
 
 class Changes(NamedTuple):
-    """Where a frame differs from the empty scene."""
+    """The pixels in which a frame differs from the empty scene."""
 
     inside: Mask
-    """The silhouette, with holes where colours agree; shadows are left out, (H, W)."""
+    """Silhouette without shadows, with holes where colours agree, (H, W)."""
     anything: Mask
-    """The silhouette and the shadows, and so also clothes that look like a shadow of what is behind them, (H, W)."""
+    """Silhouette with shadows, (H, W). It includes clothes that look like a shadow of what is behind them."""
 
 
 def subtract_background(smooth: Image, background: Image, threshold: float) -> Changes:
     """Find the pixels that differ from the background.
 
-    A pixel that is merely darker, with the hue of the background, is taken to lie in a shadow (the brightness and
-    chromaticity distortion of Horprasert, Harwood & Davis 1999).
+    A darker pixel with the hue of the background is classified as shadow (brightness and chromaticity distortion,
+    Horprasert, Harwood & Davis 1999).
 
     Args:
         smooth: smoothed frame, (H, W, 3) RGB.
-        background: the smoothed empty scene, (H, W, 3) RGB, same size and pixels.
+        background: smoothed empty scene, (H, W, 3) RGB, with the same pixels.
         threshold: see `change_threshold`.
     """
     changed = np.empty(smooth.shape[:2], np.uint8)
@@ -103,10 +107,17 @@ def _find_changes(
     image: NDArray[np.uint8], empty: NDArray[np.uint8], threshold: float, least: float, hue: float,
     changed: NDArray[np.uint8],
 ) -> None:  # fmt: skip
-    """Fill in what became of each pixel, (n,): the same, in a shadow, or new; colours are (3 n,) each.
+    """Fill the class of each pixel, (n,): unchanged, in a shadow, or new.
 
-    In float32, without branches, and without the check for a division by zero, so that it runs on whole vectors: ten
-    times as fast.
+    The kernel uses float32, no branches and no check for division by zero, so that it is vectorized: ten times as fast.
+
+    Args:
+        image: colours of the frame, (3 n,).
+        empty: colours of the empty scene, (3 n,).
+        threshold: smallest difference of a changed pixel, gray levels.
+        least: brightness of the darkest shadow, as a share.
+        hue: largest deviation of a channel in a shadow, gray levels.
+        changed: filled with `_SAME`, `_SHADOW` or `_NEW`, (n,).
     """
     one = np.float32(1.0)
     same, shadow, new = np.float32(_SAME), np.float32(_SHADOW), np.float32(_NEW)
@@ -126,10 +137,10 @@ def _find_changes(
         changed[i] = np.uint8(became if difference > threshold else same)
 
 
-def grow(mask: Mask, radius_px: float) -> Mask:
-    """Dilate a mask by a radius: the generous foreground within which edges may belong to a person.
+def dilate(mask: Mask, radius_px: float) -> Mask:
+    """Dilate a mask by a radius, px: the generous foreground in which edges may belong to a person.
 
-    The disc is an octagon, made of a square and diamonds, which takes a third of the time of a distance transform.
+    The disc is an octagon made of a square and diamonds. It takes a third of the time of a distance transform.
     """
     radius = round(radius_px)
     straight = round((np.sqrt(2) - 1) * radius)  # as wide along the diagonals as along the axes

@@ -1,4 +1,4 @@
-"""Color histograms of pixels."""
+"""Colour histograms of images."""
 
 import numpy as np
 from numba import njit
@@ -8,19 +8,19 @@ from tracker.compute.numba_options import BORROW
 from tracker.geometry.arrays import Image
 
 BINS = 12
-"""Bins of colours along each channel."""
+"""Number of bins of each colour channel."""
 
 
 @njit(**BORROW)
 def bin_of(image: Image, v: int, u: int) -> int:
-    """Index of a pixel's colour."""
+    """Return the histogram bin of a pixel's colour."""
     r, g, b = image[v, u, 0] * BINS // 256, image[v, u, 1] * BINS // 256, image[v, u, 2] * BINS // 256
     return (r * BINS + g) * BINS + b
 
 
 @njit(**BORROW)
 def count_colors(image: Image, counts: NDArray[np.int64]) -> None:
-    """Count the pixels of an image, (H, W, 3), by their colour: add to the counts, (BINS^3,)."""
+    """Add the pixels of an image, (H, W, 3), to a histogram, (BINS^3,)."""
     for v in range(image.shape[0]):
         for u in range(image.shape[1]):
             counts[bin_of(image, v, u)] += 1

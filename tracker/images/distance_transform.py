@@ -1,4 +1,4 @@
-"""Distance images: made from edges, and read between their pixels."""
+"""Distance images: compute them from edges and interpolate them between pixels."""
 
 import numpy as np
 from numba import njit
@@ -7,24 +7,25 @@ from numpy.typing import NDArray
 from tracker.compute.numba_options import FAST
 from tracker.geometry.arrays import FloatArray
 
-_ZERO = np.float32(0.0)  # a plain number would turn the kernel's arithmetic into float64
+_ZERO = np.float32(0.0)  # a Python float would promote the kernel's arithmetic to float64
 
 
 @njit(**FAST)
 def bilinear(
     image: FloatArray, width: int, height: int, u: np.float32, v: np.float32
 ) -> tuple[np.float32, np.float32, np.float32]:
-    """Value at a pixel, and its slopes along u and v; outside the image those of the nearest border pixel.
+    """Return the interpolated value at a point and its slopes along u and v.
 
-    Without a branch, so that loops that store nothing do it for whole vectors. The slopes are those of the bilinear
-    surface (KRH08 Sect. 5.3; see DESIGN section 7 for the second one).
+    Points outside the image take the value of the nearest border pixel. The slopes are those of the bilinear surface
+    (KRH08 Sect. 5.3, with the second slope corrected). The function has no branches, so that loops which store nothing
+    are vectorized.
 
     Args:
-        image: row by row, (height * width,).
-        width: of the image.
-        height: of the image.
-        u: px.
-        v: px.
+        image: pixels row by row, (height * width,).
+        width: width of the image, px.
+        height: height of the image, px.
+        u: column, px.
+        v: row, px.
     """
     right, bottom = np.float32(width - 1), np.float32(height - 1)
     u = u if u > _ZERO else _ZERO
@@ -36,7 +37,7 @@ def bilinear(
     column = column if column < last_column else last_column
     row = row if row < last_row else last_row
     a, b = u - np.float32(column), v - np.float32(row)
-    at, below = np.uint64(row * np.int32(width) + column), np.uint64(width)  # a signed index might count from the end
+    at, below = np.uint64(row * np.int32(width) + column), np.uint64(width)  # a signed index may wrap around
     d00, d01 = image[at], image[at + np.uint64(1)]
     d10, d11 = image[at + below], image[at + below + np.uint64(1)]
     upper, lower = d00 + a * (d01 - d00), d10 + a * (d11 - d10)
@@ -45,16 +46,21 @@ def bilinear(
 
 
 _STRAIGHT, _DIAGONAL, _KNIGHT = np.float32(1.0), np.float32(1.4), np.float32(2.1969)
-"""Lengths of steps to pixels beside, across a corner, and two along and one aside (Borgefors 1986, for a 5x5 mask)."""
+"""Lengths of the steps to a neighbour beside, a diagonal neighbour, and a knight's move (Borgefors 1986, 5x5 mask),
+px."""
 _BORDER = 2
-"""Pixels that a step may reach beyond an image."""
+"""Width of the border around a row that a step may read, px."""
 
 
 def distance_image(edge_map: NDArray[np.bool_] | NDArray[np.uint8], limit_px: float) -> FloatArray:
-    """Distance of each pixel to the nearest edge, `(H, W)` to `(H, W)` float32, cut off at the limit.
+    """Compute the distance of each pixel to the nearest edge, `(H, W)` float32, cut off at a limit.
 
-    The chamfer distance of OpenCV's `DIST_L2` with a 5x5 mask, 2% off the Euclidean one at most. Rows are worked on as
-    whole vectors, in a third of its time.
+    This is the chamfer distance of OpenCV's `DIST_L2` with a 5x5 mask, at most 2% off the Euclidean distance. Rows are
+    processed as vectors, in a third of OpenCV's time.
+
+    Args:
+        edge_map: edges are not 0, (H, W).
+        limit_px: largest distance, px.
     """
     height, width = edge_map.shape
     out = np.empty((height, width), np.float32)
@@ -65,13 +71,13 @@ def distance_image(edge_map: NDArray[np.bool_] | NDArray[np.uint8], limit_px: fl
 
 @njit(**FAST)
 def _measure(edges: NDArray[np.uint8], limit: np.float32, rows: FloatArray, out: FloatArray) -> None:
-    """Fill a distance image, (H, W): first by steps downwards and to the right, then by those upwards and to the left.
+    """Fill a distance image: one pass of steps down and right, one pass of steps up and left.
 
     Args:
-        edges: (H, W), 0 where there is none.
-        limit: where distances are cut off, px.
-        rows: room, (5, W + 2 `_BORDER`): the two rows before, the one at work and two to work in.
-        out: what is filled.
+        edges: edges are not 0, (H, W).
+        limit: largest distance, px.
+        rows: scratch, (5, W + 2 `_BORDER`): the two previous rows, the current row and two work rows.
+        out: distance image to fill, (H, W), px.
     """
     height, width = out.shape
     for turn in range(2):
@@ -93,7 +99,7 @@ def _measure(edges: NDArray[np.uint8], limit: np.float32, rows: FloatArray, out:
 
 @njit(inline="always", **FAST)
 def _step_down(before: FloatArray, before2: FloatArray, own: FloatArray, out: FloatArray) -> None:
-    """Fill a row, (W,), by its own distances and steps from the two rows before it, (W + 2 `_BORDER`,)."""
+    """Fill a row, (W,), from its own distances and steps from the two rows before it, (W + 2 `_BORDER`,)."""
     for x in range(np.uint64(before.shape[0] - 2 * _BORDER)):
         at = x + np.uint64(_BORDER)
         straight = before[at] + _STRAIGHT
@@ -105,9 +111,16 @@ def _step_down(before: FloatArray, before2: FloatArray, own: FloatArray, out: Fl
 
 @njit(inline="always", **FAST)
 def _step_aside(right: bool, limit: np.float32, a: FloatArray, b: FloatArray, out: FloatArray) -> None:
-    """Fill a row, (W + 2 `_BORDER`,), from distances `a`, (W or more,), by steps along it to one side; `b` is room.
+    """Fill a row, (W + 2 `_BORDER`,), by steps along it to one side.
 
-    Steps of one pixel, of two, of four: after each any number of pixels below twice that has been gone.
+    Steps of 1, 2, 4, ... pixels compose to any number of pixels.
+
+    Args:
+        right: whether the steps go right, else left.
+        limit: largest distance, px.
+        a: distances so far, (W or more,); overwritten.
+        b: scratch, (W or more,).
+        out: row to fill.
     """
     width, step = np.uint64(out.shape[0] - 2 * _BORDER), np.uint64(1)
     while step < width and np.float32(step) < limit:

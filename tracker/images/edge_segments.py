@@ -1,8 +1,8 @@
-"""Edges linked into chains, chains cut into segments of constant curvature, segments taken or left as a whole.
+"""Link edges into chains, cut chains into segments of constant curvature, and accept or refuse whole segments.
 
-GD96 Sect. 4.2 and Fig. 6: what belongs together is judged together. A segment is accepted by its directed chamfer
-distance to the contours of the predicted bodies, so that an edge of the background that merely crosses a limb is
-refused with all its points, and one of the limb is kept with all of them.
+Segments follow GD96 Sect. 4.2 and Fig. 6. A segment is accepted by its directed chamfer distance to the contours of the
+predicted bodies. A background edge that merely crosses a limb is therefore refused with all its pixels, and an edge of
+the limb is accepted with all of them.
 """
 
 from typing import NamedTuple
@@ -17,37 +17,37 @@ from tracker.geometry.arrays import FloatArray, IntArray
 from tracker.geometry.segment_distance import LANES, RowSortedPoints, cells_within, sort_points
 
 MAX_LENGTH = 30
-"""Most pixels of a segment: where body and background are linked in a smooth line, they part here at the latest."""
+"""Largest number of pixels of a segment. It separates body and background where they are linked smoothly."""
 BEND_RAD = 0.35
-"""How far the direction of the edge may stray from one that turns evenly before the segment ends, rad."""
+"""Largest deviation of an edge's direction from one that turns evenly within a segment, rad."""
 STRAYS = 3
-"""As many pixels in a row must stray: single ones are noise."""
+"""Number of consecutive deviating pixels that end a segment; single ones are noise."""
 MAX_ANGLE_RAD = np.radians(45.0)
-"""Largest angle between an edge and a contour that it may belong to."""
-_STRIDE = 2  # of the pixels that are sampled
+"""Largest angle between an edge and a contour that it may belong to, rad."""
+_STRIDE = 2  # pixels from one sample to the next
 _NONE_LEFT = -10
-_ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernel's arithmetic into float64
+_ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # Python floats would promote the kernel's arithmetic to float64
 _SHORT2 = np.float32(1e-6)
-"""A piece is as long at least, px^2."""
+"""Smallest squared length of a piece, px^2."""
 
 
 class Segments(NamedTuple):
-    """Edge pixels in the order in which they are linked."""
+    """Edge pixels in linked order."""
 
     points_px: FloatArray
     """u and v of each edge pixel, (N, 2), px."""
     normals: FloatArray
-    """Unit gradient at each, from dark to light, (N, 2)."""
+    """Unit gradient at each pixel, from dark to light, (N, 2)."""
     firsts: IntArray
-    """Index of the first pixel of each segment, and N, (S + 1,)."""
+    """Index of the first pixel of each segment, then N, (S + 1,)."""
 
 
 def link_edges(found: NDArray[np.uint8], gradients: NDArray[np.int16]) -> Segments:
-    """Link edge pixels into chains and cut these into segments of constant curvature.
+    """Link the pixels of edges into segments of constant curvature.
 
     Args:
         found: thin edges, not 0, (H, W).
-        gradients: of the image along u and v, (2, H, W); none may be zero on an edge.
+        gradients: image gradient along u and v, (2, H, W); not zero on edges.
     """
     pixels = cv2.findNonZero(found)
     n = 0 if pixels is None else len(pixels)
@@ -61,48 +61,49 @@ def link_edges(found: NDArray[np.uint8], gradients: NDArray[np.int16]) -> Segmen
     return Segments(points, normals, firsts[: count + 1].copy())
 
 
-def accept(samples: "Samples", pieces_px: FloatArray, threshold_px: float) -> NDArray[np.bool_]:
-    """Judge each segment by its directed chamfer distance to predicted contours.
+def accept_segments(samples: "Samples", pieces_px: FloatArray, threshold_px: float) -> NDArray[np.bool_]:
+    """Return which segments are accepted by their directed chamfer distance to predicted contours, (S,) bool.
 
-    A pixel counts with its distance to the nearest piece of contour that runs more or less as the edge does, at most
-    twice the threshold.
+    Each pixel counts with its distance to the nearest piece of contour of similar direction, at most twice the
+    threshold.
 
     Args:
-        samples: of the segments of a view.
+        samples: samples of the segments of a view.
         pieces_px: end points x0, y0, x1, y1 of the visible pieces of predicted contours, (M, 4), px of the view.
-        threshold_px: mean distance up to which a segment is accepted, px.
-
-    Returns:
-        (S,) bool.
+        threshold_px: largest mean distance of an accepted segment, px.
     """
     return np.asarray(samples.means(samples.distances(pieces_px, 2.0 * threshold_px)) <= threshold_px)
 
 
 class Samples(NamedTuple):
-    """Pixels of segments, every other one: distances change little from one to the next."""
+    """Every other pixel of each segment; distances change little from one pixel to the next."""
 
     pixels: RowSortedPoints
-    """u and v, the normal's u and v, and the index of the segment, sorted for `distances`; n pixels."""
+    """u, v, the normal's u and v, and the segment's index, sorted for `distances`; n pixels."""
     counts: IntArray
-    """Number of them in each segment, (S,)."""
+    """Number of samples of each segment, (S,)."""
 
     def distances(self, pieces_px: FloatArray, reach_px: float) -> FloatArray:
-        """Distance of each to the nearest piece of contour, (M, 4), that runs more or less as its edge, (n,), px; none
-        is longer than the reach."""
+        """Return the distance of each sample to the nearest piece of similar direction, (n,), px, at most the reach.
+
+        Args:
+            pieces_px: end points of pieces of contour, (M, 4), px.
+            reach_px: largest distance, px.
+        """
         out = np.empty(self.pixels.points.shape[1], np.float32)
         pieces = np.ascontiguousarray(pieces_px, np.float32)
-        nearest_alongside(self.pixels.points, self.pixels.rows, pieces, reach_px, MAX_ANGLE_RAD, out)
+        nearest_parallel_segment(self.pixels.points, self.pixels.rows, pieces, reach_px, MAX_ANGLE_RAD, out)
         return out[: self.pixels.n_points]
 
     def means(self, distances: FloatArray) -> NDArray[np.float64]:
-        """The mean of each segment's pixels, (n,) to (S,)."""
+        """Return the mean of each segment's samples, (n,) to (S,)."""
         sums = np.zeros(len(self.counts))
         _sum_up(self.pixels.points[4], distances, sums)
         return sums / self.counts
 
 
-def sampled(segments: Segments) -> Samples:
-    """Sample segments, from the first pixel of each on."""
+def sample_segments(segments: Segments) -> Samples:
+    """Sample segments, beginning with the first pixel of each."""
     counts = -(-np.diff(segments.firsts) // _STRIDE)
     points = np.empty((counts.sum(), 5), np.float32)
     width, height = _sample(segments.points_px, segments.normals, segments.firsts, points)
@@ -111,7 +112,7 @@ def sampled(segments: Segments) -> Samples:
 
 @njit(nogil=True, cache=True)
 def _sample(points: FloatArray, normals: FloatArray, firsts: IntArray, out: FloatArray) -> tuple[int, int]:
-    """Fill points, their normals and the index of their segment, (n, 5); the size of an image that holds them."""
+    """Fill points, normals and segment indices, (n, 5); return width and height of an image that holds them, px."""
     n, width, height = 0, 1, 1
     for segment in range(firsts.shape[0] - 1):
         for i in range(firsts[segment], firsts[segment + 1], _STRIDE):
@@ -124,7 +125,7 @@ def _sample(points: FloatArray, normals: FloatArray, firsts: IntArray, out: Floa
 
 @njit(nogil=True, cache=True)
 def _sum_up(of: FloatArray, distances: FloatArray, sums: NDArray[np.float64]) -> None:
-    """Add distances, (n,), to the sums, (S,), that they are of, (n or more,)."""
+    """Add distances, (n,), to the sums of their segments, (S,); `of` holds the segment of each, (n or more,)."""
     for i in range(distances.shape[0]):
         sums[int(of[i])] += distances[i]
 
@@ -134,9 +135,17 @@ def _chain(
     found: NDArray[np.uint8], pixels: NDArray[np.int32], gradients: NDArray[np.int16],
     points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_],
 ) -> None:  # fmt: skip
-    """Put the pixels (N, 2) of edges in linked order, and mark where chains begin, (N,).
+    """Put edge pixels in linked order and mark where chains begin.
 
-    Chains begin at ends of edges first, then anywhere; at a junction the straightest way is taken.
+    Chains begin at ends of edges first, then anywhere. At a junction the straightest continuation is taken.
+
+    Args:
+        found: edges are not 0, (H, W).
+        pixels: u and v of the edges, (N, 2).
+        gradients: image gradient along u and v, (2, H, W).
+        points: filled with the pixels in order, (N, 2).
+        normals: filled with their unit gradients, (N, 2).
+        begins: marked where chains begin, (N,).
     """
     height, width = found.shape
     left = np.zeros((height + 2, width + 2), np.uint8)  # with a border, so that every pixel has eight neighbours
@@ -173,7 +182,7 @@ def _chain(
 
 @njit(nogil=True, cache=True)
 def _neighbours(left: NDArray[np.uint8], u: int, v: int) -> int:
-    """Pixels of edges around one."""
+    """Count the edge pixels around an edge pixel."""
     count = -1
     for dv in range(-1, 2):
         for du in range(-1, 2):
@@ -183,11 +192,11 @@ def _neighbours(left: NDArray[np.uint8], u: int, v: int) -> int:
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _cut(points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_], firsts: IntArray) -> int:
-    """Cut chains where they stop turning evenly; fills the first pixels of segments and returns their number.
+    """Cut chains where they stop turning evenly; fill the first pixels of segments and return the number of segments.
 
-    The direction of the gradient, unwrapped, is a straight line over the length of a circular arc. That line is fitted
-    to what the segment has so far; the segment ends before the first of some pixels in a row that stray from it, or
-    where the direction jumps, as it does at a corner and where the other side becomes the darker one.
+    Along a circular arc the unwrapped gradient direction is a straight line over arc length. That line is fitted to the
+    segment so far. The segment ends before the first of `STRAYS` consecutive pixels that deviate from it. It also ends
+    where the direction jumps: at a corner, or where the darker side changes.
     """
     n_points = points.shape[0]
     count, i = 0, 0
@@ -220,12 +229,20 @@ def _cut(points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_], fir
 
 
 @njit(**FAST)
-def nearest_alongside(
+def nearest_parallel_segment(
     pixels: FloatArray, rows: IntArray, pieces: FloatArray, reach: float, max_angle: float, out: FloatArray
 ) -> None:
-    """Distance of each pixel, (5, N) as in `Samples`, to the nearest piece, (M, 4), that runs its way, up to a reach.
+    """Fill the distance of each pixel to the nearest piece of similar direction, (N,), px, at most the reach.
 
-    As in `nearest.nearest_segment`, pieces are held only against the pixels nearby.
+    As in `segment_distance.nearest_segment`, a piece is compared only with nearby pixels.
+
+    Args:
+        pixels: see `Samples.pixels`, (5, N).
+        rows: cells of the sorted pixels.
+        pieces: end points x0, y0, x1, y1, (M, 4), px.
+        reach: largest distance, px.
+        max_angle: largest angle between edge and piece, rad.
+        out: filled.
     """
     far, across = np.float32(reach), np.float32(np.sin(max_angle) ** 2)
     u, v, nu, nv = pixels[0], pixels[1], pixels[2], pixels[3]

@@ -1,4 +1,4 @@
-"""Frame to edge map, over colour channels, within the foreground where there is one."""
+"""Detect edges over all colour channels, within the foreground if one is known."""
 
 from typing import NamedTuple
 
@@ -12,9 +12,9 @@ from tracker.geometry.arrays import FloatArray, Image
 from tracker.images.background_subtraction import Mask
 
 STRONG_FRACTION, WEAK_FRACTION = 0.92, 0.80
-"""Canny's thresholds, as fractions of the pixels whose gradient is weaker (without a foreground)."""
+"""Canny's thresholds without a foreground, as the fractions of pixels with a weaker gradient."""
 MIN_GRADIENT = 24.0
-"""Gradients (Sobel 3x3, of 255) below this are noise, whatever the fractions say."""
+"""Gradient below which edges are noise, gray levels (Sobel 3x3, of 255)."""
 
 
 class Levels(NamedTuple):
@@ -23,25 +23,25 @@ class Levels(NamedTuple):
     strong: float
     """An edge begins where the gradient is stronger."""
     weak: float
-    """It goes on while the gradient is stronger."""
+    """An edge continues while the gradient is stronger."""
 
 
 class Edges(NamedTuple):
-    """Edges one pixel thin, and the gradients that they are crests of."""
+    """Thin edges and the image gradient."""
 
     found: NDArray[np.uint8]
-    """255 on an edge, (H, W)."""
+    """255 on an edge, one pixel thin, (H, W)."""
     gradients: NDArray[np.int16]
-    """Sobel gradient of the colour channel in which it is strongest, along u and along v, (2, H, W)."""
+    """Sobel gradient of the colour channel with the strongest gradient, along u and v, (2, H, W)."""
 
 
 def levels(strengths: FloatArray, restricted: bool) -> Levels:
-    """Choose the thresholds for an image.
+    """Choose Canny's thresholds for an image.
 
     Args:
-        strengths: L1 norms of the strongest channel's gradient at places spread over the whole image, (n,).
-        restricted: whether only a foreground is looked at. Inside it the noise sets the bounds, not what share of
-            the picture is textured.
+        strengths: L1 norms of the strongest channel's gradient at samples spread over the whole image, (n,).
+        restricted: whether edges are restricted to a foreground. The bounds then follow noise, not the share of texture
+            in the image.
     """
     strongest, weaker = quantiles(strengths, (STRONG_FRACTION, WEAK_FRACTION)).tolist()
     strong, weak = max(2 * MIN_GRADIENT, strongest), max(MIN_GRADIENT, weaker)
@@ -49,9 +49,9 @@ def levels(strengths: FloatArray, restricted: bool) -> Levels:
 
 
 def detect_edges(smooth: Image, bounds: Levels, foreground: Mask | None = None) -> Edges:
-    """Canny's edges over colour channels: at each pixel the channel with the strongest gradient counts.
+    """Detect Canny edges over colour channels: at each pixel the channel with the strongest gradient counts.
 
-    Two regions of equal brightness and different hue have an edge here that a gray image does not show.
+    Two regions of equal brightness and different hue have an edge that a gray image does not show.
 
     Args:
         smooth: smoothed frame, (H, W, 3) RGB.
@@ -68,13 +68,13 @@ def detect_edges(smooth: Image, bounds: Levels, foreground: Mask | None = None) 
 
 @njit(nogil=True, cache=True)
 def _strongest(image: NDArray[np.uint8], out_x: NDArray[np.int16], out_y: NDArray[np.int16]) -> None:
-    """Sobel gradient of the channel with the largest L1 norm at each pixel, of (H, 3 W) to (H, W) each.
+    """Fill the Sobel gradient of the channel with the largest L1 norm at each pixel, (H, 3 W) to (H, W) each.
 
-    Row by row, so that nothing as large as the image is kept: fresh memory costs more than the sums. In float32, where
-    they run on whole vectors; numba would widen integers to 64 bits. Beyond the border the image is mirrored.
+    The image is mirrored beyond its border. Rows are processed one by one, because fresh memory for a whole image costs
+    more than the sums. Float32 is vectorized; numba would widen integers to 64 bits.
     """
     height, width = image.shape
-    # With a pixel, that is three numbers, more on either side.
+    # One more pixel (three numbers) on either side.
     blurred, derived = np.empty(width + 6, np.float32), np.empty(width + 6, np.float32)
     gx, gy = np.empty(width, np.float32), np.empty(width, np.float32)
     for v in range(height):
@@ -93,7 +93,7 @@ def _strongest(image: NDArray[np.uint8], out_x: NDArray[np.int16], out_y: NDArra
 
 @njit(nogil=True, cache=True)
 def _take_strongest(gx: FloatArray, gy: FloatArray, out_x: NDArray[np.int16], out_y: NDArray[np.int16]) -> None:
-    """Gradients of a row's channels, (3 W,) each, to those of the strongest channels, (W,) each."""
+    """Fill the gradients of the strongest channels of a row, (3 W,) to (W,) each."""
     for i in range(out_x.shape[0]):
         x0, x1, x2 = gx[3 * i], gx[3 * i + 1], gx[3 * i + 2]
         y0, y1, y2 = gy[3 * i], gy[3 * i + 1], gy[3 * i + 2]

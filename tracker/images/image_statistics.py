@@ -1,7 +1,7 @@
-"""What a whole image is like, from some thousand places: noise, contrast, exposure.
+"""Measure contrast, noise and colours of a whole image at some thousand samples.
 
-Thresholds follow the whole image, and must not change with the region that happens to be looked at. Reading the
-gradients and smoothed colours at a grid of places takes a fraction of the time of computing them everywhere.
+Thresholds follow the whole image and must not depend on the region of interest. Gradients and smoothed colours at a
+grid of samples take a fraction of the time of computing them everywhere.
 """
 
 from typing import NamedTuple
@@ -15,53 +15,53 @@ from tracker.geometry.arrays import FloatArray, Image
 from tracker.images.background_subtraction import SMOOTHING_PX
 
 SPACING_PX = 20
-"""Distance between neighbouring probes, matched px."""
-_LEAST_PLACES = 8  # along each axis, in small images
+"""Distance between neighbouring samples, working px."""
+_MIN_SAMPLES = 8  # smallest number of samples along each axis
 _TAPS = 9
-"""Matched pixels a side that smoothing (7) and a derivative (3) draw on."""
+"""Side of the patch that smoothing (7) and a derivative (3) read, working px."""
 
 
-class Readings(NamedTuple):
-    """What the probes of an image show."""
+class ImageStatistics(NamedTuple):
+    """Measurements at the samples of an image."""
 
     colors: FloatArray
     """Smoothed colour, (n, 3), gray levels."""
     strengths: FloatArray
-    """L1 norm of the gradient of the channel in which it is largest, (n,), as `edges` computes it."""
+    """L1 norm of the gradient of the strongest channel, (n,), as `edges` computes it."""
 
 
-class Probes:
-    """A grid of places in the images of one camera, as filmed."""
+class SampleGrid:
+    """A grid of samples in the images of one camera, as filmed."""
 
     def __init__(self, size: tuple[int, int], scale: float) -> None:
-        """Lay the grid.
+        """Lay out the grid.
 
         Args:
             size: width and height of the footage, px.
-            scale: matched pixels per pixel of the footage, at most 1.
+            scale: working pixels per pixel of the footage, at most 1.
         """
         self._columns, self._rows = (_taps(length, scale) for length in size)
         self._block = min(int(1 / scale), 2)
         self._kernels = _kernels()
 
-    def read(self, image: Image) -> Readings:
-        """Read a frame as filmed, (H, W, 3)."""
+    def measure(self, image: Image) -> ImageStatistics:
+        """Measure a frame as filmed, (H, W, 3), at the samples."""
         n = len(self._rows) * len(self._columns)
-        out = Readings(np.empty((n, 3), np.float32), np.empty(n, np.float32))
+        out = ImageStatistics(np.empty((n, 3), np.float32), np.empty(n, np.float32))
         _read(image, self._rows, self._columns, self._block, self._kernels, out)
         return out
 
 
 def _taps(length: int, scale: float) -> NDArray[np.int64]:
-    """Positions along one axis, (places, taps), px of the footage, within the image."""
-    places = max(_LEAST_PLACES, round(length * scale / SPACING_PX))
+    """Return the tap positions along one axis, (places, taps), px of the footage, within the image."""
+    places = max(_MIN_SAMPLES, round(length * scale / SPACING_PX))
     middles = (np.arange(places) + 0.5) * length / places
     taps = middles[:, None] + (np.arange(_TAPS) - _TAPS // 2) / scale
     return np.clip(np.round(taps), 0, length - 1).astype(np.int64)
 
 
 def _kernels() -> FloatArray:
-    """Smoothing, and Sobel's derivatives along u and v of the smoothed image, as rows, (3, taps^2)."""
+    """Return smoothing and Sobel's derivatives along u and v of the smoothed image as rows, (3, taps^2)."""
     smooth = np.pad(cv2.getGaussianKernel(_TAPS - 2, SMOOTHING_PX).ravel(), 1)
     narrow = smooth[1:-1]
     wide, derived = np.convolve(narrow, (1.0, 2.0, 1.0)), np.convolve(narrow, (1.0, 0.0, -1.0))
@@ -71,12 +71,17 @@ def _kernels() -> FloatArray:
 
 @njit(nogil=True, cache=True, fastmath={"reassoc", "contract"})
 def _read(
-    image: Image, rows: NDArray[np.int64], columns: NDArray[np.int64], block: int, kernels: FloatArray, out: Readings
+    image: Image,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    block: int,
+    kernels: FloatArray,
+    out: ImageStatistics,
 ) -> None:
-    """Fill what each place shows by the responses of the kernels, (3, taps^2).
+    """Fill the measurements of each sample from the responses of the kernels, (3, taps^2).
 
-    One place after the other: the patches of all of them would be fresh memory, and their product with the kernels so
-    large that BLAS spreads it over threads of its own, which wait for cores that are busy.
+    Samples are processed one by one. All patches at once would need fresh memory, and BLAS would spread their product
+    over threads that wait for busy cores.
     """
     patch, responses, n = np.empty((3, kernels.shape[1]), np.float32), np.empty(3, np.float32), 0
     for r in range(rows.shape[0]):
@@ -99,7 +104,7 @@ def _read(
 def _take_patch(
     image: Image, rows: NDArray[np.int64], columns: NDArray[np.int64], block: int, patch: FloatArray
 ) -> None:
-    """Fill a patch, (3, taps^2); each tap is the mean of a block of pixels, as a reduced image would show."""
+    """Fill a patch, (3, taps^2). Each tap is the mean of a block of pixels, like a pixel of a reduced image."""
     height, width, _ = image.shape
     share = np.float32(1.0 / (block * block))
     for di in range(block):
@@ -107,7 +112,7 @@ def _take_patch(
             for i in range(rows.shape[0]):
                 line = image[min(rows[i] + di, height - 1)]
                 for j in range(columns.shape[0]):
-                    # An index that may be negative is looked at twice.
+                    # An index that may be negative is checked twice.
                     u, t = np.uint64(min(columns[j] + dj, width - 1)), np.uint64(i * columns.shape[0] + j)
                     for channel in range(3):
                         level = share * np.float32(line[u, channel])

@@ -1,9 +1,8 @@
-"""What stands still in a view: the edges of the room, learnt while the bodies are followed.
+"""Learn the static edges of a view while bodies are tracked: a background model of edges.
 
-Where neither a mask nor a background tells who is in the picture, an edge that was there before a limb came, at the
-same place and in the same direction, is not the limb's: without this an arm that passes a picture on the wall is left
-hanging on it. Each view remembers the edges that it showed away from the bodies; a segment that lies on them is refused
-as a whole, as GD96 Sect. 4.2 refuses those that the prediction does not explain.
+Without masks or a background image, an edge that was there before a limb came is not the limb's. Otherwise an arm that
+passes a picture on the wall sticks to it. The model averages the edges of a view away from the bodies. A segment that
+lies on them is refused as a whole, as GD96 Sect. 4.2 refuses segments that the prediction does not explain.
 """
 
 import numpy as np
@@ -14,38 +13,38 @@ from tracker.geometry.arrays import FloatArray
 from tracker.images.edge_segments import Segments
 
 _MEMORY = 4
-"""Frames that count: an edge is known at first sight, and three frames later where its place was seen without it."""
+"""Length of the running mean, frames. A new edge is known at once; one where none was before, after three frames."""
 _KNOWN = 0.5
-"""Least share of the time that an edge was there, running the same way, and of a segment that lies on such edges."""
+"""Smallest share of frames in which an edge was present with the same direction, and of a segment on such edges."""
 
 
-class Scenery:
-    """The edges of one view that are not near any body."""
+class StaticEdgeModel:
+    """Running mean of the edges of one view away from all bodies."""
 
     def __init__(self, size: tuple[int, int]) -> None:
-        """Begin knowing nothing.
+        """Begin without any edges.
 
         Args:
-            size: width and height of the whole image, matched px.
+            size: width and height of the whole image, working px.
         """
         width, height = size
-        # Where an edge flickers or turns, the mean of its unit gradients, 0 where there was none, is short.
+        # Mean of unit gradients, 0 in frames without an edge. It is short where an edge flickers or turns.
         self._gradients = np.zeros((height, width, 2), np.float32)
         self._frames = np.zeros((height, width), np.uint8)
 
-    def holds(self, segments: Segments, corner_px: tuple[int, int]) -> NDArray[np.bool_]:
-        """Which segments are edges of the room, (S,).
+    def contains(self, segments: Segments, corner_px: tuple[int, int]) -> NDArray[np.bool_]:
+        """Return which segments are static, (S,).
 
         Args:
-            segments: of a region.
-            corner_px: where its first pixel lies in the whole image, matched px.
+            segments: segments of a region.
+            corner_px: first pixel of the region in the whole image, working px.
         """
         known = np.zeros(len(segments.firsts) - 1, np.bool_)
         left, top = corner_px
-        _compare(segments, self._gradients[top:, left:], known)
+        _mark_known(segments, self._gradients[top:, left:], known)
         return known
 
-    def learn(
+    def update(
         self,
         segments: Segments,
         corner_px: tuple[int, int],
@@ -53,23 +52,23 @@ class Scenery:
         pieces_px: FloatArray,
         reach_px: float,
     ) -> None:
-        """Take in what a region shows away from the bodies.
+        """Update the model with the edges of a region away from the bodies.
 
         Args:
-            segments: of the region, all of them.
-            corner_px: where its first pixel lies in the whole image, matched px.
-            size: its width and height.
+            segments: all segments of the region.
+            corner_px: first pixel of the region in the whole image, working px.
+            size: width and height of the region, px.
             pieces_px: visible pieces of the contours of all bodies, x0, y0, x1, y1, (M, 4), px of the region.
-            reach_px: edges nearer to these may be the bodies' own, px.
+            reach_px: edges nearer to these pieces may belong to bodies and are left out, px.
         """
         (left, top), (width, height) = corner_px, size
         region = slice(top, top + height), slice(left, left + width)
-        _update(segments, pieces_px, int(np.ceil(reach_px)), self._gradients[region], self._frames[region])
+        _update_means(segments, pieces_px, int(np.ceil(reach_px)), self._gradients[region], self._frames[region])
 
 
 @njit(nogil=True, cache=True)
-def _compare(segments: Segments, gradients: FloatArray, known: NDArray[np.bool_]) -> None:
-    """See `Scenery.holds`; the remembered gradients (h, w, 2) begin at the region's corner."""
+def _mark_known(segments: Segments, gradients: FloatArray, known: NDArray[np.bool_]) -> None:
+    """Mark the known segments, (S,); the mean gradients, (h, w, 2), begin at the region's corner."""
     points, normals, firsts = segments.points_px, segments.normals, segments.firsts
     for s in range(known.shape[0]):
         there = 0
@@ -81,12 +80,12 @@ def _compare(segments: Segments, gradients: FloatArray, known: NDArray[np.bool_]
 
 
 @njit(nogil=True, cache=True)
-def _update(
+def _update_means(
     segments: Segments, pieces: FloatArray, reach: int, gradients: FloatArray, frames: NDArray[np.uint8]
 ) -> None:
-    """Bring the mean gradients (H, W, 2) of the pixels that no piece is near up to date, and their count of frames.
+    """Update the mean gradients, (H, W, 2), of pixels away from all pieces, and their frame counts, (H, W).
 
-    An edge is written a pixel wider on all sides: noise moves edges by so much.
+    Edges are drawn one pixel wider on all sides, because noise moves them by that much.
     """
     height, width = frames.shape
     now, free = np.zeros((height, width, 2), np.float32), np.ones((height, width), np.bool_)

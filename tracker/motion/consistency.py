@@ -1,13 +1,12 @@
-"""Frames whose pose does not go together with those around it: a second opinion from the motion itself.
+"""Find frames whose pose is inconsistent with the neighbouring frames, from the motion alone.
 
-Where a run of a tracker meets a keyframe, or another run, both have an opinion of the same moment, and the body jumps
-by as much as they disagree. So does a pose that is wrong for a single frame. A step from one frame to the next is
-compared with the steps before and after it, joint by joint:
+Where a tracking run meets a keyframe or another run, their poses may disagree, so that the body jumps. It jumps too if
+the pose of a single frame is wrong. Each step between frames is compared with the steps before and after it:
 
     off(f) = max over joints of |s(f) - (s(f-1) + s(f+1)) / 2|,  s(f) = p(f+1) - p(f)
 
-which is a jump at once, and nothing for a steady motion. What people's hands do in everyday and in vigorous motion
-stays below an acceleration of 90 m/s^2; what needs more is called a disagreement.
+This residual is 0 for a steady motion and large for a jump. Hands in everyday and in vigorous motion stay below an
+acceleration of 90 m/s^2; a larger one counts as inconsistent.
 """
 
 from collections.abc import Sequence
@@ -17,25 +16,25 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
 
-_MOST_M_S2 = 90.0
-_LEAST_M, _MOST_M = 0.05, 0.25
-"""Jumps below are noise of a good tracker; above they count at any frame rate."""
+_MAX_ACCELERATION_M_S2 = 90.0
+_MIN_THRESHOLD_M, _MAX_THRESHOLD_M = 0.05, 0.25
+"""Smaller residuals are tracking noise; larger ones are inconsistent at any frame rate."""
 
 
 def threshold_m(fps: float) -> float:
-    """How far off a step may be at a frame rate, metres."""
-    return float(np.clip(_MOST_M_S2 / fps**2, _LEAST_M, _MOST_M))
+    """Return the largest consistent residual of a step at a frame rate, metres."""
+    return float(np.clip(_MAX_ACCELERATION_M_S2 / fps**2, _MIN_THRESHOLD_M, _MAX_THRESHOLD_M))
 
 
 def motion_residuals_m(points_world: Array) -> Array:
-    """How far each step of consecutive frames is off those before and after it.
+    """Compare each step between consecutive frames with the steps before and after it.
 
     Args:
         points_world: joints on n consecutive frames, (n, n_points, 3), metres.
 
     Returns:
-        Of the step to each frame but the first the largest distance over the joints, (n - 1,), metres; 0 for less than
-        three frames, where there is nothing to compare with.
+        For the step to each frame but the first, the largest residual over the joints, (n - 1,), metres. All 0 for
+        fewer than three frames.
     """
     steps = np.diff(points_world, axis=0)
     if len(steps) < 2:
@@ -49,17 +48,17 @@ def motion_residuals_m(points_world: Array) -> Array:
 def inconsistent_frames(
     models: Sequence[BodyModel], frames: Sequence[int], values: Array, keyframes: frozenset[int] | set[int], fps: float
 ) -> list[int]:
-    """Find the frames that disagree with their neighbours.
+    """Find the frames that are inconsistent with their neighbours.
 
     Args:
         models: the body that each pose was made with.
-        frames: that have a pose, ascending.
+        frames: frames that have a pose, ascending.
         values: their poses, (n, n_values).
-        keyframes: those that a person vouches for; of two that disagree the other one is named.
+        keyframes: frames set or verified by a person; of two inconsistent frames the other one is reported.
         fps: frame rate, 1/s.
 
     Returns:
-        One frame for each jump, ascending: the later of the two unless that is a keyframe and the earlier is none.
+        One frame for each jump, ascending: the later of the two, unless only that one is a keyframe.
     """
     at = np.asarray(frames, dtype=np.int64)
     found: list[int] = []
@@ -69,7 +68,7 @@ def inconsistent_frames(
             if len(run) > 1
             else np.zeros(0)
         )
-        # A jump shows, halved, in the steps beside it too: only the largest of them is one.
+        # Half of a jump appears in the neighbouring steps too: only the largest of them counts.
         beside = np.pad(off, 1)
         peaks = (off > threshold_m(fps)) & (off >= beside[:-2]) & (off > beside[2:])
         for i in np.flatnonzero(peaks):

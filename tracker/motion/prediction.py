@@ -1,4 +1,4 @@
-"""Where a body will be: a polynomial over its last poses (GD96 Sect. 4.2)."""
+"""Predict a pose by a polynomial through the last poses (GD96 Sect. 4.2)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,16 +9,16 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 
-MOST_ORDER = 2
+MAX_ORDER = 2
 
 
 @dataclass(frozen=True)
 class PredictSettings:
-    """How motion goes on."""
+    """Settings of the motion model."""
 
     order: int = 1
-    """Degree of the polynomial: 0 stays, 1 is constant velocity, 2 is constant acceleration, as in the paper.
-    A parabola through noisy poses overshoots: on every recording tried, constant velocity tracks better."""
+    """Degree of the polynomial: 0 stays, 1 is constant velocity, 2 is constant acceleration, as in the paper. On noisy
+    poses a parabola overshoots and tracks worse than constant velocity."""
     window: int = 3
     """Number of past poses it is fitted to."""
     bound_rad: float = float(np.radians(25))
@@ -27,10 +27,10 @@ class PredictSettings:
     """Largest predicted change of a position from one frame to the next, metres."""
 
     def __post_init__(self) -> None:
-        """Raise a TrackerError for settings that predict nothing."""
-        if not 0 <= self.order <= MOST_ORDER or self.window < 1:
+        """Check the settings; raise a TrackerError for values that predict nothing."""
+        if not 0 <= self.order <= MAX_ORDER or self.window < 1:
             raise TrackerError(
-                f"expected a prediction of order 0 to {MOST_ORDER} over at least 1 past pose, found order "
+                f"expected a prediction of order 0 to {MAX_ORDER} over at least 1 past pose, found order "
                 f"{self.order} over {self.window}"
             )
 
@@ -38,8 +38,8 @@ class PredictSettings:
 def predict(model: BodyModel, past: Sequence[Array], settings: PredictSettings) -> Array:
     """Extrapolate the past poses by one frame.
 
-    The polynomial runs through steps from the last pose, in the degrees of freedom; angles that may wind are first
-    unwrapped, so that a turn through half a circle goes on. With fewer poses than the order needs, the order is lower.
+    The polynomial is fitted to steps from the last pose, in the degrees of freedom. Unlimited angles are unwrapped
+    first, so that a rotation continues through half a turn. With too few poses for the order, the order is reduced.
 
     Args:
         model: the body.
@@ -62,6 +62,6 @@ def predict(model: BodyModel, past: Sequence[Array], settings: PredictSettings) 
 
 
 def unwrapped(model: BodyModel, step: Array) -> Array:
-    """The shorter way round for angles that may wind: a step (n_dofs,) with those brought within half a turn."""
+    """Wrap the unlimited angles of a step (n_dofs,) to half a turn around 0."""
     winds = ~model.dof_is_length & np.isinf(model.limits).all(axis=1)
     return np.where(winds, np.remainder(step + np.pi, 2 * np.pi) - np.pi, step)

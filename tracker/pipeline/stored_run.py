@@ -12,7 +12,7 @@ from tracker.geometry.arrays import Array
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.track_session import StoreSink, TrackSession
 from tracker.pipeline.tracked_changes import StoredPerson, keyframes_of, recorded_method, settings_record
-from tracker.session.locked_dofs import free_of, kept_locks
+from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Person, Session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseRecord
@@ -63,8 +63,8 @@ def stored_run(session: Session, store: AnnotationStore, observer: Observer, tas
     people, frames = session.people, task.frames
     left = _frames_left(store, task)
     start = [_start_poses(store, p, left or frames, i in task.people) for i, p in enumerate(people)]
-    locks = kept_locks(people, store.setting)
-    active = [free_of(p.model, locked) for p, locked in zip(people, locks, strict=True)]
+    locks = load_locks(people, store.setting)
+    active = [active_dofs(p.model, locked) for p, locked in zip(people, locks, strict=True)]
     subjects = Subjects.of(
         [p.model for p in people], task.people, active, keyframes_of(store, people, frozenset(frames))
     )

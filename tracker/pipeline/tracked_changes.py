@@ -54,9 +54,9 @@ def tracked_changes(
                 status=found.statuses[i],
                 cost_px=_number(found.cost_px),
                 settings=record,
-                view_costs_px=tuple(_number(c) for c in found.views_px),
-                part_costs_px=tuple(_number(c) for c in found.parts_px[i]),
-                remark=found.remarks[i],
+                view_costs_px=tuple(_number(c) for c in found.view_costs_px),
+                part_costs_px=tuple(_number(c) for c in found.part_costs_px[i]),
+                remark=found.notes[i],
             ),
             tuple(Alternative(o.values, stored[i].revision, _number(o.cost_px)) for o in found.alternatives[i]),
         )

@@ -13,7 +13,7 @@ _STRAIGHT_DOWN = 0.1
 """A camera whose axis has a smaller level component than this looks from above, or from below."""
 
 
-def standing_pose(
+def default_pose(
     model: BodyModel, cameras: Sequence[Camera], R_world_up: Array | None = None, beside_m: float = 0.0
 ) -> Array:
     """Upright pose where the cameras look: where a model stands before anybody has placed it.
@@ -32,7 +32,7 @@ def standing_pose(
     if np.array_equal(R, np.eye(3)):
         return here
     points = model.points_world(model.neutral()) @ R.T + middle
-    return fit_to_points(model, dict(zip(model.point_names, points, strict=True))).values
+    return fit_to_points(model, dict(zip(model.point_names, points, strict=True))).pose
 
 
 def _rightward(camera: Camera, up: Array) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
-from tracker.fitting.gauss_newton import Block, Normal, StayNear, normal_of, solve
+from tracker.fitting.gauss_newton import NormalEquations, PosePrior, ResidualBlock, normal_equations, solve
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
@@ -196,15 +196,15 @@ def _take_hold(
 
 @dataclass(frozen=True, eq=False)
 class _UnderPointer:
-    """A `Block` that draws the grabbed point to a line of sight and, more weakly, to a depth."""
+    """A `ResidualBlock` that draws the grabbed point to a line of sight and, more weakly, to a depth."""
 
     hand: Grab
     target_world: Array
     """Where the point should be, (3,), metres: under the pointer, at the depth."""
     depth_weight: float = _DEPTH_WEIGHT
 
-    def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
-        """See `Block`."""
+    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+        """See `ResidualBlock`."""
         hand, (target_px, m_per_px, depth_axis) = self.hand, self._image
         point_world = rigid.apply(kinematics.Ts_world_part[hand.part], hand.place_part)
         points_px, px_by_point = hand.camera.project_with_jacobian(point_world[None])
@@ -212,7 +212,7 @@ class _UnderPointer:
         r[:2], by_point[:2] = m_per_px @ (points_px[0] - target_px), m_per_px @ px_by_point[0]
         r[2], by_point[2] = depth_axis @ (point_world - self.target_world), depth_axis
         J_world = model.point_jacobian(kinematics, np.array([hand.part]), point_world[None])[0]  # (3, n_dofs)
-        return normal_of(r, by_point @ J_world)
+        return normal_equations(r, by_point @ J_world)
 
     @cached_property
     def _image(self) -> tuple[Array, Array, Array]:
@@ -238,21 +238,21 @@ def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
     target = hand.camera.back_project(np.asarray(pointer_px) + hand.offset_px, hand.depth_m)
     if hand.moves_body:
         return _moved_body(hand, target)
-    blocks: list[Block] = [
+    blocks: list[ResidualBlock] = [
         _UnderPointer(hand, target),
         _rest(hand),
     ]
     fit = solve(model, values, blocks, free=hand.free, **_QUICK)
     joint, first = model.dof_joint[hand.free][[-1, 0]]
-    if joint == first or _has_reached(hand, fit.values, target) or _is_stretched(hand, fit.values, int(first), target):
-        return fit.values
+    if joint == first or _has_reached(hand, fit.pose, target) or _is_stretched(hand, fit.pose, int(first), target):
+        return fit.pose
     # A straight limb cannot see that bending would bring the point nearer: begin with its joint bent, either way.
     for bend in (_BEND_RAD, -_BEND_RAD):
         start = model.clip(model.retract(values, np.where(hand.free & (model.dof_joint == joint), bend, 0.0)))
         bent = solve(model, start, blocks, free=hand.free, **_BENT)
         if bent.cost < fit.cost:
-            fit = solve(model, bent.values, blocks, free=hand.free, **_QUICK)
-    return fit.values
+            fit = solve(model, bent.pose, blocks, free=hand.free, **_QUICK)
+    return fit.pose
 
 
 def _has_reached(hand: Grab, values: Array, target_world: Array) -> bool:
@@ -275,7 +275,7 @@ def _is_stretched(hand: Grab, values: Array, first: int, target_world: Array) ->
     return bool(min(np.linalg.norm(p - places[-1]) for p in (places[0], target_world)) > _STRETCHED * length)
 
 
-def hold_anew(hand: Grab, values: Array, pointer_px: Array) -> Grab:
+def regrab(hand: Grab, values: Array, pointer_px: Array) -> Grab:
     """The same hand on the same place, taken anew in another pose, (n_values,), with the pointer elsewhere, (2,)."""
     place = hand.place_world(values)
     return replace(
@@ -314,7 +314,7 @@ def turn(hand: Grab, pointer_px: Array, values: Array) -> Array:
     if model.joints[part].kind == "ball" or np.count_nonzero(own) >= 3:
         return orient(model, values, part, R_turn @ T_world_part[:3, :3], hand.unlocked)
     target = T_world_part[:3, 3] + R_turn @ (hand.place_world(hand.values) - T_world_part[:3, 3])
-    return solve(model, values, [_UnderPointer(hand, target)], free=own, **_QUICK).values
+    return solve(model, values, [_UnderPointer(hand, target)], free=own, **_QUICK).pose
 
 
 def push(hand: Grab, pointer_px: Array, values: Array) -> Array:
@@ -331,8 +331,8 @@ def push(hand: Grab, pointer_px: Array, values: Array) -> Array:
     target = camera.back_project(hand.pointer_px + hand.offset_px, depth)
     if hand.moves_body:
         return _moved_body(hand, target)
-    blocks: list[Block] = [_UnderPointer(hand, target, _PUSH_DEPTH_WEIGHT), _rest(hand)]
-    return solve(model, values, blocks, free=hand.free, **_QUICK).values
+    blocks: list[ResidualBlock] = [_UnderPointer(hand, target, _PUSH_DEPTH_WEIGHT), _rest(hand)]
+    return solve(model, values, blocks, free=hand.free, **_QUICK).pose
 
 
 def _moved_body(hand: Grab, target_world: Array) -> Array:
@@ -342,6 +342,6 @@ def _moved_body(hand: Grab, target_world: Array) -> Array:
     return hand.model.retract(hand.values, np.where(hand.free, step, 0.0))
 
 
-def _rest(hand: Grab) -> StayNear:
+def _rest(hand: Grab) -> PosePrior:
     """What keeps the chain near its pose at the grab."""
-    return StayNear(hand.values, np.where(np.isfinite(hand.model.spreads), _STIFF_WEIGHT, _REST_WEIGHT))
+    return PosePrior(hand.values, np.where(np.isfinite(hand.model.spreads), _STIFF_WEIGHT, _REST_WEIGHT))

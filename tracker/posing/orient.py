@@ -7,26 +7,26 @@ from numpy.typing import NDArray
 
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import Normal, normal_of, solve
+from tracker.fitting.gauss_newton import NormalEquations, normal_equations, solve
 from tracker.geometry.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)
 class _Orientation:
-    """A `Block` that draws the axes of a part to wanted directions."""
+    """A `ResidualBlock` that draws the axes of a part to wanted directions."""
 
     part: int
     R_world_wanted: Array
     """(3, 3)."""
 
-    def normal(self, model: BodyModel, values: Array, kinematics: Kinematics) -> Normal:
-        """See `Block`."""
+    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+        """See `ResidualBlock`."""
         R = kinematics.Ts_world_part[self.part, :3, :3]
         turns = np.where(model.dof_is_length[:, None], 0.0, kinematics.axes_world)
         turns = turns * model.moves[:, [self.part]]
         # A turn about a moves the axes of the part, the columns of R, by a x R.
         J = np.cross(turns[:, None, :], R.T[None])  # (n_dofs, axis, 3)
-        return normal_of((R - self.R_world_wanted).T.ravel(), J.reshape(model.n_dofs, 9).T)
+        return normal_equations((R - self.R_world_wanted).T.ravel(), J.reshape(model.n_dofs, 9).T)
 
 
 def orient(
@@ -48,4 +48,4 @@ def orient(
     own = own if free is None else own & free
     if not np.any(own):
         return np.array(values)
-    return solve(model, values, [_Orientation(part, R_world_wanted)], free=own, tolerance=1e-7).values
+    return solve(model, values, [_Orientation(part, R_world_wanted)], free=own, tolerance=1e-7).pose

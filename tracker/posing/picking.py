@@ -17,7 +17,7 @@ _RINGS, _SECTORS = 10, 20
 """Fineness of an outline: it is within some 1% of the part's girth."""
 
 
-class PartOutline(NamedTuple):
+class PartHull(NamedTuple):
     """Where a view shows a part, whatever hides it."""
 
     body: int
@@ -30,12 +30,12 @@ class PartOutline(NamedTuple):
     """Convex outline, (n, 2), undistorted px."""
 
 
-def part_outlines(bodies: Sequence[PosedBody], cameras: Sequence[Camera]) -> list[list[PartOutline]]:
+def part_hulls(bodies: Sequence[PosedBody], cameras: Sequence[Camera]) -> list[list[PartHull]]:
     """Outlines of all parts in some views; those too near to the camera, or behind it, are left out.
 
     All kinds of parts are convex, or so nearly that nobody sees it: the hull of the surface is the outline.
     """
-    found: list[list[PartOutline]] = [[] for _ in cameras]
+    found: list[list[PartHull]] = [[] for _ in cameras]
     for b, body in enumerate(bodies):
         Ts = body.kinematics.Ts_world_part
         points = _surfaces(body.model) @ np.swapaxes(Ts[:, :3, :3], 1, 2) + Ts[:, None, :3, 3]
@@ -43,7 +43,7 @@ def part_outlines(bodies: Sequence[PosedBody], cameras: Sequence[Camera]) -> lis
             depths, px = camera.depths(points), camera.project(points[:, 1:]).astype(np.float32)
             for part in np.flatnonzero(depths[:, 1:].min(axis=1) >= NEAR_PLANE_M):
                 hull = cv2.convexHull(px[part]).reshape(-1, 2)
-                out.append(PartOutline(b, int(part), float(depths[part, 0]), hull))
+                out.append(PartHull(b, int(part), float(depths[part, 0]), hull))
     return found
 
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.contour_residuals import ContourMatch
-from tracker.fitting.gauss_newton import Block, of_values
-from tracker.fitting.gauss_newton_compiled import solve
+from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.fitting.gauss_newton import ResidualBlock, value_mask
+from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.fitting.pins import PinBlock, pin_block
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
@@ -81,7 +81,7 @@ def fit_frame(
             theta_px = settings.theta_px  # None: that of each view
             if reach != 1.0:
                 theta_px = reach * (theta_px or float(np.median([v.theta_px / v.scale for v in views])))
-            match = ContourMatch(views, bodies, person, settings.match, theta_px, everywhere=True)
+            match = ContourResiduals(views, bodies, person, settings.match, theta_px, everywhere=True)
             sigma = np.where(model.dof_is_length, _TRUST_M, _TRUST_RAD)
             now[person], pinned[person] = _fit_one(model, now[person], blocks[person], [match], sigma, masks[person])
     return FrameFit(tuple(now), tuple(pinned))
@@ -91,14 +91,14 @@ def _fit_one(
     model: BodyModel,
     values: Array,
     pins: PinBlock | None,
-    evidence: Sequence[Block],
+    evidence: Sequence[ResidualBlock],
     sigmas: Array,
     mask: NDArray[np.bool_] | None,
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Fit one person from a pose that is trusted so far; returns the pose and which of its values pins determine."""
     blocks = [*evidence, *prior_blocks(model, values, sigmas), *([pins] if pins is not None else [])]
-    fit = solve(model, values, blocks, mask, _ITERATIONS, _TOLERANCE)
+    fit = solve_compiled(model, values, blocks, mask, _ITERATIONS, _TOLERANCE)
     if pins is None:
-        return fit.values, np.zeros(len(model.value_names), dtype=bool)
-    by_pins = np.diag(pins.normal(model, fit.values, model.kinematics(fit.values)).hessian)
-    return fit.values, of_values(model, by_pins > 0.5 * np.diag(fit.hessian))
+        return fit.pose, np.zeros(len(model.value_names), dtype=bool)
+    by_pins = np.diag(pins.linearize(model, fit.pose, model.kinematics(fit.pose)).hessian)
+    return fit.pose, value_mask(model, by_pins > 0.5 * np.diag(fit.hessian))

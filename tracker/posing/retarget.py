@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import Block, PointTargets, StayNear, solve
+from tracker.fitting.gauss_newton import PointTargets, PosePrior, ResidualBlock, solve
 from tracker.fitting.pins import pin_block
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
@@ -18,7 +18,7 @@ _LOOSE_RAD, _LOOSE_M = 0.5, 0.5
 """The same of the pose itself: it decides only what the joints leave open, such as the twist of a straight arm."""
 
 
-def rebodied(
+def retarget_pose(
     values: Array,
     was: BodyModel,
     becomes: BodyModel,
@@ -44,10 +44,10 @@ def rebodied(
     points = np.array([i for i, n in enumerate(becomes.point_names) if n in was.point_names], dtype=np.int64)
     places = was.points_world(values)[[was.point_names.index(becomes.point_names[i]) for i in points]]
     near = np.where(becomes.dof_is_length, 1 / _LOOSE_M, 1 / _LOOSE_RAD)
-    blocks: list[Block] = [
+    blocks: list[ResidualBlock] = [
         PointTargets(points, places, np.full(len(points), 1 / _JOINT_M)),
-        StayNear(values, near),
+        PosePrior(values, near),
     ]
     if pins:
         blocks.append(pin_block(becomes, cameras, pins))
-    return solve(becomes, values, blocks, free, max_iterations=30, tolerance=1e-5).values
+    return solve(becomes, values, blocks, free, max_iterations=30, tolerance=1e-5).pose

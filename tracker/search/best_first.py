@@ -82,7 +82,7 @@ class SearchSettings:
         return np.array(bounds), np.array(steps)
 
 
-BEFORE_REFINEMENT = SearchSettings(passes=(1.5,), patience=1, limbs_apart=True)
+COARSE_SEARCH = SearchSettings(passes=(1.5,), patience=1, limbs_apart=True)
 """A search that only has to come near, because a refinement follows. Of 90 starts 8 to 12 degrees and 5 to 8 cm off in
 every degree of freedom 70 were refined to the true pose after it, with 145 poses scored; after the defaults it were 76,
 with 1,100; without a search 10."""
@@ -196,11 +196,13 @@ def search(
     predicted = [np.array(p, dtype=np.float64) for p in poses]
     best = list(predicted)
     first = cost(best)
-    best_px, views_px, evaluations = first.total_px, first.views_px, 1
+    best_px, view_costs_px, evaluations = first.total_px, first.view_costs_px, 1
     for stage in stages(cost.models, settings, people, free):
-        for step in _search_stage(cost, stage, settings, predicted[stage.person], best, best_px, views_px, evaluations):
+        for step in _search_stage(
+            cost, stage, settings, predicted[stage.person], best, best_px, view_costs_px, evaluations
+        ):
             yield step
-            best, best_px, views_px = list(step.best), step.best_px, step.best_views_px
+            best, best_px, view_costs_px = list(step.best), step.best_px, step.best_views_px
             evaluations = step.evaluations
 
 
@@ -211,7 +213,7 @@ def _search_stage(
     predicted: Array,
     best: Sequence[Array],
     best_px: float,
-    views_px: Array,
+    view_costs_px: Array,
     evaluations: int,
 ) -> Iterator[SearchStep]:
     """Best-first search of one stage around the best pose so far, within the bounds around the prediction."""
@@ -255,9 +257,9 @@ def _search_stage(
             candidate, candidate_px = candidates[cheapest], float(totals[cheapest])
             if candidate_px < best_px:
                 best = [*best[:person], candidate, *best[person + 1 :]]
-                best_px, views_px, idle = candidate_px, views[cheapest], 0
+                best_px, view_costs_px, idle = candidate_px, views[cheapest], 0
         done = not queue or idle >= settings.patience or expansions >= settings.max_expansions
         shown = tuple(candidate if i == person else p for i, p in enumerate(best))
-        yield SearchStep(stage, shown, candidate_px, tuple(best), best_px, views_px, evaluations, done)
+        yield SearchStep(stage, shown, candidate_px, tuple(best), best_px, view_costs_px, evaluations, done)
         if done:
             return

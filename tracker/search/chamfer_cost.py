@@ -7,7 +7,7 @@ averaged over the views. Costs are in undistorted pixels of the footage; images 
 
 import os
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from typing import Literal, NamedTuple
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import Tree, forward_kinematics
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.numba_options import FAST
-from tracker.compute.threads import helpers
+from tracker.compute.threads import kernel_pool
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray
@@ -49,7 +49,7 @@ class Cost(NamedTuple):
 
     total_px: float
     """Mean over the views that have any edges, px of the footage."""
-    views_px: Array
+    view_costs_px: Array
     """Cost of each view, (V,), px of the footage; NaN for a view without edges."""
     forward_px: Array
     """Model to image, (V,), px of the footage."""
@@ -57,8 +57,8 @@ class Cost(NamedTuple):
     """Image to model, (V,), px of the footage."""
 
 
-class _Scene(NamedTuple):
-    """The evidence of all views as arrays, for the kernels; lengths in matched px."""
+class _ViewArrays(NamedTuple):
+    """The evidence of all views as arrays, for the kernels; lengths in working px."""
 
     P: Array
     """Projection matrices, (V, 3, 4)."""
@@ -96,6 +96,19 @@ class _Scratch(NamedTuple):
     """Weights of edge points, (room,)."""
 
 
+class _Contours(NamedTuple):
+    """Contours of predicted bodies in all views, one view after the other; empty where poses are to be traced."""
+
+    ends: FloatArray
+    """u0, v0, u1, v1 of each piece, (4, N), undistorted working px."""
+    occluded: NDArray[np.bool_]
+    """Whether a part hides the piece, (N,)."""
+    edges: NDArray[np.int32]
+    """Number of the straight edge that each piece is cut from, (N,)."""
+    firsts: NDArray[np.int64]
+    """Index of the first piece of each view, and the number of all, (V + 1,); (0,) where there are none."""
+
+
 class ChamferCost:
     """The cost of poses against fixed evidence; what a search minimizes.
 
@@ -128,12 +141,14 @@ class ChamferCost:
         self._surfaces = occluding_contours.surfaces_of(self.models)
         self._scales = np.array([v.scale for v in views])
         thetas = [v.outlier_px(theta_px) for v in views]
+        widest = max((v.camera for v in views), key=lambda camera: camera.width)
+        room = occluding_contours.contour_room(widest, len(self.models))
+        self._predicted, self._contours = tuple(b.values for b in predicted), self._traced(views, predicted, room)
         near = [
-            _near(v, occluding_contours.trace(predicted, v.camera), theta)
-            for v, theta in zip(views, thetas, strict=True)
+            _near(v, *pieces, theta) for v, pieces, theta in zip(views, self._pieces_by_view(), thetas, strict=True)
         ]
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
-        self._scene = _Scene(
+        self._arrays = _ViewArrays(
             np.stack([v.camera.projection for v in views]),
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
@@ -144,15 +159,21 @@ class ChamferCost:
             np.array([n.n_points for n in near], dtype=np.int64),
             np.array(thetas),
         )
-        widest = max((v.camera for v in views), key=lambda camera: camera.width)
-        self._room = max(occluding_contours.contour_room(widest, len(self.models)), self._scene.points.shape[1])
+        self._room = max(room, self._arrays.points.shape[1])
         self._own = threading.local()
 
     def __call__(self, poses: Sequence[Array]) -> Cost:
         """Cost of one pose of everybody; `poses` holds the values of each body."""
-        directed_px = self._directed(0, poses[0][None], poses)[0] / self._scales[:, None]
-        views_px = self._blank_unseen(directed_px.mean(axis=-1))
-        return Cost(float(self._mean(views_px)), views_px, directed_px[:, 0], directed_px[:, 1])
+        return self._cost(self._directed(0, poses[0][None], poses)[0])
+
+    def at_prediction(self) -> Cost:
+        """Cost of the predicted poses, whose contours are traced already."""
+        return self._cost(self._directed(0, self._predicted[0][None], self._predicted, self._contours)[0])
+
+    def _cost(self, directed: Array) -> Cost:
+        directed_px = directed / self._scales[:, None]
+        view_costs_px = self._blank_unseen(directed_px.mean(axis=-1))
+        return Cost(float(self._mean(view_costs_px)), view_costs_px, directed_px[:, 0], directed_px[:, 1])
 
     def of_person(self, person: int, candidates: Array, poses: Sequence[Array]) -> tuple[Array, Array]:
         """Costs of many candidate poses of one person, the others held at `poses`.
@@ -165,19 +186,46 @@ class ChamferCost:
         Returns:
             The total costs, (C,), and those of each view, (C, V), px of the footage; NaN for views without edges.
         """
-        views_px = self._blank_unseen(self._directed(person, candidates, poses).mean(axis=-1) / self._scales)
-        return self._mean(views_px), views_px
+        view_costs_px = self._blank_unseen(self._directed(person, candidates, poses).mean(axis=-1) / self._scales)
+        return self._mean(view_costs_px), view_costs_px
 
     @property
-    def scene_px(self) -> tuple[FloatArray, ...]:
-        """The edge points that count, of each view, (n, 2), matched px."""
-        scene = self._scene
+    def edge_points_px(self) -> tuple[FloatArray, ...]:
+        """The edge points that count, of each view, (n, 2), working px."""
+        arrays = self._arrays
         return tuple(
-            scene.points[:, first : first + n].T for first, n in zip(scene.firsts[:-1], scene.counts, strict=True)
+            arrays.points[:, first : first + n].T for first, n in zip(arrays.firsts[:-1], arrays.counts, strict=True)
         )
 
-    def _directed(self, person: int, candidates: Array, poses: Sequence[Array]) -> Array:
-        """The directed costs of candidates of a person, see `of_person`, (C, V, 2), matched px.
+    @property
+    def predicted_pieces_px(self) -> list[FloatArray]:
+        """The visible contours of the predicted bodies in each view, u0, v0, u1, v1, (M, 4), working px."""
+        return [pieces[~occluded] for pieces, occluded in self._pieces_by_view()]
+
+    def _pieces_by_view(self) -> Iterator[tuple[FloatArray, NDArray[np.bool_]]]:
+        """Pieces of the predicted contours in each view, (N, 4), and whether they are hidden, (N,)."""
+        ends, occluded, _, firsts = self._contours
+        for a, b in pairwise(firsts.tolist()):
+            yield np.ascontiguousarray(ends[:, a:b].T), occluded[a:b]
+
+    def _traced(self, views: Sequence[ViewEvidence], bodies: Sequence[PosedBody], room: int) -> _Contours:
+        """Trace the contours of posed bodies in all views."""
+        out = _Contours(
+            np.empty((4, room * len(views)), np.float32), np.empty(room * len(views), np.bool_),
+            np.empty(room * len(views), np.int32), np.zeros(len(views) + 1, np.int64),
+        )  # fmt: skip
+        n = _trace_views(
+            np.stack([v.camera.projection for v in views]),
+            np.stack([v.camera.center_world for v in views]),
+            occluding_contours.part_poses(bodies), self._surfaces,
+            occluding_contours.piece_buffer(self._surfaces, room), out,
+        )  # fmt: skip
+        return _Contours(out.ends[:, :n].copy(), out.occluded[:n].copy(), out.edges[:n].copy(), out.firsts)
+
+    def _directed(
+        self, person: int, candidates: Array, poses: Sequence[Array], contours: _Contours | None = None
+    ) -> Array:
+        """The directed costs of candidates of a person, see `of_person`, (C, V, 2), working px.
 
         One kernel for all who ask: another would take the sums of single precision in another order.
         """
@@ -186,17 +234,18 @@ class ChamferCost:
         directed = np.empty((len(candidates), len(self._seen), 2))
         poses_of = np.ascontiguousarray(candidates, dtype=np.float64)
         Ts, paper = self._part_poses(poses), self.outliers == "paper"
+        traced = contours or _no_contours()
 
         def score(share: slice) -> None:
             _score_candidates(
-                poses_of[share], first, model.n_dofs, model.tree, Ts, self._surfaces, self._scene, paper,
-                self._scratch(), directed[share],
+                poses_of[share], first, model.n_dofs, model.tree, Ts, self._surfaces, self._arrays, paper,
+                traced, self._scratch(), directed[share],
             )  # fmt: skip
 
         if self._threads > 1 and len(candidates) >= _WORTH_SHARING:
             shares = np.linspace(0, len(candidates), self._threads + 1).astype(int)
             slices = [slice(a, b) for a, b in pairwise(shares)]
-            others = [helpers().submit(score, s) for s in slices[1:]]
+            others = [kernel_pool().submit(score, s) for s in slices[1:]]
             score(slices[0])
             for other in others:
                 other.result()
@@ -219,15 +268,15 @@ class ChamferCost:
             )  # fmt: skip
         return scratch
 
-    def _blank_unseen(self, views_px: Array) -> Array:
-        views_px[..., ~self._seen] = np.nan
-        return views_px
+    def _blank_unseen(self, view_costs_px: Array) -> Array:
+        view_costs_px[..., ~self._seen] = np.nan
+        return view_costs_px
 
-    def _mean(self, views_px: Array) -> Array:
+    def _mean(self, view_costs_px: Array) -> Array:
         """Mean over the views with edges, (..., V) to (...); where there is none, that of the outlier distances."""
         if not self._seen.any():
-            return np.full(views_px.shape[:-1], np.mean(self._scene.thetas / self._scales))
-        return views_px[..., self._seen].mean(axis=-1)
+            return np.full(view_costs_px.shape[:-1], np.mean(self._arrays.thetas / self._scales))
+        return view_costs_px[..., self._seen].mean(axis=-1)
 
 
 @lru_cache(maxsize=1)  # a hand makes dozens of costs a second from the same views
@@ -236,10 +285,16 @@ def _distances(views: tuple[ViewEvidence, ...]) -> FloatArray:
     return np.concatenate([v.distance.ravel() for v in views])
 
 
-def _near(view: ViewEvidence, contour: occluding_contours.Contour, theta: float) -> RowSortedPoints:
+@lru_cache(maxsize=1)
+def _no_contours() -> _Contours:
+    """No contours: poses are to be traced."""
+    return _Contours(np.empty((4, 0), np.float32), np.empty(0, np.bool_), np.empty(0, np.int32), np.empty(0, np.int64))
+
+
+def _near(view: ViewEvidence, pieces_px: FloatArray, occluded: NDArray[np.bool_], theta: float) -> RowSortedPoints:
     """Edge points within theta of the visible model contour."""
     everything = sort_points(view.points_px, view.camera.size)
-    return within_reach(everything, contour.pieces_px, contour.hidden, theta)
+    return within_reach(everything, pieces_px, occluded, theta)
 
 
 @njit(**FAST)
@@ -311,11 +366,11 @@ def _take_visible(
     n: int, pieces: occluding_contours.Pieces, visible: FloatArray, segments: Segments
 ) -> tuple[int, int]:
     """Take the visible ones of n pieces, and join them to segments; the number of both."""
-    ends, hidden, edges = pieces.ends, pieces.hidden, pieces.edges
+    ends, occluded, edges = pieces.ends, pieces.occluded, pieces.edges
     su, sv, du, dv = segments.u, segments.v, segments.du, segments.dv
     joined, edge, k, m = 0, -1, np.uint64(0), np.uint64(0)
     for i in range(np.uint64(n)):
-        if hidden[i]:
+        if occluded[i]:
             edge = -1
             continue
         x0, y0, x1, y1 = ends[0, i], ends[1, i], ends[2, i], ends[3, i]
@@ -332,35 +387,78 @@ def _take_visible(
     return int(m), int(k)
 
 
+@njit(nogil=True, cache=True)
+def _trace_views(
+    P: Array, eyes: Array, Ts: Array, surfaces: occluding_contours.Surfaces, pieces: occluding_contours.Pieces,
+    out: _Contours,
+) -> int:  # fmt: skip
+    """Fill the contours of posed parts in all views; their number."""
+    occluding_contours.place_parts(Ts, surfaces, pieces)
+    at = 0
+    for view in range(P.shape[0]):
+        n = occluding_contours.trace_pieces(P[view], eyes[view], surfaces, occluding_contours.PIECE_PX, pieces)
+        out.firsts[view] = at
+        out.ends[:, at : at + n] = pieces.ends[:, :n]
+        out.occluded[at : at + n] = pieces.occluded[:n]
+        out.edges[at : at + n] = pieces.edges[:n]
+        at += n
+    out.firsts[P.shape[0]] = at
+    return at
+
+
+@njit(**FAST)
+def _take_traced(view: int, contours: _Contours, pieces: occluding_contours.Pieces) -> int:
+    """Copy the pieces of a view that are traced already; their number."""
+    first, last = contours.firsts[view], contours.firsts[view + 1]
+    n = last - first
+    for i in range(n):
+        for k in range(4):
+            pieces.ends[k, i] = contours.ends[k, first + i]
+        pieces.occluded[i], pieces.edges[i] = contours.occluded[first + i], contours.edges[first + i]
+    return n
+
+
 @njit(**FAST)
 def _score(
-    Ts: Array, surfaces: occluding_contours.Surfaces, scene: _Scene, paper: bool, scratch: _Scratch, directed: Array
+    Ts: Array,
+    surfaces: occluding_contours.Surfaces,
+    views: _ViewArrays,
+    paper: bool,
+    contours: _Contours,
+    scratch: _Scratch,
+    directed: Array,
 ) -> None:
-    """Fill the directed costs of one pose, (V, 2): model to image and image to model, matched px."""
+    """Fill the directed costs of one pose, (V, 2): model to image and image to model, working px."""
     d, pixel = scratch.distances, 0
-    occluding_contours.place(Ts, surfaces, scratch.pieces)
-    for view in range(scene.P.shape[0]):
-        width, height, theta = scene.sizes[view, 0], scene.sizes[view, 1], scene.thetas[view]
-        n = occluding_contours.trace_pieces(
-            scene.P[view], scene.eyes[view], surfaces, occluding_contours.PIECE_PX, scratch.pieces
-        )
+    traced = contours.firsts.shape[0] > 0
+    if not traced:
+        occluding_contours.place_parts(Ts, surfaces, scratch.pieces)
+    for view in range(views.P.shape[0]):
+        width, height, theta = views.sizes[view, 0], views.sizes[view, 1], views.thetas[view]
+        if traced:
+            n = _take_traced(view, contours, scratch.pieces)
+        else:
+            n = occluding_contours.trace_pieces(
+                views.P[view], views.eyes[view], surfaces, occluding_contours.PIECE_PX, scratch.pieces
+            )
         n_visible, n_segments = _take_visible(n, scratch.pieces, scratch.visible, scratch.segments)
-        image = scene.distances[pixel : pixel + width * height]
+        image = views.distances[pixel : pixel + width * height]
         if paper:
             directed[view, 0] = _forward_paper(n_visible, image, width, height, theta, scratch)
         else:
             directed[view, 0] = _forward(n_visible, image, width, height, theta, scratch.visible)
-        first, last = scene.firsts[view], scene.firsts[view + 1]
-        u, v = scene.points[0][first:last], scene.points[1][first:last]
-        nearest_segment(u, v, scene.rows[view], scratch.segments, n_segments, theta, d)
-        directed[view, 1] = _robust_mean(d, scratch.ones, scene.counts[view], theta, paper)
+        first, last = views.firsts[view], views.firsts[view + 1]
+        u, v = views.points[0][first:last], views.points[1][first:last]
+        nearest_segment(u, v, views.rows[view], scratch.segments, n_segments, theta, d)
+        directed[view, 1] = _robust_mean(d, scratch.ones, views.counts[view], theta, paper)
         pixel += width * height
 
 
 @njit(nogil=True, cache=True)
 def _score_candidates(
     candidates: Array, first: int, n_dofs: int, tree: Tree, Ts: Array,
-    surfaces: occluding_contours.Surfaces, scene: _Scene, paper: bool, scratch: _Scratch, directed: Array,
+    surfaces: occluding_contours.Surfaces, views: _ViewArrays, paper: bool, contours: _Contours, scratch: _Scratch,
+    directed: Array,
 ) -> None:  # fmt: skip
     """`_score` for many poses of the person whose parts begin at `first`; directed is (C, V, 2)."""
     last = first + tree.parents.shape[0]
@@ -368,4 +466,4 @@ def _score_candidates(
     axes, origins = np.empty((n_dofs, 3)), np.empty((n_dofs, 3))
     for c in range(candidates.shape[0]):
         forward_kinematics(candidates[c], tree, own[first:last], axes, origins)
-        _score(own, surfaces, scene, paper, scratch, directed[c])
+        _score(own, surfaces, views, paper, contours, scratch, directed[c])

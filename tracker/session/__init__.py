@@ -1,1 +1,5 @@
-"""What a session folder is, who may write it, how it is made from loose files."""
+"""The session folder: reading and writing it, its lock, making it from loose files.
+
+Imports `geometry`, `body`, `formats` and `footage`. Callers use `session.load_session`, `lock.SessionLock`,
+`assemble.assemble` and `locked_dofs`.
+"""

@@ -1,7 +1,7 @@
-"""One writer for each session: a lock file that says who, where and since when.
+"""The lock of a session for one writer: a file that names the holder's program, machine and time.
 
-A file, because sessions lie on network drives, where the system's own locks cannot be relied on. What a program that
-died leaves behind is recognised on the machine it ran on; of another machine nothing can be known.
+A lock file works on network drives, where the system's own locks are unreliable. A lock left by a dead program is
+recognized on the machine on which it ran; a lock of another machine counts as held.
 """
 
 import json
@@ -18,27 +18,27 @@ from tracker.errors import SessionError
 
 LOCK_FILE = "lock.json"
 
-_WRITING_S = 0.2  # a lock file that cannot be read may be one that is being written
+_WRITING_S = 0.2  # an unreadable lock file may be in the process of being written
 
 
 class Holder(NamedTuple):
-    """Who holds a lock."""
+    """The holder of a lock."""
 
     host: str
     process: int
     started: str
-    """When the process began, as the system tells it; empty where it does not. Process numbers are used again."""
+    """Start time of the process according to the system; empty if unknown. Process numbers are reused."""
     since: str
-    """When the lock was taken, ISO 8601."""
+    """Time at which the lock was taken, ISO 8601."""
     token: str
-    """Tells this lock from all others."""
+    """Identifies this lock uniquely."""
 
 
 class SessionLock:
     """The right to write a session; a context manager.
 
     Raises:
-        SessionError: on entering, where another program holds the session or the folder cannot be written.
+        SessionError: on entering, if another program holds the session or the folder cannot be written.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -53,7 +53,7 @@ class SessionLock:
         self.release()
 
     def acquire(self) -> None:
-        """Take the lock; one that a dead program of this machine left is taken over.
+        """Acquire the lock. A lock that a dead program of this machine left is replaced.
 
         Raises:
             SessionError: another program holds it, or the folder cannot be written.
@@ -75,16 +75,16 @@ class SessionLock:
         self._held = me
 
     def release(self) -> None:
-        """Give the lock back; nothing happens where it is not held."""
+        """Release the lock, if it is held."""
         if self._held is not None and _read(self._path) == self._held:
             self._path.unlink(missing_ok=True)
         self._held = None
 
     def _create(self, me: Holder) -> bool:
-        """Make the lock file; False where there is one already."""
+        """Create the lock file; return False if there is one already."""
         try:
-            # Exclusive creation: of two programs that try at once, one fails. Hard links would also make the file
-            # whole at once, but not every network drive has them.
+            # Exclusive creation: of two programs at the same time, one fails. Hard links would make the content appear
+            # atomically too, but some network drives lack them.
             with self._path.open("x", encoding="utf-8") as file:
                 json.dump(me._asdict(), file)
         except FileExistsError:
@@ -101,7 +101,7 @@ class SessionLock:
             return  # released in the meantime
         if holder is None or _is_alive(holder):
             raise SessionError(f"session {self._path.parent} is open already {_describe(holder, self._path)}")
-        # Another program may be taking it over at the same time: whoever moves the file away looks at what it moved.
+        # Another program may replace it at the same time: each one checks the file that it has moved away.
         aside = self._path.with_name(f".{LOCK_FILE}.stale.{secrets.token_hex(8)}")
         try:
             self._path.rename(aside)
@@ -132,10 +132,10 @@ def _describe(holder: Holder | None, path: Path) -> str:
 
 
 def _is_alive(holder: Holder) -> bool:
-    """Whether the holder may still run; only what is surely dead counts as dead."""
+    """Return whether the holder may still run; only a process that is certainly gone counts as dead."""
     if holder.host != socket.gethostname():
         return True
-    if os.name == "nt":  # signal 0 would end the process there
+    if os.name == "nt":  # signal 0 would end the process on Windows
         return True
     try:
         os.kill(holder.process, 0)
@@ -148,10 +148,10 @@ def _is_alive(holder: Holder) -> bool:
 
 
 def _start_of(process: int) -> str:
-    """Start of a process, in ticks since the machine started; empty where the system does not say."""
+    """Return the start time of a process, in ticks since boot; empty if the system does not provide it."""
     try:
         stat = Path(f"/proc/{process}/stat").read_text("utf-8")
     except OSError:
         return ""
-    # The program's name, in parentheses, may hold spaces; the start is the 22nd field, the 20th after the name.
+    # The program's name, in parentheses, may contain spaces. The start time is field 22, the 20th after the name.
     return stat.rpartition(")")[2].split()[19]

@@ -1,4 +1,4 @@
-"""Locked degrees of freedom, which neither a hand nor a search nor a fit moves: how they are kept with a session."""
+"""Locked degrees of freedom, which no edit, search or fit changes: how they are stored with a session."""
 
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
@@ -10,15 +10,15 @@ from tracker.body.model import BodyModel
 from tracker.session.session import Person
 
 SETTING = "locked"
-"""Setting of the session: by name of the person the names of the degrees of freedom."""
+"""Key of the session's setting: by name of the person the names of the locked degrees of freedom."""
 
 
-def kept_locks(people: Sequence[Person], setting: Callable[[str, Any], Any]) -> tuple[frozenset[int], ...]:
-    """What is locked of each person, by index; names that a model has no more are passed over.
+def load_locks(people: Sequence[Person], setting: Callable[[str, Any], Any]) -> tuple[frozenset[int], ...]:
+    """Load the locked degrees of freedom of each person, by index. Names that a model lacks are ignored.
 
     Args:
         people: of the session.
-        setting: what is kept with the session under a name, or a default.
+        setting: returns the session's setting of a name, or a default.
     """
     kept = setting(SETTING, {})
     return tuple(
@@ -26,11 +26,11 @@ def kept_locks(people: Sequence[Person], setting: Callable[[str, Any], Any]) -> 
     )
 
 
-def to_keep(people: Sequence[Person], locks: Sequence[Collection[int]]) -> dict[str, list[str]]:
-    """The value of `SETTING` for what is locked of each person, by index."""
+def locks_setting(people: Sequence[Person], locks: Sequence[Collection[int]]) -> dict[str, list[str]]:
+    """Return the value of `SETTING` for the locked degrees of freedom of each person; the inverse of `load_locks`."""
     return {p.name: [p.model.dof_names[i] for i in sorted(dofs)] for p, dofs in zip(people, locks, strict=True)}
 
 
-def free_of(model: BodyModel, locked: Collection[int]) -> NDArray[np.bool_]:
-    """The degrees of freedom of a body that may move, (n_dofs,)."""
+def active_dofs(model: BodyModel, locked: Collection[int]) -> NDArray[np.bool_]:
+    """Return which degrees of freedom of a body are not locked, (n_dofs,)."""
     return ~np.isin(np.arange(model.n_dofs), list(locked))

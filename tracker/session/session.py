@@ -1,4 +1,4 @@
-"""What a session is: calibrated cameras with their footage, people with their body models, in one folder.
+"""Sessions: calibrated cameras with their footage and people with their body models, in one folder.
 
     my_session/
       session.toml         version, name, fps, n_frames, up, floor, per camera its footage, the people
@@ -6,8 +6,8 @@
       models/NAME.toml     a person's body model
       annotations.sqlite   poses (see `tracker.store.annotation_store`)
 
-Footage may stay where it is. Paths in session.toml are relative to the session folder for what lies in it or
-beside it, so that the two can move together, and absolute for the rest.
+Footage may lie anywhere. Paths in session.toml are relative to the session folder for files in it or beside it, so
+that both can be moved together, and absolute otherwise.
 """
 
 import os
@@ -33,7 +33,7 @@ from tracker.geometry.ground_plane import GroundPlane
 
 VERSION = 2
 _VERSION_WITHOUT_FLOOR = 1
-"""What a session is written as whose floor nobody has set, so that older programs can read it."""
+"""Version written for a session without a floor, so that older programs can read it."""
 SESSION_FILE = "session.toml"
 CALIBRATION_FILE = "calibration.toml"
 ANNOTATIONS_FILE = "annotations.sqlite"
@@ -64,7 +64,7 @@ class Session:
     folder: Path
     """The session's folder; absolute."""
     name: str
-    """Title for people to read."""
+    """Title for display."""
     fps: float
     """Frame rate of all cameras, 1/s."""
     n_frames: int
@@ -72,13 +72,13 @@ class Session:
     cameras: tuple[CameraSource, ...]
     people: tuple[Person, ...]
     up: str = "z"
-    """World axis that points up: x, y or z, with a minus sign where it points down."""
+    """World axis that points up: x, y or z, with a minus sign for an axis that points down."""
     floor: GroundPlane | None = None
-    """The floor as a person has set it; None where it is the plane through the world's origin across `up`."""
+    """The floor set by a person; None for the plane through the world's origin across `up`."""
 
     @property
     def annotations_path(self) -> Path:
-        """Where the session's poses are stored."""
+        """Path of the database of the session's poses."""
         return self.folder / ANNOTATIONS_FILE
 
 
@@ -95,7 +95,7 @@ def create_session(
     """Write a new session folder; it appears complete or not at all.
 
     Args:
-        folder: where; must not exist, or be empty.
+        folder: path of the session; must not exist, or be empty.
         cameras: at least one.
         people: at least one.
         fps: frame rate of all cameras, 1/s.
@@ -105,7 +105,7 @@ def create_session(
 
     Raises:
         SessionError: the folder is in use or cannot be written, or a name or axis is not allowed.
-        RecordingError: footage is missing or unreadable (only where `n_frames` is left out).
+        RecordingError: footage is missing or unreadable (only if `n_frames` is left out).
     """
     folder = _tidy(Path(folder))
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -130,7 +130,7 @@ def create_session(
 
 
 def save_session(session: Session) -> None:
-    """Write a session's files into its folder, which is made if need be; session.toml comes last.
+    """Write a session's files into its folder, which is created if missing; session.toml comes last.
 
     Raises:
         SessionError: a name or axis is not allowed, or the folder cannot be written.
@@ -146,10 +146,10 @@ def save_session(session: Session) -> None:
 
 
 def load_session(folder: str | Path) -> Session:
-    """Read a session folder. Footage is not looked at: `Recording` does that.
+    """Read a session folder. Footage is not opened; `Recording` does that.
 
     Raises:
-        SessionError: no session there, newer than this program, or malformed.
+        SessionError: there is no session, or it is newer than this program or malformed.
         CalibrationError: the calibration is missing or malformed.
         ModelError: a body model is missing or malformed.
     """
@@ -214,7 +214,7 @@ def _load_person(row: dict[str, Any], folder: Path) -> Person:
 
 
 def save_floor(session: Session, up: str, floor: GroundPlane | None) -> Session:
-    """Write another floor into a session's session.toml, which is otherwise left as it is.
+    """Replace the floor in a session's session.toml.
 
     Args:
         session: as it was loaded.
@@ -239,7 +239,7 @@ def save_floor(session: Session, up: str, floor: GroundPlane | None) -> Session:
 
 
 def save_model(session: Session, person: int, model: BodyModel) -> Session:
-    """Write another body model of a person into a session, which is otherwise left as it is.
+    """Replace the body model of a person in a session's folder.
 
     Returns:
         The session with that model.
@@ -274,7 +274,7 @@ def _load_floor(row: dict[str, Any] | None, where: str) -> GroundPlane | None:
 
 
 def _write(session: Session, into: Path) -> None:
-    """Write the files of a session into a folder that will be, or is, `session.folder`."""
+    """Write the files of a session into a folder that is, or will become, `session.folder`."""
     (into / "models").mkdir(exist_ok=True)
     write_calibration(into / CALIBRATION_FILE, [c.camera for c in session.cameras])
     for person in session.people:
@@ -316,7 +316,7 @@ def _check(session: Session) -> None:
         if twice:
             raise SessionError(f"{where}: more than one {what} is named '{twice[0]}'; give each its own name")
     for name in people:
-        # The name becomes a file's name, so it must not lead out of the folder.
+        # The name becomes the name of a file, so it must not lead out of the folder.
         if not _NAME.fullmatch(name):
             raise SessionError(
                 f"{where}: a person cannot be named '{name}'; use letters, digits, spaces, dots, '-' and '_'"
@@ -347,7 +347,7 @@ def _check_keys(data: dict[str, Any], known: set[str], where: str) -> None:
 
 
 def _absolute(source: CameraSource) -> CameraSource:
-    """Pin relative paths to the working folder of now: the session outlives it."""
+    """Make relative paths absolute by the current working folder, which the session outlives."""
     return replace(
         source,
         footage=_tidy(source.footage),
@@ -362,10 +362,10 @@ def _tidy(path: Path) -> Path:
 
 
 def _relative(path: Path, folder: Path) -> str:
-    """Write a path relative to the session folder where it lies in it or in its parent, else absolute."""
+    """Return a path relative to the session folder if it lies in it or in its parent, else absolute."""
     if path.is_relative_to(folder):
         return path.relative_to(folder).as_posix()
-    # The file system's top holds everything: what lies only there does not move with the session.
+    # Every path lies in the root of the file system: paths that share only the root do not move with the session.
     if folder.parent != Path(folder.anchor) and path.is_relative_to(folder.parent):
         return (Path("..") / path.relative_to(folder.parent)).as_posix()
     return path.as_posix()

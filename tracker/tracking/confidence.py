@@ -1,7 +1,7 @@
-"""How sure a tracker is of a pose: what the evidence says of it, and a status.
+"""Classify a pose as good, doubtful or lost, from features of how well it fits the evidence.
 
-How likely each limb is lost is a logistic function of what the evidence says of it. Its weights were fitted on
-simulated footage, where the error is known, and are checked on other scenes (`tests/benchmarks/calibrate_status.py`).
+The log odds that a limb is lost are linear in its features. The weights were fitted on simulated footage, where the
+error is known, and are checked on other scenes (`tests/benchmarks/calibrate_status.py`).
 """
 
 from collections.abc import Sequence
@@ -20,101 +20,101 @@ from tracker.geometry.arrays import Array
 
 Status = Literal["good", "doubtful", "lost"]
 
-_LEAST_SAMPLES = 12
-"""Colours of fewer samples say nothing about a part."""
-_LEAST_PX = 5.0
-"""Contours shorter than this explain as little as one of this length."""
-_LEAST_TRUST = 0.5
-"""Silhouettes trusted less have no say."""
-_MOST_UNEXPLAINED = 0.07
-"""A silhouette of whose contour more than this is explained by no part shows a limb that is elsewhere."""
+_MIN_SAMPLES = 12
+"""Fewest colour samples of a part that count."""
+_MIN_LENGTH_PX = 5.0
+"""Shortest contour length that the explained points are divided by, px."""
+_MIN_TRUST = 0.5
+"""Silhouettes trusted less are left out."""
+_MAX_UNEXPLAINED = 0.07
+"""A larger unexplained share of a silhouette's contour shows a limb that is elsewhere."""
 _WEIGHTS = np.array([-1.611, 0.579, 2.663, 5.724, 6.632, -2.025, -2.906, -5.704])
-"""Of the evidence in `evidence`, in its order; the last is the constant."""
+"""Weights of `features`, in their order, and the constant."""
 _DOUBTFUL, _LOST = -3.8, 0.0
-"""Log odds that a limb is lost from which on the frame is doubtful, and lost. Few limbs are lost, and a lost one that
-is called good is the costlier error: doubt begins at 1 to 45."""
-_SUSPECT, _SUSPECT_OF_SEVERAL = -3.5, -3.0
-"""From which on a limb is searched for, of somebody alone and of one of several. A search is begun nearly as soon as
-there is doubt: it costs time, and a limb that is left astray leads the frames after it astray. Among several people
-half of all limbs are in doubt, and what is searched in vain may find what is another's."""
+"""Log odds of a lost limb above which a frame is doubtful, and lost. Few limbs are lost, and to call a lost limb good
+is the worse error: a frame is doubtful from odds of 1 to 45."""
+_SEARCH, _SEARCH_OF_SEVERAL = -3.5, -3.0
+"""Log odds above which a limb is searched, of a single person and of one of several. A wrong limb misleads the frames
+after it, so that a search begins nearly as early as doubt. Among several people half of all limbs are in doubt, and a
+search may take another person's limb."""
 _LOST_FORWARD = 0.6
-"""Of a body whose contours are farther than this from all edges, in outlier distances, nothing holds."""
+"""Mean distance of the contour to the edges above which the whole body is lost, in outlier distances."""
 
 
-class LimbFigures(NamedTuple):
-    """What the evidence says of one limb."""
+class LimbFeatures(NamedTuple):
+    """Features of one limb."""
 
     name: str
     """Name of its last part."""
     color: float
-    """Colours under the part that is worst off: how much likelier on this part than elsewhere, nats per sample."""
+    """Mean log-likelihood ratio of the colours under its worst part, part against elsewhere, nats per sample."""
     worst_drop: float
-    """How much less that is than where the colours were learnt, in the view in which it is most, nats per sample."""
+    """Largest drop of that ratio in a view, against the frame where the colours were learnt, nats per sample."""
     spread_px: float
-    """Standard deviation of its end, matched px where the body stands."""
+    """Standard deviation of its end, working px at the body."""
     forward: float
-    """Mean cut-off distance of its visible contour to the edges, in outlier distances; 0 where nothing is visible."""
+    """Mean truncated distance of its visible contour to the edges, in outlier distances; 0 where nothing is visible."""
     shown: float
-    """Length of its visible contour in the views that see the body, as a share of what it would be from the side."""
+    """Length of its visible contour in the views that see the body, relative to that seen from the side."""
     explained: float
-    """Points of edges and silhouette that it explains, for each pixel of its visible contour."""
+    """Number of edge and silhouette points that it explains, per pixel of its visible contour."""
 
 
-class Quality(NamedTuple):
-    """What the evidence says of a pose. Distances are in outlier distances."""
+class PoseQuality(NamedTuple):
+    """Features of a pose. Distances are in outlier distances."""
 
     forward: float
-    """Mean cut-off distance of the visible contour to the edges."""
+    """Mean truncated distance of the visible contour to the edges."""
     views: int
-    """Views that see the body."""
+    """Number of views that see the body."""
     unexplained: float
-    """Share of the silhouette's contour that no part explains, in the second worst of the trusted views."""
-    limbs: tuple[LimbFigures, ...]
-    """The same limb by limb."""
+    """Share of the silhouette's contour that no part explains, in the second worst trusted view."""
+    limbs: tuple[LimbFeatures, ...]
+    """Features of each limb."""
 
     @property
     def log_odds(self) -> Array:
         """Log odds that each limb is lost, (n_limbs,)."""
         return _log_odds(self)
 
-    def doubted(self, alone: bool) -> tuple[str, ...]:
-        """Names of limbs that seem lost themselves, of somebody alone or of one of several."""
-        least = _SUSPECT if alone else _SUSPECT_OF_SEVERAL
+    def doubtful_limbs(self, alone: bool) -> tuple[str, ...]:
+        """Return the names of limbs that seem lost, of a single person or of one of several."""
+        least = _SEARCH if alone else _SEARCH_OF_SEVERAL
         return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if odds > least)
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """Names of limbs that are likelier lost than found."""
+        """Names of limbs that are more likely lost than not."""
         return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if odds > _LOST)
 
-    def suspects(self, alone: bool) -> tuple[str, ...]:
-        """Names of limbs worth a search, likeliest first; all where the image shows what no part explains."""
-        doubted, everyone = self.doubted(alone), self.unexplained > _MOST_UNEXPLAINED
+    def search_candidates(self, alone: bool) -> tuple[str, ...]:
+        """Return the limbs to search, most likely lost first; all limbs if part of the silhouette is unexplained."""
+        doubtful, all_limbs = self.doubtful_limbs(alone), self.unexplained > _MAX_UNEXPLAINED
         names = [self.limbs[i].name for i in np.argsort(-self.log_odds)]
-        return tuple(name for name in names if everyone or name in doubted)
+        return tuple(name for name in names if all_limbs or name in doubtful)
 
     @property
-    def body_lost(self) -> bool:
-        """Whether the body stands elsewhere, not a limb or two of it."""
+    def is_body_lost(self) -> bool:
+        """Whether the whole body is lost, not only a limb or two."""
         return self.views == 0 or self.forward > _LOST_FORWARD or 2 * len(self.lost) > len(self.limbs)
 
 
-def evidence(found: Quality, limb: LimbFigures) -> Array:
-    """What the log odds of a limb are made of, (7,)."""
+def features(pose: PoseQuality, limb: LimbFeatures) -> Array:
+    """Return the features of a limb that the classifier weighs, (7,)."""
     return np.array([
         np.clip(limb.color, -2, 1),
         np.clip(limb.worst_drop, -0.5, 3),
         np.log(np.clip(limb.spread_px, 0.5, 50)),
-        min(found.unexplained, _MOST_UNEXPLAINED),
+        min(pose.unexplained, _MAX_UNEXPLAINED),
         limb.forward,
         np.log(np.clip(limb.shown, 0.02, 2)),
         min(limb.explained, 1),
     ])  # fmt: skip
 
 
-@lru_cache(maxsize=8)  # asked several times for each frame
-def _log_odds(found: Quality) -> Array:
-    odds = np.array([_WEIGHTS @ [*evidence(found, x), 1.0] for x in found.limbs])
+@lru_cache(maxsize=8)  # used several times for each frame
+def _log_odds(found: PoseQuality) -> Array:
+    odds = np.array([_WEIGHTS @ [*features(found, x), 1.0] for x in found.limbs])
     odds.flags.writeable = False
     return odds
 
@@ -127,17 +127,17 @@ def quality(
     trusts: Array,
     px_per_m: float,
     colors: tuple[ColorScore, PartColors] | None,
-) -> Quality:
-    """Sum up what speaks for and against a pose.
+) -> PoseQuality:
+    """Compute the features of a pose.
 
     Args:
-        body: in the pose that was found.
-        fit: that pose, and the normal matrix there.
+        body: in the pose.
+        fit: the pose, and the normal matrix there.
         costs: of its parts.
-        thetas_px: outlier distance of each view, (V,), matched px.
-        trusts: how far the silhouette of each view is trusted, (V,), 0 to 1; 0 where there is none.
-        px_per_m: length of a metre in the images where the body stands, matched px.
-        colors: of its parts; None where there are none.
+        thetas_px: outlier distance of each view, (V,), working px.
+        trusts: trust in the silhouette of each view, (V,), 0 to 1; 0 where there is none.
+        px_per_m: length of a metre in the images at the body, working px.
+        colors: scores of the colours, and the colours that were learnt; None before the first frame.
     """
     model, chains = body.model, limbs(body.model)
     far = np.nan_to_num(costs.forward_px) / thetas_px[:, None] * costs.length_px
@@ -146,15 +146,15 @@ def quality(
     color, worst_drop = np.full(len(model.parts), np.inf), np.zeros(len(model.parts))
     if colors is not None:
         score, known = colors
-        color = np.where(score.samples >= _LEAST_SAMPLES, score.parts, np.inf)
+        color = np.where(score.samples >= _MIN_SAMPLES, score.parts, np.inf)
         worst_drop = np.nan_to_num(known.usual - score.views, nan=-np.inf).max(axis=0, initial=-np.inf)
     spreads = px_per_m * _end_spreads(body, fit)
-    return Quality(
+    return PoseQuality(
         float(far.sum() / max(1e-9, costs.length_px.sum())),
         views,
-        _second_largest(1.0 - costs.outline[trusts > _LEAST_TRUST]),
+        _second_largest(1.0 - costs.silhouette[trusts > _MIN_TRUST]),
         tuple(
-            LimbFigures(
+            LimbFeatures(
                 c.name, float(color[c.parts].min()), float(worst_drop[c.parts].max()), float(spread),
                 *_of_contour(costs, far, beside_px, c.parts),
             )
@@ -164,35 +164,39 @@ def quality(
 
 
 def _of_contour(costs: PartCosts, far: Array, beside_px: Array, parts: NDArray[np.int64]) -> tuple[float, float, float]:
-    """The figures `forward`, `shown` and `explained` of some parts.
+    """Return the features `forward`, `shown` and `explained` of some parts.
 
     Args:
         costs: of all parts.
         far: summed distance of their contours, (V, n_parts), px times outlier distances.
-        beside_px: length of their contours if they were seen from the side, in all views together, (n_parts,), px.
-        parts: which are asked.
+        beside_px: length of their contours seen from the side, summed over the views, (n_parts,), px.
+        parts: indices of the parts.
     """
     length = float(costs.length_px[:, parts].sum())
     forward = float(far[:, parts].sum()) / max(1e-9, length)
-    return forward, length / float(beside_px[parts].sum()), float(costs.points[:, parts].sum()) / max(_LEAST_PX, length)
+    return (
+        forward,
+        length / float(beside_px[parts].sum()),
+        float(costs.points[:, parts].sum()) / max(_MIN_LENGTH_PX, length),
+    )
 
 
 def _second_largest(shares: Array) -> float:
-    """What at least two views say; 0 where there are fewer."""
+    """Return the second largest share; 0 where there are fewer than two."""
     return float(np.sort(shares)[-2]) if len(shares) > 1 else 0.0
 
 
-def judge(found: Quality) -> Status:
-    """Good, doubtful or lost."""
+def classify(found: PoseQuality) -> Status:
+    """Return the status of a pose."""
     most = found.log_odds.max(initial=-np.inf)
-    if found.body_lost or most > _LOST:
+    if found.is_body_lost or most > _LOST:
         return "lost"
-    return "doubtful" if most > _DOUBTFUL or found.unexplained > _MOST_UNEXPLAINED else "good"
+    return "doubtful" if most > _DOUBTFUL or found.unexplained > _MAX_UNEXPLAINED else "good"
 
 
-def reason(found: Quality) -> str:
-    """What speaks most against a pose, for people; empty where it is good."""
-    if judge(found) == "good":
+def reason(found: PoseQuality) -> str:
+    """Return the main reason against a pose, for people to read; empty where it is good."""
+    if classify(found) == "good":
         return ""
     if found.views == 0:
         return "no view shows the body"
@@ -205,12 +209,12 @@ def reason(found: Quality) -> str:
 
 
 def worst(statuses: Sequence[Status]) -> Status:
-    """The worst of several."""
+    """Return the worst of several statuses; "good" for none."""
     return max(statuses, key=("good", "doubtful", "lost").index, default="good")
 
 
 def _end_spreads(body: PosedBody, fit: Fit) -> Array:
-    """Standard deviation of the end of each limb, (n_limbs,), metres."""
+    """Return the standard deviation of the end of each limb, (n_limbs,), metres."""
     model = body.model
     ends = np.array([np.flatnonzero(model.point_parts == c.parts[-1])[-1] for c in limbs(model)], dtype=np.int64)
     J = model.point_jacobian(body.kinematics, model.point_parts[ends], body.points_world[ends])

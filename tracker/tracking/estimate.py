@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 from tracker.geometry.arrays import Array
-from tracker.tracking.confidence import Quality, Status
+from tracker.tracking.confidence import PoseQuality, Status
 
 
-class OtherPose(NamedTuple):
+class AlternativePose(NamedTuple):
     """A pose of a person that fits the evidence about as well as the estimate."""
 
     values: Array
@@ -23,21 +23,21 @@ class PoseEstimate(NamedTuple):
     """Poses, (n_values,) each."""
     cost_px: float
     """Cost of the poses against all edges near them, px of the footage."""
-    views_px: Array
+    view_costs_px: Array
     """Cost in each view, (V,), px of the footage; NaN for a view without edges."""
     evaluations: int
     """Number of poses that a search scored."""
     statuses: tuple[Status, ...]
     """How sure the tracker is of each person."""
-    remarks: tuple[str, ...]
+    notes: tuple[str, ...]
     """What was unusual about each person; empty where nothing was."""
-    parts_px: tuple[Array, ...]
+    part_costs_px: tuple[Array, ...]
     """Mean distance of the contour of each part to the edges, (n_parts,) each, px; NaN where hidden."""
     covariances: tuple[Array, ...]
     """Covariance of each pose, (n_dofs, n_dofs) each, rad and metres; zero for a keyframe."""
-    qualities: tuple[Quality | None, ...]
+    qualities: tuple[PoseQuality | None, ...]
     """Features from which the statuses follow; None for a keyframe."""
-    alternatives: tuple[tuple[OtherPose, ...], ...]
+    alternatives: tuple[tuple[AlternativePose, ...], ...]
     """Poses that are about as good, best first. A person who has any is at most doubtful."""
     method: str
     """Name of the tracking method, such as `chamfer`."""
@@ -51,14 +51,14 @@ class TrackedFrame(NamedTuple):
     """Poses, (n_values,) each."""
     statuses: tuple[Status, ...]
     """How sure the tracker is of each person."""
-    others: tuple[tuple[Array, ...], ...] = ()
+    alternatives: tuple[tuple[Array, ...], ...] = ()
     """Poses that are about as good, (n_values,) each; empty where unknown for everybody."""
 
     @classmethod
     def of(cls, estimate: PoseEstimate) -> "TrackedFrame":
         """Return the part of an estimate that a second pass needs; the whole holds much more."""
-        others = tuple(tuple(other.values for other in of_one) for of_one in estimate.alternatives)
-        return cls(estimate.frame, estimate.poses, estimate.statuses, others)
+        alternatives = tuple(tuple(a.values for a in of_one) for of_one in estimate.alternatives)
+        return cls(estimate.frame, estimate.poses, estimate.statuses, alternatives)
 
 
 class BackwardStep(NamedTuple):

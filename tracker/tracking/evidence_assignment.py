@@ -1,9 +1,9 @@
-"""Evidence shared fairly among several people: what one body explains does not pull at another.
+"""Assign edges to people: an edge explained by one body does not attract another.
 
-An edge that runs along the contour of one body and not along that of another belongs to the first. A segment of edges
-is given away as a whole, as the prediction accepts it as a whole (`segments`), a point of the silhouette's contour by
-itself. What several bodies explain, and what none does, stays with all of them: it is up to the residuals, where each
-point draws the nearest piece of contour, whosever it is.
+An edge that runs along the contour of one body and not along that of another belongs to the first. Segments of edges
+are assigned as a whole, as the prediction accepts them (`edge_segments`); points of the silhouette's contour are
+assigned one by one. Evidence that several bodies explain, or none, stays with all of them: in the residuals each point
+is matched with the nearest piece of contour of any body.
 """
 
 from collections.abc import Sequence
@@ -19,60 +19,63 @@ from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.contours.occluding_contours import PIECE_PX, Contour, trace_view
 from tracker.contours.surfaces import Surfaces
-from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence, findable, unfiltered, with_segments
+from tracker.evidence.view_evidence import (
+    ACCEPTED_SHARE,
+    ViewEvidence,
+    foreground_segments,
+    with_all_segments,
+    with_segments,
+)
 from tracker.geometry.arrays import Array, FloatArray
-from tracker.images.edge_segments import MAX_ANGLE_RAD, Samples, Segments, nearest_alongside, sampled
+from tracker.images.edge_segments import MAX_ANGLE_RAD, Samples, Segments, nearest_parallel_segment, sample_segments
 
-_CLEARLY = 0.5
-"""What is another's is nearer to that body than this share of its distance from one's own."""
+_OWNERSHIP_RATIO = 0.5
+"""Evidence is foreign to a body if its distance to another one is below this share of that to the body."""
 _REACH = 2.0
-"""Up to where distances are told apart, in outlier distances."""
+"""Distances are truncated here, in outlier distances."""
 
 
-class Sharing:
-    """The evidence of one frame, to be shared out for whatever poses."""
+class EvidencePool:
+    """The evidence of one frame before it is assigned."""
 
     def __init__(self, views: Sequence[ViewEvidence]) -> None:
-        """Take the evidence, the same for all people; views whose edges have no direction stay as they are."""
+        """Take the evidence of each view. Edges without direction are not assigned."""
         self.views = tuple(views)
-        """As they were observed."""
+        """The views as observed."""
 
     @cached_property
-    def everything(self) -> tuple[ViewEvidence, ...]:
-        """The same with the edges that the predictions refused."""
-        return tuple(map(unfiltered, self.views))
+    def all_edges(self) -> tuple[ViewEvidence, ...]:
+        """The views with all edges, also those that the predictions refused."""
+        return tuple(map(with_all_segments, self.views))
 
     @cached_property
     def samples(self) -> tuple[tuple[Samples | None, Samples | None], ...]:
-        """What of each view is asked whose it is: its edges, and the points of its silhouette, each by itself; None of
-        what there is not."""
-        return tuple(_sampled(v) for v in self.views)
+        """Samples of the edges and of the silhouette's points of each view; None where there are none."""
+        return tuple(_samples_of(v) for v in self.views)
 
 
-class Shares:
-    """The evidence of one frame as it is shared out for some poses: distances are measured once for all people."""
+class EvidenceAssignment:
+    """The evidence of one frame, assigned to people in some poses. Distances are computed once for all people."""
 
-    def __init__(self, sharing: Sharing, bodies: Sequence[PosedBody]) -> None:
-        """Take the evidence, and everybody where they stand as far as is known."""
-        self.poses = tuple(b.values for b in bodies)
-        """Where they stand, (n_values,) each."""
-        self._sharing = sharing
+    def __init__(self, pool: EvidencePool, bodies: Sequence[PosedBody]) -> None:
+        """Prepare the assignment for posed bodies; nothing is computed yet."""
+        self.bodies = tuple(bodies)
+        """All people in the poses for which the evidence is assigned."""
+        self._pool = pool
         self._own: dict[tuple[int, bool], tuple[ViewEvidence, ...]] = {}
-        self._bodies = list(bodies)
 
     def own(self, person: int, everywhere: bool = False) -> tuple[ViewEvidence, ...]:
-        """The evidence of each view without the edges and the silhouette's points that clearly are somebody else's.
+        """Return the evidence of each view without what clearly belongs to somebody else.
 
-        Not to be asked by several threads at a time.
+        It must not be called by several threads at a time.
 
         Args:
             person: whose evidence is wanted.
-            everywhere: whether poses far from the present one will be asked, among all edges, those that the prediction
-                refused too; else views in which nobody else is near stay as they are, because nothing there is in
-                reach.
+            everywhere: assign all edges, for poses far from the present one. Otherwise views in which nobody else is
+                near stay as they are.
         """
-        if len(self._bodies) == 1:
-            return self._sharing.everything if everywhere else self._sharing.views
+        if len(self.bodies) == 1:
+            return self._pool.all_edges if everywhere else self._pool.views
         if (person, everywhere) not in self._own:
             self._own[person, everywhere] = tuple(v.own(person, everywhere) for v in self._views)
         return self._own[person, everywhere]
@@ -80,126 +83,132 @@ class Shares:
     @cached_property
     def _views(self) -> list["_View"]:
         surfaces, Ts = (
-            occluding_contours.surfaces_of(tuple(b.model for b in self._bodies)),
-            occluding_contours.part_poses(self._bodies),
+            occluding_contours.surfaces_of(tuple(b.model for b in self.bodies)),
+            occluding_contours.part_poses(self.bodies),
         )
-        sharing = self._sharing
-        return [_View(v, *s, surfaces, Ts) for v, s in zip(sharing.views, sharing.samples, strict=True)]
+        pool = self._pool
+        return [_View(v, *s, surfaces, Ts) for v, s in zip(pool.views, pool.samples, strict=True)]
 
 
 class _View:
-    """What one view shows of several people in some poses."""
+    """One view of several people in some poses."""
 
     def __init__(
-        self, view: ViewEvidence, edges: Samples | None, outline: Samples | None, surfaces: Surfaces, Ts: Array
+        self, view: ViewEvidence, edges: Samples | None, silhouette: Samples | None, surfaces: Surfaces, Ts: Array
     ) -> None:
-        self._view, self._edges, self._outline, self._surfaces, self._Ts = view, edges, outline, surfaces, Ts
+        self._view, self._edges, self._silhouette, self._surfaces, self._Ts = view, edges, silhouette, surfaces, Ts
 
     def own(self, person: int, everywhere: bool) -> ViewEvidence:
-        """See `Shares.own`."""
-        view, seen = self._view, self._view
-        if view.segments is None or self._edges is None or not (everywhere or self._theirs.near[person]):
-            return unfiltered(view) if everywhere else view
+        """See `EvidenceAssignment.own`."""
+        view, out = self._view, self._view
+        if view.segments is None or self._edges is None or not (everywhere or self._ownership.near[person]):
+            return with_all_segments(view) if everywhere else view
         asked = view.accepted
         if everywhere or asked is None:
-            asked = findable(view.segments, view.still)
-        theirs = asked & self._theirs.edges[person]
-        if theirs.any():
-            seen = with_segments(view, asked & ~theirs)
+            asked = foreground_segments(view.segments, view.is_static)
+        foreign = asked & self._ownership.edges[person]
+        if foreign.any():
+            out = with_segments(view, asked & ~foreign)
         elif everywhere:
-            seen = unfiltered(view)
-        if view.silhouette is None or self._outline is None:
-            return seen
-        mine = ~self._theirs.outline[person]
-        points, normals = view.silhouette.points_px[mine], view.silhouette.normals[mine]
-        return replace(seen, silhouette=replace(view.silhouette, points_px=points, normals=normals))
+            out = with_all_segments(view)
+        if view.silhouette is None or self._silhouette is None:
+            return out
+        own = ~self._ownership.silhouette[person]
+        points, normals = view.silhouette.points_px[own], view.silhouette.normals[own]
+        return replace(out, silhouette=replace(view.silhouette, points_px=points, normals=normals))
 
     @cached_property
-    def _theirs(self) -> "_Theirs":
+    def _ownership(self) -> "_Ownership":
         view, n_people = self._view, int(self._surfaces.people[-1]) + 1
-        edges, outline = self._edges or _nothing(), self._outline or _nothing()
-        out = _Theirs(
-            np.empty((n_people, len(edges.counts)), np.bool_), np.empty((n_people, len(outline.counts)), np.bool_),
+        edges, silhouette = self._edges or _no_samples(), self._silhouette or _no_samples()
+        out = _Ownership(
+            np.empty((n_people, len(edges.counts)), np.bool_), np.empty((n_people, len(silhouette.counts)), np.bool_),
             np.zeros(n_people, np.bool_),
         )  # fmt: skip
-        _tell_apart(
+        _assign(
             view.camera.projection, view.camera.center_world, self._Ts, self._surfaces,
-            occluding_contours.contour_buffer(view.camera, n_people), edges, outline, view.theta_px, out,
+            occluding_contours.contour_buffer(view.camera, n_people), edges, silhouette, view.theta_px, out,
         )  # fmt: skip
         return out
 
 
-class _Theirs(NamedTuple):
-    """Of each person what runs along the contours of the others and clearly not along their own, in one view."""
+class _Ownership(NamedTuple):
+    """Evidence of one view that is foreign to each person: it runs along others' contours and not along their own."""
 
     edges: NDArray[np.bool_]
-    """Which segments do, (K, S)."""
-    outline: NDArray[np.bool_]
-    """Which points of the silhouette do, (K, N)."""
+    """Whether each segment is foreign, (K, S)."""
+    silhouette: NDArray[np.bool_]
+    """Whether each point of the silhouette is foreign, (K, N)."""
     near: NDArray[np.bool_]
-    """Whether boxes around the contours of the person and of anybody else come within reach of each other, (K,)."""
+    """Whether the box around the person's contour comes within reach of another person's, (K,)."""
 
 
-def _sampled(view: ViewEvidence) -> tuple[Samples | None, Samples | None]:
-    """See `Sharing.samples`."""
+def _samples_of(view: ViewEvidence) -> tuple[Samples | None, Samples | None]:
+    """See `EvidencePool.samples`."""
     silhouette, edges = view.silhouette, view.samples
     if silhouette is None or not len(silhouette.points_px):
         return edges, None
     points = silhouette.points_px
-    return edges, sampled(Segments(points, silhouette.normals, np.arange(len(points) + 1)))
+    return edges, sample_segments(Segments(points, silhouette.normals, np.arange(len(points) + 1)))
 
 
 @lru_cache(maxsize=1)  # not made by the import, which would load a kernel
-def _nothing() -> Samples:
-    """Samples of no segments."""
-    return sampled(Segments(np.empty((0, 2), np.float32), np.empty((0, 2), np.float32), np.zeros(1, np.int64)))
+def _no_samples() -> Samples:
+    """Return samples of no segments."""
+    return sample_segments(Segments(np.empty((0, 2), np.float32), np.empty((0, 2), np.float32), np.zeros(1, np.int64)))
 
 
-# One call for all that is asked of a view: of a dozen calls each hands the interpreter's lock over and waits for it.
+# One call for each view: each call would release the interpreter lock and wait for it again.
 @njit(nogil=True, cache=True)
-def _tell_apart(
-    P: Array, eye: Array, Ts: Array, surfaces: Surfaces, contour: Contour, edges: Samples, outline: Samples,
-    theta_px: float, out: _Theirs,
+def _assign(
+    P: Array, eye: Array, Ts: Array, surfaces: Surfaces, contour: Contour, edges: Samples, silhouette: Samples,
+    theta_px: float, out: _Ownership,
 ) -> None:  # fmt: skip
-    """Tell in one view what is whose.
+    """Compute the ownership of the evidence of one view.
 
     Args:
-        P: the view, as the following three see `contours.trace_view`.
+        P: of the view; see `trace_view` for this and the next three.
         eye: of the view.
-        Ts: of everybody.
-        surfaces: of everybody.
-        contour: room for the contours.
+        Ts: of all people.
+        surfaces: of all people.
+        contour: buffer for the contours.
         edges: samples of the edges.
-        outline: points of the silhouette, each its own segment.
+        silhouette: points of the silhouette, each a segment of its own.
         theta_px: outlier distance, px.
-        out: what is filled.
+        out: is filled.
     """
     reach, n_people = _REACH * theta_px, out.near.shape[0]
     n = trace_view(P, eye, Ts, surfaces, PIECE_PX, contour)
     own, boxes = np.empty((n, 4), np.float32), np.empty((n_people, 4))
     # Distances of the samples from each person's visible contours, px, cut off at the reach.
     to_edges = np.empty((n_people, edges.pixels.points.shape[1]), np.float32)
-    to_outline = np.empty((n_people, outline.pixels.points.shape[1]), np.float32)
+    to_silhouette = np.empty((n_people, silhouette.pixels.points.shape[1]), np.float32)
     for person in range(n_people):
-        m = _take_own(person, n, contour, surfaces.people, own, boxes[person])
-        nearest_alongside(edges.pixels.points, edges.pixels.rows, own[:m], reach, MAX_ANGLE_RAD, to_edges[person])
-        nearest_alongside(outline.pixels.points, outline.pixels.rows, own[:m], reach, MAX_ANGLE_RAD, to_outline[person])
+        m = _take_own_pieces(person, n, contour, surfaces.people, own, boxes[person])
+        nearest_parallel_segment(
+            edges.pixels.points, edges.pixels.rows, own[:m], reach, MAX_ANGLE_RAD, to_edges[person]
+        )
+        nearest_parallel_segment(
+            silhouette.pixels.points, silhouette.pixels.rows, own[:m], reach, MAX_ANGLE_RAD, to_silhouette[person]
+        )
     for a in range(n_people):
         for b in range(n_people):
-            if a != b and _meet(boxes[a], boxes[b], reach):
+            if a != b and _are_near(boxes[a], boxes[b], reach):
                 out.near[a] = True
     for person in range(n_people):
-        _mark_theirs(edges, to_edges, person, theta_px, out.edges[person])
-        _mark_theirs(outline, to_outline, person, theta_px, out.outline[person])
+        _mark_foreign(edges, to_edges, person, theta_px, out.edges[person])
+        _mark_foreign(silhouette, to_silhouette, person, theta_px, out.silhouette[person])
 
 
 @njit(nogil=True, cache=True)
-def _take_own(person: int, n: int, contour: Contour, people: NDArray[np.int64], own: FloatArray, box: Array) -> int:
-    """Take the visible ones of n pieces that are a person's, (n or more, 4), and bound them, (4,); their number."""
+def _take_own_pieces(
+    person: int, n: int, contour: Contour, people: NDArray[np.int64], own: FloatArray, box: Array
+) -> int:
+    """Copy a person's visible pieces among n, (n or more, 4), fill their box, (4,), and return their number."""
     box[:2], box[2:] = np.inf, -np.inf
     m = 0
     for i in range(n):
-        if contour.hidden[i] or people[contour.parts[i]] != person:
+        if contour.occluded[i] or people[contour.parts[i]] != person:
             continue
         for k in range(4):
             own[m, k] = contour.pieces_px[i, k]
@@ -209,25 +218,25 @@ def _take_own(person: int, n: int, contour: Contour, people: NDArray[np.int64], 
 
 
 @njit(nogil=True, cache=True)
-def _meet(a: Array, b: Array, reach: float) -> bool:
-    """Whether two boxes u0, v0, u1, v1, (4,), come within reach; one that holds nothing meets none."""
+def _are_near(a: Array, b: Array, reach: float) -> bool:
+    """Return whether two boxes u0, v0, u1, v1, (4,), come within reach of each other; an empty box does not."""
     return bool(a[0] - reach < b[2] and b[0] - reach < a[2] and a[1] - reach < b[3] and b[1] - reach < a[3])
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _mark_theirs(
-    samples: Samples, distances: FloatArray, person: int, theta_px: float, theirs: NDArray[np.bool_]
+def _mark_foreign(
+    samples: Samples, distances: FloatArray, person: int, theta_px: float, foreign: NDArray[np.bool_]
 ) -> None:
-    """Mark the segments, (S,), whose samples lie along the others' contours and clearly not along a person's own.
+    """Mark the segments, (S,), whose samples lie along others' contours and clearly not along a person's own.
 
     Args:
         samples: of the segments.
-        distances: of the samples from each person's contours, (K, n or more), px.
-        person: whose.
+        distances: of the samples to each person's contours, (K, n or more), px.
+        person: index of the person.
         theta_px: outlier distance, px.
-        theirs: what is marked.
+        foreign: is filled.
     """
-    to_own, to_others = np.zeros(theirs.shape[0]), np.zeros(theirs.shape[0])
+    to_own, to_others = np.zeros(foreign.shape[0]), np.zeros(foreign.shape[0])
     for i in range(samples.pixels.rows[-1, -1]):
         nearest = np.float32(np.inf)
         for other in range(distances.shape[0]):
@@ -236,6 +245,6 @@ def _mark_theirs(
         segment = int(samples.pixels.points[4, i])
         to_own[segment] += distances[person, i]
         to_others[segment] += nearest
-    for s in range(theirs.shape[0]):
+    for s in range(foreign.shape[0]):
         own, others = to_own[s] / samples.counts[s], to_others[s] / samples.counts[s]
-        theirs[s] = others <= ACCEPTED_SHARE * theta_px and others < _CLEARLY * own
+        foreign[s] = others <= ACCEPTED_SHARE * theta_px and others < _OWNERSHIP_RATIO * own

@@ -1,4 +1,4 @@
-"""What a tracker remembers of one person from frame to frame: where they were, their colours, what was searched."""
+"""The state that a tracker carries from frame to frame for one person: poses, colours, and the back-off of searches."""
 
 from collections.abc import Sequence
 
@@ -6,34 +6,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import Colors, PartColors
-from tracker.body.limbs import Limb
+from tracker.body.limbs import Limb, limbs
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import held
+from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.motion.prediction import PredictSettings, predict
-from tracker.tracking import confidence
-from tracker.tracking.confidence import Quality, Status
+from tracker.tracking.confidence import PoseQuality, Status
 
-_LONGEST_PAUSE = 8
-"""A limb that seems lost and is not found is searched at least every so many frames."""
-_UNDOUBTED_PAUSE, _LONGEST_UNDOUBTED = 31, 64
-"""One of several people that nothing speaks against but what no part explains, which may be anybody's, waits so many
-frames after the first search in vain, and so many at most."""
-_LEARN_FRAMES, _TRACKED_SHARE, _GIVEN_SHARE = 3, 0.15, 0.5
-"""Every so many frames the colours of the parts are brought up to date, and what such a frame counts; what a keyframe
-counts against the frames before it."""
-_POSES = 8
-"""Past poses that are remembered."""
+_MAX_BACKOFF_FRAMES = 8
+"""Longest back-off of a limb that seems lost."""
+_CALM_BACKOFF_FRAMES, _MAX_CALM_BACKOFF_FRAMES = 31, 64
+"""First and longest back-off of a limb that does not seem lost itself, where there are several people: the unexplained
+part of the silhouette may be anybody's."""
+_LEARN_FRAMES = 3
+"""The colours of the parts are updated every so many frames."""
+_TRACKED_SHARE, _KEYFRAME_SHARE = 0.15, 0.5
+"""Weight of a tracked frame, and of a keyframe, against the colours learnt before."""
+_HISTORY_FRAMES = 8
 
 
-class Memory:
-    """What is remembered of one person."""
+class PersonMemory:
+    """The state of one person."""
 
     def __init__(
         self,
         model: BodyModel,
         start: Array | Sequence[Array],
-        free: NDArray[np.bool_] | None = None,
+        active_dofs: NDArray[np.bool_] | None = None,
         alone: bool = True,
     ) -> None:
         """Begin with the poses before the first frame.
@@ -41,84 +40,90 @@ class Memory:
         Args:
             model: the body.
             start: the pose from which the first frame is predicted, (n_values,), or several, the last one last.
-            free: the degrees of freedom that may move, (n_dofs,); None: all.
+            active_dofs: the degrees of freedom that may move, (n_dofs,); None: all.
             alone: whether there is nobody else.
         """
-        self.model, self.free, self.alone = model, free, alone
-        moving = np.ones(model.n_dofs, dtype=bool) if free is None else free
-        limbs = [limb._replace(dofs=limb.dofs & moving) for limb in confidence.limbs(model)]
-        self.limbs = [limb for limb in limbs if limb.dofs.any()]
-        """Limbs that may be searched, by what of them may move."""
-        self.past = list(np.atleast_2d(np.array(start)))
-        """Their last poses, the last one last, (n_values,) each."""
-        self.last_good = self.past[-1]
-        """The last pose that nothing spoke against, (n_values,)."""
-        self.known: PartColors | None = None
-        """The colours of their parts; None before the first frame."""
-        self._frames = 0
-        self._pauses: dict[str, tuple[int, int]] = {}  # per limb: when it was searched, and the pause after that
+        self.model, self.active_dofs, self.alone = model, active_dofs, alone
+        active = np.ones(model.n_dofs, dtype=bool) if active_dofs is None else active_dofs
+        restricted = [limb._replace(dofs=limb.dofs & active) for limb in limbs(model)]
+        self.limbs = [limb for limb in restricted if limb.dofs.any()]
+        """Limbs that may be searched, with their active degrees of freedom."""
+        self.history = list(np.atleast_2d(np.array(start)))
+        """The last poses, the last one last, (n_values,) each."""
+        self.last_good = self.history[-1]
+        """The last pose of status "good", (n_values,)."""
+        self.part_colors: PartColors | None = None
+        """The colours of the parts; None before the first frame."""
+        self._n_frames = 0
+        self._backoffs: dict[str, tuple[int, int]] = {}  # by limb: the frame of the last search, and its back-off
 
-    def expected(self, settings: PredictSettings) -> Array:
-        """The predicted pose of the next frame."""
-        return self._expected(settings, self.past)
+    def predict(self, settings: PredictSettings) -> Array:
+        """Return the predicted pose of the next frame, (n_values,)."""
+        return self._predict(settings, self.history)
 
-    def expected_ahead(self, settings: PredictSettings) -> Array:
-        """The predicted pose of the frame after the next one, (n_values,), as if that came as expected."""
-        return self._expected(settings, [*self.past, self.expected(settings)])
+    def predict_two_ahead(self, settings: PredictSettings) -> Array:
+        """Return the predicted pose of the frame after the next, (n_values,), if the next is as predicted."""
+        return self._predict(settings, [*self.history, self.predict(settings)])
 
-    def was_expected(self, settings: PredictSettings) -> Array:
-        """The pose of the next frame, (n_values,), as it was predicted before the last one was known."""
-        return self._expected(settings, [*self.past[:-1], self._expected(settings, self.past[:-1])])
+    def predict_before_last(self, settings: PredictSettings) -> Array:
+        """Return the pose of the next frame, (n_values,), as predicted before the last one was known."""
+        return self._predict(settings, [*self.history[:-1], self._predict(settings, self.history[:-1])])
 
-    def _expected(self, settings: PredictSettings, past: list[Array]) -> Array:
-        return held(self.model, predict(self.model, past, settings), past[-1], self.free)
+    def _predict(self, settings: PredictSettings, history: list[Array]) -> Array:
+        return with_locked_dofs(self.model, predict(self.model, history, settings), history[-1], self.active_dofs)
 
-    def suspects(self, found: Quality) -> list[Limb]:
-        """Limbs worth a search that may move, likeliest to be lost first."""
-        return [x for name in found.suspects(self.alone) for x in self.limbs if x.name == name]
+    def search_candidates(self, quality: PoseQuality) -> list[Limb]:
+        """Return the limbs worth a search that may move, most likely lost first."""
+        return [x for name in quality.search_candidates(self.alone) for x in self.limbs if x.name == name]
 
-    def due(self, found: Quality) -> list[Limb]:
-        """Those of them whose turn it is: one that was searched in vain waits longer each time.
+    def limbs_to_search(self, quality: PoseQuality) -> list[Limb]:
+        """Return the limbs to search now. After each failed search a limb's back-off doubles.
 
-        Of somebody alone a limb that is likelier lost than found does not wait: a limb that moves fast is elsewhere in
-        each frame, and the longer it goes astray the farther off is all that is predicted from it.
+        A single person's limb that is more likely lost than found does not back off. A fast limb is elsewhere in each
+        frame, and predictions from a wrong pose get worse.
 
-        Of several people nobody knows whose it is what no part explains: it makes nobody's limb due while another of
-        theirs seems lost itself, and those that it does wait longer.
-
-        Args:
-            found: what the evidence says of the pose.
-        """
-        suspects, alone = self.suspects(found), self.alone
-        doubted = [] if alone else [x for x in suspects if x.name in found.doubted(alone)]
-        longest = _LONGEST_PAUSE if alone or doubted else _LONGEST_UNDOUBTED
-
-        def rested(limb: Limb) -> bool:
-            last, pause = self._pauses.get(limb.name, (-1, 0))
-            return (alone and limb.name in found.lost) or self._frames > last + min(pause, longest)
-
-        return [x for x in doubted or suspects if rested(x)]
-
-    def searched(self, limb: Limb, before: Quality, found: bool) -> None:
-        """Note how the search for a limb went, and what the evidence had said before."""
-        least = 1 if self.alone or limb.name in before.doubted(self.alone) else _UNDOUBTED_PAUSE
-        longer = max(least, 2 * self._pauses.get(limb.name, (0, 0))[1] + 1)
-        self._pauses[limb.name] = (self._frames, 0 if found else min(_LONGEST_UNDOUBTED, longer))
-
-    def update(self, pose: Array, colors: Colors, status: Status, given: bool) -> None:
-        """Take in what a frame brought.
+        With several people, an unexplained part of the silhouette alone makes no limb due while another limb of the
+        person seems lost.
 
         Args:
-            pose: where they are, (n_values,).
-            colors: of the frame, everybody where they are.
-            status: how sure that is.
-            given: whether a person said so.
+            quality: of the refined pose.
         """
-        self._frames += 1
-        if self.known is None or given:
-            self.known = colors.learn(self.known, _GIVEN_SHARE)
-        elif self._frames % _LEARN_FRAMES == 0 and status != "lost":
-            self.known = colors.learn(self.known, _TRACKED_SHARE)
-        self.past = [*self.past[1 - _POSES :], pose]
+        candidates, alone = self.search_candidates(quality), self.alone
+        doubtful = [] if alone else [x for x in candidates if x.name in quality.doubtful_limbs(alone)]
+        longest = _MAX_BACKOFF_FRAMES if alone or doubtful else _MAX_CALM_BACKOFF_FRAMES
+
+        def cooled_down(limb: Limb) -> bool:
+            last, backoff = self._backoffs.get(limb.name, (-1, 0))
+            return (alone and limb.name in quality.lost) or self._n_frames > last + min(backoff, longest)
+
+        return [x for x in doubtful or candidates if cooled_down(x)]
+
+    def record_search(self, limb: Limb, before: PoseQuality, found: bool) -> None:
+        """Record the outcome of a limb search.
+
+        Args:
+            limb: the limb that was searched.
+            before: quality of the pose before the search.
+            found: whether the limb moved.
+        """
+        calm = not (self.alone or limb.name in before.doubtful_limbs(self.alone))
+        longer = max(_CALM_BACKOFF_FRAMES if calm else 1, 2 * self._backoffs.get(limb.name, (0, 0))[1] + 1)
+        self._backoffs[limb.name] = (self._n_frames, 0 if found else min(_MAX_CALM_BACKOFF_FRAMES, longer))
+
+    def update(self, pose: Array, colors: Colors, status: Status, keyframe: bool) -> None:
+        """Take in the result of a frame.
+
+        Args:
+            pose: of the person, (n_values,).
+            colors: of the frame, with all people in their poses.
+            status: of the pose.
+            keyframe: whether the pose is a keyframe.
+        """
+        self._n_frames += 1
+        if self.part_colors is None or keyframe:
+            self.part_colors = colors.learn(self.part_colors, _KEYFRAME_SHARE)
+        elif self._n_frames % _LEARN_FRAMES == 0 and status != "lost":
+            self.part_colors = colors.learn(self.part_colors, _TRACKED_SHARE)
+        self.history = [*self.history[1 - _HISTORY_FRAMES :], pose]
         if status == "good":
             self.last_good = pose

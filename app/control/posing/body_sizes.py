@@ -1,19 +1,18 @@
 """Editing the sizes of bodies: a draft that the views show, then a new revision of the model, undone as edits are."""
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from app.control.search.search_runs import Runs
-from app.control.session.session_state import Screen
-from app.state.state import SizeDraft
-from tracker.body.dimensions import BodyDimensions, PartDimensions, mirror_part, scaled, sizes_of, with_sizes
+from app.control.search.search_runs import SearchRuns
+from app.control.session.activities import Activities
+from app.control.session.session_state import SessionState
+from app.state.people import SizeDraft
+from tracker.body.dimensions import BodyDimensions, PartDimensions, dimensions_of, mirror_part, scaled, with_dimensions
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.posing.retarget import rebodied
+from tracker.posing.retarget import retarget_pose
 from tracker.session.session import save_model
 from tracker.store.records import Change, PoseChange
 
@@ -30,27 +29,27 @@ class _Refitted(NamedTuple):
     """Mean distance of their joints from where they were, metres."""
 
 
-class Sizing:
+class BodySizeEditing:
     """The sizes of everybody in the session; at most one person's are being edited."""
 
-    def __init__(self, screen: Screen, runs: Runs, editing: Callable[[], AbstractContextManager[None]]) -> None:
+    def __init__(self, session_state: SessionState, runs: SearchRuns, activities: Activities) -> None:
         """Edit the sizes of who is on this screen.
 
         Args:
             screen: holds the state.
             runs: searches as they went; of other sizes they mean nothing any more.
-            editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
+            activities: ends jobs and gestures before an edit.
         """
-        self._screen, self._runs, self._editing = screen, runs, editing
+        self._session_state, self._runs, self._activities = session_state, runs, activities
 
     def model(self, person: int) -> BodyModel:
         """The body of a person as it is being edited, else the present one."""
-        draft = self._screen.state.draft
-        return draft.model if draft is not None and draft.person == person else self._screen.present[person]
+        draft = self._session_state.state.draft
+        return draft.model if draft is not None and draft.person == person else self._session_state.present[person]
 
     def couple(self, alike: bool) -> None:
         """Edit both sides at once from now on, or each by itself."""
-        self._screen.set(sides_alike=alike)
+        self._session_state.set(sides_alike=alike)
 
     def set_height(self, person: int, height_m: float) -> None:
         """Scale the draft as a whole to another body height, metres.
@@ -58,21 +57,21 @@ class Sizing:
         Raises:
             TrackerError: nobody is that tall.
         """
-        with self._screen.lock:
+        with self._session_state.lock:
             sizes = self._sizes(person)
             # Lengths are checked against the height, which a wrong number must not divide by.
             wrong = not (np.isfinite(height_m) and height_m > 0)
             self._draft(person, sizes._replace(height_m=height_m) if wrong else scaled(sizes, height_m))
 
     def set_part(self, person: int, part: str, sizes: PartDimensions) -> None:
-        """Give a part of the draft other sizes, and its twin where both sides are edited at once.
+        """Give a part of the draft other sizes, and its mirror_part where both sides are edited at once.
 
         Raises:
             TrackerError: no part has such sizes.
         """
-        with self._screen.lock:
+        with self._session_state.lock:
             before = self._sizes(person)
-            other = mirror_part(part) if self._screen.state.sides_alike else None
+            other = mirror_part(part) if self._session_state.state.sides_alike else None
             both = {name: sizes for name in (part, other) if name is not None and name in before.parts}
             self._draft(person, before._replace(parts={**before.parts, **both}))
 
@@ -82,7 +81,7 @@ class Sizing:
         Raises:
             TrackerError: no body is that wide.
         """
-        with self._screen.lock:
+        with self._session_state.lock:
             before = self._sizes(person)
             self._draft(person, before._replace(widths_m={**before.widths_m, girdle: width_m}))
 
@@ -92,16 +91,16 @@ class Sizing:
         Raises:
             TrackerError: the person has always had these.
         """
-        with self._screen.lock:
-            former = self._screen.saver.former_body(person)
+        with self._session_state.lock:
+            former = self._session_state.saver.former_body(person)
             if former is None:
-                name = self._screen.session.people[person].name
+                name = self._session_state.session.people[person].name
                 raise TrackerError(f"expected sizes that {name} had before, found none; these are the first")
-            self._screen.set(draft=SizeDraft(person, former), sizes_message="")
+            self._session_state.set(draft=SizeDraft(person, former), sizes_message="")
 
     def discard(self) -> None:
         """Edit no more; the sizes stay as they are."""
-        self._screen.set(draft=None, sizes_message="")
+        self._session_state.set(draft=None, sizes_message="")
 
     def apply(self, person: int, refit: bool) -> None:
         """Make the draft the present body: a new revision, on disk when this returns, and one entry of the history.
@@ -114,12 +113,14 @@ class Sizing:
         Raises:
             TrackerError: there is nothing to change, or it cannot be written.
         """
-        with self._editing():
-            screen, name = self._screen, self._screen.session.people[person].name
-            before, model = screen.saver.revision(person), self.model(person)
-            same = model is screen.present[person] or sizes_of(model) == sizes_of(screen.present[person])
+        with self._activities.editing():
+            session_state, name = self._session_state, self._session_state.session.people[person].name
+            before, model = session_state.saver.revision(person), self.model(person)
+            same = model is session_state.present[person] or dimensions_of(model) == dimensions_of(
+                session_state.present[person]
+            )
             if not same:
-                screen.embody(save_model(screen.session, person, model))
+                session_state.set_body_models(save_model(session_state.session, person, model))
             refitted = self._refit(person) if refit else _Refitted([], 0.0)
             if same and not refitted.changes:
                 raise TrackerError(
@@ -129,16 +130,17 @@ class Sizing:
             n = len(refitted.changes)
             counted = f", {n} keyframe{'' if n == 1 else 's'} refitted" if n else ""
             told = counted if refit else ", poses kept"
-            edit = screen.saver.write(
+            edit = session_state.saver.write(
                 f"sizes of {name}{told}", refitted.changes, None, by_program=False, even_empty=True
             )
-            if edit is not None and screen.saver.error is None:
-                edits = screen.saver.setting(_KEY, {})
-                screen.saver.keep_setting(_KEY, {**edits, str(edit): [name, before, screen.saver.revision(person)]})
+            if edit is not None and session_state.saver.error is None:
+                saver = session_state.saver
+                change = {str(edit): [name, before, saver.revision(person)]}
+                saver.keep_setting(_KEY, {**saver.setting(_KEY, {}), **change})
             off = f", joints {refitted.off_m * 1000:.0f} mm off on average" if n else ""
             self._runs.clear()
-            screen.refresh_saving()
-            screen.show(screen.state.frame, draft=None, sizes_message=f"Applied{told}{off}.")
+            session_state.refresh_saving()
+            session_state.show_frame(session_state.state.frame, draft=None, sizes_message=f"Applied{told}{off}.")
 
     def follow(self) -> None:
         """Bring back the bodies that belong to where the history has just been moved.
@@ -146,44 +148,48 @@ class Sizing:
         Raises:
             TrackerError: a body cannot be written.
         """
-        screen, saver = self._screen, self._screen.saver
+        session_state, saver = self._session_state, self._session_state.saver
         edits = saver.setting(_KEY, {})
         latest = next((e for e in saver.history(1) if not e.undone), None)
-        for edit in saver.passed:
+        for edit in saver.moved_edits:
             name, before, after = edits.get(str(edit), (None, 0, 0))
-            person = next((i for i, p in enumerate(screen.session.people) if p.name == name), None)
+            person = next((i for i, p in enumerate(session_state.session.people) if p.name == name), None)
             if person is None:
                 continue
             # A move goes one way: where its last entry is done now, all of them are.
-            done = latest is not None and latest.edit == saver.passed[-1]
+            done = latest is not None and latest.edit == saver.moved_edits[-1]
             model = saver.body(after if done else before)
-            if model is not screen.present[person]:
-                screen.embody(save_model(screen.session, person, model))
+            if model is not session_state.present[person]:
+                session_state.set_body_models(save_model(session_state.session, person, model))
             self._runs.clear()
-            screen.set(draft=None, sizes_message="")
+            session_state.set(draft=None, sizes_message="")
 
     def _sizes(self, person: int) -> BodyDimensions:
-        return sizes_of(self.model(person))
+        return dimensions_of(self.model(person))
 
     def _draft(self, person: int, sizes: BodyDimensions) -> None:
         if sizes == self._sizes(person):
             return
-        model = with_sizes(self._screen.present[person], sizes)
-        self._screen.set(draft=SizeDraft(person, model), sizes_message="")
+        model = with_dimensions(self._session_state.present[person], sizes)
+        self._session_state.set(draft=SizeDraft(person, model), sizes_message="")
 
     def _refit(self, person: int) -> _Refitted:
         """The keyframes of a person that were made with another body, taken over into the present one."""
-        screen, saver = self._screen, self._screen.saver
-        cameras = [c.camera for c in screen.session.cameras]
-        becomes, revision, name = screen.present[person], saver.revision(person), screen.session.people[person].name
+        session_state, saver = self._session_state, self._session_state.saver
+        cameras = [c.camera for c in session_state.session.cameras]
+        becomes, revision, name = (
+            session_state.present[person],
+            saver.revision(person),
+            session_state.session.people[person].name,
+        )
         changes: list[Change] = []
         off_m: list[float] = []
-        for row in saver.rows(person, range(screen.session.n_frames)):
+        for row in saver.rows(person, range(session_state.session.n_frames)):
             record = saver.record(person, row.frame) if row.keyframe else None
             if record is None or record.model_revision == revision or not saver.fits(person, record.model_revision):
                 continue
             was, pins = saver.body(record.model_revision), saver.pins(person, row.frame)
-            values = rebodied(record.values, was, becomes, pins, cameras, screen.free(person))
+            values = retarget_pose(record.values, was, becomes, pins, cameras, session_state.active_dofs(person))
             told = {"method": "refit", "model_revision": record.model_revision}
             pose = replace(
                 record, values=values, model_revision=revision, status="", cost_px=None, settings=told,

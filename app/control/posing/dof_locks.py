@@ -1,25 +1,25 @@
 """Locked degrees of freedom: what neither a hand nor a search nor a fit moves; kept with the session."""
 
-from collections.abc import Callable, Collection
-from contextlib import AbstractContextManager
+from collections.abc import Collection
 
-from app.control.session.session_state import Screen
+from app.control.session.activities import Activities
+from app.control.session.session_state import SessionState
 from tracker.body.model import BodyModel
-from tracker.session.locked_dofs import SETTING, kept_locks, to_keep
+from tracker.session.locked_dofs import SETTING, load_locks, locks_setting
 
 
-class Locks:
+class DofLocks:
     """The locks of everybody in the session."""
 
-    def __init__(self, screen: Screen, editing: Callable[[], AbstractContextManager[None]]) -> None:
+    def __init__(self, session_state: SessionState, activities: Activities) -> None:
         """Take over the locks that are kept with the session.
 
         Args:
             screen: holds the state.
-            editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
+            activities: ends jobs and gestures before an edit.
         """
-        self._screen, self._editing = screen, editing
-        screen.set(locked=kept_locks(screen.session.people, screen.saver.setting))
+        self._session_state, self._activities = session_state, activities
+        session_state.set(locked=load_locks(session_state.session.people, session_state.saver.setting))
 
     def set(self, person: int, dofs: Collection[int], locked: bool) -> None:
         """Lock or unlock degrees of freedom of a person, each ball joint as a whole; on disk when this returns.
@@ -27,16 +27,18 @@ class Locks:
         Raises:
             TrackerError: the session's settings cannot be written.
         """
-        model = self._screen.models[person]
+        model = self._session_state.models[person]
         chosen = _with_whole_balls(model, {d for d in dofs if 0 <= d < model.n_dofs})
-        with self._editing():
-            before = self._screen.state.locked
+        with self._activities.editing():
+            before = self._session_state.state.locked
             now = before[person] | chosen if locked else before[person] - chosen
             if now == before[person]:
                 return
             everybody = (*before[:person], now, *before[person + 1 :])
-            self._screen.saver.keep_setting(SETTING, to_keep(self._screen.session.people, everybody))
-            self._screen.set(locked=everybody)
+            self._session_state.saver.keep_setting(
+                SETTING, locks_setting(self._session_state.session.people, everybody)
+            )
+            self._session_state.set(locked=everybody)
 
 
 def _with_whole_balls(model: BodyModel, dofs: Collection[int]) -> frozenset[int]:

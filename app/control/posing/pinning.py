@@ -1,14 +1,14 @@
 """Pins by hand: set, moved, removed; the fit that takes them in. Each gesture is one entry of the history."""
 
 import time
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from app.control.session.session_state import Screen
-from app.state.state import Shown
+from app.control.session.activities import Activities
+from app.control.session.session_state import SessionState
+from app.state.people import ShownPose
 from tracker.body.limbs import display_name
 from tracker.errors import TrackerError
 from tracker.geometry.triangulation import PointObservation
@@ -31,7 +31,7 @@ class _Held:
     camera: int
     pins: Pins
     """The pins of everybody before the gesture."""
-    people: tuple[Shown, ...]
+    people: tuple[ShownPose, ...]
     """Everybody before the gesture: where each of its fits starts from, so that only the pin's place decides."""
     live: bool
     """Whether the body follows while the pin moves."""
@@ -40,15 +40,16 @@ class _Held:
 class Pinning:
     """The pins of the frame that is shown; at most one is in a hand."""
 
-    def __init__(self, screen: Screen, editing: Callable[[], AbstractContextManager[None]]) -> None:
+    def __init__(self, session_state: SessionState, activities: Activities) -> None:
         """Pin who is on this screen.
 
         Args:
             screen: holds the state.
-            editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
+            activities: ends jobs and gestures before an edit.
         """
-        self._screen, self._editing = screen, editing
+        self._session_state, self._activities = session_state, activities
         self._held: _Held | None = None
+        activities.add_gesture(self.finish)
 
     def begin(
         self, page: int, frame: int, camera: int, person: int, point: str, position_px: tuple[float, float], live: bool
@@ -61,16 +62,18 @@ class Pinning:
             camera: index of the view.
             person: index of the person.
             point: name of the point.
-            place_px: where it is seen, undistorted px.
+            position_px: where it is seen, undistorted px.
             live: whether the body follows as the pin is moved.
 
         Raises:
             TrackerError: the place is outside of the image.
         """
-        session = self._screen.session
+        session = self._session_state.session
         if not (0 <= frame < session.n_frames and 0 <= camera < len(session.cameras)):
             return
-        if not (0 <= person < len(self._screen.models) and point in self._screen.models[person].point_names):
+        if not (
+            0 <= person < len(self._session_state.models) and point in self._session_state.models[person].point_names
+        ):
             return
         source = session.cameras[camera].camera
         if _within(position_px, source.size) != position_px:
@@ -78,45 +81,47 @@ class Pinning:
                 f"expected a pin within the {source.width}x{source.height} px of {source.name}, found it at "
                 f"({position_px[0]:.0f}, {position_px[1]:.0f}); set it where the image shows the joint"
             )
-        with self._editing():
-            self._screen.go_to(frame)
-            state = self._screen.state
+        with self._activities.editing():
+            self._session_state.go_to(frame)
+            state = self._session_state.state
             self._held = _Held(page, person, point, camera, state.pins, state.people, live)
-            self._screen.last_save = time.monotonic()
+            self._session_state.last_save = time.monotonic()
             pins = _with(state.pins, person, PointObservation(point, camera, position_px))
-            self._screen.set(person=person, point=point, pins=pins, holds_pin=True)
+            self._session_state.set(person=person, point=point, pins=pins, is_pin_held=True)
 
     def move(self, page: int, position_px: tuple[float, float]) -> None:
         """Move the pin in the hand, at most to the border of the image; the body follows where that was wanted."""
-        with self._screen.lock:
+        with self._session_state.lock:
             held = self._held
             if held is None or page != held.page:
                 return
-            position_px = _within(position_px, self._screen.session.cameras[held.camera].camera.size)
-            pins = _with(self._screen.state.pins, held.person, PointObservation(held.point, held.camera, position_px))
-            if pins == self._screen.state.pins:
+            position_px = _within(position_px, self._session_state.session.cameras[held.camera].camera.size)
+            pins = _with(
+                self._session_state.state.pins, held.person, PointObservation(held.point, held.camera, position_px)
+            )
+            if pins == self._session_state.state.pins:
                 return  # a click only sets it
             if held.live:
                 self._show_fit([held.person], held.people, pins)
             else:
-                self._screen.set(pins=pins)
-            if time.monotonic() - self._screen.last_save > _CHECKPOINT_S:
+                self._session_state.set(pins=pins)
+            if time.monotonic() - self._session_state.last_save > _CHECKPOINT_S:
                 self._save(held)
 
     def end(self, page: int) -> None:
         """Let go: the gesture is one entry of the history, on disk when this returns."""
-        with self._screen.lock:
+        with self._session_state.lock:
             if self._held is not None and page == self._held.page:
                 self.finish()
 
     def cancel(self, page: int) -> None:
         """Let go and put pins and body back where they were."""
-        with self._screen.lock:
+        with self._session_state.lock:
             held = self._held
             if held is None or page != held.page:
                 return
             self._held = None
-            self._screen.take_back(held)
+            self._session_state.revert(held)
 
     def finish(self) -> None:
         """End the gesture at hand, if there is one, and save it; called under the lock."""
@@ -124,25 +129,25 @@ class Pinning:
         if held is None:
             return
         self._save(held)
-        self._held = self._screen.edit_of = None
-        self._screen.set(holds_pin=False)
+        self._held = self._session_state.open_edit_owner = None
+        self._session_state.set(is_pin_held=False)
 
     def remove(self, frame: int, person: int, point: str | None = None, camera: int | None = None) -> None:
         """Take away the pins of a person on a frame: of one point, in one view, or all; one entry of the history."""
-        if not (0 <= frame < self._screen.session.n_frames and 0 <= person < len(self._screen.models)):
+        if not (0 <= frame < self._session_state.session.n_frames and 0 <= person < len(self._session_state.models)):
             return
-        with self._editing():
-            self._screen.go_to(frame)
-            pins = list(self._screen.state.pins)
+        with self._activities.editing():
+            self._session_state.go_to(frame)
+            pins = list(self._session_state.state.pins)
             pins[person] = tuple(
                 p for p in pins[person]
                 if not ((point is None or p.point == point) and (camera is None or p.camera == camera))
             )  # fmt: skip
-            if len(pins[person]) == len(self._screen.state.pins[person]):
+            if len(pins[person]) == len(self._session_state.state.pins[person]):
                 return
-            self._screen.set(pins=tuple(pins))
+            self._session_state.set(pins=tuple(pins))
             what = "remove all pins" if point is None else f"remove pin {display_name(point)}{self._in(camera)}"
-            self._screen.save(what, "manual")
+            self._session_state.save(what, "manual")
 
     def fit(self, frame: int, person: int | None = None) -> None:
         """Fit people to pins and edges together.
@@ -155,12 +160,12 @@ class Pinning:
         Raises:
             TrackerError: there is nothing to fit to: neither pins nor, yet, edges.
         """
-        if not 0 <= frame < self._screen.session.n_frames:
+        if not 0 <= frame < self._session_state.session.n_frames:
             return
-        with self._editing():
-            self._screen.go_to(frame)
-            state = self._screen.state
-            views = self._screen.frames.evidence_at_hand(frame)
+        with self._activities.editing():
+            self._session_state.go_to(frame)
+            state = self._session_state.state
+            views = self._session_state.frames.cached_evidence(frame)
             placed = [i for i, shown in enumerate(state.people) if shown.source is not None or state.pins[i]]
             meant = {state.person, *placed} if person is None else {person}
             pinned = sorted(i for i in meant if state.pins[i])
@@ -172,35 +177,42 @@ class Pinning:
             people = sorted(meant) if views is not None else pinned
             self._show_fit(people, state.people, state.pins)
             told = " and ".join([*(["pins"] if pinned else []), *(["edges"] if views is not None else [])])
-            self._screen.save(f"fit to {told}", "fitted")
+            self._session_state.save(f"fit to {told}", "fitted")
 
-    def _show_fit(self, fitted: Iterable[int], start: tuple[Shown, ...], pins: Pins) -> None:
+    def _show_fit(self, fitted: Iterable[int], start: tuple[ShownPose, ...], pins: Pins) -> None:
         """Fit some people from a start, the others as they stand, and show them."""
-        screen = self._screen
+        session_state = self._session_state
         fitted = list(fitted)
-        views = screen.frames.evidence_at_hand(screen.state.frame)
-        cameras = [c.camera for c in screen.session.cameras]
-        free = [screen.free(person) for person in range(len(screen.models))]
+        views = session_state.frames.cached_evidence(session_state.state.frame)
+        cameras = [c.camera for c in session_state.session.cameras]
+        free = [session_state.active_dofs(person) for person in range(len(session_state.models))]
         found = fit_frame(
-            screen.models, [p.values for p in start], pins, cameras, views, screen.state.settings, fitted, free
+            session_state.models,
+            [p.values for p in start],
+            pins,
+            cameras,
+            views,
+            session_state.state.settings,
+            fitted,
+            free,
         )
         people = list(start)
         for person in fitted:
             sources = tuple("pinned" if by_pin else "fitted" for by_pin in found.pinned[person])
-            people[person] = Shown(found.poses[person], "pinned" if pins[person] else "fitted", sources=sources)
-        poses = tuple(p.values for p in people)
-        screen.set(people=tuple(people), pins=pins, **screen.costs(poses))
+            people[person] = ShownPose(found.poses[person], "pinned" if pins[person] else "fitted", sources=sources)
+        costs = session_state.costs(tuple(p.values for p in people))
+        session_state.set(people=tuple(people), pins=pins, **costs)
 
     def _save(self, held: _Held) -> None:
         """Write what the gesture has done so far."""
         had = any((p.point, p.camera) == (held.point, held.camera) for p in held.pins[held.person])
-        if held.pins == self._screen.state.pins and self._screen.edit_of is not held:
+        if held.pins == self._session_state.state.pins and self._session_state.open_edit_owner is not held:
             return
         what = f"{'move' if had else 'set'} pin {display_name(held.point)}{self._in(held.camera)}"
-        self._screen.save(what, "fitted", held)
+        self._session_state.save(what, "fitted", held)
 
     def _in(self, camera: int | None) -> str:
-        return "" if camera is None else f" in {self._screen.session.cameras[camera].camera.name}"
+        return "" if camera is None else f" in {self._session_state.session.cameras[camera].camera.name}"
 
 
 def _with(pins: Pins, person: int, pin: PointObservation) -> Pins:

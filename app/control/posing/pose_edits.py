@@ -1,12 +1,13 @@
 """Posing without a drag: numbers, steps, and whole poses at a stroke. Each is one entry of the history."""
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
-from app.control.session.session_state import Screen
+from app.control.session.activities import Activities
+from app.control.session.session_state import SessionState
 from tracker.body.limbs import display_name, limb_display_name
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
@@ -14,7 +15,7 @@ from tracker.geometry.arrays import Array
 from tracker.posing import drag
 from tracker.posing.edits import bent_alike, limb_of, mirrored, taken_over
 from tracker.posing.orient import orient
-from tracker.posing.retarget import rebodied
+from tracker.posing.retarget import retarget_pose
 
 _SAME_GESTURE_S = 1.0
 """Changes of one slider, or steps of one joint, within this time of each other are one entry of the history."""
@@ -26,14 +27,14 @@ _TURNED = 1e-6
 class PoseEdits:
     """Changes the pose of a person on the frame that the user saw; what is locked stays."""
 
-    def __init__(self, screen: Screen, editing: Callable[[], AbstractContextManager[None]]) -> None:
+    def __init__(self, session_state: SessionState, activities: Activities) -> None:
         """Pose who is on this screen.
 
         Args:
             screen: holds the state.
-            editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
+            activities: ends jobs and gestures before an edit.
         """
-        self._screen, self._editing = screen, editing
+        self._session_state, self._activities = session_state, activities
 
     def set_dof(self, person: int, dof: int, value: float, frame: int | None = None) -> None:
         """Set one degree of freedom, rad or metres; what lies beyond its limits ends there.
@@ -78,8 +79,8 @@ class PoseEdits:
             TrackerError: the view does not see the point, or whatever moves it is locked.
         """
         with self._on(person, frame) as model:
-            view = self._screen.session.cameras[camera].camera.pinhole
-            values = self._screen.state.poses[person]
+            view = self._session_state.session.cameras[camera].camera.pinhole
+            values = self._session_state.state.poses[person]
             name = model.point_names[0] if point is None else point
             place = model.points_world(values)[model.point_names.index(name)]
             step = view.T_world_camera[:3, :3] @ np.array([right_m, -up_m, 0.0])
@@ -88,7 +89,7 @@ class PoseEdits:
                 raise TrackerError(
                     f"expected {display_name(name)} before {view.name}, found it behind; choose another view"
                 )
-            hand = drag.grab(model, values, view, name, start, self._screen.free(person))
+            hand = drag.grab(model, values, view, name, start, self._session_state.active_dofs(person))
             label = f"nudge {display_name(name)}"
             self._take(person, drag.drag(hand, end, values), label, ("nudge", name, camera))
 
@@ -103,7 +104,7 @@ class PoseEdits:
             gesture: what is done with the same one is one entry of the history.
         """
         with self._on(person, None) as model:
-            values, free = self._screen.state.poses[person], self._screen.free(person)
+            values, free = self._session_state.state.poses[person], self._session_state.active_dofs(person)
             T = model.kinematics(values).Ts_world_part[part]
             if position_world is not None:
                 step = np.zeros(model.n_dofs)
@@ -116,8 +117,12 @@ class PoseEdits:
     def mirror(self, person: int, frame: int | None = None) -> None:
         """Exchange left and right in the body's own plane of symmetry."""
         with self._on(person, frame) as model:
-            values = self._screen.state.poses[person]
-            self._take(person, taken_over(model, values, mirrored(model, values), self._screen.free(person)), "mirror")
+            values = self._session_state.state.poses[person]
+            self._take(
+                person,
+                taken_over(model, values, mirrored(model, values), self._session_state.active_dofs(person)),
+                "mirror",
+            )
 
     def copy_from(self, person: int, other: int, frame: int | None = None) -> None:
         """Take over the stored pose of another frame.
@@ -126,15 +131,17 @@ class PoseEdits:
             TrackerError: the person has no pose there.
         """
         with self._on(person, frame) as model:
-            stored = self._screen.saver.pose(person, other)
+            stored = self._session_state.saver.pose(person, other)
             if stored is None:
-                name = self._screen.session.people[person].name
+                name = self._session_state.session.people[person].name
                 raise TrackerError(
                     f"expected a pose of {name} on frame {other} to copy, found none; choose another frame"
                 )
             assert stored.revision is not None
-            copied = rebodied(stored.values, self._screen.saver.body(stored.revision), model)
-            values = taken_over(model, self._screen.state.poses[person], copied, self._screen.free(person))
+            copied = retarget_pose(stored.values, self._session_state.saver.body(stored.revision), model)
+            values = taken_over(
+                model, self._session_state.state.poses[person], copied, self._session_state.active_dofs(person)
+            )
             self._take(person, values, f"copy frame {other}")
 
     def copy_person(self, person: int, other: int, frame: int | None = None) -> None:
@@ -143,45 +150,47 @@ class PoseEdits:
         Raises:
             TrackerError: there is nobody else of that index.
         """
-        if other == person or not 0 <= other < len(self._screen.models):
+        if other == person or not 0 <= other < len(self._session_state.models):
             raise TrackerError(f"expected another person to copy the pose of, found number {other}; choose another")
         with self._on(person, frame) as model:
-            values, body = self._screen.state.poses, self._screen.models[other]
-            bent = bent_alike(model, values[person], body, values[other], self._screen.free(person))
-            self._take(person, bent, f"copy the pose of {self._screen.session.people[other].name}")
+            values, body = self._session_state.state.poses, self._session_state.models[other]
+            bent = bent_alike(model, values[person], body, values[other], self._session_state.active_dofs(person))
+            self._take(person, bent, f"copy the pose of {self._session_state.session.people[other].name}")
 
     def reset(self, person: int, point: str | None, frame: int | None = None) -> None:
         """Put the limb of a point back to the neutral pose; without a point, or with the root's, all but the root."""
         with self._on(person, frame) as model:
             limb, dofs = limb_of(model, point)
-            dofs = dofs & self._screen.free(person)
-            values = taken_over(model, self._screen.state.poses[person], model.neutral(), dofs)
+            dofs = dofs & self._session_state.active_dofs(person)
+            values = taken_over(model, self._session_state.state.poses[person], model.neutral(), dofs)
             self._take(person, values, f"reset {limb_display_name(limb)}")
 
     @contextmanager
     def _on(self, person: int, frame: int | None) -> Iterator[BodyModel]:
         """Work on the frame that the user saw; gives the person's model."""
-        with self._editing():
-            self._screen.go_to(frame)
-            yield self._screen.models[person]
+        with self._activities.editing():
+            self._session_state.go_to(frame)
+            yield self._session_state.models[person]
 
     def _numbers(self, person: int) -> Array:
         """The pose as one number for each degree of freedom, (n_dofs,), rad or metres."""
-        model = self._screen.models[person]
-        return model.difference(self._screen.state.poses[person], model.neutral())
+        model = self._session_state.models[person]
+        return model.difference(self._session_state.state.poses[person], model.neutral())
 
     def _set_numbers(self, person: int, dof: int, numbers: Array, label: str) -> None:
-        model, before = self._screen.models[person], self._screen.state.poses[person]
-        if dof in self._screen.state.locked[person]:
+        model, before = self._session_state.models[person], self._session_state.state.poses[person]
+        if dof in self._session_state.state.locked[person]:
             raise TrackerError(f"{display_name(model.dof_names[dof])} is locked; unlock it to change it")
         changed = model.clip(model.retract(model.neutral(), numbers))
         self._take(person, taken_over(model, before, changed, np.arange(model.n_dofs) == dof), label, ("dof", dof))
 
     def _take(self, person: int, values: Array, label: str, gesture: object = None, lasting: bool = False) -> None:
         """Show and save a pose; steps of one gesture in quick succession, or of a lasting one, are one entry."""
-        screen = self._screen
-        screen.pose(person, values)
-        gesture = (label, person, screen.state.frame, gesture) if gesture is not None else object()
-        if gesture != screen.edit_of or (not lasting and time.monotonic() - screen.last_save > _SAME_GESTURE_S):
-            screen.edit_of = None
-        screen.save(label, "manual", gesture)
+        session_state = self._session_state
+        session_state.show_pose(person, values)
+        gesture = (label, person, session_state.state.frame, gesture) if gesture is not None else object()
+        if gesture != session_state.open_edit_owner or (
+            not lasting and time.monotonic() - session_state.last_save > _SAME_GESTURE_S
+        ):
+            session_state.open_edit_owner = None
+        session_state.save(label, "manual", gesture)

@@ -1,14 +1,15 @@
 """The cost over the range of one degree of freedom, the others held: how steep, how wide, how many valleys."""
 
 import threading
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 
 import numpy as np
 
-from app.control.session.session_state import Screen
-from app.runtime.jobs import Latest
-from app.state.state import Landscape, State
+from app.control.session.activities import Activities
+from app.control.session.session_state import SessionState
+from app.runtime.jobs import LatestWinsWorker
+from app.state.search import CostLandscape
+from app.state.state import State
 from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
@@ -23,30 +24,30 @@ _REST_S = 0.08
 """Least time between two landscapes: the pose may change much faster."""
 
 
-class Landscapes:
+class CostLandscapes:
     """Works out the landscape in the background while a page looks at it; the newest pose wins."""
 
-    def __init__(self, screen: Screen, editing: Callable[[], AbstractContextManager[None]]) -> None:
+    def __init__(self, session_state: SessionState, activities: Activities) -> None:
         """Follow the screen; nothing is worked out until a page looks.
 
         Args:
             screen: holds the state.
-            editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
+            activities: ends jobs and gestures before an edit.
         """
-        self._screen, self._editing = screen, editing
+        self._session_state, self._activities = session_state, activities
         self._pages: set[int] = set()
         self._pages_lock = threading.Lock()
         self._dof: str | None = None
         self._worked_out: tuple[object, ...] = ()
-        self._latest = Latest(self._work_out, "landscape", _REST_S)
-        screen.subscribe(self._changed)
+        self._latest = LatestWinsWorker(self._work_out, "landscape", _REST_S)
+        session_state.subscribe(self._changed)
 
     def watch(self, page: int, looks: bool) -> None:
         """Note whether a page looks at the landscape."""
         with self._pages_lock:
             (self._pages.add if looks else self._pages.discard)(page)
         if looks:
-            self._latest.offer(self._screen.state)
+            self._latest.offer(self._session_state.state)
 
     def choose(self, dof: str) -> None:
         """Look at another degree of freedom of the person worked on, by its name.
@@ -54,13 +55,13 @@ class Landscapes:
         Raises:
             TrackerError: the person has none of that name.
         """
-        model = self._screen.models[self._screen.state.person]
+        model = self._session_state.models[self._session_state.state.person]
         if dof not in model.dof_names:
             raise TrackerError(
                 f"expected a degree of freedom such as {model.dof_names[0]}, found '{dof}'; choose one from the list"
             )
         self._dof = dof
-        self._latest.offer(self._screen.state)
+        self._latest.offer(self._session_state.state)
 
     def set_value(self, person: int, dof: int, value: float) -> None:
         """Put a degree of freedom where the landscape was clicked, rad or metres: one edit.
@@ -68,32 +69,32 @@ class Landscapes:
         Raises:
             TrackerError: there is no such person or degree of freedom, it is locked, or the value is no number.
         """
-        models = self._screen.models
+        models = self._session_state.models
         if not (0 <= person < len(models) and 0 <= dof < models[person].n_dofs and np.isfinite(value)):
             raise TrackerError(
                 "expected a value of one of the body's degrees of freedom, found another; reload the page"
             )
-        if dof in self._screen.state.locked[person]:
+        if dof in self._session_state.state.locked[person]:
             raise TrackerError(
                 f"expected a degree of freedom that may move, "
                 f"found {models[person].dof_names[dof]} locked; unlock it first"
             )
-        with self._editing():
-            model, state = models[person], self._screen.state
+        with self._activities.editing():
+            model, state = models[person], self._session_state.state
             values = model.clip(along(model, state.poses[person], dof, np.array([value]))[0])
-            self._screen.pose(person, values)
-            self._screen.save(f"set {display_name(model.dof_names[dof])}", "manual")
+            self._session_state.show_pose(person, values)
+            self._session_state.save(f"set {display_name(model.dof_names[dof])}", "manual")
 
     def close(self) -> None:
         """End the thread."""
         self._latest.close()
 
     def _changed(self, state: State) -> None:
-        if self._pages and not state.job.running:
+        if self._pages and not state.search.running:
             self._latest.offer(state)
 
     def _work_out(self, state: State) -> None:
-        views = self._screen.frames.evidence_at_hand(state.frame)
+        views = self._session_state.frames.cached_evidence(state.frame)
         person, poses = state.person, state.poses
         model = state.models[person]
         dof = self._dof_of(model, state)
@@ -102,7 +103,7 @@ class Landscapes:
             return
         found = landscape(views, state.models, poses, state.settings, person, dof)
         self._worked_out = key
-        self._screen.set(landscape=found)
+        self._session_state.set(landscape=found)
 
     def _dof_of(self, model: BodyModel, state: State) -> int:
         """The degree of freedom chosen; else one of the joint touched last, else one of a limb."""
@@ -120,7 +121,7 @@ def landscape(
     settings: TrackSettings,
     person: int,
     dof: int,
-) -> Landscape:
+) -> CostLandscape:
     """Score a person at many values of one degree of freedom within its limits, everything else as it is.
 
     Args:
@@ -138,8 +139,8 @@ def landscape(
     low, high = (low if np.isfinite(low) else current - reach), (high if np.isfinite(high) else current + reach)
     values = np.linspace(min(low, current), max(high, current), SAMPLES)
     cost = pose_cost(views, models, poses, settings)
-    totals_px, views_px = cost.of_person(person, along(model, poses[person], dof, values), poses)
-    return Landscape(person, dof, current, cost(poses).total_px, values, totals_px, views_px)
+    totals_px, view_costs_px = cost.of_person(person, along(model, poses[person], dof, values), poses)
+    return CostLandscape(person, dof, current, cost(poses).total_px, values, totals_px, view_costs_px)
 
 
 def current_value(model: BodyModel, pose: Array, dof: int) -> float:

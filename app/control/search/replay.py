@@ -1,14 +1,15 @@
 """Looking back at searches: their steps one by one, their candidates, their results beside one another."""
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from dataclasses import replace
 
 import numpy as np
 
-from app.control.search.search_runs import Run, Runs
-from app.control.session.session_state import Screen
-from app.state.state import ReplayState, Shown, finite_or_none
+from app.control.search.search_runs import SearchRun, SearchRuns
+from app.control.session.activities import Activities
+from app.control.session.session_state import SessionState
+from app.state.people import ShownPose
+from app.state.search import ReplayState, SearchView
+from app.state.state import finite_or_none
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 
@@ -16,19 +17,20 @@ from tracker.geometry.arrays import Array
 class Replay:
     """What is looked at of the recorded runs. Looking changes no stored pose; taking one over is an edit."""
 
-    def __init__(self, screen: Screen, runs: Runs, editing: Callable[[], AbstractContextManager[None]]) -> None:
+    def __init__(self, session_state: SessionState, runs: SearchRuns, activities: Activities) -> None:
         """Look at nothing yet.
 
         Args:
             screen: holds the state.
             runs: what has been recorded.
-            editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
+            activities: ends jobs and gestures before an edit.
         """
-        self._screen, self._runs, self._editing = screen, runs, editing
+        self._session_state, self._runs, self._activities = session_state, runs, activities
+        activities.add_gesture(self.leave)
 
-    def runs(self) -> list[Run]:
+    def runs(self) -> list[SearchRun]:
         """The runs of the shown frame, the oldest first; hold the screen's lock to read them."""
-        return self._runs.of_frame(self._screen.state.frame)
+        return self._runs.of_frame(self._session_state.state.frame)
 
     def show(self, number: int, step: int) -> None:
         """Show a recorded step in place of the true poses; before the first it is the start, beyond the last the last.
@@ -36,9 +38,9 @@ class Replay:
         Raises:
             TrackerError: the run is kept no more, or is still at work.
         """
-        with self._screen.lock:
+        with self._session_state.lock:
             run = self._run(number)
-            if self._screen.state.job.running:
+            if self._session_state.state.search.running:
                 raise TrackerError(
                     "expected a search that is over or stands to replay, found one at work; stop it first (Esc)"
                 )
@@ -56,18 +58,18 @@ class Replay:
                     run.stages[kept.stage].name, kept.candidate_px, kept.best_px,
                     tuple(finite_or_none(float(c)) for c in kept.best_views_px), kept.evaluations,
                 )  # fmt: skip
-            self._look(replay=shown, preview=None)
+            self._set_view(replace(self._view, replay=shown, preview=None))
 
     def leave(self) -> None:
         """Show the true poses again; called before anything else happens to the frame."""
-        with self._screen.lock:
-            if self._screen.state.look.replay is not None or self._screen.state.look.preview is not None:
-                self._look(replay=None, preview=None)
+        with self._session_state.lock:
+            if self._view.replay is not None or self._view.preview is not None:
+                self._set_view(replace(self._view, replay=None, preview=None))
 
     def forget(self) -> None:
         """Compare no more either: another frame is shown."""
-        with self._screen.lock:
-            self._look(replay=None, preview=None, compared=None, compared_run=None)
+        with self._session_state.lock:
+            self._set_view(SearchView(speed=self._view.speed))
 
     def compare(self, number: int | None) -> None:
         """Draw the result of a run over the views; None for no more.
@@ -75,15 +77,18 @@ class Replay:
         Raises:
             TrackerError: the run is kept no more.
         """
-        with self._screen.lock:
-            self._look(compared=None if number is None else self._run(number).best, compared_run=number)
+        with self._session_state.lock:
+            compared = None if number is None else self._run(number).best
+            self._set_view(replace(self._view, compared=compared, compared_run=number))
 
     def preview(self, number: int, candidate: int | None) -> None:
         """Draw a candidate of a run over the views; None for no more, and for one that is no candidate any more."""
-        with self._screen.lock:
+        with self._session_state.lock:
             run = self._runs.find(number)
-            is_there = run is not None and candidate is not None and 0 <= candidate < len(run.candidates)
-            self._look(preview=run.candidates[candidate].poses if run and candidate is not None and is_there else None)
+            poses = None
+            if run is not None and candidate is not None and 0 <= candidate < len(run.candidates):
+                poses = run.candidates[candidate].poses
+            self._set_view(replace(self._view, preview=poses))
 
     def take(self, number: int, candidate: int | None) -> None:
         """Take over a candidate of a run, or its result where that is None: one edit, which can be undone.
@@ -91,7 +96,7 @@ class Replay:
         Raises:
             TrackerError: the run or the candidate is kept no more.
         """
-        with self._screen.lock:
+        with self._session_state.lock:
             run = self._run(number)
             if candidate is not None and not 0 <= candidate < len(run.candidates):
                 raise TrackerError(
@@ -99,28 +104,32 @@ class Replay:
                 )
             poses = run.best if candidate is None else run.candidates[candidate].poses
         label = f"take run {number}" if candidate is None else f"take candidate {candidate + 1} of run {number}"
-        with self._editing():
-            if run.frame == self._screen.state.frame:
+        with self._activities.editing():
+            if run.frame == self._session_state.state.frame:
                 self._adopt(poses, label)
 
     def _adopt(self, poses: tuple[Array, ...], label: str) -> None:
-        screen = self._screen
-        poses = screen.within_locks(poses)
+        session_state = self._session_state
+        poses = session_state.within_locks(poses)
         people = tuple(
-            p if p.source is not None and np.array_equal(p.values, new) else Shown(new, "searched")
-            for p, new in zip(screen.state.people, poses, strict=True)
+            p if p.source is not None and np.array_equal(p.values, new) else ShownPose(new, "searched")
+            for p, new in zip(session_state.state.people, poses, strict=True)
         )
-        screen.set(people=people, **screen.costs(poses))
-        screen.save(label, "searched")
+        session_state.set(people=people, **session_state.costs(poses))
+        session_state.save(label, "searched")
 
-    def _run(self, number: int) -> Run:
+    def _run(self, number: int) -> SearchRun:
         run = self._runs.find(number)
-        if run is None or run.frame != self._screen.state.frame:
+        if run is None or run.frame != self._session_state.state.frame:
             raise TrackerError(
-                f"expected a run of frame {self._screen.state.frame}, found run {number}, which is kept no more; "
-                "choose another from the list"
+                f"expected a recorded run of frame {self._session_state.state.frame}, found run {number}, "
+                "which is discarded; choose another from the list"
             )
         return run
 
-    def _look(self, **changes: object) -> None:
-        self._screen.set(look=replace(self._screen.state.look, **changes))  # type: ignore[arg-type]
+    @property
+    def _view(self) -> SearchView:
+        return self._session_state.state.search_view
+
+    def _set_view(self, view: SearchView) -> None:
+        self._session_state.set(search_view=view)

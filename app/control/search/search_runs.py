@@ -65,7 +65,7 @@ class StageCount(NamedTuple):
     done: bool
 
 
-class Run:
+class SearchRun:
     """One search of one frame. Not locked by itself: whoever holds it holds the screen's lock."""
 
     def __init__(
@@ -159,12 +159,12 @@ class Run:
         self.thinned += 1
 
 
-class Runs:
-    """The runs of the frames searched last. Locked as a `Run` is."""
+class SearchRuns:
+    """The runs of the frames searched last. Locked as a `SearchRun` is."""
 
     def __init__(self) -> None:
         """Begin with none."""
-        self._runs: dict[int, list[Run]] = {}
+        self._runs: dict[int, list[SearchRun]] = {}
         self._number = 0
 
     def begin(
@@ -175,10 +175,10 @@ class Runs:
         start_px: float,
         settings: TrackSettings,
         free: Sequence[NDArray[np.bool_]] | None = None,
-    ) -> Run:
-        """Note that a search begins; the oldest run makes room. See `Run`."""
+    ) -> SearchRun:
+        """Note that a search begins; the oldest run makes room. See `SearchRun`."""
         self._number += 1
-        run = Run(self._number, frame, models, start, start_px, settings, free)
+        run = SearchRun(self._number, frame, models, start, start_px, settings, free)
         of_frame = self._runs.pop(frame, [])
         self._runs[frame] = [*of_frame, run][-_KEPT_RUNS:]  # this frame now is the newest of the dict
         while len(self._runs) > _KEPT_FRAMES:
@@ -189,10 +189,10 @@ class Runs:
         """Keep none of them any more."""
         self._runs.clear()
 
-    def of_frame(self, frame: int) -> list[Run]:
+    def of_frame(self, frame: int) -> list[SearchRun]:
         """Runs of a frame, the oldest first."""
         return list(self._runs.get(frame, []))
 
-    def find(self, number: int) -> Run | None:
+    def find(self, number: int) -> SearchRun | None:
         """The run of a number; None where it is kept no more."""
         return next((r for runs in self._runs.values() for r in runs if r.number == number), None)

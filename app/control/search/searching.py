@@ -6,27 +6,38 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.control.search.search_runs import Run, Runs
-from app.control.session.session_state import Screen
+from app.control.search.search_runs import SearchRun, SearchRuns
+from app.control.session.activities import Activities
+from app.control.session.session_state import SessionState
 from app.runtime.jobs import Job
-from app.state.state import JobState, Shown, finite_or_none
+from app.state.people import ShownPose
+from app.state.search import SearchState
+from app.state.state import finite_or_none
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.search.best_first import SearchStep, stages
-from tracker.tracking.chamfer.settings import search_frame
+from tracker.tracking.chamfer.settings import TrackSettings, search_frame
+from tracker.tracking.subjects import Subjects
 
 _SAVE_S = 0.5
 """A running search is on disk at least this often."""
 
 
-class Searching:
+class SearchRunner:
     """At most one search, which runs or stands on the shown frame."""
 
-    def __init__(self, screen: Screen, runs: Runs) -> None:
-        """Search what is on this screen, and take down in `runs` how it went."""
-        self._screen, self._runs = screen, runs
+    def __init__(self, session_state: SessionState, runs: SearchRuns, activities: Activities) -> None:
+        """Search nothing yet.
+
+        Args:
+            session_state: holds the state.
+            runs: records the searches.
+            activities: ends tracking and gestures before a search.
+        """
+        self._session_state, self._runs, self._activities = session_state, runs, activities
+        activities.add_job(self, on_shown_frame=True)
         self._job: Job[SearchStep] | None = None
-        self._run: Run | None = None
+        self._run: SearchRun | None = None
         self._person: int | None = None  # who alone is searched; None for everybody
 
     @property
@@ -34,138 +45,165 @@ class Searching:
         """Whether a search is at work."""
         return self._job is not None and self._job.running
 
-    def step(self, person: int | None = None) -> None:
-        """Do one expansion, beginning a search where none of the same people stands; by default of everybody."""
-        with self._screen.lock:
-            if not self.running:
-                self._standing_job(person).step()
+    def set_settings(self, settings: TrackSettings) -> None:
+        """Change the settings of the next search or tracking run; a paused search is discarded."""
+        self.halt()
+        with self._session_state.lock:
+            self.forget()
+            self._session_state.set(settings=settings)
+            self._session_state.set(**self._session_state.costs(self._session_state.state.poses))
 
-    def run(self, person: int | None = None) -> None:
-        """Search to the end, going on with a search of the same people that stands; by default of everybody."""
-        self._go(lambda _: False, person)
+    def step(self, person: int | None = None) -> None:
+        """Do one expansion of the search, and begin a search if none of the same people is paused.
+
+        Args:
+            person: index of the only person to search, with all others fixed; by default all people are searched.
+        """
+        with self._activities.starting(self):
+            if not self.running:
+                self._paused_job(person).step()
 
     def run_stage(self, person: int | None = None) -> None:
-        """Search to the end of the stage at hand, which is the next one where a stage has just ended."""
+        """Search to the end of the current stage, or of the next one if a stage has just ended; see `step`."""
         self._go(lambda step: step.stage_done, person)
 
-    def run_again(self, number: int | None, person: int | None = None) -> None:
-        """Search anew from where a run of this frame began, by the settings of now; None for the newest run.
+    def run(self, person: int | None = None) -> None:
+        """Search to the end; continues a paused search of the same people, see `step`."""
+        self._go(lambda _: False, person)
+
+    def run_again(self, number: int | None = None, person: int | None = None) -> None:
+        """Search again from the start of a recorded run of this frame, with the present settings.
+
+        Args:
+            number: of the run; None for the newest.
+            person: see `step`.
 
         Raises:
-            TrackerError: the run is kept no more.
+            TrackerError: the run is no longer recorded.
         """
-        with self._screen.lock:
-            runs = self._runs.of_frame(self._screen.state.frame)
+        self.halt()
+        with self._activities.starting(self):
+            runs = self._runs.of_frame(self._session_state.state.frame)
             if number is not None:
                 runs = [r for r in runs if r.number == number]
                 if not runs:
-                    raise TrackerError(f"expected a run of this frame, found run {number}, which is kept no more")
+                    raise TrackerError(
+                        f"expected a recorded run of this frame, found run {number}, which is discarded; "
+                        "choose another from the list"
+                    )
             if not self.running:
                 self.forget()
                 self._go(lambda _: False, person, runs[-1].start if runs else None)
 
-    def pace(self, speed: float | None) -> None:
-        """Watch so many expansions a second, at once; None for as many as there can be.
+    def set_speed(self, speed: float | None) -> None:
+        """Limit the search to a number of expansions per second; None for full speed.
 
         Raises:
-            TrackerError: the speed is no positive number.
+            TrackerError: the speed is not a positive number.
         """
         if speed is not None and not (np.isfinite(speed) and speed > 0):
             raise TrackerError(f"expected a speed above 0 expansions a second, found {speed:g}; choose another")
-        with self._screen.lock:
-            self._screen.set(look=replace(self._screen.state.look, speed=speed))
+        with self._session_state.lock:
+            self._session_state.set(search_view=replace(self._session_state.state.search_view, speed=speed))
             if self._job is not None:
                 self._job.pace(_rest_s(speed))
 
     def halt(self) -> None:
-        """Stop a running search, which then stands; must not be called holding the lock, which its last step takes."""
+        """Pause a running search after its current step. The caller must not hold the lock: the step takes it."""
         job = self._job
         if job is not None:
             job.stop()
 
     def forget(self) -> None:
-        """Let no search stand any more; its steps are taken no notice of."""
+        """Discard a paused search; late steps are ignored."""
         self._job = None
         if self._run is not None:
             self._run.over = True
-        self._screen.set(job=JobState())
+        self._session_state.set(search=SearchState())
+
+    def stop(self) -> None:
+        """Pause a running search with its best poses on disk; it can be continued."""
+        self.halt()
 
     def _go(
         self, until: Callable[[SearchStep], bool], person: int | None, start: tuple[Array, ...] | None = None
     ) -> None:
-        with self._screen.lock:
+        with self._activities.starting(self):
             if not self.running:
-                job = self._standing_job(person, start)
-                self._screen.set(job=replace(self._screen.state.job, running=True))
+                job = self._paused_job(person, start)
+                self._session_state.set(search=replace(self._session_state.state.search, running=True))
                 job.run(until)
 
-    def _standing_job(self, person: int | None, start: tuple[Array, ...] | None = None) -> Job[SearchStep]:
+    def _paused_job(self, person: int | None, start: tuple[Array, ...] | None = None) -> Job[SearchStep]:
         """The search that stands, or a new one from given poses, else from those shown."""
-        screen, state = self._screen, self._screen.state
+        session_state, state = self._session_state, self._session_state.state
         if self._job is None or self._job.ended or self._person != person:
-            frame, settings, models = state.frame, state.settings, screen.models
-            poses = state.poses if start is None else screen.within_locks(start)
-            free = [screen.free(i) & (person is None or i == person) for i in range(len(models))]
+            frame, settings, models = state.frame, state.settings, session_state.models
+            poses = state.poses if start is None else session_state.within_locks(start)
+            free = [session_state.active_dofs(i) & (person is None or i == person) for i in range(len(models))]
             if not stages(models, settings.search, free=free):
                 raise TrackerError(
                     "expected something that a search may move, found everything locked; unlock some of it"
                 )
             if self._run is not None:
                 self._run.over = True
-            start_px = screen.costs(poses)["cost_px"]
-            known_px = start_px if isinstance(start_px, float) else np.nan
+            start_px = session_state.costs(poses)["cost_px"]
+            known_px = np.nan if start_px is None else start_px
             run = self._runs.begin(frame, models, poses, known_px, settings, free)
+            subjects = Subjects.of(models, active_dofs=free)
             job: Job[SearchStep] = Job(
-                lambda: search_frame(screen.frames.evidence(frame), models, poses, settings, free=free),
+                lambda: search_frame(session_state.frames.evidence(frame), subjects, poses, settings),
                 lambda step, seconds: self._stepped(job, step, seconds),
                 lambda error: self._ended(job, error),
                 lambda: self._paused(job),
             )
-            job.pace(_rest_s(state.look.speed))
-            self._job, self._run, self._person, screen.edit_of = job, run, person, None
-            screen.set(job=JobState(kind="search", stages=tuple(s.name for s in run.stages)))
+            job.pace(_rest_s(state.search_view.speed))
+            self._job, self._run, self._person, session_state.open_edit_owner = job, run, person, None
+            session_state.set(search=SearchState(kind="search", stages=tuple(s.name for s in run.stages)))
         return self._job
 
     def _stepped(self, job: Job[SearchStep], step: SearchStep, seconds: float) -> None:
-        screen = self._screen
-        with screen.lock:
+        session_state = self._session_state
+        with session_state.lock:
             if job is not self._job or self._run is None:
                 return
             self._run.add(step, seconds)
             people = tuple(
                 p if self._is_left(i) or (p.source is not None and np.array_equal(p.values, best))
-                else Shown(best, "searched")
-                for i, (p, best) in enumerate(zip(screen.state.people, step.best, strict=True))
+                else ShownPose(best, "searched")
+                for i, (p, best) in enumerate(zip(session_state.state.people, step.best, strict=True))
             )  # fmt: skip
             shown = replace(
-                screen.state.job, running=job.running, kind="search", stage=step.stage.name,
+                session_state.state.search, running=job.running, kind="search", stage=step.stage.name,
                 evaluations=step.evaluations, per_second=step.evaluations / max(1e-6, seconds),
                 best_px=step.best_px, candidate=step.candidate, message="",
             )  # fmt: skip
-            changed = any(a is not b for a, b in zip(people, screen.state.people, strict=True))
-            costs = {"cost_px": step.best_px, "view_costs_px": tuple(finite_or_none(c) for c in step.best_views_px)}
-            screen.set(people=people, job=shown, **costs)
-            if changed and time.monotonic() - screen.last_save > _SAVE_S:
-                screen.save("search", "searched", job)
+            changed = any(a is not b for a, b in zip(people, session_state.state.people, strict=True))
+            view_costs_px = tuple(finite_or_none(c) for c in step.best_views_px)
+            session_state.set(people=people, search=shown, cost_px=step.best_px, view_costs_px=view_costs_px)
+            if changed and time.monotonic() - session_state.last_save > _SAVE_S:
+                session_state.save("search", "searched", job)
 
     def _paused(self, job: Job[SearchStep]) -> None:
-        with self._screen.lock:
+        with self._session_state.lock:
             if job is self._job:
-                self._screen.set(job=replace(self._screen.state.job, running=False))
+                self._session_state.set(search=replace(self._session_state.state.search, running=False))
                 self._save(job)
 
     def _ended(self, job: Job[SearchStep], error: Exception | None) -> None:
-        screen = self._screen
-        with screen.lock:
+        session_state = self._session_state
+        with session_state.lock:
             if job is not self._job or self._run is None:
                 return
             self._run.over = True
             if error is None:
-                message = f"done: {screen.state.job.evaluations} poses scored"
+                message = f"done: {session_state.state.search.evaluations} poses scored"
             else:
                 message = str(error) if isinstance(error, TrackerError) else f"the search failed: {error}"
-            ended = replace(screen.state.job, running=False, kind=None, stage=None, candidate=None, message=message)
-            screen.set(job=ended, **screen.costs(screen.state.poses))
+            ended = replace(
+                session_state.state.search, running=False, kind=None, stage=None, candidate=None, message=message
+            )
+            session_state.set(search=ended, **session_state.costs(session_state.state.poses))
             self._save(job)
 
     def _is_left(self, person: int) -> bool:
@@ -173,8 +211,8 @@ class Searching:
         return self._person is not None and person != self._person
 
     def _save(self, job: Job[SearchStep]) -> None:
-        if any(p.source == "searched" for p in self._screen.state.people):
-            self._screen.save("search", "searched", job)
+        if any(p.source == "searched" for p in self._session_state.state.people):
+            self._session_state.save("search", "searched", job)
 
 
 def _rest_s(speed: float | None) -> float:

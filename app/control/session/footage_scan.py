@@ -2,19 +2,19 @@
 
 import threading
 
-from app.control.session.session_state import Screen
-from app.state.state import FootageState
+from app.control.session.session_state import SessionState
+from app.state.progress import FootageState
 from tracker.errors import TrackerError
 
 _LOOK_S = 0.2
 
 
-class Listing:
+class FootageScan:
     """Watches, in a thread of its own, until all frames of all videos are listed."""
 
-    def __init__(self, screen: Screen) -> None:
+    def __init__(self, session_state: SessionState) -> None:
         """Begin to watch."""
-        self._screen = screen
+        self._session_state = session_state
         self._over = threading.Event()
         self._thread: threading.Thread | None = None
         if self._look():
@@ -34,14 +34,14 @@ class Listing:
 
     def _look(self) -> bool:
         """Bring the state up to date; says whether there is more to come."""
-        screen = self._screen
+        session_state = self._session_state
         try:
-            share, error = screen.frames.listed_share, None
+            share, error = session_state.frames.listed_share, None
         except TrackerError as failure:
             share, error = None, str(failure)
         found = FootageState(share, error)
-        if found != screen.state.footage:
-            with screen.lock:
-                screen.set(footage=found)
-                screen.request_evidence()
+        if found != session_state.state.footage:
+            with session_state.lock:
+                session_state.set(footage=found)
+                session_state.request_evidence()
         return share is not None

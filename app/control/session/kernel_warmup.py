@@ -6,7 +6,7 @@ import sys
 import threading
 from collections.abc import Sequence
 
-from app.control.session.session_state import Screen
+from app.control.session.session_state import SessionState
 from tracker.compute.kernel_cache import compiled_mark
 
 _LOG = logging.getLogger(__name__)
@@ -18,7 +18,7 @@ COMMAND = (sys.executable, "-m", "app.bench.compile_kernels")
 class Compiling:
     """Watches over the program that compiles, where there is something to compile."""
 
-    def __init__(self, screen: Screen, command: Sequence[str] = COMMAND) -> None:
+    def __init__(self, screen: SessionState, command: Sequence[str] = COMMAND) -> None:
         """Have everything compiled in the background, unless it is.
 
         The program starts when the first frame has its cost: until then the page's own program compiles what that

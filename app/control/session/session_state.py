@@ -1,101 +1,106 @@
-"""What is on the screen: the state under its lock, and what all who change it share: loading, costs, saving."""
+"""Hold the session's state and its lock; load, score and save poses for the controller's parts."""
 
 import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.session.frame_cache import Frames
-from app.state.state import Shown, State, finite_or_none
+from app.session.frame_cache import FrameCache
+from app.state.people import ShownPose
+from app.state.state import Costs, ShownFrame, State, StateChanges, finite_or_none
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import held
+from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.triangulation import PointObservation
-from tracker.posing.default_pose import standing_pose
-from tracker.posing.retarget import rebodied
-from tracker.session.locked_dofs import free_of
+from tracker.posing.default_pose import default_pose
+from tracker.posing.retarget import retarget_pose
+from tracker.session.locked_dofs import active_dofs
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import pose_cost
 
 _APART_M = 0.9
-"""How far from each other people stand whom nobody has placed, metres: each can be seen and taken by itself."""
+"""Distance between people who are not placed yet, metres: each can be seen and dragged by itself."""
 
 
-class Screen:
-    """The state of one open session. Whoever changes it holds `lock`; the views are told within it."""
+class SessionState:
+    """The state of one open session. A change takes `lock`; the views are called under it."""
 
-    def __init__(self, session: Session, saver: Saver, frames: Frames) -> None:
+    def __init__(self, session: Session, saver: Saver, frames: FrameCache) -> None:
         """Show the first frame.
 
         Args:
-            session: what is open.
-            saver: keeps its poses.
+            session: to open.
+            saver: stores its poses.
             frames: gives images and evidence.
         """
         self.session, self.saver, self.frames = session, saver, frames
         self.lock = threading.RLock()
-        self.stand(up_rotation(session.up, session.floor))
+        self.set_default_poses(up_rotation(session.up, session.floor))
         self._subscribers: list[Callable[[State], None]] = []
-        self._edit: int | None = None  # the entry of the history that the gesture at hand amends
-        self.edit_of: object = None
-        """The gesture whose next save amends the last entry of the history; None makes a new entry."""
+        self._edit: int | None = None  # the entry of the history that the current gesture amends
+        self.open_edit_owner: object = None
+        """The gesture whose next save amends the last entry of the history; None if a save makes a new entry."""
         self.last_save = 0.0
-        """When poses were last written, s of the monotonic clock."""
+        """Time of the last save, s of the monotonic clock."""
         unlocked = (frozenset[int](),) * len(session.people)
         shown = self._load(0)
-        self.state = State(frame=0, pins=self._load_pins(0), locked=unlocked, **shown._asdict())
+        self.state = State(frame=0, pins=self._load_pins(0), locked=unlocked, **shown)
         self.refresh_saving()
         self.frames.request(0, self._evidence_ready)
 
     @property
     def models(self) -> tuple[BodyModel, ...]:
-        """The bodies in which everybody is shown."""
+        """The bodies in which people are shown."""
         return self.state.models
 
     @property
     def present(self) -> tuple[BodyModel, ...]:
-        """The bodies that new poses are made with."""
+        """The bodies of new poses."""
         return tuple(p.model for p in self.session.people)
 
     def present_poses(self) -> tuple[Array, ...]:
-        """The poses shown, taken over into the present bodies where they were made with others, (n_values,) each."""
+        """Return the shown poses, (n_values,) each, retargeted to the present bodies."""
         bodies = zip(self.state.poses, self.state.models, self.present, strict=True)
-        return tuple(rebodied(values, was, becomes) for values, was, becomes in bodies)
+        return tuple(retarget_pose(values, was, becomes) for values, was, becomes in bodies)
 
-    def free(self, person: int) -> NDArray[np.bool_]:
-        """The degrees of freedom of a person that may move, (n_dofs,): those that are not locked."""
-        return free_of(self.present[person], self.state.locked[person])
+    def active_dofs(self, person: int) -> NDArray[np.bool_]:
+        """Return which degrees of freedom of a person are not locked, (n_dofs,)."""
+        return active_dofs(self.present[person], self.state.locked[person])
 
     def within_locks(self, poses: Sequence[Array]) -> tuple[Array, ...]:
-        """Poses, (n_values,) of each person, with what is locked as it is shown."""
+        """Return poses, (n_values,) each, with locked degrees of freedom as in the shown poses."""
         return tuple(
-            held(model, new, now, self.free(i)) if self.state.locked[i] else new
+            with_locked_dofs(model, new, now, self.active_dofs(i)) if self.state.locked[i] else new
             for i, (model, new, now) in enumerate(zip(self.models, poses, self.state.poses, strict=True))
         )
 
-    def stand(self, R_world_up: Array) -> None:
-        """Let whom nobody has placed stand upright, by a rotation whose z axis points up, (3, 3)."""
+    def set_default_poses(self, R_world_up: Array) -> None:
+        """Place people without a pose upright, side by side.
+
+        Args:
+            R_world_up: rotation whose z axis points up, (3, 3).
+        """
         cameras = [c.camera for c in self.session.cameras]
         self._R_world_up = R_world_up
         middle = (len(self.present) - 1) / 2
-        self._standing = tuple(
-            standing_pose(model, cameras, R_world_up, _APART_M * (i - middle)) for i, model in enumerate(self.present)
+        self._default_poses = tuple(
+            default_pose(model, cameras, R_world_up, _APART_M * (i - middle)) for i, model in enumerate(self.present)
         )
 
-    def embody(self, session: Session) -> None:
-        """Go on with a session whose people have other bodies; to be followed by `show`."""
+    def set_body_models(self, session: Session) -> None:
+        """Continue with a session whose people have other bodies; call `show_frame` afterwards."""
         self.session = session
-        self.saver.embody(session)
-        self.stand(self._R_world_up)
+        self.saver.set_body_models(session)
+        self.set_default_poses(self._R_world_up)
 
     def subscribe(self, view: Callable[[State], None]) -> Callable[[], None]:
-        """Tell a view every new state from now on; returns what ends it."""
+        """Call a view with every new state; returns the function that ends this."""
         with self.lock:
             self._subscribers.append(view)
 
@@ -106,71 +111,89 @@ class Screen:
 
         return unsubscribe
 
-    def set(self, **changes: object) -> None:
-        """Make a new state and tell the views."""
+    def set(self, **changes: Unpack[StateChanges]) -> None:
+        """Change fields of the state and call the views. A new frame brings its pins unless they are given."""
         with self.lock:
-            if changes.get("frame", self.state.frame) != self.state.frame and "pins" not in changes:
-                changes["pins"] = self._load_pins(changes["frame"])  # type: ignore[arg-type]
-            self.state = replace(self.state, **changes)  # type: ignore[arg-type]
+            frame = changes.get("frame", self.state.frame)
+            if frame != self.state.frame and "pins" not in changes:
+                changes["pins"] = self._load_pins(frame)
+            self.state = replace(self.state, **changes)
             for view in list(self._subscribers):
                 view(self.state)
 
-    def show(self, frame: int, **changes: object) -> None:
-        """Show the stored poses of a frame; what amends the last entry of the history is over."""
-        self.edit_of = None
+    def show_frame(self, frame: int, /, **changes: Unpack[StateChanges]) -> None:
+        """Show the stored poses of a frame, with other changes; the next save makes a new entry of the history."""
+        self.open_edit_owner = None
         shown = self._load(frame)
-        costs = self.costs(tuple(p.values for p in shown.people), frame, shown.models)
-        pins = self._load_pins(frame)
-        self.set(frame=frame, pins=pins, drag=None, holds_pin=False, **shown._asdict(), **costs, **changes)
+        costs = self.costs(tuple(p.values for p in shown["people"]), frame, shown["models"])
+        loaded: StateChanges = {"frame": frame, "pins": self._load_pins(frame), **shown, **costs}
+        no_gesture: StateChanges = {"drag": None, "is_pin_held": False}
+        after: StateChanges = {**loaded, **no_gesture, **changes}
+        self.set(**after)
         self.request_evidence()
 
     def request_evidence(self) -> None:
-        """See to it that the frame's evidence comes, and the costs of the poses shown with it."""
-        if self.frames.evidence_at_hand(self.state.frame) is None:
+        """Request the frame's evidence in the background, unless it is cached; the costs follow."""
+        if self.frames.cached_evidence(self.state.frame) is None:
             self.frames.request(self.state.frame, self._evidence_ready)
 
     def costs(
         self, poses: tuple[Array, ...], frame: int | None = None, models: tuple[BodyModel, ...] | None = None
-    ) -> dict[str, object]:
-        """The state's costs of given poses, by default of the bodies shown; empty while there is no evidence."""
-        views = self.frames.evidence_at_hand(self.state.frame if frame is None else frame)
+    ) -> Costs:
+        """Score poses, (n_values,) each.
+
+        Args:
+            poses: of all people.
+            frame: on which they are scored; by default the shown one.
+            models: bodies of the poses; by default the shown ones.
+
+        Returns:
+            Costs without values while the frame has no evidence.
+        """
+        views = self.frames.cached_evidence(self.state.frame if frame is None else frame)
         if views is None:
             return {"cost_px": None, "view_costs_px": ()}
         cost = pose_cost(views, models or self.models, poses, self.state.settings)(poses)
         return {
             "cost_px": finite_or_none(cost.total_px),
-            "view_costs_px": tuple(finite_or_none(c) for c in cost.views_px),
+            "view_costs_px": tuple(finite_or_none(c) for c in cost.view_costs_px),
         }
 
-    def pose(self, person: int, values: Array, **changes: object) -> None:
-        """Show a pose that somebody gave one person, with its cost."""
-        people = self.posed(person, values)
-        self.set(people=people, **self.costs(tuple(p.values for p in people)), **changes)
+    def show_pose(self, person: int, values: Array) -> None:
+        """Show a person in a pose set by hand, (n_values,), with its cost."""
+        people = self.people_with_pose(person, values)
+        self.set(people=people, **self.costs(tuple(p.values for p in people)))
 
-    def posed(self, person: int, values: Array) -> tuple[Shown, ...]:
-        """Everybody as they are shown, one of them in a pose that somebody gave, (n_values,)."""
+    def people_with_pose(self, person: int, values: Array) -> tuple[ShownPose, ...]:
+        """Return the shown people, one of them in a pose set by hand, (n_values,)."""
         people = list(self.state.people)
-        people[person] = Shown(values, "manual")
+        people[person] = ShownPose(values, "manual")
         return tuple(people)
 
     def go_to(self, frame: int | None) -> None:
-        """Show the frame that the user saw, which a tracker may have left meanwhile; None for the one shown."""
+        """Show the frame that the user saw, which a tracker may have left; None for the shown one."""
         if frame is not None and frame != self.state.frame and 0 <= frame < self.session.n_frames:
-            self.show(frame)
+            self.show_frame(frame)
 
-    def take_back(self, gesture: object) -> None:
-        """Show the frame as it was before a gesture, which may have been written in part."""
-        if self.edit_of is gesture:
+    def revert(self, gesture: object) -> None:
+        """Show the frame as it was before a gesture, and undo what was saved of the gesture."""
+        if self.open_edit_owner is gesture:
             self.saver.undo()
             self.refresh_saving()
-        self.show(self.state.frame)
+        self.show_frame(self.state.frame)
 
     def save(self, label: str, source: str, gesture: object = None) -> None:
-        """Write the poses shown; calls of one gesture make one entry of the history, without one each makes its own."""
-        goes_on = gesture is not None and (self.edit_of is gesture or self.edit_of == gesture)
+        """Save the shown poses.
+
+        Args:
+            label: of the entry of the history.
+            source: of the values that changed.
+            gesture: successive saves of one gesture make one entry; None makes an entry for this save.
+        """
+        goes_on = gesture is not None and (self.open_edit_owner is gesture or self.open_edit_owner == gesture)
         amend = self._edit if goes_on else None
         self._edit = self.saver.save(self.state, label, source, amend)
-        self.edit_of, self.last_save = gesture, time.monotonic()
+        self.open_edit_owner, self.last_save = gesture, time.monotonic()
         self.refresh_saving()
 
     def refresh_saving(self) -> None:
@@ -178,39 +201,31 @@ class Screen:
         undo, redo = self.saver.undo_label(), self.saver.redo_label()
         self.set(undo=undo, redo=redo, save_error=self.saver.error, timeline_version=self.saver.timeline_version)
 
-    def _load(self, frame: int) -> "_Loaded":
-        """What a frame shows: stored poses, else drafts from the nearest frame that has one."""
-        shown: list[Shown] = []
-        for person, standing in enumerate(self._standing):
+    def _load(self, frame: int) -> ShownFrame:
+        """Return the stored poses of a frame; a person without one is shown in the pose of the nearest frame."""
+        people: list[ShownPose] = []
+        for person, default in enumerate(self._default_poses):
             stored = self.saver.pose(person, frame)
             if stored is not None:
-                shown.append(stored)
+                people.append(stored)
             else:
                 nearest = self.saver.nearest_pose(person, frame)
-                shown.append(Shown(standing if nearest is None else nearest, None))
-        present = tuple(self.saver.revision(person) for person in range(len(shown)))
-        return _Loaded(tuple(shown), *self.bodies(shown), present)
+                people.append(ShownPose(default if nearest is None else nearest, None))
+        present = tuple(self.saver.revision(person) for person in range(len(people)))
+        models, revisions = self.bodies(people)
+        return {"people": tuple(people), "models": models, "revisions": revisions, "present": present}
 
-    def bodies(self, shown: Sequence[Shown]) -> tuple[tuple[BodyModel, ...], tuple[int, ...]]:
-        """The bodies of poses, and what the store calls them: the present ones of those that are not stored."""
+    def bodies(self, shown: Sequence[ShownPose]) -> tuple[tuple[BodyModel, ...], tuple[int, ...]]:
+        """Return the bodies of poses and their model revisions; poses that are not stored have the present body."""
         saver = self.saver
         revisions = tuple(saver.revision(i) if p.revision is None else p.revision for i, p in enumerate(shown))
         return tuple(saver.body(r) for r in revisions), revisions
 
     def _load_pins(self, frame: int) -> tuple[tuple[PointObservation, ...], ...]:
-        """The pins of everybody on a frame."""
+        """Return the pins of all people on a frame."""
         return tuple(self.saver.pins(person, frame) for person in range(len(self.session.people)))
 
     def _evidence_ready(self, frame: int) -> None:
         with self.lock:
             if frame == self.state.frame:
                 self.set(**self.costs(self.state.poses))
-
-
-class _Loaded(NamedTuple):
-    """What the state shows of a frame."""
-
-    people: tuple[Shown, ...]
-    models: tuple[BodyModel, ...]
-    revisions: tuple[int, ...]
-    present: tuple[int, ...]

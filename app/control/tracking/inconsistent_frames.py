@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from app.control.session.session_state import Screen
-from app.runtime.jobs import Latest
+from app.control.session.session_state import SessionState
+from app.runtime.jobs import LatestWinsWorker
 from app.state.state import State
 from tracker.motion.consistency import inconsistent_frames
 
@@ -17,18 +17,18 @@ _AT_ONCE = 2000
 """Frames looked at together."""
 
 
-class Disagreements:
+class InconsistentFrames:
     """Looks at every frame once, then at what changes. Publishes to the screen's state."""
 
-    def __init__(self, screen: Screen) -> None:
+    def __init__(self, session_state: SessionState) -> None:
         """Begin to look."""
-        self._screen = screen
-        self._found: list[set[int]] = [set() for _ in screen.models]
+        self._session_state = session_state
+        self._found: list[set[int]] = [set() for _ in session_state.models]
         self._seen = 0  # version of the timeline
-        self._latest: Latest[int] = Latest(self._look, "disagreements", _REST_S)
+        self._latest: LatestWinsWorker[int] = LatestWinsWorker(self._look, "disagreements", _REST_S)
         self._offered = 0
-        screen.subscribe(self._changed)
-        self._changed(screen.state)
+        session_state.subscribe(self._changed)
+        self._changed(session_state.state)
 
     def close(self) -> None:
         """Look no more."""
@@ -40,27 +40,31 @@ class Disagreements:
             self._latest.offer(state.timeline_version)
 
     def _look(self, version: int) -> None:
-        screen = self._screen
-        with screen.lock:
-            changed = sorted(screen.saver.timeline(self._seen))
+        session_state = self._session_state
+        with session_state.lock:
+            changed = sorted(session_state.saver.timeline(self._seen))
         self._seen = version
         for first, last in _stretches(changed):
-            for person in range(len(screen.models)):
+            for person in range(len(session_state.models)):
                 self._look_at(person, first, last)
         found = tuple(sorted(set().union(*self._found)))
-        with screen.lock:
-            if found != screen.state.disagreeing:
-                screen.set(disagreeing=found)
+        with session_state.lock:
+            if found != session_state.state.disagreeing:
+                session_state.set(disagreeing=found)
 
     def _look_at(self, person: int, first: int, last: int) -> None:
         """Look anew at a stretch of frames of one person."""
-        screen = self._screen
+        saver = self._session_state.saver
         around = range(max(0, first - 2 * _REACH), last + 2 * _REACH + 1)
-        rows = [r for r in screen.saver.numbers(person, around) if screen.saver.fits(person, r.model_revision)]
-        models = [screen.saver.body(r.model_revision) for r in rows]
-        keyframes = {r.frame for r in screen.saver.rows(person, around) if r.keyframe}
+        rows = [
+            r
+            for r in self._session_state.saver.pose_rows(person, around)
+            if self._session_state.saver.fits(person, r.model_revision)
+        ]
+        models = [saver.body(r.model_revision) for r in rows]
+        keyframes = {r.frame for r in saver.rows(person, around) if r.keyframe}
         values = np.array([r.values for r in rows])
-        off = inconsistent_frames(models, [r.frame for r in rows], values, keyframes, screen.session.fps)
+        off = inconsistent_frames(models, [r.frame for r in rows], values, keyframes, self._session_state.session.fps)
         touched = range(max(0, first - _REACH), last + _REACH + 1)
         known = self._found[person]
         known -= {f for f in known if f in touched}

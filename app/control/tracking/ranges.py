@@ -1,17 +1,17 @@
 """Work on a range of frames: interpolate, clear, mark, track within it; each is one entry of the history."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
-from app.control.session.session_state import Screen
+from app.control.session.activities import Activities
+from app.control.session.session_state import SessionState
 from app.control.tracking.tracking import Tracking
 from app.runtime.jobs import Job
-from app.state.state import RangeState
+from app.state.progress import RangeState
 from tracker.errors import TrackerError
 from tracker.motion.interpolation import interpolate_pose
 from tracker.store.records import Change, FrameRow, MarkChange, PoseChange, PoseRecord
@@ -41,16 +41,17 @@ class _Run:
 class Ranges:
     """At most one piece of work on a range of frames. Ranges name their first and last frame."""
 
-    def __init__(self, screen: Screen, tracking: Tracking, editing: Callable[[], AbstractContextManager[None]]) -> None:
+    def __init__(self, session_state: SessionState, tracking: Tracking, activities: Activities) -> None:
         """Work on the poses of this screen.
 
         Args:
             screen: holds the state.
             tracking: tracks within a range.
-            editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
+            activities: ends jobs and gestures before an edit.
         """
-        self._screen, self._tracking, self._editing = screen, tracking, editing
+        self._session_state, self._tracking, self._activities = session_state, tracking, activities
         self._run: _Run | None = None
+        activities.add_job(self, on_shown_frame=False)
 
     @property
     def running(self) -> bool:
@@ -69,7 +70,7 @@ class Ranges:
             TrackerError: nobody has two poses to go between, or no frame lies between them.
         """
         first, last = self._within(first, last)
-        with self._editing():
+        with self._activities.editing():
             gaps = [(i, *gap) for i in self._whose(people) for gap in self._gaps(i, first, last)]
             if not gaps:
                 raise TrackerError(
@@ -87,7 +88,7 @@ class Ranges:
             TrackerError: there is none to remove.
         """
         first, last = self._within(first, last)
-        with self._editing():
+        with self._activities.editing():
             rows = [(i, row) for i, row in self._rows(first, last, people) if not row.keyframe]
             if not rows:
                 raise TrackerError(
@@ -105,7 +106,7 @@ class Ranges:
             TrackerError: there is no pose to mark.
         """
         first, last = self._within(first, last)
-        with self._editing():
+        with self._activities.editing():
             rows = self._rows(first, last, people)
             if not rows:
                 raise TrackerError(f"expected poses in frames {first} to {last} to mark, found none; set or track some")
@@ -117,13 +118,13 @@ class Ranges:
 
     def toggle_keyframe(self) -> None:
         """Vouch for the shown pose of the person worked on, or take that back; a draft is stored by it."""
-        state, saver = self._screen.state, self._screen.saver
+        state, saver = self._session_state.state, self._session_state.saver
         rows = saver.rows(state.person, range(state.frame, state.frame + 1))
         if rows:
             self.mark(state.frame, state.frame, "none" if rows[0].keyframe else "keyframe", [state.person])
             return
-        with self._editing():
-            state = self._screen.state
+        with self._activities.editing():
+            state = self._session_state.state
             values = state.poses[state.person]
             record = PoseRecord(
                 values, ("manual",) * len(values), saver.revision(state.person), keyframe=True, reviewed=True
@@ -134,8 +135,8 @@ class Ranges:
 
     def toggle_reviewed(self) -> None:
         """Say that the shown pose of the person worked on has been looked at, or take that back."""
-        state = self._screen.state
-        rows = self._screen.saver.rows(state.person, range(state.frame, state.frame + 1))
+        state = self._session_state.state
+        rows = self._session_state.saver.rows(state.person, range(state.frame, state.frame + 1))
         isnt = bool(rows) and rows[0].reviewed
         self.mark(state.frame, state.frame, "unreviewed" if isnt else "reviewed", [state.person])
 
@@ -146,25 +147,32 @@ class Ranges:
             TrackerError: nobody has been placed.
         """
         first, last = self._within(first, last)
-        with self._editing():
+        with self._activities.editing():
             begin, end = (last, first) if backward else (first, last)
-            if self._screen.state.frame != begin:
-                self._screen.show(begin)
+            if self._session_state.state.frame != begin:
+                self._session_state.show_frame(begin)
             self._tracking.start(backward, end)
 
     def halt(self) -> None:
-        """Stop what is under way; what is written stays. Must not be called holding the lock, which its steps take."""
+        """Stop the work; frames already written stay. The caller must not hold the lock: the last step takes it."""
         run = self._run
         if run is not None:
             run.job.stop()
-            with self._screen.lock:
+            with self._session_state.lock:
                 if self._run is run:
                     self._end(run, "stopped")
 
+    def forget(self) -> None:
+        """Do nothing: halted work has ended."""
+
+    def stop(self) -> None:
+        """Stop the work, see `halt`."""
+        self.halt()
+
     def _begin(self, run: _Run, what: str, total: int, changes: Iterator[Change]) -> None:
         """Write changes: a few before this returns, many in the background."""
-        self._screen.edit_of = None
-        self._screen.set(ranges=RangeState(running=True, what=what, total=total))
+        self._session_state.open_edit_owner = None
+        self._session_state.set(ranges=RangeState(running=True, what=what, total=total))
         run.job = Job(
             lambda: _pieces(changes),
             lambda piece, _: self._write(run, piece),
@@ -180,59 +188,61 @@ class Ranges:
             run.job.run()
 
     def _write(self, run: _Run, piece: Sequence[Change]) -> None:
-        screen = self._screen
-        with screen.lock:
+        session_state = self._session_state
+        with session_state.lock:
             if run is not self._run:
                 return
-            run.edit = screen.saver.write(run.label, piece, run.edit, run.by_program)
-            done = screen.state.ranges
-            screen.set(ranges=replace(done, done=done.done + len(piece)))
-            screen.refresh_saving()
-            if any(c.frame == screen.state.frame for c in piece):
-                screen.show(screen.state.frame)
+            run.edit = session_state.saver.write(run.label, piece, run.edit, run.by_program)
+            done = session_state.state.ranges
+            session_state.set(ranges=replace(done, done=done.done + len(piece)))
+            session_state.refresh_saving()
+            if any(c.frame == session_state.state.frame for c in piece):
+                session_state.show_frame(session_state.state.frame)
 
     def _ended(self, run: _Run, error: Exception | None) -> None:
-        with self._screen.lock:
+        with self._session_state.lock:
             if run is self._run:
                 self._end(run, "done" if error is None else f"stopped, because {error}")
 
     def _end(self, run: _Run, how: str) -> None:
-        state = self._screen.state.ranges
+        state = self._session_state.state.ranges
         frames = "1 frame" if state.done == 1 else f"{state.done} frames"
         did = f"{run.did} {frames}" if how == "done" else f"{how}: {run.did} {frames} of {state.total}"
         self._run = None
-        self._screen.refresh_saving()
-        self._screen.set(ranges=RangeState(message=did))
+        self._session_state.refresh_saving()
+        self._session_state.set(ranges=RangeState(message=did))
 
     def _within(self, first: int, last: int) -> tuple[int, int]:
         """A range in order and within the recording."""
         first, last = sorted((first, last))
-        end = self._screen.session.n_frames - 1
+        end = self._session_state.session.n_frames - 1
         if last < 0 or first > end:
             raise TrackerError(f"expected frames from 0 to {end}, found {first} to {last}; mark another range")
         return max(0, first), min(last, end)
 
     def _whose(self, people: Sequence[int] | None) -> Sequence[int]:
-        everybody = range(len(self._screen.models))
+        everybody = range(len(self._session_state.models))
         if people is not None and not set(people) <= set(everybody):
             raise TrackerError(f"expected people from 0 to {everybody[-1]}, found {list(people)}; reload the page")
         return everybody if people is None else people
 
     def _rows(self, first: int, last: int, people: Sequence[int] | None) -> list[tuple[int, FrameRow]]:
-        return [(i, row) for i in self._whose(people) for row in self._screen.saver.rows(i, range(first, last + 1))]
+        return [
+            (i, row) for i in self._whose(people) for row in self._session_state.saver.rows(i, range(first, last + 1))
+        ]
 
     def _name(self, person: int) -> str:
-        return self._screen.session.people[person].name
+        return self._session_state.session.people[person].name
 
     def _gaps(self, person: int, first: int, last: int) -> Iterator[tuple[int, int]]:
         """Neighbouring frames with poses that stay, with others between them."""
-        rows = self._screen.saver.rows(person, range(first, last + 1))
+        rows = self._session_state.saver.rows(person, range(first, last + 1))
         stay = [row.frame for row in rows if row.keyframe or row.frame in (first, last)]
         return ((a, b) for a, b in pairwise(stay) if b - a > 1)
 
     def _filled(self, person: int, start: int, end: int) -> Iterator[PoseChange]:
         """Poses for the frames between two that have one."""
-        saver, name, model = self._screen.saver, self._name(person), self._screen.present[person]
+        saver, name, model = self._session_state.saver, self._name(person), self._session_state.present[person]
         ends = [saver.pose_now(person, frame) for frame in (start, end)]
         if ends[0] is None or ends[1] is None:  # of a body model of other values
             return

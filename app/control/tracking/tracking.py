@@ -6,9 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from app.control.session.session_state import Screen
+from app.control.session.activities import Activities
+from app.control.session.session_state import SessionState
 from app.runtime.jobs import Job
-from app.state.state import Shown, TrackState, finite_or_none
+from app.state.people import ShownPose
+from app.state.progress import TrackState
+from app.state.state import StateChanges, finite_or_none
 from tracker.errors import TrackerError
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.track_session import Step, TrackSession
@@ -38,7 +41,7 @@ class _Run(NamedTuple):
 class _SaverSink:
     """Saves the poses of a run through the saver, which retries failed writes."""
 
-    def __init__(self, screen: Screen) -> None:
+    def __init__(self, screen: SessionState) -> None:
         self._screen = screen
 
     def write(self, label: str, changes: Sequence[PoseChange], edit: int | None) -> int | None:
@@ -52,9 +55,15 @@ class _SaverSink:
 class Tracking:
     """At most one tracking run, which is at work or paused."""
 
-    def __init__(self, screen: Screen) -> None:
-        """Track on this screen."""
-        self._screen = screen
+    def __init__(self, screen: SessionState, activities: Activities) -> None:
+        """Track nothing yet.
+
+        Args:
+            screen: holds the state.
+            activities: ends searches and gestures before a run.
+        """
+        self._screen, self._activities = screen, activities
+        activities.add_job(self, on_shown_frame=True)
         self._run: _Run | None = None
 
     @property
@@ -73,7 +82,7 @@ class Tracking:
             TrackerError: nobody has been placed, or there is no frame to track.
         """
         screen = self._screen
-        with screen.lock:
+        with self._activities.editing():
             state, saver = screen.state, screen.saver
             models = screen.present
             people = tuple(i for i in range(len(models)) if saver.frames(i))
@@ -81,7 +90,7 @@ class Tracking:
                 raise TrackerError("expected a person who has been placed, found none; pose the body here first")
             frames = self._frames(backward, until, people)
             way = "backward" if backward else "forward"
-            free = [screen.free(person) for person in range(len(models))]
+            free = [screen.active_dofs(person) for person in range(len(models))]
             session = TrackSession(
                 make_tracker(state.settings),
                 TrackingRun(
@@ -101,29 +110,34 @@ class Tracking:
                 lambda: self._paused(run),
             )
             run = _Run(session, job)
-            self._run, screen.edit_of = run, None
+            self._run, screen.open_edit_owner = run, None
             track = TrackState(running=True, first=frames[0], last=frames[-1], total=len(frames))
             screen.set(track=track, follow=True)
             run.job.run()
 
-    def go_on(self) -> None:
-        """Go on with a run that is paused; nothing where none is."""
-        with self._screen.lock:
+    def resume(self) -> None:
+        """Continue a paused run, if there is one."""
+        with self._activities.starting(self):
             if self._run is not None and not self._run.job.running:
                 self._screen.set(track=replace(self._screen.state.track, running=True))
                 self._run.job.run()
 
-    def halt(self, stay: bool = False) -> None:
-        """Pause a run that is at work; must not be called holding the lock, which its last step takes.
-
-        Args:
-            stay: show what is shown now, whatever the last step finds: a hand is about to change it.
-        """
+    def pause(self) -> None:
+        """Pause a running run with its results on disk. The caller must not hold the lock: the last step takes it."""
         run = self._run
         if run is not None:
-            if stay and run.job.running:
-                self._screen.set(follow=False)
             run.job.stop()
+
+    def halt(self) -> None:
+        """Pause a running run, and keep the shown frame: it is about to be changed. See `pause`."""
+        if self.running:
+            self._screen.set(follow=False)
+        self.pause()
+
+    def stop(self) -> None:
+        """End the run; its results stay. The caller must not hold the lock."""
+        self.halt()
+        self.forget()
 
     def forget(self) -> None:
         """End a run that has been halted: what it found stays, and it goes on no more. The last message is over."""
@@ -146,7 +160,7 @@ class Tracking:
             at = self._screen.state.track.at
             if follow and at is not None and at != self._screen.state.frame:
                 self.flush()
-                self._screen.show(at)
+                self._screen.show_frame(at)
 
     def _frames(self, backward: bool, until: int | None, people: Sequence[int]) -> range:
         """Frames to track in their order: from the one shown where somebody has no stored pose on it, else the next."""
@@ -185,7 +199,7 @@ class Tracking:
             per_second=steps / max(1e-6, seconds),
         ))  # fmt: skip
         if screen.state.frame in {found.frame for found in step.better}:
-            screen.show(screen.state.frame, follow=screen.state.follow)
+            screen.show_frame(screen.state.frame, follow=screen.state.follow)
 
     def _show_tracked(self, run: _Run, found: PoseEstimate, seconds: float) -> None:
         """Show the progress of the first pass, and the frame if it is shown or followed."""
@@ -198,13 +212,15 @@ class Tracking:
             doubtful=track.doubtful + (worst == "doubtful"), lost=track.lost + (worst == "lost"),
         )  # fmt: skip
         if screen.state.follow or screen.state.frame == found.frame:
-            screen.set(track=track, **self._found(run, found))
+            changes = self._found(run, found)
+            changes["track"] = track
+            screen.set(**changes)
         else:
             screen.set(track=track)
         if time.monotonic() - screen.last_save > _SAVE_S:
             run.session.save()
 
-    def _found(self, run: _Run, found: PoseEstimate) -> dict[str, object]:
+    def _found(self, run: _Run, found: PoseEstimate) -> StateChanges:
         """Return the fields of the state that show a tracked frame."""
         keyframes, tracked = run.subjects.keyframes_at(found.frame), run.subjects.tracked
         people = []
@@ -213,10 +229,10 @@ class Tracking:
             if stored is not None:
                 people.append(stored)
             elif i not in tracked:
-                people.append(Shown(shown.values, None, revision=self._screen.state.revisions[i]))
+                people.append(ShownPose(shown.values, None, revision=self._screen.state.revisions[i]))
             else:
-                parts_px = tuple(finite_or_none(c) for c in found.parts_px[i])
-                people.append(Shown(found.poses[i], "tracked", found.statuses[i], found.remarks[i], parts_px))
+                part_costs_px = tuple(finite_or_none(c) for c in found.part_costs_px[i])
+                people.append(ShownPose(found.poses[i], "tracked", found.statuses[i], found.notes[i], part_costs_px))
         models, revisions = self._screen.bodies(people)
         return {
             "frame": found.frame,
@@ -224,7 +240,7 @@ class Tracking:
             "models": models,
             "revisions": revisions,
             "cost_px": finite_or_none(found.cost_px),
-            "view_costs_px": tuple(finite_or_none(c) for c in found.views_px),
+            "view_costs_px": tuple(finite_or_none(c) for c in found.view_costs_px),
         }
 
     def _paused(self, run: _Run) -> None:

@@ -1,13 +1,12 @@
 """Setting the floor from three clicked points; kept in session.toml, with the former one to go back to."""
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from app.control.session.session_state import Screen
+from app.control.session.activities import Activities
+from app.control.session.session_state import SessionState
 from app.state.floor_picking import FloorState, Picking, with_mark, with_next, without_last
 from tracker.errors import TrackerError
 from tracker.geometry.ground_plane import GroundPlane, nearest_axis, up_rotation
@@ -17,20 +16,20 @@ _KEY = "former_floor"
 """Setting of the session: the floor before the one that is set."""
 
 
-class Flooring:
+class FloorEditing:
     """The floor of the session, and the hand that sets another."""
 
-    def __init__(self, screen: Screen, editing: Callable[[], AbstractContextManager[None]]) -> None:
+    def __init__(self, session_state: SessionState, activities: Activities) -> None:
         """Show the session's floor.
 
         Args:
             screen: holds the state.
-            editing: gives the lock with nothing at work and no gesture at hand (`Controller.editing`).
+            activities: ends jobs and gestures before an edit.
         """
-        self._screen, self._editing = screen, editing
-        self._cameras = [c.camera for c in screen.session.cameras]
-        floor = FloorState(screen.session.up, screen.session.floor, former=self._former() is not None)
-        screen.set(floor=floor)
+        self._session_state, self._activities = session_state, activities
+        self._cameras = [c.camera for c in session_state.session.cameras]
+        floor = FloorState(session_state.session.up, session_state.session.floor, former=self._former() is not None)
+        session_state.set(floor=floor)
 
     def begin(self) -> None:
         """Begin to click points; what was clicked before is forgotten."""
@@ -42,19 +41,19 @@ class Flooring:
 
     def mark(self, camera: int, position_px: tuple[float, float]) -> None:
         """Mark the point at hand in a view, undistorted px."""
-        with self._screen.lock:
-            picking = self._screen.state.floor.picking
+        with self._session_state.lock:
+            picking = self._session_state.state.floor.picking
             if picking is not None and 0 <= camera < len(self._cameras):
                 self._pick(with_mark(picking, self._cameras, camera, *position_px))
 
-    def go_on(self) -> None:
+    def next_point(self) -> None:
         """Go on to the next point.
 
         Raises:
             TrackerError: the point at hand is not known yet.
         """
-        with self._screen.lock:
-            picking = self._screen.state.floor.picking
+        with self._session_state.lock:
+            picking = self._session_state.state.floor.picking
             if picking is None:
                 return
             if picking.picks[-1].point_world is None:
@@ -63,8 +62,8 @@ class Flooring:
 
     def take_back(self) -> None:
         """Take the last mark back."""
-        with self._screen.lock:
-            picking = self._screen.state.floor.picking
+        with self._session_state.lock:
+            picking = self._session_state.state.floor.picking
             if picking is not None:
                 self._pick(without_last(picking, self._cameras))
 
@@ -74,8 +73,8 @@ class Flooring:
         Raises:
             TrackerError: there is no plane, or it cannot be written.
         """
-        with self._editing():
-            picking = self._screen.state.floor.picking
+        with self._activities.editing():
+            picking = self._session_state.state.floor.picking
             if picking is None:
                 return
             if picking.plane is None:
@@ -88,25 +87,25 @@ class Flooring:
         Raises:
             TrackerError: there is none, or it cannot be written.
         """
-        with self._editing():
+        with self._activities.editing():
             former = self._former()
             if former is None:
                 raise TrackerError("there is no former floor to go back to: this one is the calibration's")
             self._change(*former)
 
     def _change(self, up: str, plane: GroundPlane | None) -> None:
-        before = self._screen.state.floor
-        self._screen.session = save_floor(self._screen.session, up, plane)
-        self._screen.saver.keep_setting(_KEY, _kept(before.up, before.plane))
-        self._screen.stand(up_rotation(up, plane))
-        self._screen.set(floor=FloorState(up, plane, former=True))
+        before = self._session_state.state.floor
+        self._session_state.session = save_floor(self._session_state.session, up, plane)
+        self._session_state.saver.keep_setting(_KEY, _kept(before.up, before.plane))
+        self._session_state.set_default_poses(up_rotation(up, plane))
+        self._session_state.set(floor=FloorState(up, plane, former=True))
 
     def _pick(self, picking: Picking | None) -> None:
-        with self._screen.lock:
-            self._screen.set(floor=replace(self._screen.state.floor, picking=picking))
+        with self._session_state.lock:
+            self._session_state.set(floor=replace(self._session_state.state.floor, picking=picking))
 
     def _former(self) -> tuple[str, GroundPlane | None] | None:
-        data = self._screen.saver.setting(_KEY)
+        data = self._session_state.saver.setting(_KEY)
         if not isinstance(data, dict) or data.get("up") not in UPS:
             return None
         normal = data.get("normal")

@@ -3,22 +3,22 @@
 from dataclasses import replace
 from typing import Any
 
-from app.control.session.session_state import Screen
+from app.control.session.session_state import SessionState
 from app.state.view_3d import View3d, kept, restored
 
 _KEY = "view_3d"
 """Setting of the session."""
 
 
-class Viewing:
+class View3dSettings:
     """The choices of whoever looks at the 3-D view."""
 
-    def __init__(self, screen: Screen) -> None:
+    def __init__(self, session_state: SessionState) -> None:
         """Take over what is kept with the session."""
-        self._screen = screen
+        self._session_state = session_state
         # Two bodies close together are told apart by their own colours, not by those of their parts.
-        usual = View3d(colors="people" if len(screen.session.people) > 1 else "parts")
-        screen.set(view_3d=restored(screen.saver.setting(_KEY), usual))
+        usual = View3d(colors="people" if len(session_state.session.people) > 1 else "parts")
+        session_state.set(view_3d=restored(session_state.saver.setting(_KEY), usual))
 
     def choose(self, **changes: Any) -> None:
         """Change fields of `View3d`; on disk when this returns.
@@ -26,14 +26,25 @@ class Viewing:
         Raises:
             TrackerError: the session's settings cannot be written; the view is changed all the same.
         """
-        with self._screen.lock:
-            view = replace(self._screen.state.view_3d, **changes)
-            if view == self._screen.state.view_3d:
+        with self._session_state.lock:
+            view = replace(self._session_state.state.view_3d, **changes)
+            if view == self._session_state.state.view_3d:
                 return
-            self._screen.set(view_3d=view)
-            self._screen.saver.keep_setting(_KEY, kept(view))
+            self._session_state.set(view_3d=view)
+            self._session_state.saver.keep_setting(_KEY, kept(view))
+
+    def pause(self, page: int, paused: bool) -> None:
+        """Pause the 3-D view and its panels during drags, or no longer, for a page that renders in software.
+
+        Args:
+            page: number of the page.
+            paused: whether the page wants the pause.
+        """
+        with self._session_state.lock:
+            others = self._session_state.state.pages_pausing_3d - {page}
+            self._session_state.set(pages_pausing_3d=others | {page} if paused else others)
 
     def snap(self, camera: int | None) -> None:
         """Look through a camera, by index, with its image behind the bodies; None lets the view go."""
-        if camera is None or 0 <= camera < len(self._screen.session.cameras):
-            self._screen.set(snapped=camera)
+        if camera is None or 0 <= camera < len(self._session_state.session.cameras):
+            self._session_state.set(snapped=camera)

@@ -26,7 +26,7 @@ def row(name, time_us, must=None):
 def test_the_painted_cost_is_honest(frame):
     """Written with other means, it says the same of poses, good and bad: to 0.3 px, and in the same order."""
     cost = frame.cost()
-    painted = PaintedCost(frame.views, frame.model, cost.scene_px)
+    painted = PaintedCost(frame.views, frame.model, cost.edge_points_px)
     poses = frame.candidates(25)
     fast, slow = cost.of_person(0, poses, [frame.values])[0], np.array([painted(p) for p in poses])
     assert np.ptp(fast) > 2

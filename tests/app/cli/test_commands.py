@@ -156,8 +156,8 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
 
     def elsewhere(frame):
         found = estimates[frame]
-        remarks = ("followed back from frame 2",)
-        return found._replace(poses=(found.poses[0] + 0.01,), remarks=remarks, statuses=("good",))
+        notes = ("tracked back from frame 2",)
+        return found._replace(poses=(found.poses[0] + 0.01,), notes=notes, statuses=("good",))
 
     def ways_back(run, found, settings):
         offered.append(found)
@@ -175,7 +175,7 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
     assert told["statuses"] == {"person": {"good": 4, "lost": 1}}
     found = stored(session)
     np.testing.assert_array_equal(found[1].values, estimates[1].poses[0] + 0.01)
-    assert (found[1].status, found[1].remark) == ("good", "followed back from frame 2")
+    assert (found[1].status, found[1].remark) == ("good", "tracked back from frame 2")
     for k in (2, 3, 4):
         np.testing.assert_array_equal(found[k].values, estimates[k].poses[0])
     assert found[3].status == "lost"
@@ -240,13 +240,13 @@ def test_several_people(run, tmp_path):
 
 
 def test_simulate(run, tmp_path):
-    status, out, err = run(
-        "simulate", tmp_path / "sim", "--frames", "2", "--cameras", "2", "--body", "model", "--masks"
-    )
+    options = ("--frames", "2", "--cameras", "2", "--size", "160", "120", "--body", "model", "--masks")
+    status, out, err = run("simulate", tmp_path / "sim", *options)
     assert (status, out) == (0, f"made {tmp_path / 'sim'}\n")
     assert err.splitlines()[-1].startswith("rendering: 4 of 4, ")  # an image of each camera for each frame
     made = load_session(tmp_path / "sim")
     assert (made.n_frames, [c.camera.name for c in made.cameras]) == (2, ["cam1", "cam2"])
+    assert {c.camera.size for c in made.cameras} == {(160, 120)}
     for name in ("truth.trc", "truth.csv", "truth_model.toml", "masks/cam2/000001.png", "background/cam1.png"):
         assert (tmp_path / "sim" / name).is_file(), name
     assert run("info", tmp_path / "sim")[0] == 0

@@ -17,7 +17,7 @@ def test_a_fresh_session_shows_a_draft_that_is_not_stored(opened):
     controller = opened()
     assert controller.state.people[0].source is None
     assert controller.state.undo is None
-    assert controller.timeline() == {}
+    assert controller.stored_poses.timeline() == {}
 
 
 def test_a_drag_is_one_entry_and_ends_at_the_pointer(opened):
@@ -27,8 +27,8 @@ def test_a_drag_is_one_entry_and_ends_at_the_pointer(opened):
     np.testing.assert_allclose(pixel_of(controller, "left_wrist"), target, atol=1.0)
     assert controller.state.undo == "drag left wrist, frame 0"
     assert controller.state.people[0].source == "manual"
-    assert controller.timeline()[0]["keyframe"]
-    controller.undo()
+    assert controller.stored_poses.timeline()[0]["keyframe"]
+    controller.history.undo()
     assert controller.state.undo is None
     assert controller.state.people[0].source is None
 
@@ -45,21 +45,21 @@ def test_a_hand_that_holds_still_sees_what_the_pose_costs(opened):
     controller = opened()
     before = controller.state.cost_px
     start = pixel_of(controller, "torso")
-    controller.hand.begin_drag(PAGE, FRONT, 0, "torso", tuple(start))
+    controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
     for seq, way in enumerate((10.0, 60.0, 120.0)):
-        controller.hand.move_drag(PAGE, (start[0] + way, start[1]), seq)
+        controller.dragging.move(PAGE, (start[0] + way, start[1]), seq)
     shown = controller.state.poses
     wait_for(lambda: controller.state.cost_px != before)
-    wait_for(lambda: controller.state.cost_px == controller._screen.costs(shown)["cost_px"])
+    wait_for(lambda: controller.state.cost_px == controller._session_state.costs(shown)["cost_px"])
     assert controller.state.drag is not None
-    controller.hand.cancel_drag(PAGE)
+    controller.dragging.cancel(PAGE)
     assert controller.state.cost_px == before
 
 
 def test_the_cost_of_what_has_been_let_go_is_not_touched(opened):
     controller = opened()
     drag(controller, "torso", (120.0, 0.0))
-    controller._screen.set(cost_px=1.4)  # as a tracker knows it
+    controller._session_state.set(cost_px=1.4)  # as a tracker knows it
     time.sleep(0.1)
     assert controller.state.cost_px == 1.4
 
@@ -68,10 +68,10 @@ def test_a_cancelled_drag_leaves_nothing(opened):
     controller = opened()
     values = controller.state.poses[0]
     start = pixel_of(controller, "torso")
-    controller.hand.begin_drag(PAGE, FRONT, 0, "torso", tuple(start))
-    controller.hand.move_drag(PAGE, tuple(start + 40), 1)
+    controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
+    controller.dragging.move(PAGE, tuple(start + 40), 1)
     assert not np.array_equal(controller.state.poses[0], values)
-    controller.hand.cancel_drag(PAGE)
+    controller.dragging.cancel(PAGE)
     np.testing.assert_array_equal(controller.state.poses[0], values)
     assert controller.state.undo is None
 
@@ -80,13 +80,13 @@ def test_a_long_drag_is_on_disk_before_it_ends(opened, session, monkeypatch):
     monkeypatch.setattr("app.control.posing.dragging._CHECKPOINT_S", 0.0)
     controller = opened()
     start = pixel_of(controller, "torso")
-    controller.hand.begin_drag(PAGE, FRONT, 0, "torso", tuple(start))
-    controller.hand.move_drag(PAGE, tuple(start + 40), 1)
+    controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
+    controller.dragging.move(PAGE, tuple(start + 40), 1)
     other = AnnotationStore(session / "annotations.sqlite", read_only=True)
     np.testing.assert_array_equal(other.pose("person", 0).values, controller.state.poses[0])
     other.close()
-    controller.hand.move_drag(PAGE, tuple(start + 60), 2)
-    controller.hand.cancel_drag(PAGE)
+    controller.dragging.move(PAGE, tuple(start + 60), 2)
+    controller.dragging.cancel(PAGE)
     assert controller.state.undo is None
     assert controller.state.people[0].source is None
 
@@ -94,10 +94,10 @@ def test_a_long_drag_is_on_disk_before_it_ends(opened, session, monkeypatch):
 def test_another_page_cannot_move_what_this_one_holds(opened):
     controller = opened()
     start = pixel_of(controller, "torso")
-    controller.hand.begin_drag(PAGE, FRONT, 0, "torso", tuple(start))
+    controller.dragging.begin(PAGE, FRONT, 0, "torso", tuple(start))
     values = controller.state.poses[0]
-    controller.hand.move_drag(PAGE + 1, tuple(start + 40), 1)
-    controller.hand.end_drag(PAGE + 1)
+    controller.dragging.move(PAGE + 1, tuple(start + 40), 1)
+    controller.dragging.end(PAGE + 1)
     np.testing.assert_array_equal(controller.state.poses[0], values)
     assert controller.state.drag is not None
 
@@ -107,24 +107,24 @@ def test_restart_shows_the_same_pose_and_history(opened):
     drag(controller, "torso", (10.0, 5.0))
     drag(controller, "right_knee", (8.0, -6.0))
     drag(controller, "left_elbow", (8.0, -6.0))
-    controller.undo()
+    controller.history.undo()
     before = controller.state
     controller = opened()
     np.testing.assert_array_equal(controller.state.poses[0], before.poses[0])
     assert (controller.state.undo, controller.state.redo) == (before.undo, before.redo)
     assert controller.state.redo == "drag left elbow, frame 0"
-    controller.redo()
+    controller.history.redo()
     assert controller.state.redo is None
 
 
 def test_undo_goes_to_the_frame_it_is_about(opened):
     controller = opened()
     drag(controller, "torso", (10.0, 5.0))
-    controller.seek(7)
+    controller.navigation.seek(7)
     assert controller.state.people[0].source is None  # a draft: the pose of the nearest frame
-    controller.undo()
+    controller.history.undo()
     assert controller.state.frame == 0
-    assert controller.timeline(1)[0] is None
+    assert controller.stored_poses.timeline(1)[0] is None
 
 
 def test_a_slider_is_one_entry_however_often_it_moves(opened):
@@ -135,15 +135,15 @@ def test_a_slider_is_one_entry_however_often_it_moves(opened):
         controller.pose_edits.set_dof(0, dof, value)
     assert controller.state.poses[0][dof] == pytest.approx(model.limits[dof, 1])  # within its limit
     assert controller.state.undo == "set left shoulder abduction, frame 0"
-    controller.undo()
+    controller.history.undo()
     assert controller.state.undo is None
 
 
 def test_values_nobody_touched_keep_their_source(opened, session):
     controller = opened()
     drag(controller, "torso", (10.0, 0.0))
-    controller.search_step()
-    wait_for(lambda: controller.state.job.evaluations and not controller.state.job.running)
+    controller.search.step()
+    wait_for(lambda: controller.state.search.evaluations and not controller.state.search.running)
     drag(controller, "left_wrist", (10.0, 0.0))
     store = AnnotationStore(session / "annotations.sqlite", read_only=True)
     sources = store.pose("person", 0).sources
@@ -156,14 +156,14 @@ def test_values_nobody_touched_keep_their_source(opened, session):
 def test_stepping_a_search(opened):
     controller = opened()
     seen = []
-    controller.subscribe(lambda state: seen.append(state.job))
-    controller.search_step()
-    wait_for(lambda: controller.state.job.evaluations > 1 and not controller.state.job.running)
-    first = controller.state.job
+    controller.subscribe(lambda state: seen.append(state.search))
+    controller.search.step()
+    wait_for(lambda: controller.state.search.evaluations > 1 and not controller.state.search.running)
+    first = controller.state.search
     assert first.kind == "search"
     assert first.stage == "torso and head"
-    controller.search_step()
-    wait_for(lambda: controller.state.job.evaluations > first.evaluations)
+    controller.search.step()
+    wait_for(lambda: controller.state.search.evaluations > first.evaluations)
     assert any(job.candidate is not None for job in seen)
     assert controller.state.undo == "search, frame 0"
 
@@ -171,45 +171,45 @@ def test_stepping_a_search(opened):
 def test_a_search_to_its_end_lowers_the_cost_and_is_one_entry(opened):
     controller = opened()
     before = controller.state.cost_px
-    controller.set_settings(TrackSettings(search=SearchSettings(passes=(1.0,), max_expansions=4)))
-    controller.search_frame()
-    wait_for(lambda: controller.state.job.message)
-    assert controller.state.job.message.startswith("done")
+    controller.search.set_settings(TrackSettings(search=SearchSettings(passes=(1.0,), max_expansions=4)))
+    controller.search.run()
+    wait_for(lambda: controller.state.search.message)
+    assert controller.state.search.message.startswith("done")
     assert controller.state.cost_px < before
     assert controller.state.undo == "search, frame 0"
     assert controller.state.people[0].source == "searched"
-    controller.undo()
+    controller.history.undo()
     assert controller.state.undo is None
 
 
 def test_a_stopped_search_keeps_the_best_so_far_on_disk(opened, session):
     controller = opened()
-    controller.search_frame()
-    wait_for(lambda: controller.state.job.evaluations > 30)
-    controller.stop()
-    assert not controller.state.job.running
-    assert controller.state.job.kind == "search"  # it stands, and can go on
+    controller.search.run()
+    wait_for(lambda: controller.state.search.evaluations > 30)
+    controller.activities.stop()
+    assert not controller.state.search.running
+    assert controller.state.search.kind == "search"  # it stands, and can go on
     store = AnnotationStore(session / "annotations.sqlite", read_only=True)
     np.testing.assert_array_equal(store.pose("person", 0).values, controller.state.poses[0])
     store.close()
-    evaluations = controller.state.job.evaluations
-    controller.search_step()
-    wait_for(lambda: controller.state.job.evaluations > evaluations)
+    evaluations = controller.state.search.evaluations
+    controller.search.step()
+    wait_for(lambda: controller.state.search.evaluations > evaluations)
 
 
 @pytest.mark.parametrize("interruption", ["seek", "drag", "undo", "set"])
 def test_whatever_a_hand_does_stops_a_running_search(opened, interruption):
     controller = opened()
     drag(controller, "torso", (4.0, 4.0))
-    controller.search_frame()
-    wait_for(lambda: controller.state.job.evaluations > 15)
+    controller.search.run()
+    wait_for(lambda: controller.state.search.evaluations > 15)
     {
-        "seek": lambda: controller.seek(3),
+        "seek": lambda: controller.navigation.seek(3),
         "drag": lambda: drag(controller, "left_knee", (3.0, 3.0)),
-        "undo": controller.undo,
+        "undo": controller.history.undo,
         "set": lambda: controller.pose_edits.set_dof(0, 8, 0.3),
     }[interruption]()
-    assert not controller.state.job.running
+    assert not controller.state.search.running
     values = controller.state.poses[0]
     time.sleep(0.2)
     assert controller.state.poses[0] is values  # no late step
@@ -217,9 +217,9 @@ def test_whatever_a_hand_does_stops_a_running_search(opened, interruption):
 
 def test_seeking_out_of_range_stays_within(opened):
     controller = opened()
-    controller.seek(10_000)
+    controller.navigation.seek(10_000)
     assert controller.state.frame == controller.session.n_frames - 1
-    controller.seek(-5)
+    controller.navigation.seek(-5)
     assert controller.state.frame == 0
 
 
@@ -237,8 +237,8 @@ def test_nothing_is_lost_when_the_disk_is_full(opened, monkeypatch):
     monkeypatch.setattr(AnnotationStore, "commit", real)
     drag(controller, "left_wrist", (5.0, 0.0))  # the next save holds what the failed one did not
     assert controller.state.save_error is None
-    controller.seek(1)
-    controller.seek(0)
+    controller.navigation.seek(1)
+    controller.navigation.seek(0)
     assert controller.state.poses[0][0] == values[0]
 
 

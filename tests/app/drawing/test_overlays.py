@@ -8,11 +8,11 @@ import pytest
 from app.drawing import overlays
 from app.drawing.overlays import Path
 from app.state.page_view import View
-from app.state.state import Shown
+from app.state.people import ShownPose
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.images.edge_segments import Segments
+from tracker.images.edge_segments import Segments, sample_segments
 
 
 def kinds_of(paths, kind, camera=0):
@@ -32,7 +32,7 @@ SEGMENTS = view_of("accepted", "rejected")
 
 
 def drawn(controller, state, views=None, view=SEGMENTS):
-    views = controller.frames.evidence_at_hand(state.frame) if views is None else views
+    views = controller.frames.cached_evidence(state.frame) if views is None else views
     return overlays.paths(controller.session, state, view, views)
 
 
@@ -49,7 +49,7 @@ def test_a_body_accepts_the_edges_along_it_and_no_others(controller):
 
     def counts(shift_m):
         values = state.poses[0] + shift_m * (np.arange(22) == 0)
-        paths = drawn(controller, replace(state, people=(Shown(values, "manual"),)))
+        paths = drawn(controller, replace(state, people=(ShownPose(values, "manual"),)))
         return [sum(len(p.segments_px) for p in paths if p.kind == kind) for kind in ("accepted", "rejected")]
 
     (near, left), (away, all_left) = counts(0.0), counts(3.0)
@@ -65,7 +65,13 @@ def test_segments_lie_in_undistorted_pixels_of_the_whole_image(controller):
     segments = Segments(points, normals, np.array([0, 4, 6]))
     camera = controller.session.cameras[0].camera.pinhole.scaled(0.5).cropped((10, 20, 60, 70))
     view = ViewEvidence(
-        camera, 0.5, np.empty((0, 2), np.float32), np.empty((50, 50), np.float32), (10, 20), segments=segments
+        camera,
+        0.5,
+        np.empty((0, 2), np.float32),
+        np.empty((50, 50), np.float32),
+        (10, 20),
+        segments=segments,
+        samples=sample_segments(segments),
     )
     paths = drawn(controller, controller.state, [view] * 4)
     lines = np.concatenate([p.segments_px for p in paths if p.camera == 0])
@@ -79,9 +85,9 @@ def test_visible_and_hidden_contours_are_what_the_tracing_says(controller):
     traced = occluding_contours.trace(
         [PosedBody(session.people[0].model, state.poses[0])], session.cameras[1].camera.pinhole
     )
-    assert 0 < traced.hidden.sum() < len(traced.hidden)
+    assert 0 < traced.occluded.sum() < len(traced.occluded)
     paths = drawn(controller, state, view=view_of("contours", "hidden"))
-    for kind, those in (("hidden", traced.hidden), ("model", ~traced.hidden)):
+    for kind, those in (("hidden", traced.occluded), ("model", ~traced.occluded)):
         (path,) = kinds_of(paths, kind, camera=1)
         np.testing.assert_array_equal(path.segments_px, traced.pieces_px[those])
         assert path.color == session.people[0].color

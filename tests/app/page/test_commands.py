@@ -5,6 +5,7 @@ import time
 import pytest
 from gestures import PAGE
 
+from app.control.posing import dragging
 from app.control.session import session_state
 from app.page.client_messages import Drag, FitPose, LockDofs, Nudge, SetDof
 from app.page.commands import dispatch
@@ -23,12 +24,16 @@ def scorings(placed, monkeypatch):
     return scored
 
 
-def test_the_end_of_a_drag_scores_once(placed, scorings):
+def test_the_end_of_a_drag_scores_once(placed, scorings, monkeypatch):
+    monkeypatch.setattr(dragging, "_HEAD_START_S", 0.0)
+    save = placed._saver.save
+    monkeypatch.setattr(placed._saver, "save", lambda *args: time.sleep(0.5) or save(*args))
     dispatch(placed, PAGE, drag_to(320.0, "start", 1))
     for seq in range(2, 6):
         dispatch(placed, PAGE, drag_to(320.0 + seq, "move", seq))
+    time.sleep(0.5)  # until the background has scored the moves, and would score the next at once
     dispatch(placed, PAGE, drag_to(340.0, "end", 6))
-    time.sleep(0.5)  # for the background, which must not score it too
+    time.sleep(0.5)
     assert len([poses for poses in scorings if poses[0] is placed.state.poses[0]]) == 1
     assert placed.state.cost_px is not None
     assert placed.state.drag is None

@@ -46,7 +46,7 @@ async def test_a_run_is_watched_frame_by_frame(controller, tracker):
         await page.hear("state", lambda m: m["track"]["running"] and m["track"]["total"] == 4)
         tracker.let_go(2)
         state = await page.hear("state", lambda m: m["frame"] == 4)
-        assert (state["status"], state["remark"]) == ("doubtful", "left arm searched anew")
+        assert (state["status"], state["remark"]) == ("doubtful", "left arm relocated")
         assert state["part_costs_px"] == [0.5] * 9 + [None]
         assert state["view_costs_px"] == [1.0, None, 2.0, 3.0]
         await page.hear("overlay", lambda m: m["frame"] == 4)
@@ -58,7 +58,7 @@ async def test_a_run_is_watched_frame_by_frame(controller, tracker):
         cells = {k: c for m in page.told if m["type"] == "timeline" for k, c in m["cells"].items()}
         cells |= (await page.hear("timeline", lambda m: "6" in m["cells"]))["cells"] if "6" not in cells else {}
         assert cells["4"]["status"] == "doubtful"
-        assert cells["4"]["remark"] == "left arm searched anew"
+        assert cells["4"]["remark"] == "left arm relocated"
 
 
 async def test_images_come_though_the_tracker_is_ahead_by_then(controller, tracker):
@@ -175,7 +175,7 @@ async def test_another_group_replaces_the_first_and_closed_ones_rest(controller)
 
 
 async def test_a_drag_means_the_frame_that_the_hand_saw(controller):
-    controller.seek(5)
+    controller.navigation.seek(5)
     async with visiting(controller) as page:
         await page.hear("timeline")
         hold = {"camera": 0, "person": 0, "point": "torso", "u": 320.0, "v": 240.0, "frame": 2}
@@ -243,7 +243,12 @@ async def test_what_is_not_understood_is_refused_and_nothing_has_happened(contro
         await page.send(kind, **({"phase": "start"} if kind == "pin" else {}), **fields)
         assert "the page sent a wrong message" in (await page.hear("notice"))["text"]
     now = controller.state
-    assert (now.pins, now.people, now.undo, now.cast) == (before.pins, before.people, before.undo, before.cast)
+    assert (now.pins, now.people, now.undo, now.visibility) == (
+        before.pins,
+        before.people,
+        before.undo,
+        before.visibility,
+    )
 
 
 @pytest.mark.parametrize(
@@ -266,7 +271,7 @@ async def test_a_wrong_message_is_one_notice_and_the_socket_stays_open(controlle
 
 
 async def test_a_fault_of_the_program_is_a_notice(controller, monkeypatch):
-    monkeypatch.setattr(controller, "undo", lambda: 1 / 0)
+    monkeypatch.setattr(controller.history, "undo", lambda: 1 / 0)
     async with visiting(controller) as page:
         await page.send("undo")
         assert "ZeroDivisionError" in (await page.hear("notice"))["text"]
@@ -275,11 +280,11 @@ async def test_a_fault_of_the_program_is_a_notice(controller, monkeypatch):
 
 
 async def test_many_cells_travel_as_columns(controller, monkeypatch):
-    controller.seek(6)
+    controller.navigation.seek(6)
     controller.ranges.toggle_keyframe()
     controller.ranges.interpolate(2, 6)
     controller.ranges.mark(4, 4, "reviewed")
-    named = controller.timeline()
+    named = controller.stored_poses.timeline()
     monkeypatch.setattr(messages, "_FEW_CELLS", 0)
     async with visiting(controller) as page:
         message = await page.hear("cells")

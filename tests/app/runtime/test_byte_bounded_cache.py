@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import pytest
 
-from app.runtime.byte_bounded_cache import Recent, bytes_of
+from app.runtime.byte_bounded_cache import ByteBoundedCache, bytes_of
 
 
 def test_each_is_computed_once_whoever_asks():
@@ -18,7 +18,7 @@ def test_each_is_computed_once_whoever_asks():
         go.wait(5)
         return bytes(10)
 
-    recent = Recent(compute, 100)
+    recent = ByteBoundedCache(compute, 100)
     threads = [threading.Thread(target=recent.get, args=(3,)) for _ in range(4)]
     for thread in threads:
         thread.start()
@@ -31,7 +31,7 @@ def test_each_is_computed_once_whoever_asks():
 
 
 def test_the_oldest_go_where_bytes_run_out_and_the_newest_stays_however_large():
-    recent = Recent(lambda key: np.zeros(key, np.uint8), 1000)
+    recent = ByteBoundedCache(lambda key: np.zeros(key, np.uint8), 1000)
     for key in (400, 401, 402):
         recent.get(key)
     assert [recent.peek(key) is not None for key in (400, 401, 402)] == [False, True, True]
@@ -52,7 +52,7 @@ def test_what_failed_is_tried_again():
             raise ValueError("not yet")
         return b"there"
 
-    recent = Recent(compute, 100)
+    recent = ByteBoundedCache(compute, 100)
     with pytest.raises(ValueError, match="not yet"):
         recent.get(1)
     assert recent.get(1) == b"there"

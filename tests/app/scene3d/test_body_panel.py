@@ -9,7 +9,7 @@ from viser._gui_handles import GuiEvent
 
 from app.scene3d import body_panel
 from app.scene3d.body_panel import BodyPanel
-from tracker.body.dimensions import sizes_of
+from tracker.body.dimensions import dimensions_of
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def test_sizes_that_are_entered_become_a_draft_in_metres(controller, panel):
     folder = panel._folders[0]
     enter(folder.parts["left_forearm"], (29.0, 4.1, 4.6))
     enter(folder.widths["shoulder"], 41.0)
-    sizes = sizes_of(controller.sizing.model(0))
+    sizes = dimensions_of(controller.body_sizes.model(0))
     assert sizes.parts["left_forearm"].length_m == pytest.approx(0.29)
     assert sizes.parts["right_forearm"].girths_m == pytest.approx((0.041, 0.046))  # both sides alike
     assert sizes.widths_m["shoulder"] == pytest.approx(0.41)
@@ -62,4 +62,4 @@ def test_a_state_from_before_does_not_take_away_what_was_just_entered(controller
 
     monkeypatch.setattr(body_panel.asyncio, "to_thread", after_a_state)
     enter(panel._folders[0].height, 190.0)
-    assert sizes_of(controller.sizing.model(0)).height_m == pytest.approx(1.9)
+    assert dimensions_of(controller.body_sizes.model(0)).height_m == pytest.approx(1.9)

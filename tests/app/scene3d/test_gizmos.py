@@ -76,13 +76,13 @@ async def test_the_root_is_moved_and_turned_as_one_entry(controller, handles):
     # When it is let go it stands where the state says.
     wait_for(lambda: np.allclose(root.position, T[:3, 3] + [0.1, 0.2, -0.1]))
     wait_for(lambda: controller.state.undo == "place torso, frame 0")
-    controller.undo()
+    controller.history.undo()
     assert controller.state.undo == "drag left wrist, frame 0"
 
 
 async def test_a_joint_turns_within_its_limits_and_the_gizmo_comes_back(controller, handles):
     assert not handles["joint"].visible or controller.state.point is not None
-    controller.select(0, "left_elbow")
+    controller.navigation.select(0, "left_elbow")
     wait_for(lambda: handles["joint"].visible)
     T = part_frame(controller, "left_elbow")
     wait_for(lambda: np.allclose(handles["joint"].position, part_frame(controller, "left_elbow")[:3, 3]))
@@ -102,5 +102,5 @@ def test_gizmos_hide_while_a_tracker_runs(placed, tracker):
     server = Server()
     Gizmos(server, placed)
     wait_for(lambda: server.handles["root"].visible)
-    placed.track(False, None)
+    placed.tracking.start(False, None)
     wait_for(lambda: not server.handles["root"].visible)

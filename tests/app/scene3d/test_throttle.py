@@ -39,18 +39,20 @@ def test_with_a_graphics_card_everything_is_drawn_at_once(controller, clock):
 
 
 def test_work_is_drawn_but_once_in_a_while(controller, clock):
-    running = replace(controller.state, holding_3d=SOFTWARE, job=replace(controller.state.job, running=True))
+    running = replace(
+        controller.state, pages_pausing_3d=SOFTWARE, search=replace(controller.state.search, running=True)
+    )
     drawn, due = Throttle(controller), []
     for seconds in (0.0, 1.9, 2.1, 3.9):
         clock.now = 100.0 + seconds
         due.append(drawn.due(running) is not None)
     assert due == [True, False, True, False]
-    ended = replace(running, job=replace(running.job, running=False))
+    ended = replace(running, search=replace(running.search, running=False))
     assert drawn.due(ended) is ended
 
 
 def test_frames_that_go_by_are_passed_over_and_the_one_that_stays_is_drawn(controller, clock):
-    controller.state = replace(controller.state, holding_3d=SOFTWARE, frame=1)
+    controller.state = replace(controller.state, pages_pausing_3d=SOFTWARE, frame=1)
     drawn = Throttle(controller)
     assert drawn.due(controller.state) is controller.state
     left, stays = replace(controller.state, frame=5), replace(controller.state, frame=9)
@@ -77,6 +79,6 @@ def test_frames_that_go_by_are_passed_over_and_the_one_that_stays_is_drawn(contr
 
 def test_who_looks_through_a_camera_sees_bodies_and_image_together(controller, clock):
     drawn = Throttle(controller)
-    controller.state = replace(controller.state, holding_3d=SOFTWARE, frame=7, snapped=0)
+    controller.state = replace(controller.state, pages_pausing_3d=SOFTWARE, frame=7, snapped=0)
     assert drawn.due(controller.state) is controller.state
     assert clock.now == 100.0

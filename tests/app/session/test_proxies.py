@@ -4,7 +4,7 @@ import numpy as np
 from gestures import wait_for
 
 from app.session import proxies
-from app.session.frame_cache import Frames
+from app.session.frame_cache import FrameCache
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.session.session import load_session
@@ -49,14 +49,14 @@ def test_the_page_looks_at_the_proxy_and_matches_the_footage(run, session, monke
     real = recording._read_one
     monkeypatch.setattr(recording, "_read_one", lambda camera, k: decoded.append(k) or real(camera, k))
     observer = Observer(loaded.cameras, recording)
-    frames, plain = Frames(observer, proxies.proxies(loaded)), Frames(observer)
+    frames, plain = FrameCache(observer, proxies.proxies(loaded)), FrameCache(observer)
     try:
         seen = frames.images(31)
         assert decoded == []
         for image, truth in zip(seen, plain.images(31), strict=True):
             assert np.abs(image.astype(int) - truth).mean() < 4
         frames.request(31, lambda _: None)
-        wait_for(lambda: frames.evidence_at_hand(31) is not None)
+        wait_for(lambda: frames.cached_evidence(31) is not None)
         assert 31 in decoded
     finally:
         frames.close()

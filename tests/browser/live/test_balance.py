@@ -36,7 +36,7 @@ def balance(data_folder, tmp_path_factory):
     joints = read_joints(data / "reference_joints.trc", session.fps)
     known = {n: p for n, p in zip(joints.names, joints.points[0], strict=True) if n not in ("neck", "head")}
     model = session.people[0].model
-    points = model.points_world(fit_to_points(model, known).values)
+    points = model.points_world(fit_to_points(model, known).pose)
     targets = [
         dict(zip(model.point_names, c.camera.pinhole.project(points).tolist(), strict=True)) for c in session.cameras
     ]

@@ -80,13 +80,13 @@ async def test_a_search_goes_stage_by_stage_and_the_tree_marks_where_it_is(page)
     await page.keyboard.press("s")
     await shows(page, f"{RUNS}[0].stages[1].evaluations > 0 && {RUNS}[0].state === 'paused'", 30)
     # The stage at work is marked, as long as it takes; a speed that is chosen counts at once.
-    await page.get_by_label("Expansions a second").select_option("1")
+    await page.get_by_label("Expansions per second").select_option("1")
     await shows(page, "quadrille.state.searchSetup.speed === 1")
     await page.keyboard.press("f")
     await shows(page, "quadrille.state.state.job.running", 10)  # the stage was marked before, while the search stood
     await shows(page, "document.querySelectorAll('.tree-pass.is-running').length === 1", 10)
     assert await page.locator("#search-controls").get_by_text("Stage", exact=True).is_disabled()
-    await page.get_by_label("Expansions a second").select_option("0")
+    await page.get_by_label("Expansions per second").select_option("0")
     await shows(page, f"{OVER} && document.querySelectorAll('.tree-pass:not(.is-done)').length === 0", 60)
 
 
@@ -101,7 +101,7 @@ async def test_a_search_is_replayed_and_left_as_it_was(page):
     await shows(page, "quadrille.state.state.replay?.step === -1", 10)
     start = (await state_of(page))["searchRuns"]["runs"][0]["start_px"]
     assert (await state_of(page))["state"]["cost_px"] == pytest.approx(start)
-    await page.locator("#replay-bar").get_by_label("One step on").click()
+    await page.locator("#replay-bar").get_by_label("One step forward").click()
     await shows(page, "quadrille.state.state.replay?.step === 0", 10)
     await shows(page, "quadrille.state.overlay.paths.some(({ kind }) => kind === 'candidate')", 10)
     assert not np.array_equal(await drawn(page, "model"), true)
@@ -138,7 +138,7 @@ async def test_runs_are_compared_in_cost_and_pose_and_one_is_taken(page):
     await shows(page, "quadrille.state.overlay.paths.some(({ kind }) => kind === 'ghost')", 10)
     ghost = await drawn(page, "ghost")
     assert not np.array_equal(ghost, await drawn(page, "model"))
-    await rows.nth(1).get_by_text("Take").click()
+    await rows.nth(1).get_by_text("Apply").click()
     await shows(page, f"quadrille.state.state.undo?.startsWith('take run {first}')", 10)
     await shows(page, "quadrille.state.state.saved")
     await asyncio.sleep(0.2)

@@ -166,7 +166,7 @@ async def test_that_kernels_are_compiled_is_said_while_they_are(page, endpoint):
 async def test_work_that_waits_for_kernels_says_so(page, endpoint):
     figures = page.locator("#search-figures")
     track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "total": 18}
-    for compiling, done, text in ((True, 0, "waits for the compiler"), (False, 0, "0.0/s"), (True, 3, "0.0/s")):
+    for compiling, done, text in ((True, 0, "waiting for compilation"), (False, 0, "0.0/s"), (True, 3, "0.0/s")):
         endpoint.state |= {"compiling": compiling, "track": track | {"done": done}}
         await endpoint.broadcast(endpoint.state)
         await expect(figures).to_have_text(text)
@@ -178,4 +178,4 @@ async def test_the_second_pass_is_told_from_the_first(page, endpoint):
         endpoint.state["track"] = track | {"back": back, "done": 4, "total": 9}
         await endpoint.broadcast(endpoint.state)
         await expect(page.locator("#search-stage")).to_have_text(text, use_inner_text=True)
-    assert await page.locator("#search-stage").get_attribute("title") == "Following back who was lost"
+    assert await page.locator("#search-stage").get_attribute("title") == "Tracking lost people backward"

@@ -43,7 +43,7 @@ async def test_layers_and_cameras_are_found_by_name(page, endpoint):
 
 async def test_it_says_why_not(page, endpoint):
     await open_palette(page, "redo")
-    assert "nothing to redo" in await page.locator("#palette-why").inner_text()
+    assert "Nothing to redo" in await page.locator("#palette-why").inner_text()
     await page.keyboard.press("Enter")
     assert await page.locator("#palette").is_visible()
     await page.locator("#palette-query").fill("clear range")
@@ -92,7 +92,7 @@ async def test_every_key_and_button_is_in_it(page):
     # These stand for many keys, and the palette has the places that they lead to one by one.
     assert [m for m in missing if m != "Commands"] == [
         "Show or hide a layer, by its number in the menu",
-        "Fill the grid with a camera, and back; two digits for 10 to 16",
+        "Fill the grid with a camera (toggle); two digits for 10 to 16",
     ]
 
 
@@ -107,8 +107,8 @@ async def test_the_list_of_keys_is_searched_and_fits(page):
     scroller = page.locator("#key-list .scroller")
     assert await scroller.evaluate("(element) => element.scrollWidth <= element.clientWidth")
     assert "More" not in await page.locator("#key-list h3").all_inner_texts()  # every key is about something
-    await page.keyboard.type("former doubt")
-    assert await page.locator("#key-list dd:visible").all_inner_texts() == ["Former doubtful or lost frame"]
+    await page.keyboard.type("previous doubt")
+    assert await page.locator("#key-list dd:visible").all_inner_texts() == ["Previous doubtful or lost frame"]
 
 
 async def test_undo_holds_in_every_part_of_the_page(page, endpoint):
@@ -137,7 +137,9 @@ async def test_undo_holds_in_every_part_of_the_page(page, endpoint):
 
 async def test_a_key_that_does_nothing_says_why(page, endpoint):
     await page.keyboard.press("Alt+p")
-    await shows(page, "document.querySelector('.notice:not([hidden]) span')?.textContent.startsWith('No tracking run')")
+    await shows(
+        page, "document.querySelector('.notice:not([hidden]) span')?.textContent.startsWith('Nothing is being tracked')"
+    )
     assert not endpoint.received
 
 
@@ -153,7 +155,7 @@ async def test_people_are_changed_by_key_by_name_and_by_a_click(page, endpoint):
     await shows(page, "quadrille.state.state.person === 1")
     await page.keyboard.press("p")
     await shows(page, "quadrille.state.state.person === 0")
-    await open_palette(page, "work on person 1")
+    await open_palette(page, "select person 1")
     await page.keyboard.press("Enter")
     await shows(page, "quadrille.state.state.person === 1")
     handles = await page.evaluate("quadrille.state.overlay.handles")
@@ -172,7 +174,7 @@ async def test_one_frame_without_a_pose_is_a_page_too(browser, endpoint, address
     page.on("pageerror", lambda error: errors.append(str(error)))
     await page.goto(address)
     await shows(page, "window.quadrille?.state.shown?.frame === 0 && quadrille.state.overlay")
-    assert await page.locator("#source").inner_text() == "No pose yet"
+    assert await page.locator("#source").inner_text() == "No pose"
     for key in ("Period", "Comma", "End", "Space", "n", "k", "Control+z", "h", "Escape"):
         await page.keyboard.press(key)
     assert await page.locator("#frame").input_value() == "0"

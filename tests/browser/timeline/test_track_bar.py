@@ -159,7 +159,7 @@ async def test_the_card_says_what_the_tracker_thinks_of_the_frame(page):
     # Left beside right, whatever the order of the model; three parts of the trunk leave a gap.
     assert texts == [
         "torso", "0.80 px", "head", "1.20 px", "pelvis", "0.90 px", "",
-        "left arm", "4.50 px", "right arm", "unseen", "left leg", "1.50 px", "right leg", "2.50 px",
+        "left arm", "4.50 px", "right arm", "not visible", "left leg", "1.50 px", "right leg", "2.50 px",
     ]  # fmt: skip
     label = page.locator("#frame-parts span")
     boxes = {await one.inner_text(): await one.bounding_box() for one in await label.all()}

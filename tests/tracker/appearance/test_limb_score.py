@@ -52,7 +52,7 @@ def plain_samples(views, bodies, person, values, limb, away=()):
 
 
 def plain_look(views, bodies, person, values, limb, ratios, away=()):
-    """What `LimbLook` says of one pose, by its definition."""
+    """What `LimbScorer` says of one pose, by its definition."""
     nats = 0.0
     for view, part, hidden, behind, pixels in plain_samples(views, bodies, person, values, limb, away):
         for i, (u, v) in enumerate(pixels):
@@ -92,7 +92,7 @@ def test_a_look_is_what_its_definition_says(gavrila, couple, name):
     poses = moved(gavrila, bodies[1].values, limb, 25)
     away = [p for x in limbs(gavrila) if x.name == name.replace("left", "?").replace("right", "left") for p in x.parts]
     for gone in ([], away):
-        found = Colors(views, bodies, 1).look(bodies[1].values, limb.parts, known, gone)(poses)
+        found = Colors(views, bodies, 1).limb_scorer(bodies[1].values, limb.parts, known, gone)(poses)
         wanted = [plain_look(views, bodies, 1, v, limb.parts, known.log_ratios, gone) for v in poses]
         assert np.std(wanted) > 20
         assert np.median(np.abs(found - wanted)) < 2
@@ -108,7 +108,7 @@ def test_a_limb_in_the_open(gavrila, couple):
     bodies = [PosedBody(gavrila, pose)]
     arm = np.array([gavrila.part_index[n] for n in ("left_upper_arm", "left_forearm")])
     for ratios in (None, known):
-        found = Colors(views, bodies).look(pose, arm, ratios)(pose[None])
+        found = Colors(views, bodies).limb_scorer(pose, arm, ratios)(pose[None])
         table = np.zeros_like(known.log_ratios) if ratios is None else ratios.log_ratios
         assert found[0] == pytest.approx(plain_look(views, bodies, 0, pose, arm, table), abs=0.5)
 
@@ -123,8 +123,8 @@ def test_what_hides_a_limb_beside_the_image_is_known_too(way):
     colors = Colors(dressed(bodies, [camera], {"solid": (200, 0, 0)}), bodies)
     part = np.array([0])
     hidden, beside = (at(ball, 0, y, 0).values for y in (3.1 * way, -3.1 * way))
-    assert colors.look(hidden, part, None)(hidden[None]) == 0
-    assert colors.look(beside, part, None)(beside[None]) == pytest.approx(-0.25 * 5 * SAMPLES)
+    assert colors.limb_scorer(hidden, part, None)(hidden[None]) == 0
+    assert colors.limb_scorer(beside, part, None)(beside[None]) == pytest.approx(-0.25 * 5 * SAMPLES)
 
 
 @pytest.mark.parametrize("distance", [0.05, 0.3, 0.9])
@@ -142,7 +142,7 @@ def test_a_limb_and_others_that_reach_the_cameras_plane(gavrila, distance):
         [at(solid((0.2, 0.2, 0.2)), *(place - np.array([2.0, 0.0, 0.0])))], [camera], {"solid": SUIT["forearm"]}
     )
     poses = moved(gavrila, stand, arm, 20, 1)
-    found = Colors(near, bodies).look(stand, arm.parts, known)(poses)
+    found = Colors(near, bodies).limb_scorer(stand, arm.parts, known)(poses)
     assert np.isfinite(found).all()
     for pose, nats in zip(poses, found, strict=True):
         P = camera.projection

@@ -217,7 +217,7 @@ def test_a_look_tells_where_a_limb_is(gavrila, stand):
     before_trunk[gavrila.dof_names.index("left_elbow.extension")] = 1.8
     rng = np.random.default_rng(2)
     others = [shaken(gavrila, stand, rng, 0.5, 0.0) for _ in range(20)]
-    found = colors.look(stand, arm, known)(np.array([stand, before_trunk, *others]))
+    found = colors.limb_scorer(stand, arm, known)(np.array([stand, before_trunk, *others]))
     assert found.argmax() == 0
     assert found[1] < 0
 
@@ -231,7 +231,7 @@ def test_a_limb_that_is_away_hides_nothing(gavrila):
     arm, twin = (np.array(parts(gavrila, f"{s}_upper_arm", f"{s}_forearm")) for s in ("left", "right"))
     trunk = parts(gavrila, "torso", "head")
     known = colors.learn()
-    hidden, open_ = (colors.look(stand, arm, known, x)(stand[None]) for x in ([], [*twin, *trunk]))
+    hidden, open_ = (colors.limb_scorer(stand, arm, known, x)(stand[None]) for x in ([], [*twin, *trunk]))
     assert hidden[0] == 0
     assert open_[0] != 0
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tracker.body.dimensions import PartDimensions, mirror_part, scaled, sizes_of, with_sizes
+from tracker.body.dimensions import PartDimensions, dimensions_of, mirror_part, scaled, with_dimensions
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import PRESETS, format_model, load_model, parse_model
 
@@ -20,13 +20,13 @@ def distance(model, a, b):
 @pytest.mark.parametrize("name", PRESETS)
 def test_sizes_go_there_and_back(name):
     model = load_model(name, 1.82)
-    sizes = sizes_of(model)
+    sizes = dimensions_of(model)
     parts = {
         n: PartDimensions(p.length_m * (1 + 0.01 * i), (p.girths_m[0] * 0.9, p.girths_m[1] * 1.05))
         for i, (n, p) in enumerate(sizes.parts.items())
     }
     wanted = sizes._replace(height_m=1.7, parts=parts, widths_m={n: 1.1 * w for n, w in sizes.widths_m.items()})
-    found = sizes_of(parse_model(format_model(with_sizes(model, wanted)), "test"))
+    found = dimensions_of(parse_model(format_model(with_dimensions(model, wanted)), "test"))
     assert found.height_m == wanted.height_m
     for part, own in parts.items():
         assert found.parts[part].length_m == pytest.approx(own.length_m)
@@ -36,9 +36,11 @@ def test_sizes_go_there_and_back(name):
 
 def test_a_length_is_the_distance_of_the_joints():
     model = load_model("gavrila34")
-    sizes = sizes_of(model)
+    sizes = dimensions_of(model)
     assert sizes.parts["left_thigh"].length_m == pytest.approx(distance(model, "left_hip", "left_knee"))
-    longer = with_sizes(model, sizes._replace(parts={**sizes.parts, "left_thigh": PartDimensions(0.5, (0.07, 0.08))}))
+    longer = with_dimensions(
+        model, sizes._replace(parts={**sizes.parts, "left_thigh": PartDimensions(0.5, (0.07, 0.08))})
+    )
     assert distance(longer, "left_hip", "left_knee") == pytest.approx(0.5)
     assert distance(longer, "left_knee", "left_ankle") == pytest.approx(distance(model, "left_knee", "left_ankle"))
     assert distance(longer, "right_hip", "right_knee") == pytest.approx(distance(model, "right_hip", "right_knee"))
@@ -48,7 +50,7 @@ def test_a_length_is_the_distance_of_the_joints():
 
 def test_another_height_keeps_the_proportions():
     model = load_model("gavrila22")
-    taller = with_sizes(model, scaled(sizes_of(model), 1.925))
+    taller = with_dimensions(model, scaled(dimensions_of(model), 1.925))
     for name, place in points(model).items():
         np.testing.assert_allclose(points(taller)[name], 1.1 * place, atol=1e-12)
 
@@ -69,13 +71,13 @@ def test_twins(name, other):
 )
 def test_what_no_body_has_is_refused(part, message):
     model = load_model("gavrila22")
-    sizes = sizes_of(model)
+    sizes = dimensions_of(model)
     with pytest.raises(TrackerError, match=message):
-        with_sizes(model, sizes._replace(parts={**sizes.parts, "left_calf": part}))
+        with_dimensions(model, sizes._replace(parts={**sizes.parts, "left_calf": part}))
 
 
 @pytest.mark.parametrize("height_m", [0.0, -1.0, 17.5, float("nan")])
 def test_nobody_is_that_tall(height_m):
     model = load_model("gavrila22")
     with pytest.raises(TrackerError, match="height of 30 to 300 cm"):
-        with_sizes(model, sizes_of(model)._replace(height_m=height_m))
+        with_dimensions(model, dimensions_of(model)._replace(height_m=height_m))

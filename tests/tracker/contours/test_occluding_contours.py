@@ -90,7 +90,7 @@ def test_ellipsoid_projects_to_its_ellipse(half_axes):
         assert cKDTree(dense(found.pieces_px)).query(ellipse)[0].max() < INWARD * radius_px + 0.55
         drawn = np.linalg.norm(found.pieces_px[:, 2:] - found.pieces_px[:, :2], axis=1).sum()
         assert drawn == pytest.approx(np.linalg.norm(np.diff(ellipse, axis=0), axis=1).sum(), rel=0.02)
-        assert not found.hidden.any()
+        assert not found.occluded.any()
 
 
 def test_contour_points_lie_on_the_surface_and_graze_it():
@@ -133,11 +133,11 @@ def test_what_lies_behind_is_hidden():
     large, small = solid((0.3, 0.3, 0.3), name="large"), ball()
     front, behind = at(large, 0, 0, 0), at(small, -1, 0.1, 0)
     found = trace([front, behind], FRONT)
-    assert found.hidden[found.parts == 1].all()
-    assert not found.hidden[found.parts == 0].any()
+    assert found.occluded[found.parts == 1].all()
+    assert not found.occluded[found.parts == 0].any()
     # Before it, the small one cuts nothing from the outline of the large one, and is seen whole.
-    assert not trace([front, at(small, 1, 0.1, 0)], FRONT).hidden.any()
-    assert not trace([front, at(small, -1, 1, 0)], FRONT).hidden.any()
+    assert not trace([front, at(small, 1, 0.1, 0)], FRONT).occluded.any()
+    assert not trace([front, at(small, -1, 1, 0)], FRONT).occluded.any()
 
 
 def test_hidden_up_to_the_outline_of_what_hides():
@@ -146,11 +146,11 @@ def test_hidden_up_to_the_outline_of_what_hides():
     T = blocker.model.kinematics(blocker.values).Ts_world_part[0]
     mine = found.parts == 1
     off = off_outline(outline((0.15, 0.3, 0.2), T, FRONT), middles(found, mine))
-    hidden = found.hidden[mine]
-    assert 10 < hidden.sum() < len(hidden) - 10
+    occluded = found.occluded[mine]
+    assert 10 < occluded.sum() < len(occluded) - 10
     # Each piece is judged by its middle; at the very outline a line of sight that only grazes may pass.
-    assert np.all(hidden[off < -0.5])
-    assert not np.any(hidden[off > 0.1])
+    assert np.all(occluded[off < -0.5])
+    assert not np.any(occluded[off > 0.1])
 
 
 def test_people_hide_each_other():
@@ -158,35 +158,35 @@ def test_people_hide_each_other():
     from_front = trace([one, other], FRONT)
     from_back = trace([one, other], camera_at("back", (-4.0, 0.0, 0.0)))
     for found, before in ((from_front, 0), (from_back, 1)):
-        assert not found.hidden[found.parts == before].any()
-        assert found.hidden[found.parts != before].any()
-        assert not found.hidden[found.parts != before].all()
+        assert not found.occluded[found.parts == before].any()
+        assert found.occluded[found.parts != before].any()
+        assert not found.occluded[found.parts != before].all()
     # The order in which people are listed changes their numbers, nothing else.
     swapped = trace([other, one], FRONT)
     for part in (0, 1):
         np.testing.assert_array_equal(
-            swapped.pieces_px[(swapped.parts == part) & ~swapped.hidden],
-            from_front.pieces_px[(from_front.parts == 1 - part) & ~from_front.hidden],
+            swapped.pieces_px[(swapped.parts == part) & ~swapped.occluded],
+            from_front.pieces_px[(from_front.parts == 1 - part) & ~from_front.occluded],
         )
 
 
-@pytest.mark.parametrize(("gap_m", "hidden"), [(JOINT_MARGIN_M - 0.01, True), (JOINT_MARGIN_M + 0.01, False)])
-def test_no_contour_where_parts_adjoin(gap_m, hidden):
+@pytest.mark.parametrize(("gap_m", "occluded"), [(JOINT_MARGIN_M - 0.01, True), (JOINT_MARGIN_M + 0.01, False)])
+def test_no_contour_where_parts_adjoin(gap_m, occluded):
     """A ball before a plate, its outline by a gap before the plate's face: within the margin they merely meet."""
     depth = -(gap_m + PLATE_M)
     joined = parse_model(BALL_ON_PLATE.replace("BEHIND", str(depth)), "ball on plate")
     found = trace([at(joined, 0, 0, 0, turns=())], FRONT)
-    assert set(found.hidden[found.parts == 0]) == {hidden}
+    assert set(found.occluded[found.parts == 0]) == {occluded}
     # Bodies of their own in the same places share no joint: there is a contour between them.
     apart = trace([at(ball(), 0, 0, 0), at(solid((PLATE_M, 0.3, 0.3), (0.3, 0.3)), depth, 0, 0)], FRONT)
-    assert not apart.hidden[apart.parts == 0].any()
+    assert not apart.occluded[apart.parts == 0].any()
 
 
 def test_parts_do_not_hide_themselves():
     for exponents in ((0.35, 1), (0.5, 0.8), (1, 1)):
         body = at(solid((0.1, 0.15, 0.3), exponents), 0, 0, 0, turns=(0.5, 0.2, 0.9))
         for camera in cameras_around():
-            assert not trace([body], camera).hidden.any()
+            assert not trace([body], camera).occluded.any()
 
 
 def test_nothing_is_drawn_of_what_is_behind_the_camera():
@@ -196,7 +196,7 @@ def test_nothing_is_drawn_of_what_is_behind_the_camera():
     assert len(trace([at(ball(), 4, 1, 0)], camera).parts) == 0  # astride its plane
     found = trace([at(ball(), 6, 0, 0), at(ball(), 0, 0, 0)], camera)
     assert set(found.parts) == {1}
-    assert not found.hidden.any()  # nor does it hide anything
+    assert not found.occluded.any()  # nor does it hide anything
 
 
 def test_lens_distortion_is_left_out(gavrila):

@@ -4,7 +4,7 @@ from staging import at, camera_at, own_evidence, solid
 
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
-from tracker.contours.part_edges import part_edges, points_hidden
+from tracker.contours.part_edges import part_edges, points_occluded
 from tracker.search.chamfer_cost import ChamferCost
 
 FRONT = camera_at("front", (4.0, 0.0, 0.0))
@@ -56,7 +56,7 @@ def test_part_edges_never_enter_the_cost():
     bodies = two_balls()
     # The seam runs far from the outlines, of which alone the edges are made: were it scored, it would cost.
     seen = occluding_contours.trace(bodies, FRONT)
-    apart = cKDTree(dense(seen.pieces_px[~seen.hidden])).query(dense(part_edges(bodies, FRONT)))[0]
+    apart = cKDTree(dense(seen.pieces_px[~seen.occluded])).query(dense(part_edges(bodies, FRONT)))[0]
     assert apart.mean() > 8
     cost = ChamferCost(own_evidence(bodies, [FRONT]), bodies)([b.values for b in bodies])
     assert cost.total_px < 0.5
@@ -66,21 +66,21 @@ def test_points_hidden(gavrila):
     body = PosedBody(gavrila, gavrila.neutral())
     place = dict(zip(gavrila.point_names, gavrila.points_world(body.values), strict=True))
     side = camera_at("side", (0.0, 4.0, 0.0))  # at the body's left
-    hidden = dict(zip(place, points_hidden([body], [side], np.stack(list(place.values())))[0], strict=True))
+    occluded = dict(zip(place, points_occluded([body], [side], np.stack(list(place.values())))[0], strict=True))
     # The left side hides the right: the trunk its arm, the legs one another. The forearm hangs before the hip.
-    assert [n for n, h in hidden.items() if n.startswith("left") and h] == ["left_hip"]
-    assert hidden["right_shoulder"]
-    assert hidden["right_knee"]
-    assert hidden["right_wrist"]
+    assert [n for n, h in occluded.items() if n.startswith("left") and h] == ["left_hip"]
+    assert occluded["right_shoulder"]
+    assert occluded["right_knee"]
+    assert occluded["right_wrist"]
     # A joint lies within the parts around it; those do not hide it.
-    assert not points_hidden([body], [camera_at("front", (4.0, 0.0, 0.0))], np.stack(list(place.values()))).any()
+    assert not points_occluded([body], [camera_at("front", (4.0, 0.0, 0.0))], np.stack(list(place.values()))).any()
 
 
 def test_points_hidden_by_another_person():
     points = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.5, 0.0]])  # behind, before and beside
     screen = at(solid((0.05, 0.3, 0.3)), 1, 0, 0)
-    assert points_hidden([screen], [FRONT], points).tolist() == [[True, False, False]]
-    assert points_hidden([at(screen.model, 6, 0, 0)], [FRONT], points).tolist() == [[False] * 3]  # behind the camera
+    assert points_occluded([screen], [FRONT], points).tolist() == [[True, False, False]]
+    assert points_occluded([at(screen.model, 6, 0, 0)], [FRONT], points).tolist() == [[False] * 3]  # behind the camera
 
 
 def test_points_hidden_in_several_views_are_those_whose_sight_passes_a_part(gavrila):
@@ -89,8 +89,8 @@ def test_points_hidden_in_several_views_are_those_whose_sight_passes_a_part(gavr
     bodies = [PosedBody(gavrila, gavrila.clip(gavrila.retract(gavrila.neutral(), s * near))) for s in (1.0, -1.0)]
     points = rng.uniform((-0.4, -0.4, -0.8), (0.4, 0.4, 0.8), (200, 3))
     views = [FRONT, camera_at("side", (0.0, 4.0, 0.0))]
-    hidden = points_hidden(bodies, views, points)
-    for view, found in zip(views, hidden, strict=True):
+    occluded = points_occluded(bodies, views, points)
+    for view, found in zip(views, occluded, strict=True):
         # The sight as many places: whether one is within a part that does not hold the point.
         sight = points + np.linspace(0.0, 1.0, 4000)[:, None, None] * (view.center_world - points)
         wanted = np.zeros(len(points), bool)

@@ -11,11 +11,18 @@ from tracker.contours.occluding_contours import (
     contour_room,
     part_poses,
     piece_buffer,
-    place,
+    place_parts,
     surfaces_of,
 )
-from tracker.contours.static_cache import keep_pieces, kept_for, remember, still_stands, trace_moving, trace_standing
-from tracker.fitting.contour_residuals import ContourMatch, MatchSettings
+from tracker.contours.static_cache import (
+    copy_poses,
+    is_static_unchanged,
+    static_contours_buffer,
+    store_pieces,
+    trace_moving_parts,
+    trace_static,
+)
+from tracker.fitting.contour_residuals import ContourResiduals, MatchSettings
 
 CAMERAS = cameras_around()
 THETA = 20.0
@@ -38,38 +45,38 @@ def with_limb_shaken(body, limb, rng, sigma_rad=0.6):
 
 
 def traced_with_kept(bodies, then, moves):
-    """The contours of some people as those are traced that move, the others kept from another pose; view by view."""
+    """The contours of some people as those are traced that move, the others static from another pose; view by view."""
     surfaces = surfaces_of(tuple(b.model for b in bodies))
     room = contour_room(CAMERAS[0], len(bodies))
-    out, kept = piece_buffer(surfaces, room), kept_for(len(CAMERAS), room, 1, moves)
+    out, static = piece_buffer(surfaces, room), static_contours_buffer(len(CAMERAS), room, 1, moves)
     views = [(i, c.projection, c.center_world) for i, c in enumerate(CAMERAS)]
-    place(part_poses(bodies), surfaces, out)
+    place_parts(part_poses(bodies), surfaces, out)
     for i, P, eye in views:
-        trace_standing(P, eye, surfaces, PIECE_PX, kept, out)
-        keep_pieces(i, out, kept)
-    remember(part_poses(bodies), kept.Ts)
-    assert still_stands(part_poses(then), moves, kept.Ts)
-    place(part_poses(then), surfaces, out)
+        trace_static(P, eye, surfaces, PIECE_PX, static, out)
+        store_pieces(i, out, static)
+    copy_poses(part_poses(bodies), static.Ts)
+    assert is_static_unchanged(part_poses(then), moves, static.Ts)
+    place_parts(part_poses(then), surfaces, out)
     for i, P, eye in views:
-        n = trace_moving(i, P, eye, surfaces, PIECE_PX, kept, out)
-        yield out.ends[:, :n].T.copy(), out.hidden[:n].copy(), np.repeat(np.arange(len(moves)), np.diff(out.firsts))
+        n = trace_moving_parts(i, P, eye, surfaces, PIECE_PX, static, out)
+        yield out.ends[:, :n].T.copy(), out.occluded[:n].copy(), np.repeat(np.arange(len(moves)), np.diff(out.firsts))
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_pieces_of_a_limb_that_moves_among_kept_ones_are_those_of_a_trace_of_everybody(gavrila, seed):
-    """A limb swings through its own body and another's: what it covered is seen again, what it covers is hidden."""
+    """A limb swings through its own body and another's: what it covered is seen again, what it covers is occluded."""
     bodies, rng, changed = couple(gavrila, seed), np.random.default_rng(seed), 0
     for limb in limbs(gavrila):
         then = [with_limb_shaken(bodies[0], limb, rng), bodies[1]]
         moves = np.zeros(N_PEOPLE * len(gavrila.parts), bool)
         moves[limb.parts] = True
-        for camera, (pieces, hidden, parts) in zip(CAMERAS, traced_with_kept(bodies, then, moves), strict=True):
+        for camera, (pieces, occluded, parts) in zip(CAMERAS, traced_with_kept(bodies, then, moves), strict=True):
             expected, before = (occluding_contours.trace(b, camera) for b in (then, bodies))
             np.testing.assert_array_equal(parts, expected.parts)
             np.testing.assert_allclose(pieces, expected.pieces_px, atol=1e-3)
-            assert np.count_nonzero(hidden != expected.hidden) <= 1  # one that grazes, by rounding
-            standing = ~np.isin(parts, limb.parts)
-            changed += np.count_nonzero(hidden[standing] != before.hidden[~np.isin(before.parts, limb.parts)])
+            assert np.count_nonzero(occluded != expected.occluded) <= 1  # one that grazes, by rounding
+            unmoved = ~np.isin(parts, limb.parts)
+            changed += np.count_nonzero(occluded[unmoved] != before.occluded[~np.isin(before.parts, limb.parts)])
     assert changed > 50
 
 
@@ -84,12 +91,12 @@ def staged(gavrila):
 
 
 def normal(match, body):
-    return match.normal(body.model, body.values, body.model.kinematics(body.values))
+    return match.linearize(body.model, body.values, body.model.kinematics(body.values))
 
 
 def afresh(staged, bodies, person=0):
     views, _, settings = staged
-    return ContourMatch(views, bodies, person, settings, THETA, everywhere=True)
+    return ContourResiduals(views, bodies, person, settings, THETA, everywhere=True)
 
 
 @pytest.mark.parametrize("person", range(N_PEOPLE))
@@ -106,11 +113,11 @@ def test_pose_after_pose_costs_what_each_costs_by_itself(gavrila, staged, person
 
 
 def test_a_match_of_a_limb_is_that_of_the_body_as_far_as_the_limb_goes(gavrila, staged):
-    """Also after the rest has moved: what is kept is then kept anew."""
+    """Also after the rest has moved: what is static is then static anew."""
     start, rng = staged[1], np.random.default_rng(2)
     whole = afresh(staged, start)
     for limb in limbs(gavrila):
-        of_limb, body = whole.of_parts(limb.parts), start[0]
+        of_limb, body = whole.restricted_to(limb.parts, whole.workspace), start[0]
         for _ in range(3):
             for _ in range(3):
                 moved = with_limb_shaken(body, limb, rng, 0.3)

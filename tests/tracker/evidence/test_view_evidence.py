@@ -3,19 +3,19 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from staging import camera_at
+from staging import camera_at, view_evidence
 
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.errors import RecordingError
 from tracker.evidence.observer import FOREGROUND_MARGIN, Observer
-from tracker.evidence.view_evidence import SCENE_SPACING_PX, accepted, default_theta_px, view_evidence
+from tracker.evidence.view_evidence import ACCEPTED_SHARE, SCENE_SPACING_PX, default_theta_px, with_segments
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
-from tracker.images.edge_segments import link_edges
-from tracker.images.matching_view import MatchedView, match_scale, region_around
-from tracker.images.static_edges import Scenery
+from tracker.images.edge_segments import accept_segments, link_edges
+from tracker.images.static_edges import StaticEdgeModel
+from tracker.images.working_view import WorkingView, region_around, working_scale
 from tracker.session.session import load_session
 
 
@@ -93,9 +93,9 @@ def test_edges_stay_registered_through_undistortion_and_scaling(size, lens):
 
 
 def test_small_images_are_not_enlarged():
-    assert match_scale(camera_at("c", (4, 0, 0), size=(320, 240))) == 1
-    assert match_scale(camera_at("c", (4, 0, 0), size=(640, 480))) == 1
-    assert match_scale(camera_at("c", (4, 0, 0), size=(1280, 960))) == pytest.approx(0.5)
+    assert working_scale(camera_at("c", (4, 0, 0), size=(320, 240))) == 1
+    assert working_scale(camera_at("c", (4, 0, 0), size=(640, 480))) == 1
+    assert working_scale(camera_at("c", (4, 0, 0), size=(1280, 960))) == pytest.approx(0.5)
 
 
 def test_theta_is_a_share_of_the_longer_side():
@@ -107,7 +107,7 @@ def test_scene_points_are_edges_one_to_a_cell():
     camera = camera_at("c", (4, 0, 0), size=(90, 60))
     edges = np.zeros((60, 90), dtype=bool)
     edges[10, 5:80] = edges[20:50, 40] = True
-    view = view_evidence(camera, 1.0, edges)
+    view = view_evidence(camera, edges)
     u, v = view.points_px.astype(int).T
     assert edges[v, u].all()
     cells = set(zip(u // SCENE_SPACING_PX, v // SCENE_SPACING_PX, strict=True))
@@ -175,7 +175,7 @@ def test_masks_go_before_the_background(sample, tmp_path, real_frame):
         discs.append(mask)
     observer = Observer([replace(c, masks=tmp_path / c.camera.name) for c in session.cameras], recording)
     for view, camera, disc in zip(observer.evidence(25), cameras, discs, strict=True):
-        matched = MatchedView(camera)
+        matched = WorkingView(camera)
         inside = matched.mask(disc, matched.whole)
         outside = cv2.distanceTransform((~inside).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
         u, v = view.points_px.astype(int).T
@@ -214,7 +214,7 @@ def test_same_frame_twice_is_the_same(sample):
 def test_the_matched_camera_is_the_pinhole_scaled():
     camera = Camera("c", (1920, 1080), np.array([[1500.0, 0, 960], [0, 1500, 540], [0, 0, 1]]), LENS, np.eye(4))
     view = observe(camera, np.zeros((1080, 1920, 3), np.uint8))
-    expected = camera.pinhole.scaled(match_scale(camera))
+    expected = camera.pinhole.scaled(working_scale(camera))
     np.testing.assert_allclose(view.camera.K, expected.K)
     assert view.camera.size == expected.size
 
@@ -224,7 +224,7 @@ def test_a_region_shows_what_the_whole_image_shows_there(sample, real_frame):
     observer = Observer(session.cameras, recording)
     boxes = [
         region_around(c.project(real_frame.model.points_world(real_frame.values)), 60, c.size)
-        for c in observer.matched_cameras
+        for c in observer.working_cameras
     ]
     for whole, part, (u0, v0, u1, v1) in zip(observer.evidence(25), observer.evidence(25, boxes), boxes, strict=True):
         assert part.camera.size == (u1 - u0, v1 - v0) == part.distance.shape[::-1]
@@ -283,26 +283,26 @@ def test_what_is_looked_at_ahead_is_what_would_be_found_later(sample, real_frame
     session, recording = sample
     cameras = session.cameras if background else [replace(c, background=None) for c in session.cameras]
     observer, linked = Observer(cameras, recording), []
-    predicted = [visible_contours(real_frame, c) for c in observer.matched_cameras]
+    predicted = [visible_contours(real_frame, c) for c in observer.working_cameras]
     boxes = [region_around(p.reshape(-1, 2), 40, (640, 480)) for p in predicted]
-    scenery = None if background else [Scenery(c.size) for c in observer.matched_cameras]
-    expected = observer.evidence(25, boxes, predicted, scenery)
+    static_edges = None if background else [StaticEdgeModel(c.size) for c in observer.working_cameras]
+    expected = observer.evidence(25, boxes, predicted, static_edges)
     monkeypatch.setattr("tracker.evidence.observer.link_edges", lambda *a: linked.append(a) or link_edges(*a))
 
     def look_ahead(regions, still):
         observer.prefetch(25, regions, still)
-        observer._looker.submit(lambda: None).result()  # it has been done by now
+        observer._finder.submit(lambda: None).result()  # it has been done by now
 
     look_ahead(boxes, not background)
     assert len(linked) == 4
-    same_evidence(observer.evidence(25, boxes, predicted, scenery), expected)
+    same_evidence(observer.evidence(25, boxes, predicted, static_edges), expected)
     assert len(linked) == 4
     # Told other regions, or not that something stands still, it does the work again.
     look_ahead([None, *boxes[1:]], not background)
-    same_evidence(observer.evidence(25, boxes, predicted, scenery), expected)
+    same_evidence(observer.evidence(25, boxes, predicted, static_edges), expected)
     assert len(linked) == 4 + 4 + 1
     look_ahead(boxes, background)
-    same_evidence(observer.evidence(25, boxes, predicted, scenery), expected)
+    same_evidence(observer.evidence(25, boxes, predicted, static_edges), expected)
     assert len(linked) == 9 + 4 + 4
 
 
@@ -315,16 +315,22 @@ def test_what_is_wrong_with_a_frame_read_ahead_is_told_when_it_is_asked_for():
 
 def visible_contours(real_frame, camera):
     seen = occluding_contours.trace([PosedBody(real_frame.model, real_frame.values)], camera)
-    return seen.pieces_px[~seen.hidden]
+    return seen.pieces_px[~seen.occluded]
+
+
+def with_accepted_segments(view, pieces_px, threshold_px=None):
+    """The view with only the segments near pieces of contour, in px of its camera."""
+    threshold_px = threshold_px or ACCEPTED_SHARE * view.theta_px
+    return with_segments(view, accept_segments(view.samples, pieces_px, threshold_px))
 
 
 def test_only_edges_near_the_prediction_are_accepted(sample, real_frame):
     session, recording = sample
     observer = Observer([replace(c, background=None) for c in session.cameras], recording)
-    predicted = [visible_contours(real_frame, c) for c in observer.matched_cameras]
+    predicted = [visible_contours(real_frame, c) for c in observer.working_cameras]
     for view, pieces in zip(observer.evidence(25), predicted, strict=True):
         assert view.accepted is None
-        kept = accepted(view, pieces)
+        kept = with_accepted_segments(view, pieces)
         assert len(kept.accepted) == len(view.segments.firsts) - 1
         assert 0.02 < kept.accepted.mean() < 0.5  # racks and bars are refused
         pixels = view.segments.points_px[np.repeat(kept.accepted, np.diff(view.segments.firsts))]
@@ -338,17 +344,17 @@ def test_only_edges_near_the_prediction_are_accepted(sample, real_frame):
         assert kept.points_px.tolist() == [p for i, p in enumerate(pixels.tolist()) if cells[i] not in cells[:i]]
         assert len(kept.points_px) == len(kept.normals) > 100
         np.testing.assert_allclose(np.linalg.norm(kept.normals, axis=1), 1, rtol=1e-5)
-        assert not accepted(view, pieces, 0.1).accepted.all()
+        assert not with_accepted_segments(view, pieces, 0.1).accepted.all()
 
 
 def test_evidence_of_a_region_takes_the_prediction_in_pixels_of_the_whole_image(sample, real_frame):
     session, recording = sample
     observer = Observer([replace(c, background=None) for c in session.cameras], recording)
-    predicted = [visible_contours(real_frame, c) for c in observer.matched_cameras]
+    predicted = [visible_contours(real_frame, c) for c in observer.working_cameras]
     boxes = [region_around(p.reshape(-1, 2), 40, (640, 480)) for p in predicted]
     at_once = observer.evidence(25, boxes, predicted)
     for view, once, pieces in zip(observer.evidence(25, boxes), at_once, predicted, strict=True):
-        kept = accepted(view, pieces - np.array([*view.corner_px, *view.corner_px], np.float32))
+        kept = with_accepted_segments(view, pieces - np.array([*view.corner_px, *view.corner_px], np.float32))
         np.testing.assert_array_equal(once.accepted, kept.accepted)
         np.testing.assert_array_equal(once.distance, kept.distance)
         np.testing.assert_array_equal(once.points_px, kept.points_px)

@@ -3,12 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from contour_oracle import MatchOracle, without_ties
-from staging import at, camera_at, cameras_around, edge_map, own_evidence, posed, shaken, solid
+from staging import at, camera_at, cameras_around, edge_map, own_evidence, posed, shaken, solid, view_evidence
 
 from tracker.body.model import PosedBody
-from tracker.evidence.view_evidence import SCENE_SPACING_PX, Silhouette, ViewEvidence, view_evidence
-from tracker.fitting.contour_residuals import ContourMatch, MatchSettings
-from tracker.fitting.gauss_newton import StayNear, solve
+from tracker.evidence.view_evidence import SCENE_SPACING_PX, Silhouette, ViewEvidence
+from tracker.fitting.contour_residuals import ContourResiduals, MatchSettings
+from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.formats.model_toml import PRESETS, load_model
 
 MODELS = {"box": solid((0.15, 0.2, 0.5), (0.3, 0.6)), "egg": solid((0.15, 0.2, 0.3)), "drop": solid((0.2, 0.2, 0.5))}
@@ -28,7 +28,7 @@ THETA = 20.0
 
 
 def normal(match, body):
-    return match.normal(body.model, body.values, body.model.kinematics(body.values))
+    return match.linearize(body.model, body.values, body.model.kinematics(body.values))
 
 
 def staged(model, seed=0, off_deg=4.0, off_m=0.02):
@@ -55,7 +55,7 @@ def test_against_rows_built_one_by_one(model, match, seed):
     views, body, _ = staged(model, seed)
     views = without_ties(views, [body], match, THETA)
     oracle = MatchOracle(views, [body], 0, match, THETA)
-    found = normal(ContourMatch(views, [body], 0, match, THETA), body)
+    found = normal(ContourResiduals(views, [body], 0, match, THETA), body)
     residuals, J = oracle.rows(body.values)
     assert len(residuals) > 100
     assert found.cost == pytest.approx(oracle.cost(body.values), rel=1e-5)
@@ -74,7 +74,7 @@ def test_against_rows_built_one_by_one(model, match, seed):
 def test_hessian_is_positive_semidefinite(model, match):
     for seed in range(4):
         views, body, _ = staged(model, seed, 17.0, 0.1)
-        found = normal(ContourMatch(views, [body], 0, match), body)
+        found = normal(ContourResiduals(views, [body], 0, match), body)
         np.testing.assert_array_equal(found.hessian, found.hessian.T)
         assert np.linalg.eigvalsh(found.hessian).min() > -1e-9 * found.hessian.max()
 
@@ -91,7 +91,7 @@ def test_gradient_is_the_slope_of_the_cost(model, match):
     slopes = []
     for seed in range(4):
         views, body, _ = staged(model, seed)
-        contour = ContourMatch(views, [body], 0, match)
+        contour = ContourResiduals(views, [body], 0, match)
         found = normal(contour, body)
         sides = [[model.retract(body.values, s * d) for s in (1, -1)] for d in np.diag(steps)]
         costs = contour.costs(np.array(sides).reshape(-1, len(body.values))).reshape(-1, 2)
@@ -112,14 +112,14 @@ def test_the_others_hide_and_draw_edges(gavrila, person, match):
     views = own_evidence([PosedBody(m, p) for m, p in zip(models, poses, strict=True)], cameras_around())
     bodies = [PosedBody(m, shaken(m, p, rng, 0.06, 0.02)) for m, p in zip(models, poses, strict=True)]
     oracle = MatchOracle(views, bodies, person, match, THETA)
-    found = normal(ContourMatch(views, bodies, person, match, THETA), bodies[person])
+    found = normal(ContourResiduals(views, bodies, person, match, THETA), bodies[person])
     residuals, J = oracle.rows(bodies[person].values)
     assert found.cost == pytest.approx(oracle.cost(bodies[person].values), rel=1e-5)
     np.testing.assert_allclose(found.gradient / scales(found), J.T @ residuals / scales(found), atol=1e-3)
     np.testing.assert_allclose(found.hessian, J.T @ J, atol=2e-3 * (J.T @ J).max())
     # Alone it would show more, and explain more.
     together, alone = (
-        ContourMatch(views, b, i).part_costs(bodies[person].values)
+        ContourResiduals(views, b, i).part_costs(bodies[person].values)
         for b, i in ((bodies, person), ([bodies[person]], 0))
     )
     assert alone.length_px.sum() > 1.1 * together.length_px.sum()
@@ -132,11 +132,11 @@ def test_an_edge_of_somebody_elses_does_not_pull():
     left, right = at(BALL.model, 0, -0.32, 0), at(BALL.model, 0, 0.32, 0)
     views = own_evidence([left], [FRONT])
     bodies = [at(BALL.model, 0, -0.30, 0), right]
-    pulls = [normal(ContourMatch(views, bodies, i, BACKWARD, 60.0), b).gradient for i, b in enumerate(bodies)]
+    pulls = [normal(ContourResiduals(views, bodies, i, BACKWARD, 60.0), b).gradient for i, b in enumerate(bodies)]
     assert pulls[0][1] > 10  # downhill is to the left, to lower y
     np.testing.assert_array_equal(pulls[1], 0)
     # Without its owner in the scene it is the neighbour that is drawn.
-    assert normal(ContourMatch(views, [right], 0, BACKWARD, 60.0), right).gradient[1] > 10
+    assert normal(ContourResiduals(views, [right], 0, BACKWARD, 60.0), right).gradient[1] > 10
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -150,18 +150,18 @@ def test_shaken_poses_come_back(name, seed):
     """
     model, bends = MODELS[name], name == "gavrila34"
     views, body, values = staged(model, seed, 3.0 if bends else 4.0)
-    match, reached = ContourMatch(views, [body]), body.values
+    match, reached = ContourResiduals(views, [body]), body.values
     for weights in (np.where(model.dof_is_length, 20.0, 7.0), np.ones(model.n_dofs)):
-        found = solve(model, reached, [match, StayNear(reached, weights)], max_iterations=40, tolerance=1e-5)
-        reached = found.values
-    off = np.linalg.norm(model.points_world(found.values) - model.points_world(values), axis=1)
-    axes = [model.kinematics(v).Ts_world_part[:, :3, 2] for v in (values, found.values)]
+        found = solve(model, reached, [match, PosePrior(reached, weights)], max_iterations=40, tolerance=1e-5)
+        reached = found.pose
+    off = np.linalg.norm(model.points_world(found.pose) - model.points_world(values), axis=1)
+    axes = [model.kinematics(v).Ts_world_part[:, :3, 2] for v in (values, found.pose)]
     degrees = np.degrees(np.arccos(np.clip(np.sum(axes[0] * axes[1], axis=1), -1, 1)))
     assert off.mean() < 0.0015
     assert off.max() < 0.004
     # What the collarbones, the spine and the waist do of their own the outline hardly shows.
     assert degrees.mean() < (0.5 if bends else 0.3)
-    assert match.costs(found.values[None])[0] < 0.03 * match.costs(body.values[None])[0]
+    assert match.costs(found.pose[None])[0] < 0.03 * match.costs(body.values[None])[0]
 
 
 def seen(points_px, normals, distance_px, camera=FRONT):
@@ -180,7 +180,7 @@ def beside(*, turned, offset_px=6.0):
 
 def test_an_edge_at_right_angles_draws_less():
     def found(turned, match=BACKWARD):
-        return normal(ContourMatch([beside(turned=turned)], [BALL], 0, match, THETA), BALL)
+        return normal(ContourResiduals([beside(turned=turned)], [BALL], 0, match, THETA), BALL)
 
     along, aslant, across = (found(t) for t in (0.0, np.pi / 4, np.pi / 2))
     assert abs(along.gradient[1]) > 1
@@ -204,7 +204,9 @@ def test_an_edge_goes_to_the_contour_that_runs_its_way():
     for shift in (-3.0, 3.0):
         for across, expected in (((1.0, 0.0), [1, 0]), ((0.0, 1.0), [0, 1])):
             view = seen((u + 8 + shift, v - 8 + shift), across, 30.0)
-            counts = [ContourMatch([view], bodies, i, None, THETA).part_costs(b.values) for i, b in enumerate(bodies)]
+            counts = [
+                ContourResiduals([view], bodies, i, None, THETA).part_costs(b.values) for i, b in enumerate(bodies)
+            ]
             assert [int(c.points.sum()) for c in counts] == expected, (shift, across)
 
 
@@ -218,7 +220,7 @@ def test_a_silhouette_pulls_as_far_as_it_is_trusted(trust):
 
     def found(view, weight=0.5):
         match = replace(BACKWARD, silhouette=weight)
-        return normal(ContourMatch([view], [body], 0, match, THETA), body)
+        return normal(ContourResiduals([view], [body], 0, match, THETA), body)
 
     alone = found(seen(edges, out[:15], 30.0))
     both = found(seen(np.concatenate([edges, contour]), out, 30.0))
@@ -230,10 +232,10 @@ def test_a_silhouette_pulls_as_far_as_it_is_trusted(trust):
 
 def test_views_without_edges_have_no_say(gavrila):
     views, body, _ = staged(gavrila)
-    found = normal(ContourMatch(views[1:], [body]), body)
-    blind = view_evidence(views[0].camera, 1.0, np.zeros((480, 640), dtype=bool))
+    found = normal(ContourResiduals(views[1:], [body]), body)
+    blind = view_evidence(views[0].camera, np.zeros((480, 640), dtype=bool))
     for mixed in ((blind, *views[1:]), (views[1], blind, views[2]), (*views[1:], blind, blind)):
-        match = ContourMatch(mixed, [body])
+        match = ContourResiduals(mixed, [body])
         again = normal(match, body)
         for a, b in zip(again, found, strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-12)
@@ -241,7 +243,7 @@ def test_views_without_edges_have_no_say(gavrila):
             costs = match.part_costs(body.values)
             assert costs.length_px[blank].sum() == costs.points[blank].sum() == 0
             assert np.isnan(costs.forward_px[blank]).all()
-    nothing = normal(ContourMatch([blind], [body]), body)
+    nothing = normal(ContourResiduals([blind], [body]), body)
     assert nothing.cost == 0
     assert not nothing.gradient.any()
     assert not nothing.hessian.any()
@@ -252,12 +254,12 @@ def test_what_lies_outside_the_image_has_no_say():
     # 0.3 m of 520 px at 4 m: the border is at y = 2.46 m.
     ball = at(BALL.model, 0, 2.46, 0)
     view = seen((0, 0), (0, 1), 5.0)
-    match = ContourMatch([view], [ball], 0, FORWARD, THETA)
+    match = ContourResiduals([view], [ball], 0, FORWARD, THETA)
     wide = camera_at("front", (4.0, 0.0, 0.0), size=(960, 480))
     K = wide.K.copy()
     K[0, 2] = FRONT.K[0, 2]
     whole = seen((0, 0), (0, 1), 5.0, replace(wide, K=K))
-    full = ContourMatch([whole], [ball], 0, FORWARD, THETA)
+    full = ContourResiduals([whole], [ball], 0, FORWARD, THETA)
     lengths = [m.part_costs(ball.values).length_px.item() for m in (match, full)]
     assert lengths[0] == pytest.approx(0.5 * lengths[1], rel=0.05)
     costs = [m.costs(ball.values[None]).item() for m in (match, full)]
@@ -270,7 +272,7 @@ def test_what_lies_outside_the_image_has_no_say():
 def test_moving_off_the_evidence_costs(gavrila):
     """Out of the images too, where half of the residuals vanish: the edges left behind cost what they can."""
     views, _, values = staged(gavrila)
-    match = ContourMatch(views, [PosedBody(gavrila, values)])
+    match = ContourResiduals(views, [PosedBody(gavrila, values)])
     ways = [d * m for d in (*np.eye(3), *-np.eye(3)) for m in (0.05, 0.2, 0.8, 3.0, 20.0)]
     moved = np.array([gavrila.retract(values, np.pad(w, (0, gavrila.n_dofs - 3))) for w in ways])
     assert match.costs(values[None])[0] < 0.3 * match.costs(moved).min()
@@ -281,7 +283,7 @@ def test_costs_are_those_of_the_normal_equations(gavrila):
     rng = np.random.default_rng(0)
     candidates = np.array([shaken(gavrila, values, rng, 0.2, 0.05) for _ in range(6)])
     for match in (MatchSettings(), FORWARD, BACKWARD):
-        block = ContourMatch(views, [body], 0, match)
+        block = ContourResiduals(views, [body], 0, match)
         alone = [normal(block, PosedBody(gavrila, c)).cost for c in candidates]
         assert len(set(alone)) == 6
         # They are sums of residuals of single precision, here in another order.
@@ -293,7 +295,7 @@ def cropped(view, bodies, region):
     """The same evidence seen through a region of its image, u0, v0, u1, v1."""
     u0, v0, u1, v1 = region
     edges = edge_map(bodies, view.camera)[v0:v1, u0:u1]
-    out = view_evidence(view.camera.cropped(region), 1.0, edges, region[:2], view.camera.size)
+    out = view_evidence(view.camera.cropped(region), edges, None, region[:2], view.camera.size)
     order = {tuple(p): n for p, n in zip(view.points_px.astype(int), view.normals, strict=True)}
     return replace(out, normals=np.array([order[tuple(p)] for p in np.add(out.points_px.astype(int), region[:2])]))
 
@@ -310,7 +312,7 @@ def test_regions_of_the_images_change_nothing(gavrila):
     ]
     regions = [cropped(v, truth, w) for v, w in zip(views, windows, strict=True)]
     assert [r.theta_px for r in regions] == [v.theta_px for v in views]
-    whole, part = (normal(ContourMatch(v, [body]), body) for v in (views, regions))
+    whole, part = (normal(ContourResiduals(v, [body]), body) for v in (views, regions))
     # A window shifts the pixels' coordinates: rounded otherwise, outlines are cut at other points here and there.
     assert part.cost == pytest.approx(whole.cost, rel=1e-3)
     np.testing.assert_allclose(part.gradient / scales(whole), whole.gradient / scales(whole), atol=5e-3)
@@ -322,10 +324,10 @@ def test_half_the_scale_finds_the_same_pose(gavrila):
     small = [
         replace(v, scale=0.5) for v in own_evidence([PosedBody(gavrila, values)], [v.camera.scaled(0.5) for v in views])
     ]
-    rest = StayNear(body.values, np.full(gavrila.n_dofs, 1.0))
+    rest = PosePrior(body.values, np.full(gavrila.n_dofs, 1.0))
     for theta_px in (None, 30.0):  # px of the footage, which has twice as many
         ends = [
-            solve(gavrila, body.values, [ContourMatch(v, [body], 0, None, theta_px), rest], max_iterations=40).values
+            solve(gavrila, body.values, [ContourResiduals(v, [body], 0, None, theta_px), rest], max_iterations=40).pose
             for v in (views, small)
         ]
         assert np.linalg.norm(np.subtract(*map(gavrila.points_world, ends)), axis=1).mean() < 0.005
@@ -335,10 +337,10 @@ def test_the_outlier_distance_is_in_pixels_of_the_footage(gavrila):
     views, body, _ = staged(gavrila)
     halves = [replace(v, scale=0.5) for v in views]
     costs = [
-        ContourMatch(v, [body], 0, None, t).costs(body.values[None])[0] for v, t in ((views, 12.0), (halves, 24.0))
+        ContourResiduals(v, [body], 0, None, t).costs(body.values[None])[0] for v, t in ((views, 12.0), (halves, 24.0))
     ]
     assert costs[0] == costs[1]
-    assert costs[0] != ContourMatch(views, [body]).costs(body.values[None])[0]
+    assert costs[0] != ContourResiduals(views, [body]).costs(body.values[None])[0]
 
 
 def test_far_edges_have_no_say():
@@ -351,7 +353,9 @@ def test_far_edges_have_no_say():
         normals=np.concatenate([views[0].normals, np.zeros((3, 2), np.float32)]),
     )
     assert far.min() > 0
-    for a, b in zip(*(normal(ContourMatch([v], [body], 0, BACKWARD), body) for v in (views[0], noisy)), strict=True):
+    for a, b in zip(
+        *(normal(ContourResiduals([v], [body], 0, BACKWARD), body) for v in (views[0], noisy)), strict=True
+    ):
         np.testing.assert_array_equal(a, b)
 
 
@@ -360,7 +364,7 @@ def test_parts_by_hand():
     points = CENTER + np.array([[RADIUS_PX + 3, 0], [-RADIUS_PX, 0], [0, RADIUS_PX - 4], [0, RADIUS_PX + 25]])
     across = [[1, 0], [1, 0], [0, 1], [0, 1]]
     view = seen(points, across, 7.0)
-    match = ContourMatch([view], [BALL], 0, None, THETA)
+    match = ContourResiduals([view], [BALL], 0, None, THETA)
     parts = match.part_costs(BALL.values)
     assert parts.length_px.item() == pytest.approx(2 * np.pi * RADIUS_PX, rel=0.01)
     assert parts.forward_px.item() == pytest.approx(7.0, rel=1e-5)
@@ -372,5 +376,5 @@ def test_parts_by_hand():
     expected = told * (parts.length_px.item() * bent[0] + SCENE_SPACING_PX * bent[1:].sum())
     assert match.costs(BALL.values[None])[0] == pytest.approx(expected, rel=0.01)
     # Beyond the outlier distance a piece costs no more.
-    off = ContourMatch([seen(points, across, 35.0)], [BALL], 0, FORWARD, THETA)
+    off = ContourResiduals([seen(points, across, 35.0)], [BALL], 0, FORWARD, THETA)
     assert off.part_costs(BALL.values).forward_px.item() == pytest.approx(THETA)

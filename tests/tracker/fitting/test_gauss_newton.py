@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from staging import at, posed, shaken, solid
 
 from tracker.errors import TrackerError
-from tracker.fitting.gauss_newton import PointTargets, StayNear, covariance, fit_to_points, normal_of, solve
+from tracker.fitting.gauss_newton import PointTargets, PosePrior, covariance, fit_to_points, normal_equations, solve
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
@@ -35,7 +35,7 @@ def off(model, values, targets):
 
 def block_of(kind, model, values, rng):
     if kind == "prior":
-        return StayNear(shaken(model, values, rng, 0.02, 0.2), rng.uniform(0.5, 3.0, model.n_dofs))
+        return PosePrior(shaken(model, values, rng, 0.02, 0.2), rng.uniform(0.5, 3.0, model.n_dofs))
     points = rng.integers(0, len(model.point_names), 9)
     targets = model.points_world(values)[points] + rng.normal(0, 0.1, (9, 3))
     return PointTargets(points, targets, rng.uniform(0.5, 3.0, 9))
@@ -49,11 +49,11 @@ def test_blocks_against_finite_differences(kind, model, seed):
     rng = np.random.default_rng(seed)
     values = shaken(model, model.neutral(), rng, 0.3, 0.5)
     block = block_of(kind, model, values, rng)
-    found = block.normal(model, values, model.kinematics(values))
+    found = block.linearize(model, values, model.kinematics(values))
 
     def normal(step):
         moved = model.retract(values, step)
-        return block.normal(model, moved, model.kinematics(moved))
+        return block.linearize(model, moved, model.kinematics(moved))
 
     h = 1e-5
     sides = [(normal(h * e), normal(-h * e)) for e in np.eye(model.n_dofs)]
@@ -63,14 +63,14 @@ def test_blocks_against_finite_differences(kind, model, seed):
     if kind == "points":
         block = PointTargets(block.points, model.points_world(values)[block.points], block.weights)
     else:
-        block = StayNear(values, block.weights)
+        block = PosePrior(values, block.weights)
     sides = [(normal(h * e), normal(-h * e)) for e in np.eye(model.n_dofs)]
     hessian = np.array([a.gradient - b.gradient for a, b in sides]) / (2 * h)
-    np.testing.assert_allclose(block.normal(model, values, model.kinematics(values)).hessian, hessian, atol=1e-6)
+    np.testing.assert_allclose(block.linearize(model, values, model.kinematics(values)).hessian, hessian, atol=1e-6)
 
 
 def test_normal_equations_of_rows_by_hand():
-    found = normal_of(np.array([1.0, 2.0]), np.array([[1.0, 0.0], [3.0, -1.0]]))
+    found = normal_equations(np.array([1.0, 2.0]), np.array([[1.0, 0.0], [3.0, -1.0]]))
     assert found.cost == 2.5
     assert found.gradient.tolist() == [7.0, -2.0]
     assert found.hessian.tolist() == [[10.0, -3.0], [-3.0, 1.0]]
@@ -81,8 +81,8 @@ def test_without_iterations_a_pose_is_only_looked_at():
     block = target(GAVRILA, "left_wrist", 0.3, 0.2, 0.1, weight=2.0)
     found = solve(GAVRILA, wild, [block], max_iterations=0)
     here = GAVRILA.clip(wild)
-    np.testing.assert_array_equal(found.values, here)
-    normal = block.normal(GAVRILA, here, GAVRILA.kinematics(here))
+    np.testing.assert_array_equal(found.pose, here)
+    normal = block.linearize(GAVRILA, here, GAVRILA.kinematics(here))
     assert (found.cost, found.iterations) == (normal.cost, 0)
     np.testing.assert_array_equal(found.hessian, normal.hessian)
 
@@ -91,7 +91,7 @@ def test_covariance_by_hand():
     """Two blocks know where a ball is, to 1/2 and 1/3 m; nobody knows how it is turned."""
     ball = solid((0.1, 0.1, 0.1))
     place, start = target(ball, "root", 1, 2, 3, weight=2.0), at(ball, 0, 0, 0).values
-    prior = StayNear(start, np.array([3.0, 0, 0, 0, 0, 0]))
+    prior = PosePrior(start, np.array([3.0, 0, 0, 0, 0, 0]))
     found = covariance(ball, solve(ball, start, [place, prior]))
     # What is not known at all has a variance of 1, which is as good as a block of weight 1.
     np.testing.assert_allclose(np.diag(found), [1 / 14, 1 / 5, 1 / 5, 1, 1, 1], rtol=1e-6)
@@ -113,7 +113,7 @@ def test_covariance_against_noisy_targets():
         return solve(GAVRILA, truth, [block])
 
     expected = covariance(GAVRILA, fitted(0.0))
-    off = [GAVRILA.difference(fitted(rng.normal(0, sigma, places.shape)).values, truth) for _ in range(200)]
+    off = [GAVRILA.difference(fitted(rng.normal(0, sigma, places.shape)).pose, truth) for _ in range(200)]
     np.testing.assert_allclose(np.std(off, axis=0), np.sqrt(np.diag(expected)), rtol=0.2)
     distances = np.einsum("ni,ij,nj->n", off, np.linalg.inv(expected), off)
     assert distances.mean() == pytest.approx(GAVRILA.n_dofs, abs=2)
@@ -123,49 +123,49 @@ def test_weighted_mean_by_hand():
     # One point drawn to x = 0 with weight 1 and to x = 1 with weight 2: 1 (x - 0) + 4 (x - 1) = 0.
     blocks = [target(ARM, "shoulder", 0, 0, 0), target(ARM, "shoulder", 1, 0, 0, weight=2.0)]
     found = solve(ARM, ARM.neutral(), blocks, free=ARM.dof_is_length)
-    np.testing.assert_allclose(found.values[:3], [0.8, 0, 0], atol=1e-6)
+    np.testing.assert_allclose(found.pose[:3], [0.8, 0, 0], atol=1e-6)
     assert found.cost == pytest.approx(0.5 * (0.8**2 + 4 * 0.2**2))
 
 
 def test_prior_against_a_target_by_hand():
     # Weight 3 to stay at 0, weight 1 to go to 1: 9 x + (x - 1) = 0.
-    blocks = [StayNear(ARM.neutral(), np.full(ARM.n_dofs, 3.0)), target(ARM, "shoulder", 0, 1, 0)]
+    blocks = [PosePrior(ARM.neutral(), np.full(ARM.n_dofs, 3.0)), target(ARM, "shoulder", 0, 1, 0)]
     found = solve(ARM, ARM.neutral(), blocks)
-    np.testing.assert_allclose(found.values[:3], [0, 0.1, 0], atol=1e-6)
+    np.testing.assert_allclose(found.pose[:3], [0, 0.1, 0], atol=1e-6)
     assert found.cost == pytest.approx(0.5 * (9 * 0.1**2 + 0.9**2))
 
 
 def test_two_bone_arm_by_the_law_of_cosines():
     # Bones of 0.3 and 0.4 m, the hand 0.5 m away: a right angle at the elbow.
     found = solve(ARM, ARM.neutral(), [target(ARM, "hand", 0.3, 0, -0.4)], free=ROTATIONS)
-    np.testing.assert_allclose(hand(found.values), [0.3, 0, -0.4], atol=1e-6)
-    assert found.values[ARM.dof_value[-1]] == pytest.approx(np.pi / 2, abs=1e-5)
+    np.testing.assert_allclose(hand(found.pose), [0.3, 0, -0.4], atol=1e-6)
+    assert found.pose[ARM.dof_value[-1]] == pytest.approx(np.pi / 2, abs=1e-5)
 
 
 def test_out_of_reach_the_arm_is_stretched_towards_the_target():
     found = solve(ARM, ARM.neutral(), [target(ARM, "hand", 2.0, 0, -2.0)], free=ROTATIONS, max_iterations=200)
-    np.testing.assert_allclose(hand(found.values), 0.7 * np.array([1, 0, -1]) / np.sqrt(2), atol=1e-3)
+    np.testing.assert_allclose(hand(found.pose), 0.7 * np.array([1, 0, -1]) / np.sqrt(2), atol=1e-3)
 
 
 def test_free_leaves_the_rest_alone():
     free = np.array(ARM.dof_names) == "elbow.bend"
     found = solve(ARM, ARM.neutral(), [target(ARM, "hand", 0.4, 0, -0.3)], free=free)
-    np.testing.assert_array_equal(np.delete(found.values, ARM.dof_value[-1]), np.delete(ARM.neutral(), -1))
-    assert found.values[-1] == pytest.approx(np.pi / 2, abs=1e-5)
+    np.testing.assert_array_equal(np.delete(found.pose, ARM.dof_value[-1]), np.delete(ARM.neutral(), -1))
+    assert found.pose[-1] == pytest.approx(np.pi / 2, abs=1e-5)
 
 
 def test_limits_hold_and_the_rest_does_what_it_can():
     # The elbow bends forward alone; drawn back it stays straight, and the shoulder turns back in its stead.
     back = target(ARM, "hand", -0.4, 0, -0.3)
     elbow_only = solve(ARM, ARM.neutral(), [back], free=np.array(ARM.dof_names) == "elbow.bend")
-    assert elbow_only.values[-1] == 0
+    assert elbow_only.pose[-1] == 0
     whole = solve(ARM, ARM.neutral(), [target(ARM, "hand", -0.7, 0, 0)], free=ROTATIONS, max_iterations=200)
-    np.testing.assert_allclose(hand(whole.values), [-0.7, 0, 0], atol=1e-3)
+    np.testing.assert_allclose(hand(whole.pose), [-0.7, 0, 0], atol=1e-3)
     # A ball within its cone of 100 degrees: the hand cannot be raised overhead.
-    above = solve(ARM, whole.values, [target(ARM, "hand", -0.1, 0, 0.7)], free=ROTATIONS, max_iterations=200)
-    upper = ARM.kinematics(above.values).Ts_world_part[0, :3, 2]
+    above = solve(ARM, whole.pose, [target(ARM, "hand", -0.1, 0, 0.7)], free=ROTATIONS, max_iterations=200)
+    upper = ARM.kinematics(above.pose).Ts_world_part[0, :3, 2]
     assert np.degrees(np.arccos(upper[2])) <= 100 + 1e-6
-    np.testing.assert_allclose(ARM.clip(above.values), above.values, atol=1e-9)
+    np.testing.assert_allclose(ARM.clip(above.pose), above.pose, atol=1e-9)
 
 
 @settings(max_examples=25)
@@ -180,7 +180,7 @@ def test_ball_joint_recovers_a_rotation_from_points(seed):
     values[-1] = rng.uniform(0.3, 2.5)  # bent: the twist shows
     blocks = [target(ARM, n, *p) for n, p in zip(ARM.point_names, ARM.points_world(values), strict=True)]
     found = solve(ARM, ARM.neutral(), blocks, max_iterations=200)
-    np.testing.assert_allclose(ARM.points_world(found.values), ARM.points_world(values), atol=1e-4)
+    np.testing.assert_allclose(ARM.points_world(found.pose), ARM.points_world(values), atol=1e-4)
 
 
 def test_the_cost_never_rises():
@@ -197,11 +197,11 @@ class Rough:
     """A prior whose cost is rough at its bottom, as that of image residuals is; it counts how often it is asked."""
 
     def __init__(self, near, roughness):
-        self.prior, self.roughness, self.asked = StayNear(near, np.full(GAVRILA.n_dofs, 10.0)), roughness, 0
+        self.prior, self.roughness, self.asked = PosePrior(near, np.full(GAVRILA.n_dofs, 10.0)), roughness, 0
 
-    def normal(self, model, values, kinematics):
+    def linearize(self, model, values, kinematics):
         self.asked += 1
-        found = self.prior.normal(model, values, kinematics)
+        found = self.prior.linearize(model, values, kinematics)
         return found._replace(cost=found.cost + self.roughness * np.random.default_rng(self.asked).random())
 
 
@@ -223,7 +223,7 @@ def test_what_gains_too_little_ends_the_descent(seed):
     idle = Rough(near, 0.0)
     stay = solve(GAVRILA, start, [idle], gain=1e6)
     assert (idle.asked, stay.iterations) == (1, 1)
-    np.testing.assert_array_equal(stay.values, GAVRILA.clip(start))
+    np.testing.assert_array_equal(stay.pose, GAVRILA.clip(start))
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -238,9 +238,9 @@ def test_fit_to_points_recovers_poses_from_their_own_joints(seed):
     targets = points_of(GAVRILA, values)
     found = fit_to_points(GAVRILA, targets)
     # The weak pull to the start (1e-3 per rad) holds the joints back by a hair.
-    assert off(GAVRILA, found.values, targets).max() < 0.001
+    assert off(GAVRILA, found.pose, targets).max() < 0.001
     # What the joints show is the same: where every part's axis points.
-    axes = [GAVRILA.kinematics(v).Ts_world_part[:, :3, 2] for v in (values, found.values)]
+    axes = [GAVRILA.kinematics(v).Ts_world_part[:, :3, 2] for v in (values, found.pose)]
     assert np.degrees(np.arccos(np.clip(np.sum(axes[0] * axes[1], axis=1), -1, 1))).max() < 1
 
 
@@ -250,7 +250,7 @@ def test_other_sizes_are_fitted_as_well_as_they_can():
     shorter = GAVRILA.with_height(1.6)
     found = fit_to_points(shorter, targets)
     assert shorter.height_m == 1.6
-    assert 0.01 < off(shorter, found.values, targets).mean() < 0.05
+    assert 0.01 < off(shorter, found.pose, targets).mean() < 0.05
 
 
 def test_a_longer_trunk_is_not_bent_to_be_shorter():
@@ -260,7 +260,7 @@ def test_a_longer_trunk_is_not_bent_to_be_shorter():
     for name in targets:
         if name.endswith(("shoulder", "elbow", "wrist")):
             targets[name][2] -= 0.04
-    found = fit_to_points(model, targets).values
+    found = fit_to_points(model, targets).pose
     trunk = [i for i, name in enumerate(model.value_names) if name.startswith(("spine.", "waist."))]
     assert np.degrees(np.abs(found[trunk])).max() < 10  # 45 without
     assert off(model, found, targets).mean() < 0.02
@@ -274,14 +274,14 @@ def test_near_is_where_the_fit_begins():
     near = values.copy()
     near[names == "left_shoulder.twist"] = 0.7
     found = fit_to_points(GAVRILA, points_of(GAVRILA, values), near)
-    assert found.values[names == "left_shoulder.twist"][0] == pytest.approx(0.7, abs=1e-3)
+    assert found.pose[names == "left_shoulder.twist"][0] == pytest.approx(0.7, abs=1e-3)
 
 
 def test_unknown_and_missing_points_are_passed_over():
     targets = points_of(GAVRILA, shaken(GAVRILA, GAVRILA.neutral(), np.random.default_rng(4), 0.3, 0.5))
     found = fit_to_points(GAVRILA, targets | {"left_wrist": np.full(3, np.nan), "tail": np.zeros(3)})
     del targets["left_wrist"]
-    assert off(GAVRILA, found.values, targets).max() < 1e-3
+    assert off(GAVRILA, found.pose, targets).max() < 1e-3
 
 
 @pytest.mark.parametrize("known", [[], ["left_hip", "right_hip", "left_knee"]])

@@ -3,14 +3,14 @@ import pytest
 from staging import at, posed, shaken, solid
 
 from tracker.body.model import PosedBody
-from tracker.fitting.gauss_newton import StayNear, solve
-from tracker.fitting.interpenetration import KeepApart, KeepBodiesApart
+from tracker.fitting.gauss_newton import PosePrior, solve
+from tracker.fitting.interpenetration import BodyPenetration, SelfPenetration
 
 BALL, ROD = solid((0.1, 0.1, 0.1)), solid((0.05, 0.05, 0.3))
 
 
 def normal(block, body):
-    return block.normal(body.model, body.values, body.model.kinematics(body.values))
+    return block.linearize(body.model, body.values, body.model.kinematics(body.values))
 
 
 def numeric_gradient(block, body, step=1e-6):
@@ -29,12 +29,12 @@ def embraced(gavrila, seed):
 
 def test_a_body_within_another_is_pushed_out():
     bodies = [at(ROD, 0, 0, 0), at(ROD, 0.03, 0, 0)]
-    fit = solve(ROD, bodies[1].values, [KeepBodiesApart(bodies, 1, 1.0), StayNear(bodies[1].values, np.full(6, 1e-3))])
-    assert fit.values[0] > 0.05  # away from the other, who stands
-    assert np.abs(fit.values[1:]).max() < 1e-3
+    fit = solve(ROD, bodies[1].values, [BodyPenetration(bodies, 1, 1.0), PosePrior(bodies[1].values, np.full(6, 1e-3))])
+    assert fit.pose[0] > 0.05  # away from the other, who stands
+    assert np.abs(fit.pose[1:]).max() < 1e-3
     assert fit.cost < 1e-3
     # Of two the push is the same whoever is fitted.
-    pushes = [normal(KeepBodiesApart(bodies, i, 1.0), bodies[i]).gradient[:3] for i in (0, 1)]
+    pushes = [normal(BodyPenetration(bodies, i, 1.0), bodies[i]).gradient[:3] for i in (0, 1)]
     np.testing.assert_allclose(pushes[0], -pushes[1], atol=1e-9)
     assert pushes[1][0] < 0
 
@@ -42,7 +42,7 @@ def test_a_body_within_another_is_pushed_out():
 def test_bodies_that_only_touch_are_left_alone():
     for x in (0.07, 0.2, 3.0):  # flesh gives way: two fifths of the radius
         bodies = [at(ROD, 0, 0, 0), at(ROD, x, 0, 0)]
-        found = normal(KeepBodiesApart(bodies, 0, 1.0), bodies[0])
+        found = normal(BodyPenetration(bodies, 0, 1.0), bodies[0])
         assert found.cost == 0
         assert not found.gradient.any()
         assert not found.hessian.any()
@@ -53,12 +53,12 @@ def test_a_thin_part_within_a_thick_one_is_felt_from_both():
     thick = solid((0.2, 0.2, 0.3))
     bodies = [at(thick, 0, 0, 0), at(ROD, 0.1, 0, 0, turns=(0, np.pi / 2, 0))]
     for i in (0, 1):
-        assert normal(KeepBodiesApart(bodies, i, 1.0), bodies[i]).cost > 1
+        assert normal(BodyPenetration(bodies, i, 1.0), bodies[i]).cost > 1
 
 
 def test_the_weight_is_that_of_the_cost():
     bodies = [at(BALL, 0, 0, 0), at(BALL, 0.02, 0, 0)]
-    once, thrice = (normal(KeepBodiesApart(bodies, 0, w), bodies[0]) for w in (1.0, 3.0))
+    once, thrice = (normal(BodyPenetration(bodies, 0, w), bodies[0]) for w in (1.0, 3.0))
     assert thrice.cost == pytest.approx(3 * once.cost)
     np.testing.assert_allclose(thrice.gradient, 3 * once.gradient, atol=1e-9)
     np.testing.assert_allclose(thrice.hessian, 3 * once.hessian, atol=1e-9)
@@ -69,7 +69,7 @@ def test_the_weight_is_that_of_the_cost():
 def test_derivative_between_bodies(gavrila, seed, person):
     """Contacts move with the surface of the other part, whose curvature is left out: right up to a small share."""
     bodies = embraced(gavrila, seed)
-    block = KeepBodiesApart(bodies, person, 1.0)
+    block = BodyPenetration(bodies, person, 1.0)
     found, wanted = normal(block, bodies[person]), numeric_gradient(block, bodies[person])
     assert found.cost > 1
     assert found.gradient @ wanted > 0.95 * np.linalg.norm(found.gradient) * np.linalg.norm(wanted)
@@ -79,20 +79,20 @@ def test_derivative_between_bodies(gavrila, seed, person):
 
 def test_a_third_body_counts_too():
     bodies = [at(BALL, 0, 0, 0), at(BALL, 0.02, 0, 0), at(BALL, 0, 0.02, 0)]
-    of_two = normal(KeepBodiesApart(bodies[:2], 0, 1.0), bodies[0]).cost
-    assert normal(KeepBodiesApart(bodies, 0, 1.0), bodies[0]).cost == pytest.approx(2 * of_two)
+    of_two = normal(BodyPenetration(bodies[:2], 0, 1.0), bodies[0]).cost
+    assert normal(BodyPenetration(bodies, 0, 1.0), bodies[0]).cost == pytest.approx(2 * of_two)
 
 
 def test_limbs_leave_the_trunk_and_stay_elsewhere(gavrila):
     """Arms pressed into the trunk come out; a body at ease costs nothing."""
     at_ease = gavrila.neutral()
-    assert normal(KeepApart(), PosedBody(gavrila, at_ease)).cost == 0
+    assert normal(SelfPenetration(), PosedBody(gavrila, at_ease)).cost == 0
     rng, worse = np.random.default_rng(2), 0
     for _ in range(20):
         values = shaken(gavrila, at_ease, rng, 0.5, 0.0)
-        before = normal(KeepApart(), PosedBody(gavrila, values)).cost
+        before = normal(SelfPenetration(), PosedBody(gavrila, values)).cost
         if before > 1:
-            fit = solve(gavrila, values, [KeepApart(), StayNear(values, np.full(gavrila.n_dofs, 1e-2))])
-            assert normal(KeepApart(), PosedBody(gavrila, fit.values)).cost < 0.1 * before
+            fit = solve(gavrila, values, [SelfPenetration(), PosePrior(values, np.full(gavrila.n_dofs, 1e-2))])
+            assert normal(SelfPenetration(), PosedBody(gavrila, fit.pose)).cost < 0.1 * before
             worse += 1
     assert worse > 2

@@ -5,10 +5,11 @@ import pytest
 from staging import at, camera_at, cameras_around, own_evidence, posed, solid
 
 from tracker.body.model import PosedBody
+from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import Silhouette, ViewEvidence
 from tracker.fitting.match_points import N_COLUMNS, points_to_match
 from tracker.formats.model_toml import load_model
-from tracker.images.silhouette_outline import Outline
+from tracker.images.silhouette_contour import SilhouetteContour
 
 FRONT = camera_at("front", (4.0, 0.0, 0.0))
 BALL = [at(solid((0.3, 0.3, 0.3)), 0, 0, 0)]
@@ -24,13 +25,14 @@ def table(points, normal=ACROSS):
 def shown(edges, outline, turned=0.0, trust=1.0):
     """A view of an upright edge and of a silhouette's contour, turned by an angle, rad."""
     points, normals = table(outline, (np.cos(turned), np.sin(turned)))
-    told = Silhouette(np.zeros((480, 640), bool), points, normals, trust, Outline(points, normals), 40.0)
+    told = Silhouette(np.zeros((480, 640), bool), points, normals, trust, SilhouetteContour(points, normals), 40.0)
     return ViewEvidence(FRONT, 1.0, table(edges)[0], np.zeros((480, 640), np.float32), normals=table(edges)[1],
                         silhouette=told)  # fmt: skip
 
 
 def found(*args, reach=np.inf, **kwargs):
-    return points_to_match(shown(*args, **kwargs), BALL, reach, EDGES, SILHOUETTE).tolist()
+    contour = None if np.isinf(reach) else occluding_contours.trace(BALL, FRONT)
+    return points_to_match(shown(*args, **kwargs), contour, reach, EDGES, SILHOUETTE).tolist()
 
 
 def test_a_point_of_the_silhouette_joins_the_edge_it_lies_on():
@@ -71,8 +73,10 @@ def test_joined_points_weigh_what_they_did_apart():
     points = view.points_px[::2] + view.normals[::2]
     inside = np.all((points >= 0) & (points < view.camera.size), axis=1)
     points, normals = points[inside], view.normals[::2][inside]
-    told = Silhouette(np.zeros(view.distance.shape, bool), points, normals, 1.0, Outline(points, normals), 40.0)
-    joined = points_to_match(replace(view, silhouette=told), bodies, np.inf, EDGES, SILHOUETTE)
+    told = Silhouette(
+        np.zeros(view.distance.shape, bool), points, normals, 1.0, SilhouetteContour(points, normals), 40.0
+    )
+    joined = points_to_match(replace(view, silhouette=told), None, np.inf, EDGES, SILHOUETTE)
     assert joined.shape == (len(view.points_px), N_COLUMNS)  # all found their edges
     np.testing.assert_allclose(
         joined[:, 4:].sum(axis=0),

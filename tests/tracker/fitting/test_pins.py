@@ -7,7 +7,7 @@ import pytest
 from bodies import ARM
 from staging import camera_at, cameras_around, posed, seen, shaken
 
-from tracker.fitting.gauss_newton import StayNear, solve
+from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.fitting.pins import pin_block
 from tracker.formats.model_toml import load_model
 from tracker.geometry.triangulation import PointObservation, sigma_px, triangulate
@@ -24,11 +24,11 @@ def test_the_pull_of_pins_against_finite_differences(model, seed):
     values = shaken(model, model.neutral(), rng, 0.4, 0.3)
     names = rng.choice(model.point_names, 3, replace=False)
     block = pin_block(model, CAMERAS, seen(model, values, names, CAMERAS, noise_px=20.0, seed=seed))
-    found = block.normal(model, values, model.kinematics(values))
+    found = block.linearize(model, values, model.kinematics(values))
 
     def normal(step):
         moved = model.retract(values, step)
-        return block.normal(model, moved, model.kinematics(moved))
+        return block.linearize(model, moved, model.kinematics(moved))
 
     h = 1e-6
     sides = [(normal(h * e), normal(-h * e)) for e in np.eye(model.n_dofs)]
@@ -38,7 +38,7 @@ def test_the_pull_of_pins_against_finite_differences(model, seed):
     block = pin_block(model, CAMERAS, seen(model, values, names, CAMERAS))
     sides = [(normal(h * e), normal(-h * e)) for e in np.eye(model.n_dofs)]
     hessian = np.array([a.gradient - b.gradient for a, b in sides]) / (2 * h)
-    exact = block.normal(model, values, model.kinematics(values))
+    exact = block.linearize(model, values, model.kinematics(values))
     np.testing.assert_allclose(exact.hessian, hessian, rtol=1e-5, atol=1e-3 * np.abs(hessian).max())
     assert exact.cost == pytest.approx(0, abs=1e-15)
 
@@ -48,7 +48,7 @@ def test_a_pin_counts_by_the_pixels_it_is_off():
     values = posed(GAVRILA, 0)
     (pin, *_) = seen(GAVRILA, values, ["left_wrist"], CAMERAS)
     moved = pin._replace(position_px=(pin.position_px[0] + 3, pin.position_px[1] - 4))
-    found = pin_block(GAVRILA, CAMERAS, [moved]).normal(GAVRILA, values, GAVRILA.kinematics(values))
+    found = pin_block(GAVRILA, CAMERAS, [moved]).linearize(GAVRILA, values, GAVRILA.kinematics(values))
     assert found.cost == pytest.approx(0.5 * 25 / 0.64**2)
     assert sigma_px(replace(CAMERAS[0], size=(1920, 1080))) == pytest.approx(1.92)
 
@@ -60,11 +60,11 @@ def test_behind_a_camera_pins_stay_finite_and_exact():
 
     def cost(step):
         moved = GAVRILA.retract(values, step)
-        return block.normal(GAVRILA, moved, GAVRILA.kinematics(moved)).cost
+        return block.linearize(GAVRILA, moved, GAVRILA.kinematics(moved)).cost
 
     h = 1e-6 * np.eye(GAVRILA.n_dofs)
     gradient = np.array([cost(e) - cost(-e) for e in h]) / 2e-6
-    found = block.normal(GAVRILA, values, GAVRILA.kinematics(values))
+    found = block.linearize(GAVRILA, values, GAVRILA.kinematics(values))
     assert np.isfinite(found.cost)
     np.testing.assert_allclose(found.gradient, gradient, rtol=1e-4, atol=1e-3 * np.abs(gradient).max())
 
@@ -75,8 +75,8 @@ def test_a_body_is_found_by_its_pins(model):
     start = shaken(model, truth, np.random.default_rng(5), 0.3, 0.2)
     names = model.point_names
     block = pin_block(model, CAMERAS, seen(model, truth, names, CAMERAS))
-    found = solve(model, start, [block, StayNear(start, np.full(model.n_dofs, 1e-3))], max_iterations=100)
-    off = np.linalg.norm(model.points_world(found.values) - model.points_world(truth), axis=1)
+    found = solve(model, start, [block, PosePrior(start, np.full(model.n_dofs, 1e-3))], max_iterations=100)
+    off = np.linalg.norm(model.points_world(found.pose) - model.points_world(truth), axis=1)
     assert off.max() < 1e-3
 
 

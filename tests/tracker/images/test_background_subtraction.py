@@ -3,13 +3,13 @@ import pytest
 
 from tracker.images.background_subtraction import (
     MIN_DIFFERENCE,
-    brightened,
+    apply_gain,
     change_threshold,
+    dilate,
     exposure_gain,
-    grow,
-    smoothed,
+    has_usable_exposure,
+    smooth_image,
     subtract_background,
-    tells_exposure,
 )
 
 
@@ -21,7 +21,7 @@ def room(seed=0, noise=0.0):
 
 def changed(image, background):
     """Silhouette of an image before a background, both as filmed, with the threshold that they call for."""
-    pair = smoothed(image), smoothed(background)
+    pair = smooth_image(image), smooth_image(background)
     differences = np.abs(np.subtract(*pair, dtype=np.float32)).max(axis=-1)
     return subtract_background(*pair, change_threshold(differences.ravel())).inside
 
@@ -55,7 +55,7 @@ def test_noise_is_no_person_even_where_it_is_strong():
 def test_single_pixels_and_small_changes_do_not_count():
     background = np.full((40, 40, 3), 100, np.uint8)
     image = background.copy()
-    image[20, 20] = 180  # over the threshold even when smoothed, but alone
+    image[20, 20] = 180  # over the threshold even when smooth_image, but alone
     image[:, 30:] = 100 + int(MIN_DIFFERENCE) - 2
     found = changed(image, background)
     assert not found.any()
@@ -68,7 +68,7 @@ def test_growing_by_a_radius(radius):
     mask[30, 25] = True
     v, u = np.mgrid[:60, :60]
     distance = np.hypot(u - 25, v - 30)
-    grown = grow(mask, radius)
+    grown = dilate(mask, radius)
     # The disc is an octagon of a whole radius.
     assert grown[distance <= 0.9 * radius].all()
     assert not grown[distance > 1.1 * radius + 0.5].any()
@@ -77,9 +77,9 @@ def test_growing_by_a_radius(radius):
 
 def test_nothing_to_grow():
     mask = np.zeros((10, 10), dtype=bool)
-    assert not grow(mask, 5).any()
+    assert not dilate(mask, 5).any()
     mask[5, 5] = True
-    assert grow(mask, 0.5).sum() == 1
+    assert dilate(mask, 0.5).sum() == 1
 
 
 def test_a_shadow_is_no_silhouette_and_dark_clothes_are():
@@ -95,7 +95,7 @@ def test_a_shadow_is_no_silhouette_and_dark_clothes_are():
         image[10:50, 50:70] = color
         assert changed(image, background)[12:48, 52:68].all()
     # Both are where edges may lie.
-    anything = subtract_background(smoothed(image), smoothed(background), MIN_DIFFERENCE).anything
+    anything = subtract_background(smooth_image(image), smooth_image(background), MIN_DIFFERENCE).anything
     assert anything[12:48, 12:28].all()
     assert anything[12:48, 52:68].all()
     assert not anything[:, 34:46].any()
@@ -109,7 +109,7 @@ def test_exposure_is_found_although_a_person_stands_there():
     np.testing.assert_allclose(exposure_gain(seen.astype(np.float32), empty), (1.2, 1.1, 0.9), atol=0.03)
     # Where everything is black, or white, nothing can be told.
     empty[:500], empty[500:960] = 5, 250
-    told = tells_exposure(empty)
+    told = has_usable_exposure(empty)
     assert told.sum() == 40
     np.testing.assert_array_equal(exposure_gain(seen[told].astype(np.float32), empty[told]), 1)
 
@@ -117,5 +117,5 @@ def test_exposure_is_found_although_a_person_stands_there():
 def test_a_background_follows_the_exposure():
     image = np.array([[[100, 100, 100], [250, 0, 20]]], np.uint8)
     gain = np.array([1.1, 1.0, 0.5], np.float32)
-    assert brightened(image, gain).tolist() == [[[110, 100, 50], [255, 0, 10]]]
-    assert brightened(image, np.ones(3, np.float32)) is image
+    assert apply_gain(image, gain).tolist() == [[[110, 100, 50], [255, 0, 10]]]
+    assert apply_gain(image, np.ones(3, np.float32)) is image

@@ -2,13 +2,13 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker.images.background_subtraction import smoothed
-from tracker.images.edge_segments import MAX_LENGTH, Segments, accept, link_edges, sampled
+from tracker.images.background_subtraction import smooth_image
+from tracker.images.edge_segments import MAX_LENGTH, Segments, accept_segments, link_edges, sample_segments
 from tracker.images.edges import Levels, detect_edges
 
 
 def linked(image):
-    edges = detect_edges(smoothed(image), Levels(60.0, 30.0))
+    edges = detect_edges(smooth_image(image), Levels(60.0, 30.0))
     return edges, link_edges(edges.found, edges.gradients)
 
 
@@ -98,7 +98,7 @@ def test_no_edges_no_segments():
     empty = link_edges(np.zeros((20, 30), np.uint8), np.zeros((2, 20, 30), np.int16))
     assert empty.points_px.shape == (0, 2)
     assert empty.firsts.tolist() == [0]
-    assert accept(sampled(empty), np.zeros((3, 4), np.float32), 5.0).shape == (0,)
+    assert accept_segments(sample_segments(empty), np.zeros((3, 4), np.float32), 5.0).shape == (0,)
 
 
 def line(u, v, along, n=20):
@@ -119,26 +119,26 @@ def test_segments_are_taken_or_left_as_a_whole():
         np.concatenate([near_normals, slanting_normals, far_normals]),
         [0, 20, 40, 60],
     )
-    assert accept(sampled(segments), PIECES, 5.0).tolist() == [True, True, False]
-    assert accept(sampled(segments), PIECES, 3.5).tolist() == [True, False, False]
-    assert accept(sampled(segments), PIECES, 11.5).tolist() == [True, True, True]
+    assert accept_segments(sample_segments(segments), PIECES, 5.0).tolist() == [True, True, False]
+    assert accept_segments(sample_segments(segments), PIECES, 3.5).tolist() == [True, False, False]
+    assert accept_segments(sample_segments(segments), PIECES, 11.5).tolist() == [True, True, True]
 
 
 def test_the_distance_is_the_mean_over_the_segment():
     points, normals = line(10, 54, (1, 0), n=10)
     further, _ = line(20, 57, (1, 0), n=10)
     segments = of_points(np.concatenate([points, further]), np.tile(normals, (2, 1)), [0, 20])
-    assert accept(sampled(segments), PIECES, 5.6).all()
-    assert not accept(sampled(segments), PIECES, 5.4).any()
+    assert accept_segments(sample_segments(segments), PIECES, 5.6).all()
+    assert not accept_segments(sample_segments(segments), PIECES, 5.4).any()
 
 
 def test_an_edge_across_the_contour_does_not_belong_to_it():
     points, normals = line(20, 45, (0, 1), n=10)
-    assert not accept(sampled(of_points(points, normals, [0, 10])), PIECES, 5.0).any()
+    assert not accept_segments(sample_segments(of_points(points, normals, [0, 10])), PIECES, 5.0).any()
     turned = of_points(points, np.tile((0.0, 1.0), (10, 1)), [0, 10])
-    assert accept(sampled(turned), PIECES, 5.0).all()
+    assert accept_segments(sample_segments(turned), PIECES, 5.0).all()
     # Which side is darker does not matter.
-    assert accept(sampled(turned._replace(normals=-turned.normals)), PIECES, 5.0).all()
+    assert accept_segments(sample_segments(turned._replace(normals=-turned.normals)), PIECES, 5.0).all()
 
 
 @pytest.mark.parametrize("threshold", [3.0, 8.0, 20.0])
@@ -156,10 +156,14 @@ def test_distances_are_those_of_brute_force(threshold):
     along = np.abs(normals @ (step / np.linalg.norm(step, axis=1, keepdims=True)).T)
     distances = np.where(along <= np.sin(np.radians(45)), np.linalg.norm(off, axis=-1), np.inf).min(axis=1)
     clear = np.abs(distances - threshold) > 1e-3
-    np.testing.assert_array_equal(accept(sampled(segments), pieces, threshold)[clear], (distances <= threshold)[clear])
+    np.testing.assert_array_equal(
+        accept_segments(sample_segments(segments), pieces, threshold)[clear], (distances <= threshold)[clear]
+    )
     assert 10 < np.sum(distances <= threshold) < 390
 
 
 def test_nothing_predicted_accepts_nothing():
     points, normals = line(10, 50, (1, 0))
-    assert not accept(sampled(of_points(points, normals, [0, 20])), np.zeros((0, 4), np.float32), 5.0).any()
+    assert not accept_segments(
+        sample_segments(of_points(points, normals, [0, 20])), np.zeros((0, 4), np.float32), 5.0
+    ).any()

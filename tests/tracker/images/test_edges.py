@@ -2,17 +2,17 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker.images.background_subtraction import smoothed
+from tracker.images.background_subtraction import smooth_image
 from tracker.images.edges import Levels, detect_edges, levels
-from tracker.images.image_statistics import Probes
+from tracker.images.image_statistics import SampleGrid
 
 COLUMN = 30
 
 
 def found(image, foreground=None):
     """Edges of a whole image, (H, W) bool, with the thresholds that it calls for itself."""
-    strengths = Probes(image.shape[1::-1], 1.0).read(image).strengths
-    edges = detect_edges(smoothed(image), levels(strengths, restricted=foreground is not None), foreground)
+    strengths = SampleGrid(image.shape[1::-1], 1.0).measure(image).strengths
+    edges = detect_edges(smooth_image(image), levels(strengths, restricted=foreground is not None), foreground)
     assert edges.found.dtype == np.uint8
     return edges.found > 0
 
@@ -105,7 +105,7 @@ def test_edges_inside_a_region_are_those_of_the_whole_image():
 
 
 def test_gradients_are_those_of_the_strongest_channel():
-    smooth = smoothed(np.random.default_rng(1).integers(0, 255, (20, 30, 3)).astype(np.uint8))
+    smooth = smooth_image(np.random.default_rng(1).integers(0, 255, (20, 30, 3)).astype(np.uint8))
     gradients = detect_edges(smooth, Levels(60.0, 30.0)).gradients
     for v, u in ((4, 7), (11, 2), (15, 26)):
         around = smooth[v - 1 : v + 2, u - 1 : u + 2].astype(int)

@@ -6,7 +6,7 @@ from staging import camera_at, cameras_around
 
 from tracker.geometry import rigid
 from tracker.geometry.ground_plane import UP_ROTATIONS
-from tracker.posing.default_pose import standing_pose
+from tracker.posing.default_pose import default_pose
 
 
 def place(model, values, point):
@@ -22,7 +22,7 @@ def test_standing_pose(gavrila, up):
         camera_at(c.name, c.center_world, (0, 0, 0)) for c in cameras_around(3)
     ]  # they look at the origin of a world whose up is z
     turned = [_moved(c, T) for c in cameras]
-    values = standing_pose(gavrila, turned, UP_ROTATIONS[up])
+    values = default_pose(gavrila, turned, UP_ROTATIONS[up])
     np.testing.assert_allclose(place(gavrila, values, "torso"), center, atol=0.02)
     axis = np.array([{"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}[up[-1]]])[0] * (-1 if up[0] == "-" else 1)
     points = dict(zip(gavrila.point_names, gavrila.points_world(values) @ axis, strict=True))
@@ -39,7 +39,7 @@ def _moved(camera, T_new_world):
 
 def test_standing_pose_before_a_single_camera(gavrila):
     camera = camera_at("only", (1.0, 0.0, 1.0), (2.0, 0.0, 1.0))
-    values = standing_pose(gavrila, [camera])
+    values = default_pose(gavrila, [camera])
     np.testing.assert_allclose(place(gavrila, values, "torso"), [5.0, 0.0, 1.0], atol=0.01)  # 4 m in front
 
 

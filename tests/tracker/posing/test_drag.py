@@ -9,8 +9,8 @@ from tracker.fitting.gauss_newton import solve
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
 from tracker.posing import drag as posing
-from tracker.posing.drag import drag, grab, grab_part, hold_anew, minor_points, push, turn
-from tracker.posing.picking import part_outlines
+from tracker.posing.drag import drag, grab, grab_part, minor_points, push, regrab, turn
+from tracker.posing.picking import part_hulls
 
 SIDE = camera_at("side", (3.0, 2.5, 1.0))
 
@@ -239,7 +239,7 @@ def held_place(hand, values):
 @pytest.mark.parametrize("part", ["left_forearm", "left_upper_arm", "right_thigh", "right_calf"])
 def test_a_part_follows_by_the_place_that_was_touched(gavrila, pose, part):
     index = gavrila.part_index[part]
-    outline = next(o for o in part_outlines([PosedBody(gavrila, pose)], [SIDE])[0] if o.part == index)
+    outline = next(o for o in part_hulls([PosedBody(gavrila, pose)], [SIDE])[0] if o.part == index)
     start = outline.polygon_px.mean(axis=0) + 2.0
     hand = grab_part(gavrila, pose, SIDE, index, start)
     np.testing.assert_allclose(held_place(hand, pose), start, atol=0.1)
@@ -319,5 +319,5 @@ def test_after_a_turn_the_hand_goes_on_where_it_is(gavrila, pose):
     start = SIDE.project(place(gavrila, pose, "left_wrist"))
     hand = grab(gavrila, pose, SIDE, "left_wrist", start)
     turned = turn(hand, start + np.array([0, -12]), pose)
-    again = hold_anew(hand, turned, start + np.array([0, -12]))
+    again = regrab(hand, turned, start + np.array([0, -12]))
     np.testing.assert_allclose(drag(again, start + np.array([0, -12]), turned), turned, atol=5e-3)

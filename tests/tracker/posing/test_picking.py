@@ -5,7 +5,7 @@ from staging import camera_at, in_posture
 
 from tracker.body.model import PosedBody
 from tracker.geometry import rigid
-from tracker.posing.picking import part_outlines, place_on_part
+from tracker.posing.picking import part_hulls, place_on_part
 
 SIDE = camera_at("side", (3.0, 2.5, 1.0))
 
@@ -18,7 +18,7 @@ def body(gavrila):
 def test_outlines_hold_the_images_of_their_parts(body):
     """Against meshes finer than the outlines are made of: none stands out by more than half a pixel."""
     Ts = body.model.kinematics(body.values).Ts_world_part
-    found = part_outlines([body], [SIDE])[0]
+    found = part_hulls([body], [SIDE])[0]
     assert [o.part for o in found] == list(range(len(body.model.parts)))
     for outline in found:
         mesh = body.model.shapes[outline.part].mesh(40, 60)
@@ -32,12 +32,12 @@ def test_outlines_hold_the_images_of_their_parts(body):
 
 def test_parts_behind_the_camera_have_no_outline(body):
     turned = camera_at("turned", (0.0, 0.0, 0.2))
-    assert len(part_outlines([body], [turned])[0]) < len(body.model.parts)
+    assert len(part_hulls([body], [turned])[0]) < len(body.model.parts)
 
 
 @pytest.mark.parametrize("part", range(10))
 def test_the_place_touched_is_on_the_surface_and_under_the_pointer(body, part):
-    outline = next(o for o in part_outlines([body], [SIDE])[0] if o.part == part)
+    outline = next(o for o in part_hulls([body], [SIDE])[0] if o.part == part)
     T = body.model.kinematics(body.values).Ts_world_part[part]
     for toward in (0.0, 0.5, 0.9):
         pointer = outline.polygon_px.mean(axis=0) * (1 - toward) + toward * outline.polygon_px[0]
@@ -52,7 +52,7 @@ def test_the_place_touched_is_on_the_surface_and_under_the_pointer(body, part):
 
 
 def test_a_pointer_that_just_misses_takes_the_outline(body):
-    outline = part_outlines([body], [SIDE])[0][0]
+    outline = part_hulls([body], [SIDE])[0][0]
     middle = outline.polygon_px.mean(axis=0)
     outside = middle + 1.02 * (outline.polygon_px[3] - middle)
     T = body.model.kinematics(body.values).Ts_world_part[0]

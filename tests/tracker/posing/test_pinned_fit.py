@@ -132,7 +132,7 @@ def test_pins_and_edges_of_real_footage_come_below_45_mm(sample_folder):
     for k, evidence in views.items():
         true = dict(zip(joints.names, joints.points[k], strict=True))
         rng = np.random.default_rng(k)
-        start = shaken(model, fit_to_points(model, true).values, rng, 0.15, 0.03)
+        start = shaken(model, fit_to_points(model, true).pose, rng, 0.15, 0.03)
         pins = [
             PointObservation(name, i, tuple(cameras[i].pinhole.project(true[name]) + rng.normal(0, 3, 2)))
             for name in ("left_wrist", "right_wrist", "left_ankle", "right_ankle")

@@ -4,22 +4,22 @@ import numpy as np
 import pytest
 from staging import cameras_around, posed
 
-from tracker.body.dimensions import PartDimensions, sizes_of, with_sizes
+from tracker.body.dimensions import PartDimensions, dimensions_of, with_dimensions
 from tracker.formats.model_toml import load_model
 from tracker.geometry.triangulation import PointObservation
-from tracker.posing.retarget import rebodied
+from tracker.posing.retarget import retarget_pose
 
 
 @pytest.fixture(scope="module")
 def bodies():
     """A body, and the same with forearms and thighs 1.5 cm longer."""
     model = load_model("gavrila34")
-    sizes = sizes_of(model)
+    sizes = dimensions_of(model)
     parts = {
         n: PartDimensions(p.length_m + 0.015 * n.endswith(("forearm", "thigh")), p.girths_m)
         for n, p in sizes.parts.items()
     }
-    return model, with_sizes(model, sizes._replace(parts=parts))
+    return model, with_dimensions(model, sizes._replace(parts=parts))
 
 
 def off_m(values, becomes, was_values, was):
@@ -30,7 +30,7 @@ def off_m(values, becomes, was_values, was):
 def test_joints_stay_where_they_are_as_far_as_the_bones_allow(bodies, seed):
     was, becomes = bodies
     values = posed(was, seed)
-    found = rebodied(values, was, becomes)
+    found = retarget_pose(values, was, becomes)
     assert off_m(values, becomes, values, was).max() > 0.014
     # A bone that is 15 mm longer leaves 7 mm at each end at best, unless others make room.
     assert off_m(found, becomes, values, was).mean() < 0.007
@@ -41,14 +41,14 @@ def test_joints_stay_where_they_are_as_far_as_the_bones_allow(bodies, seed):
 def test_the_same_body_keeps_the_pose_to_the_last_bit(bodies):
     was, _ = bodies
     values = posed(was, 1)
-    assert rebodied(values, was, was) is values
+    assert retarget_pose(values, was, was) is values
 
 
 def test_what_is_locked_stays(bodies):
     was, becomes = bodies
     values = posed(was, 1)
     free = np.array([not name.startswith("left_elbow") for name in was.dof_names])
-    found = rebodied(values, was, becomes, free=free)
+    found = retarget_pose(values, was, becomes, free=free)
     still = was.dof_value[~free]
     np.testing.assert_array_equal(found[still], values[still])
     assert not np.array_equal(found, values)
@@ -60,6 +60,6 @@ def test_pins_draw_a_joint_away_from_where_it_was(bodies):
     wrist = was.point_names.index("left_wrist")
     place = was.points_world(values)[wrist] + (0.0, 0.0, 0.03)
     pins = [PointObservation("left_wrist", i, tuple(c.project(place))) for i, c in enumerate(cameras)]
-    without, with_pins = (rebodied(values, was, becomes, p, cameras) for p in ((), pins))
+    without, with_pins = (retarget_pose(values, was, becomes, p, cameras) for p in ((), pins))
     far = [np.linalg.norm(becomes.points_world(v)[wrist] - place) for v in (without, with_pins)]
     assert far[1] < far[0] - 0.01

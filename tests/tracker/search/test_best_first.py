@@ -3,10 +3,10 @@ import pytest
 from staging import at, cameras_around, own_evidence, shaken, solid
 
 from tracker.body.model import PosedBody
-from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch
-from tracker.fitting.gauss_newton import StayNear, solve
+from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals
+from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.formats.model_toml import load_model
-from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings, search, stages
+from tracker.search.best_first import COARSE_SEARCH, SearchSettings, search, stages
 from tracker.search.chamfer_cost import ChamferCost
 
 COARSE = SearchSettings(passes=(1.0,))
@@ -89,7 +89,7 @@ def test_a_step_tells_the_truth(gavrila, views, start, steps):
     for step in steps[::7]:
         found = cost(step.best)
         assert found.total_px == pytest.approx(step.best_px, rel=1e-9)
-        np.testing.assert_allclose(found.views_px, step.best_views_px, rtol=1e-9)
+        np.testing.assert_allclose(found.view_costs_px, step.best_views_px, rtol=1e-9)
         assert cost(step.candidate).total_px == pytest.approx(step.candidate_px, rel=1e-9)
 
 
@@ -277,7 +277,7 @@ def test_limbs_apart(gavrila):
     assert named["arms: left_collarbone"][-1] == "left_elbow.extension"
     assert sorted(d for dofs in named.values() for d in dofs) == sorted(bending.dof_names)
     ball = at(solid((0.2, 0.2, 0.2)), 0, 0, 0).model
-    assert [s.group for s in stages([ball], BEFORE_REFINEMENT)] == list(ball.search_groups)
+    assert [s.group for s in stages([ball], COARSE_SEARCH)] == list(ball.search_groups)
 
 
 def test_a_refinement_makes_up_for_a_short_search(gavrila, views, truth):
@@ -288,12 +288,12 @@ def test_a_refinement_makes_up_for_a_short_search(gavrila, views, truth):
         return last.best[0], last.evaluations
 
     def refines(pose):
-        blocks = [ContourMatch(views, [PosedBody(gavrila, pose)]), StayNear(pose, np.ones(gavrila.n_dofs))]
-        values = solve(gavrila, pose, blocks, max_iterations=15, tolerance=1e-3, gain=WORTH_A_STEP).values
+        blocks = [ContourResiduals(views, [PosedBody(gavrila, pose)]), PosePrior(pose, np.ones(gavrila.n_dofs))]
+        values = solve(gavrila, pose, blocks, max_iterations=15, tolerance=1e-3, gain=MIN_DECREASE).pose
         return np.linalg.norm(gavrila.points_world(values) - gavrila.points_world(truth), axis=1).max() < 0.02
 
     starts = [gavrila.clip(shaken(gavrila, truth, np.random.default_rng(i), np.radians(8), 0.05)) for i in range(8)]
-    near, scored = zip(*(found(s, BEFORE_REFINEMENT) for s in starts), strict=True)
+    near, scored = zip(*(found(s, COARSE_SEARCH) for s in starts), strict=True)
     assert max(scored) < 0.25 * found(starts[0], SearchSettings())[1]
     assert sum(map(refines, starts)) <= 3
     assert sum(map(refines, near)) >= 7

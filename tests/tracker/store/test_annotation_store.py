@@ -43,7 +43,7 @@ def xs(store, person="ann"):
 def test_pose_comes_back_whole(store, path):
     full = pose(
         0.1, keyframe=True, status="lost", cost_px=1.25, settings={"step_deg": 5, "tree": ["arms"]},
-        view_costs_px=(0.5, None, 2.0), part_costs_px=(None, 0.25), remark="left arm searched anew", reviewed=True,
+        view_costs_px=(0.5, None, 2.0), part_costs_px=(None, 0.25), remark="left arm relocated", reviewed=True,
     )  # fmt: skip
     store.commit("Place", [PoseChange("ann", 7, full)], author="eve")
     store.close()

@@ -10,10 +10,10 @@ from staging import SUIT, cameras_around, dressed, own_evidence, posed
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
-from tracker.fitting.contour_residuals import ContourMatch
-from tracker.fitting.gauss_newton import StayNear, solve
+from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
-from tracker.tracking.confidence import LimbFigures, Quality, judge, quality, reason, worst
+from tracker.tracking.confidence import LimbFeatures, PoseQuality, classify, quality, reason, worst
 
 
 def names_of(model, parts):
@@ -69,7 +69,7 @@ def test_worst():
 
 
 figures = st.builds(
-    LimbFigures,
+    LimbFeatures,
     name=st.just("arm"),
     color=st.floats(-3, 3),
     worst_drop=st.floats(-3, 6),
@@ -78,7 +78,7 @@ figures = st.builds(
     shown=st.floats(0, 1.2),
     explained=st.floats(0, 1.5),
 )
-CLEAR = LimbFigures("leg", 1.0, 0.0, 1.2, 0.05, 0.6, 0.5)
+CLEAR = LimbFeatures("leg", 1.0, 0.0, 1.2, 0.05, 0.6, 0.5)
 ASTRAY = (0.3, 0.2, 0.1)
 """Contours far from edges, hardly seen, that explain little."""
 
@@ -86,40 +86,48 @@ ASTRAY = (0.3, 0.2, 0.1)
 @given(before=figures, worse=st.tuples(*[st.floats(0, 3)] * 6), body=st.tuples(*[st.floats(0, 0.1)] * 2))
 def test_worse_figures_never_clear_a_limb(before, worse, body):
     signs = (-1, 1, 1, 1, -1, -1)
-    after = LimbFigures("arm", *(b + s * w for b, s, w in zip(before[1:], signs, worse, strict=True)))
-    better = Quality(0.05, 3, 0.0, (before, CLEAR))
-    worst_of = Quality(0.05 + body[0], 3, body[1], (after, CLEAR))
+    after = LimbFeatures("arm", *(b + s * w for b, s, w in zip(before[1:], signs, worse, strict=True)))
+    better = PoseQuality(0.05, 3, 0.0, (before, CLEAR))
+    worst_of = PoseQuality(0.05 + body[0], 3, body[1], (after, CLEAR))
     assert (worst_of.log_odds >= better.log_odds).all()
     for alone in (True, False):
-        assert set(better.suspects(alone)) <= set(worst_of.suspects(alone))
+        assert set(better.search_candidates(alone)) <= set(worst_of.search_candidates(alone))
     order = ("good", "doubtful", "lost")
-    assert order.index(judge(worst_of)) >= order.index(judge(better))
+    assert order.index(classify(worst_of)) >= order.index(classify(better))
 
 
 def test_what_is_plain():
-    undressed, vague = LimbFigures("x", -2.0, 3.0, 4.0, *ASTRAY), LimbFigures("y", 0.2, 1.0, 40.0, *ASTRAY)
-    assert judge(Quality(0.05, 3, 0.0, (CLEAR, CLEAR))) == "good"
+    undressed, vague = LimbFeatures("x", -2.0, 3.0, 4.0, *ASTRAY), LimbFeatures("y", 0.2, 1.0, 40.0, *ASTRAY)
+    assert classify(PoseQuality(0.05, 3, 0.0, (CLEAR, CLEAR))) == "good"
     for limb in (undressed, vague):
-        found = Quality(0.15, 3, 0.03, (CLEAR, CLEAR, limb))
-        assert found.suspects(True) == found.suspects(False) == (limb.name,)
-        assert judge(found) == "lost"
-        assert not found.body_lost
-    assert Quality(0.15, 3, 0.03, (CLEAR, undressed, vague)).body_lost  # most of it
-    assert judge(Quality(1.0, 3, 0.0, (CLEAR, CLEAR))) == "lost"  # no edge anywhere near
-    assert judge(Quality(0.0, 0, 0.0, ())) == "lost"  # nothing sees the body
+        found = PoseQuality(0.15, 3, 0.03, (CLEAR, CLEAR, limb))
+        assert found.search_candidates(True) == found.search_candidates(False) == (limb.name,)
+        assert classify(found) == "lost"
+        assert not found.is_body_lost
+    assert PoseQuality(0.15, 3, 0.03, (CLEAR, undressed, vague)).is_body_lost  # most of it
+    assert classify(PoseQuality(1.0, 3, 0.0, (CLEAR, CLEAR))) == "lost"  # no edge anywhere near
+    assert classify(PoseQuality(0.0, 0, 0.0, ())) == "lost"  # nothing sees the body
     # What no part explains speaks against every limb.
-    assert (Quality(0.05, 3, 0.12, (CLEAR, vague)).log_odds > Quality(0.05, 3, 0.0, (CLEAR, vague)).log_odds).all()
+    assert (
+        PoseQuality(0.05, 3, 0.12, (CLEAR, vague)).log_odds > PoseQuality(0.05, 3, 0.0, (CLEAR, vague)).log_odds
+    ).all()
 
 
 @pytest.mark.parametrize(
     ("found", "words"),
     [
-        (Quality(0.05, 3, 0.0, (CLEAR, CLEAR)), ""),
-        (Quality(0.15, 3, 0.03, (CLEAR, LimbFigures("left_forearm", -2.0, 3.0, 4.0, *ASTRAY))), "left arm uncertain"),
-        (Quality(0.15, 3, 0.03, (LimbFigures("right_calf", -2.0, 3.0, 4.0, *ASTRAY), CLEAR)), "right leg uncertain"),
-        (Quality(0.02, 3, 0.2, (CLEAR, CLEAR)), "part of the silhouette unexplained"),
-        (Quality(1.0, 3, 0.0, (CLEAR, CLEAR)), "no edges near the body"),
-        (Quality(0.0, 0, 0.0, ()), "no view shows the body"),
+        (PoseQuality(0.05, 3, 0.0, (CLEAR, CLEAR)), ""),
+        (
+            PoseQuality(0.15, 3, 0.03, (CLEAR, LimbFeatures("left_forearm", -2.0, 3.0, 4.0, *ASTRAY))),
+            "left arm uncertain",
+        ),
+        (
+            PoseQuality(0.15, 3, 0.03, (LimbFeatures("right_calf", -2.0, 3.0, 4.0, *ASTRAY), CLEAR)),
+            "right leg uncertain",
+        ),
+        (PoseQuality(0.02, 3, 0.2, (CLEAR, CLEAR)), "part of the silhouette unexplained"),
+        (PoseQuality(1.0, 3, 0.0, (CLEAR, CLEAR)), "no edges near the body"),
+        (PoseQuality(0.0, 0, 0.0, ()), "no view shows the body"),
     ],
 )
 def test_what_is_said_against_a_pose(found, words):
@@ -127,11 +135,11 @@ def test_what_is_said_against_a_pose(found, words):
 
 
 def judged(model, truth, values, colors=False):
-    """Quality of a pose before the evidence of another one."""
+    """PoseQuality of a pose before the evidence of another one."""
     bodies = [PosedBody(model, truth)]
     views = dressed(bodies, cameras_around(), SUIT) if colors else own_evidence(bodies, cameras_around())
-    match = ContourMatch(views, [PosedBody(model, values)])
-    fit = solve(model, values, [match, StayNear(values, np.full(model.n_dofs, 5.0))], max_iterations=0)
+    match = ContourResiduals(views, [PosedBody(model, values)])
+    fit = solve(model, values, [match, PosePrior(values, np.full(model.n_dofs, 5.0))], max_iterations=0)
     thetas = np.array([v.theta_px for v in views])
     score = None
     if colors:
@@ -167,4 +175,4 @@ def test_quality_where_nothing_is_seen(gavrila):
     truth = posed(gavrila, 1)
     found = judged(gavrila, truth, gavrila.retract(truth, np.pad([0.0, 0.0, 30.0], (0, gavrila.n_dofs - 3))))
     assert found.views == 0
-    assert judge(found) == "lost"
+    assert classify(found) == "lost"

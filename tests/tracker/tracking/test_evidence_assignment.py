@@ -6,9 +6,9 @@ from staging import at, camera_at, own_evidence, solid
 
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import Silhouette, with_segments
-from tracker.images.edge_segments import Segments
-from tracker.images.silhouette_outline import Outline
-from tracker.tracking.evidence_assignment import Shares, Sharing, _tell_apart
+from tracker.images.edge_segments import Segments, sample_segments
+from tracker.images.silhouette_contour import SilhouetteContour
+from tracker.tracking.evidence_assignment import EvidenceAssignment, EvidencePool, _assign
 
 BALL = solid((0.15, 0.15, 0.3))
 FRONT = camera_at("front", (4.0, 0.0, 0.0))
@@ -19,8 +19,10 @@ def seen(bodies, camera=FRONT):
     (view,) = own_evidence(bodies, [camera])
     each = Segments(view.points_px, view.normals, np.arange(len(view.points_px) + 1))
     inside = np.zeros((camera.height, camera.width), bool)
-    outline = Silhouette(inside, view.points_px, view.normals, 1.0, Outline(view.points_px, view.normals), 40.0)
-    return replace(view, segments=each, silhouette=outline)
+    outline = Silhouette(
+        inside, view.points_px, view.normals, 1.0, SilhouetteContour(view.points_px, view.normals), 40.0
+    )
+    return replace(view, segments=each, samples=sample_segments(each), silhouette=outline)
 
 
 def off_px(points, body):
@@ -48,7 +50,7 @@ def own_segments(view, bodies, person):
     contour, theta = occluding_contours.trace(bodies, view.camera), view.theta_px
     owners = occluding_contours.surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
     own, others = (
-        mean_distances(view.segments, contour.pieces_px[~contour.hidden & of], 2 * theta)
+        mean_distances(view.segments, contour.pieces_px[~contour.occluded & of], 2 * theta)
         for of in (owners == person, owners != person)
     )
     clear = np.minimum(np.abs(others - 0.5 * theta), np.abs(others - 0.5 * own))
@@ -67,24 +69,23 @@ def test_the_shares_of_three_are_those_of_the_simple_version(person):
     segments = Segments(near, normals, np.arange(0, 1501, 3))
     view = seen(bodies)
     outline = replace(view.silhouette, points_px=points, normals=normals)
-    view = replace(view, segments=segments, silhouette=outline)
-    (own,) = Shares(Sharing([view]), bodies).own(person, everywhere=True)
+    view = replace(view, segments=segments, samples=sample_segments(segments), silhouette=outline)
+    (own,) = EvidenceAssignment(EvidencePool([view]), bodies).own(person, everywhere=True)
     kept, clear = own_segments(view, bodies, person)
     assert 5 < np.count_nonzero(~kept) < 250
     np.testing.assert_array_equal(own.accepted[clear > 1e-3], kept[clear > 1e-3])
-    each = replace(view, segments=Segments(points, normals, np.arange(1501)))
+    segments = Segments(points, normals, np.arange(1501))
+    each = replace(view, segments=segments, samples=sample_segments(segments))
     kept, clear = own_segments(each, bodies, person)
     assert clear.min() > 1e-6
     np.testing.assert_array_equal(own.silhouette.points_px, points[kept])
 
 
 def test_distances_are_measured_once_for_all(monkeypatch):
-    """Of two people in one pose each, whoever asks first."""
+    """Of two people in one pose each, in either order of calls."""
     bodies, told = [at(BALL, 0, -0.25, 0), at(BALL, 0, 0.25, 0)], []
-    monkeypatch.setattr(
-        "tracker.tracking.evidence_assignment._tell_apart", lambda *a: told.append(a) or _tell_apart(*a)
-    )
-    shares = Shares(Sharing([seen(bodies)]), bodies)
+    monkeypatch.setattr("tracker.tracking.evidence_assignment._assign", lambda *a: told.append(a) or _assign(*a))
+    shares = EvidenceAssignment(EvidencePool([seen(bodies)]), bodies)
     views = [shares.own(person, everywhere) for person in (0, 1) for everywhere in (False, True)]
     assert len(told) == 1
     assert shares.own(0) is views[0]
@@ -95,13 +96,13 @@ def test_all_edges_are_those_refused_too_but_not_the_rooms():
     view = seen(bodies)
     n = len(view.segments.firsts) - 1
     refused, still = np.arange(n) % 3 == 0, np.arange(n) % 5 == 0
-    filtered = with_segments(replace(view, still=still), ~refused & ~still)
-    sharing = Sharing([filtered])
-    near, everywhere = (Shares(sharing, bodies).own(0, everywhere=e)[0] for e in (False, True))
-    whole = Shares(Sharing([view]), bodies).own(0, everywhere=True)[0].accepted
+    filtered = with_segments(replace(view, is_static=still), ~refused & ~still)
+    sharing = EvidencePool([filtered])
+    near, everywhere = (EvidenceAssignment(sharing, bodies).own(0, everywhere=e)[0] for e in (False, True))
+    whole = EvidenceAssignment(EvidencePool([view]), bodies).own(0, everywhere=True)[0].accepted
     np.testing.assert_array_equal(near.accepted, whole & ~refused & ~still)
     np.testing.assert_array_equal(everywhere.accepted, whole & ~still)
-    alone = Shares(sharing, bodies[:1])
+    alone = EvidenceAssignment(sharing, bodies[:1])
     assert alone.own(0)[0] is filtered
     np.testing.assert_array_equal(alone.own(0, everywhere=True)[0].accepted, ~still)
 
@@ -109,14 +110,14 @@ def test_all_edges_are_those_refused_too_but_not_the_rooms():
 def test_alone_one_has_everything():
     body = at(BALL, 0, 0, 0)
     view = seen([body])
-    assert Shares(Sharing([view]), [body]).own(0)[0] is view
+    assert EvidenceAssignment(EvidencePool([view]), [body]).own(0)[0] is view
 
 
 @pytest.mark.parametrize("person", [0, 1])
 def test_what_the_other_explains_is_the_others(person):
     bodies = [at(BALL, 0, -0.25, 0), at(BALL, 0, 0.25, 0)]
     view = seen(bodies)
-    own = Shares(Sharing([view]), bodies).own(person)[0]
+    own = EvidenceAssignment(EvidencePool([view]), bodies).own(person)[0]
     kept = off_px(own.points_px, bodies[person])
     assert kept.max() < 4
     assert len(own.points_px) == pytest.approx(len(view.points_px) / 2, rel=0.1)
@@ -133,7 +134,7 @@ def test_what_nobody_explains_is_everybodys():
     stranger = at(BALL, 0, 0, 0)
     view = seen([*bodies, stranger])
     for person in (0, 1):
-        (own,) = Shares(Sharing([view]), bodies).own(person, everywhere=True)
+        (own,) = EvidenceAssignment(EvidencePool([view]), bodies).own(person, everywhere=True)
         assert (off_px(own.points_px, stranger) < 2).sum() > 20
         assert off_px(own.points_px, bodies[1 - person]).min() > 10
 
@@ -142,15 +143,17 @@ def test_far_from_everybody_else_nothing_is_in_reach():
     """Then nothing needs to be given away, unless poses far away are asked."""
     bodies = [at(BALL, 0, -0.6, 0), at(BALL, 0, 0.6, 0)]
     view = seen(bodies)
-    assert Shares(Sharing([view]), bodies).own(0)[0] is view
-    assert len(Shares(Sharing([view]), bodies).own(0, everywhere=True)[0].points_px) < 0.6 * len(view.points_px)
+    assert EvidenceAssignment(EvidencePool([view]), bodies).own(0)[0] is view
+    assert len(EvidenceAssignment(EvidencePool([view]), bodies).own(0, everywhere=True)[0].points_px) < 0.6 * len(
+        view.points_px
+    )
 
 
 def test_what_both_explain_stays_with_both():
     """Two contours that nearly coincide share their edges; the residuals give each point to the nearer one."""
     bodies = [at(BALL, 0, 0, 0), at(BALL, 0.4, 0.01, 0)]
     view = seen(bodies)
-    assert len(Shares(Sharing([view]), bodies).own(1)[0].points_px) == len(view.points_px)
+    assert len(EvidenceAssignment(EvidencePool([view]), bodies).own(1)[0].points_px) == len(view.points_px)
 
 
 def test_a_hidden_contour_explains_nothing():
@@ -159,14 +162,14 @@ def test_a_hidden_contour_explains_nothing():
     stripe = seen([far])  # edges as of the hidden one, on the near one
     assert (
         occluding_contours.trace([near, far], FRONT)
-        .hidden[occluding_contours.trace([near, far], FRONT).parts == 1]
+        .occluded[occluding_contours.trace([near, far], FRONT).parts == 1]
         .all()
     )
-    (own,) = Shares(Sharing([stripe]), [near, far]).own(0)
+    (own,) = EvidenceAssignment(EvidencePool([stripe]), [near, far]).own(0)
     assert len(own.points_px) == len(stripe.points_px)
 
 
 def test_edges_without_direction_are_shared_by_nobody():
     bodies = [at(BALL, 0, -0.25, 0), at(BALL, 0, 0.25, 0)]
-    view = replace(seen(bodies), segments=None)
-    assert Shares(Sharing([view]), bodies).own(0)[0] is view
+    view = replace(seen(bodies), segments=None, samples=None)
+    assert EvidenceAssignment(EvidencePool([view]), bodies).own(0)[0] is view

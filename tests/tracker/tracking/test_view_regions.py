@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from staging import at, camera_at, solid
 
-from tracker.tracking.view_regions import confirmed, regions, regions_ahead
+from tracker.tracking.view_regions import confirmed_regions, regions, regions_ahead
 
 BALL = solid((0.1, 0.1, 0.1))
 CAMERAS = [camera_at("front", (4.0, 0.0, 0.0)), camera_at("near", (0.3, 0.0, 0.0))]
@@ -22,7 +22,7 @@ def test_a_region_holds_a_body_and_what_the_prediction_may_be_off():
 def test_a_region_looked_at_ahead_is_left_where_somebody_comes_near_its_border(moved_m, holds):
     ahead = regions_ahead(CAMERAS, [at(BALL, 0, 0, 0)])
     bodies = [at(BALL, 0, moved_m, 0)]
-    found = confirmed(ahead, CAMERAS, bodies)
+    found = confirmed_regions(ahead, CAMERAS, bodies)
     assert found == (ahead if holds else regions(CAMERAS, bodies))
     # Either way there is more room about the body than its flesh takes.
     margin = 0.15 * CAMERAS[0].K[0, 0] / 4.0
@@ -34,5 +34,5 @@ def test_a_region_looked_at_ahead_is_left_where_somebody_comes_near_its_border(m
 def test_the_whole_image_holds_every_region_and_none_holds_it():
     far, near = [at(BALL, 0, 0, 0)], [at(BALL, 3.8, 0, 0)]
     assert regions(CAMERAS, near)[0] is None
-    assert confirmed([None, None], CAMERAS, far) == [None, None]
-    assert confirmed(regions_ahead(CAMERAS, far), CAMERAS, near)[0] is None
+    assert confirmed_regions([None, None], CAMERAS, far) == [None, None]
+    assert confirmed_regions(regions_ahead(CAMERAS, far), CAMERAS, near)[0] is None

@@ -1,24 +1,33 @@
-"""The chamfer tracker of GD96: predict, observe, estimate, judge, one frame at a time (see `scene`)."""
+"""Track people forward through the frames of a run (GD96): predict, observe, estimate, remember."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from tracker.body.model import BodyModel, PosedBody
-from tracker.compute.threads import side_by_side
-from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.arrays import Array
+from tracker.body.model import PosedBody
+from tracker.compute.threads import map_parallel
+from tracker.contours import occluding_contours
+from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Region
-from tracker.images.static_edges import Scenery
+from tracker.images.static_edges import StaticEdgeModel
 from tracker.motion.prediction import PredictSettings
-from tracker.tracking.chamfer.frame_estimator import Found, Scene
-from tracker.tracking.chamfer.settings import TrackSettings, pose_cost
-from tracker.tracking.estimate import OtherPose, PoseEstimate
-from tracker.tracking.person_memory import Memory
+from tracker.search.chamfer_cost import ChamferCost
+from tracker.tracking.chamfer.assessment import PersonEstimate
+from tracker.tracking.chamfer.frame_estimator import FrameEstimator
+from tracker.tracking.chamfer.settings import TrackSettings, chamfer_cost
+from tracker.tracking.confidence import Status
+from tracker.tracking.estimate import AlternativePose, PoseEstimate
+from tracker.tracking.person_memory import PersonMemory
 from tracker.tracking.tracker import TrackingRun
-from tracker.tracking.view_regions import confirmed, regions, regions_ahead, visible_outline
+from tracker.tracking.view_regions import confirmed_regions, regions, regions_ahead, visible_pieces_px
 
 
-def track_forward(run: TrackingRun, settings: TrackSettings) -> Iterator[PoseEstimate]:
+def track_forward(run: TrackingRun, settings: TrackSettings, lead_in: int = 0) -> Iterator[PoseEstimate]:
     """Track all people frame by frame, in the order of `run.frames`.
+
+    Args:
+        run: what to track.
+        settings: of the tracker.
+        lead_in: number of frames at the beginning that are learnt from, but not yielded.
 
     Yields:
         The poses of each frame.
@@ -26,75 +35,99 @@ def track_forward(run: TrackingRun, settings: TrackSettings) -> Iterator[PoseEst
     observer, subjects, frames, models = run.observer, run.subjects, run.frames, run.subjects.models
     several = len(models) > 1
     memories = [
-        Memory(m, start, active, alone=not several)
+        PersonMemory(m, start, active, alone=not several)
         for m, start, active in zip(models, run.start, subjects.active_dofs, strict=True)
     ]
-    scenery = [Scenery(c.size) for c in observer.matched_cameras] if settings.segments else None
-    cameras, ahead = observer.matched_cameras, list[Region | None]()
+    static_edges = [StaticEdgeModel(c.size) for c in observer.working_cameras] if settings.segments else None
+    cameras, ahead = observer.working_cameras, list[Region | None]()
 
-    def placed(frame: int, expected: Callable[[Memory, PredictSettings], Array]) -> list[PosedBody]:
-        """Everybody on a frame, where they are given or expected."""
-        given = subjects.keyframes_at(frame)
+    def placed(frame: int, predict: Callable[[PersonMemory, PredictSettings], Array]) -> tuple[PosedBody, ...]:
+        """Return all people on a frame, in their keyframes or as predicted."""
+        keyframes = subjects.keyframes_at(frame)
         poses = [
-            given.get(p, expected(m, settings.predict) if p in subjects.tracked else m.past[-1])
+            keyframes.get(p, predict(m, settings.predict) if p in subjects.tracked else m.history[-1])
             for p, m in enumerate(memories)
         ]
-        return [PosedBody(m, v) for m, v in zip(models, poses, strict=True)]
+        return tuple(PosedBody(m, v) for m, v in zip(models, poses, strict=True))
 
     for i, frame in enumerate(frames):
-        if i == 0:  # who goes on from known poses looks where who never stopped would have
-            if several and all(len(m.past) > 1 for m in memories):
-                ahead = regions_ahead(cameras, placed(frame, Memory.was_expected))
-            observer.prefetch(frame, ahead or None, still=scenery is not None)
-        given, bodies = subjects.keyframes_at(frame), placed(frame, Memory.expected)
-        sought, poses = [p for p in subjects.tracked if p not in given], [b.values for b in bodies]
-        where = confirmed(ahead, cameras, bodies) if ahead else regions(cameras, bodies)
+        if i == 0:  # a run that goes on from known poses uses the regions that one without a break would use
+            if several and all(len(m.history) > 1 for m in memories):
+                ahead = regions_ahead(cameras, placed(frame, PersonMemory.predict_before_last))
+            observer.prefetch(frame, ahead or None, with_static_edges=static_edges is not None)
+        keyframes, predicted = subjects.keyframes_at(frame), placed(frame, PersonMemory.predict)
+        where = confirmed_regions(ahead, cameras, predicted) if ahead else regions(cameras, predicted)
         following = frames[i + 1 : i + 2]
         for k in following if several else ():
-            ahead = regions_ahead(cameras, placed(k, Memory.expected_ahead))
-            observer.prefetch(k, ahead, still=scenery is not None)
-        outlines = [visible_outline(bodies, c) for c in cameras] if settings.segments else None
-        views = observer.evidence(frame, where, outlines, scenery)
-        for k in () if several else following:  # of one alone no sooner: all cores were busy with this frame
+            ahead = regions_ahead(cameras, placed(k, PersonMemory.predict_two_ahead))
+            observer.prefetch(k, ahead, with_static_edges=static_edges is not None)
+        contours = [occluding_contours.trace(predicted, c) for c in cameras]
+        visible = [visible_pieces_px(c) for c in contours] if settings.segments else None
+        views = observer.evidence(frame, where, visible, static_edges)
+        for k in () if several else following:  # for one person later: this frame has kept all cores busy
             observer.prefetch(k)
-        scene = Scene(views, memories, poses, settings)
-        estimates = scene.estimate(sought)
-        found = [estimates[p] if p in estimates else scene.held(p) for p in range(len(models))]
-        _remember(memories, scene, found, given)
-        if scenery is not None:
-            scene.teach(scenery)
-        yield summed_up(frame, views, models, scene.poses, found, settings)
+        estimator = FrameEstimator(views, memories, predicted, settings, contours)
+        estimates = estimator.estimate([p for p in subjects.tracked if p not in keyframes])
+        statuses: list[Status] = [estimates[p].status if p in estimates else "good" for p in range(len(models))]
+        _remember(memories, estimator, statuses, keyframes)
+        cost_of = chamfer_cost(views, estimator.bodies, settings)
+        if static_edges is not None:
+            _update_static_edges(static_edges, views, cost_of.predicted_pieces_px)
+        if i >= lead_in:
+            found = [estimates[p] if p in estimates else estimator.estimate_fixed(p) for p in range(len(models))]
+            yield make_estimate(frame, cost_of, estimator.bodies, found, settings)
 
 
-def summed_up(
-    frame: int, views: Sequence[ViewEvidence], models: Sequence[BodyModel], poses: Sequence[Array],
-    found: Sequence[Found], settings: TrackSettings,
-) -> PoseEstimate:  # fmt: skip
-    """What is told of a frame on which everybody was found.
+def make_estimate(
+    frame: int,
+    cost_of: ChamferCost,
+    bodies: Sequence[PosedBody],
+    people: Sequence[PersonEstimate],
+    settings: TrackSettings,
+) -> PoseEstimate:
+    """Collect the estimates of all people of a frame.
 
     Args:
         frame: its number.
-        views: its evidence.
-        models: the body of each person.
-        poses: where each stands, (n_values,).
-        found: of each what was found.
+        cost_of: the cost function around the estimated poses.
+        bodies: all people in these poses.
+        people: the estimate of each person.
         settings: of the tracker.
     """
-    cost_of = pose_cost(views, models, poses, settings)
-    cost = cost_of(poses)
-    others = [[OtherPose(rival[p], cost_of(rival).total_px) for rival in f.others] for p, f in enumerate(found)]
+    cost = cost_of.at_prediction()
+    alternatives = tuple(
+        tuple(AlternativePose(poses[p], cost_of(poses).total_px) for poses in e.alternatives)
+        for p, e in enumerate(people)
+    )
     return PoseEstimate(
-        frame, tuple(poses), cost.total_px, cost.views_px, sum(f.evaluations for f in found),
-        tuple(f.status for f in found), tuple(f.remark for f in found), tuple(f.parts_px for f in found),
-        tuple(f.covariance for f in found), tuple(f.quality for f in found), tuple(map(tuple, others)),
-        settings.method,
+        frame, tuple(b.values for b in bodies), cost.total_px, cost.view_costs_px, sum(e.evaluations for e in people),
+        tuple(e.status for e in people), tuple(e.note for e in people), tuple(e.part_costs_px for e in people),
+        tuple(e.covariance for e in people), tuple(e.quality for e in people), alternatives, settings.method,
     )  # fmt: skip
 
 
-def _remember(memories: Sequence[Memory], scene: Scene, found: Sequence[Found], given: Mapping[int, Array]) -> None:
-    """Have everybody's memory take in what a frame brought; `given` are the poses that a person set."""
+def _remember(
+    memories: Sequence[PersonMemory], estimator: FrameEstimator, statuses: Sequence[Status],
+    keyframes: Mapping[int, Array],
+) -> None:  # fmt: skip
+    """Update the memory of each person with the result of a frame."""
 
     def remember(p: int) -> None:
-        memories[p].update(scene.poses[p], scene.colors(p), found[p].status, given=p in given)
+        memories[p].update(estimator.bodies[p].values, estimator.colors(p), statuses[p], keyframe=p in keyframes)
 
-    side_by_side(remember, range(len(memories)))
+    map_parallel(remember, range(len(memories)))
+
+
+def _update_static_edges(
+    static_edges: Sequence[StaticEdgeModel], views: Sequence[ViewEvidence], visible: Sequence[FloatArray]
+) -> None:
+    """Learn the edges away from all people, in views where no silhouette tells people from the background.
+
+    Args:
+        static_edges: of each view.
+        views: the evidence of the frame.
+        visible: visible contours of all people in each view, x0, y0, x1, y1, (M, 4), working px.
+    """
+    for view, model, pieces in zip(views, static_edges, visible, strict=True):
+        if view.segments is not None and view.silhouette is None:
+            model.update(view.segments, view.corner_px, view.camera.size, pieces, ACCEPTED_SHARE * view.theta_px)

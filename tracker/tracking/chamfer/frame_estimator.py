@@ -1,395 +1,223 @@
-"""One frame of a recording: its evidence, and where everybody stands so far.
+"""Estimate the poses of all people in one frame.
 
-The prediction of each person is first refined on the edges around it (`refine`), the others standing where they are as
-far as is known (GD96 Fig. 2), then everybody once more with all others found. Only where the outcome is not credible
-(`confidence`) the best-first search of the paper is spent, on the whole body, and proposals on single limbs
-(`recover`); the cheapest refined pose wins.
+The prediction of each person is first refined on the edges around it, the others in their poses so far (GD96 Fig. 2);
+then all are refined again with the others where they were found. Only where the result is not credible (`confidence`)
+the best-first search of the paper is spent on the whole body, and proposals on single limbs (`limb_recovery`). The
+cheapest refined pose wins.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import Limb, limb_display_name
 from tracker.body.model import PosedBody
-from tracker.compute.threads import side_by_side
-from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
-from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch, PartCosts
-from tracker.fitting.gauss_newton import Block, Fit, covariance, held
-from tracker.fitting.gauss_newton_compiled import solve
-from tracker.fitting.interpenetration import KeepBodiesApart
+from tracker.compute.threads import map_parallel
+from tracker.contours.occluding_contours import Contour
+from tracker.evidence.view_evidence import ViewEvidence
+from tracker.fitting.contour_residuals import MIN_DECREASE
+from tracker.fitting.gauss_newton import Fit, with_locked_dofs
 from tracker.geometry.arrays import Array
-from tracker.images.static_edges import Scenery
-from tracker.search.best_first import BEFORE_REFINEMENT, SearchSettings
-from tracker.tracking import confidence
-from tracker.tracking.chamfer.limb_recovery import LEAST_GAIN, Judge, for_several, search_limbs
-from tracker.tracking.chamfer.settings import TrackSettings, prior_blocks, search_frame
-from tracker.tracking.confidence import Quality, Status
-from tracker.tracking.evidence_assignment import Shares, Sharing
-from tracker.tracking.person_memory import Memory
-from tracker.tracking.view_regions import px_per_m, visible_outline
+from tracker.search.best_first import COARSE_SEARCH, SearchSettings
+from tracker.tracking.chamfer.assessment import ELSEWHERE_RAD, PersonEstimate, assess, estimate_fixed, finalize
+from tracker.tracking.chamfer.frame_problem import (
+    Bodies,
+    FrameProblem,
+    PersonFit,
+    PersonPrior,
+    moved_m,
+    with_body,
+)
+from tracker.tracking.chamfer.identity_swaps import identity_swaps
+from tracker.tracking.chamfer.limb_recovery import PoseScorer, for_several, search_limbs
+from tracker.tracking.chamfer.settings import MAX_ITERATIONS, TrackSettings, search_frame
+from tracker.tracking.person_memory import PersonMemory
+from tracker.tracking.subjects import Subjects
 
-_ITERATIONS = 15
-_TOLERANCE = 1e-3  # rad or metres: a tenth of a pixel on a limb
-_AT_ONCE = 2
-"""Limbs that are searched in a frame at most, the likeliest to be lost first; the others come in the next frames."""
-_MOVED_RAD, _ANEW_RAD = 0.05, 0.3
-"""A search of a limb was not in vain where a joint turned farther; the limb is elsewhere where it turned this far."""
-_MOST_EXCESS = 60.0
-"""What two people's predictions may speak against their exchange for it to be tried: more no image makes good."""
-_STILL_M = 0.002
-"""In the joint refinement a person is refined anew when another has moved farther since, metres."""
-_SHARED_M = 0.01
-"""Evidence is shared out anew when somebody has moved farther, metres."""
-
-
-class Found(NamedTuple):
-    """One person on one frame."""
-
-    status: Status
-    remark: str
-    parts_px: Array
-    covariance: Array
-    evaluations: int
-    quality: Quality | None
-    others: tuple[tuple[Array, ...], ...] = ()
-    """What is about as good: poses of everybody, (n_values,) each, in which this person is elsewhere, best first."""
+_MAX_LIMBS = 2
+"""Number of limbs of a person that are searched in a frame, the most likely lost first."""
+_MOVED_RAD = 0.05
+"""A limb search succeeded where a joint turned farther, rad."""
+_OTHERS_MOVED_M, _SELF_MOVED_M = 0.002, 0.01
+"""A person is refined again where another, or they themselves, moved farther since, metres."""
 
 
-def _in_doubt(found: Found, remark: str, others: Sequence[tuple[Array, ...]]) -> Found:
-    """The same where the evidence goes as well with other poses."""
-    status: Status = "doubtful" if found.status == "good" else found.status
-    remarks = ", ".join(r for r in (found.remark, remark) if r)
-    return found._replace(status=status, remark=remarks, others=(*found.others, *others))
-
-
-class _Seen(NamedTuple):
-    """One person as far as they are found."""
-
-    match: ContourMatch
-    """The evidence that they were fitted to."""
-    poses: tuple[Array, ...]
-    """Where everybody stood when that was made, (n_values,) each."""
-    fit: Fit
-    anew: tuple[Limb, ...] | None = None
-    """Limbs whose prediction is not trusted, where the person was searched anew; None where that was not needed."""
-    told: tuple[Quality, PartCosts] | None = None
-    """What the evidence says of the fit, and the costs of its parts, where that has been asked."""
-    evaluations: int = 0
-    """Poses that the best-first search scored."""
-    remarks: tuple[str, ...] = ()
-    """What was done to find them."""
-    rivals: tuple[Array, ...] = ()
-    """Poses that are about as good, (n_values,) each, best first."""
-
-
-class Scene:
-    """One frame: its evidence, and where everybody stands so far."""
+class FrameEstimator:
+    """Estimates the poses of all people in one frame; `bodies` are the poses so far."""
 
     def __init__(
-        self, views: Sequence[ViewEvidence], memories: Sequence[Memory], poses: Sequence[Array], settings: TrackSettings
+        self,
+        views: Sequence[ViewEvidence],
+        memories: Sequence[PersonMemory],
+        bodies: Sequence[PosedBody],
+        settings: TrackSettings,
+        contours: Sequence[Contour] | None = None,
     ) -> None:
-        """Begin with everybody where they are expected.
+        """Begin at the predicted poses.
 
         Args:
             views: the evidence of the frame.
             memories: of each person.
-            poses: where each is expected, or given, (n_values,).
+            bodies: all people, as predicted or in their keyframes.
             settings: of the tracker.
+            contours: of all bodies in each view, if they have been traced.
         """
-        self.poses = list(poses)
-        """Where each person stands so far, (n_values,)."""
-        self._views, self._settings = views, settings
-        self._memories, self._models, self._predicted = memories, [m.model for m in memories], tuple(poses)
-        self._sharing, self._shares = Sharing(views), list[Shares]()
-        self._placed: dict[tuple[int, int], PosedBody] = {}  # poses are kept: no other gets their number
-        self._thetas = np.array([v.outlier_px(settings.theta_px) for v in views])
-
-    def teach(self, scenery: Sequence[Scenery]) -> None:
-        """Show what remembers the room the edges away from everybody, of views whose silhouette nothing tells."""
-        for view, room in zip(self._views, scenery, strict=True):
-            if view.segments is not None and view.silhouette is None:
-                pieces = visible_outline(self._bodies(), view.camera)
-                room.learn(view.segments, view.corner_px, view.camera.size, pieces, ACCEPTED_SHARE * view.theta_px)
+        self.bodies: Bodies = tuple(bodies)
+        """All people in their poses so far."""
+        people = [
+            PersonPrior(m.model, b.values, m.active_dofs, m.part_colors) for m, b in zip(memories, bodies, strict=True)
+        ]
+        predicted = None if contours is None else (self.bodies, contours)
+        self._problem = FrameProblem(views, people, settings, predicted)
+        self._memories, self._settings = memories, settings
 
     def colors(self, person: int) -> Colors:
-        """The colours of this frame under a person."""
-        return Colors(self._views, *self._around(person))
+        """Return the colours of the frame under a person."""
+        return self._problem.colors(person, self.bodies)
 
-    def held(self, person: int) -> Found:
-        """Judge nobody: a pose that was given is taken as it is."""
-        match, n = self._match(person), self._models[person].n_dofs
-        costs = match.part_costs(self.poses[person])
-        return Found("good", "", self._parts_px(costs), np.zeros((n, n)), 0, None)
+    def estimate_fixed(self, person: int) -> PersonEstimate:
+        """Return the estimate of a person whose pose is a keyframe; it is not assessed."""
+        return estimate_fixed(self._problem, person, self.bodies)
 
-    def judged(self, person: int, rivals: Sequence[Array] = ()) -> Found:
-        """Judge a person where they stand, with poses that are about as good, (n_values,) each."""
-        match = self._match(person, everywhere=True)
-        blocks, free = [match, *self._priors(person)], self._memories[person].free
-        fit = solve(self._models[person], self.poses[person], blocks, free, max_iterations=0)
-        return self._judged(person, _Seen(match, tuple(self.poses), fit, rivals=tuple(rivals)))
-
-    def estimate(self, people: Sequence[int]) -> dict[int, Found]:
-        """Find the poses of some people, one after the other, then together; they take their places in `poses`."""
+    def estimate(self, people: Sequence[int]) -> dict[int, PersonEstimate]:
+        """Find the poses of some people and move them there."""
         if self._settings.estimate == "search":
-            return {p: self._judged(p, self._searched(p)) for p in people}
-        # One after the other: where all are refined at once, each takes what belongs to who has not got there yet.
-        seen = {p: self._refined(p) for p in people}
-        self._refine_together(seen)
-        self._recover(seen)
-        if any(s.anew is not None for s in seen.values()):
-            self._refine_together(seen)
-        found = dict(zip(seen, side_by_side(lambda p: self._judged(p, seen[p]), [*seen]), strict=True))
-        for (p, q), poses in self._exchanges(seen).items():
+            return {p: self._finalize(p, self._move(p, self._search_only(p))) for p in people}
+        # One after the other: where all are refined at once, each takes edges of people who are still off.
+        fits = {p: self._move(p, self._problem.refine(p, self.bodies)) for p in people}
+        self._refine_together(fits)
+        self._recover(fits)
+        if any(f.untrusted_limbs is not None for f in fits.values()):
+            self._refine_together(fits)
+        finalized = map_parallel(lambda p: self._finalize(p, fits[p]), [*fits])
+        estimates = dict(zip(fits, finalized, strict=True))
+        for (p, q), poses in identity_swaps(self._problem, self.bodies, fits).items():
             for one, other in ((p, q), (q, p)):
-                found[one] = _in_doubt(found[one], f"may be exchanged with person {other + 1}", [poses])
+                estimates[one] = estimates[one].in_doubt(f"may be swapped with person {other + 1}", [poses])
+        return estimates
+
+    def _move(self, person: int, found: PersonFit) -> PersonFit:
+        """Move a person to the pose of a fit, and return the fit."""
+        self.bodies = with_body(self.bodies, person, found.body)
         return found
 
-    def _searched(self, person: int) -> _Seen:
-        """Search a person by best-first search alone."""
-        match = self._match(person)
-        evaluations, values = self._search(person, self.poses[person], self._settings.search)
-        blocks = [match, *self._priors(person)]
-        fit = solve(self._models[person], values, blocks, self._memories[person].free, max_iterations=0)
-        self.poses[person] = values
-        return _Seen(match, tuple(self.poses), fit, evaluations=evaluations)
+    def _finalize(self, person: int, found: PersonFit) -> PersonEstimate:
+        return finalize(self._problem, person, self.bodies, found)
 
-    def _refined(self, person: int, before: _Seen | None = None) -> _Seen:
-        """Refine a person from where they stand, as they were seen before if they were."""
-        anew = None if before is None else before.anew
-        match = self._match(person, everywhere=anew is not None)
-        blocks = [match, *self._priors(person, anew or ())]
-        model, free = self._models[person], self._memories[person].free
-        gain = WORTH_A_STEP if len(self._models) > 1 else 0.0  # who moves a little is refined again with the others
-        poses, fit = tuple(self.poses), solve(model, self.poses[person], blocks, free, _ITERATIONS, _TOLERANCE, gain)
-        self.poses[person] = fit.values
-        if before is None:
-            return _Seen(match, poses, fit)
-        return before._replace(match=match, poses=poses, fit=fit, told=None)
+    def _search_only(self, person: int) -> PersonFit:
+        """Find a person by best-first search alone."""
+        problem, bodies = self._problem, self.bodies
+        residuals = problem.residuals(person, bodies)
+        evaluations, pose = self._search(person, bodies[person].values, self._settings.search)
+        blocks = [residuals, *problem.priors(person, bodies)]
+        body = PosedBody(bodies[person].model, pose)
+        fit = problem.solve(person, pose, blocks, max_iterations=0)
+        return PersonFit(residuals, with_body(bodies, person, body), fit, body, evaluations=evaluations)
 
-    def _refine_together(self, seen: dict[int, _Seen]) -> None:
-        """Refine people again and again, each with the others where they were found, until nobody needs it."""
-        for _ in range(self._settings.rounds if len(self._models) > 1 else 0):
-            again = False
-            for person, before in seen.items():
-                if not self._stand(before.poses, np.where(np.arange(len(self.poses)) == person, _SHARED_M, _STILL_M)):
-                    seen[person], again = self._refined(person, before), True
-            if not again:
+    def _refine_together(self, fits: dict[int, PersonFit]) -> None:
+        """Refine people again, each with the others where they were found, until nobody moves or rounds are over."""
+        for _ in range(self._settings.rounds if len(self.bodies) > 1 else 0):
+            done = True
+            for person, before in fits.items():
+                limits = np.where(np.arange(len(self.bodies)) == person, _SELF_MOVED_M, _OTHERS_MOVED_M)
+                pairs = zip(before.bodies, self.bodies, limits, strict=True)
+                if not all(moved_m(then, now) < limit for then, now, limit in pairs):
+                    fits[person] = self._move(person, self._problem.refine(person, self.bodies, before))
+                    done = False
+            if done:
                 break
 
-    def _moved_m(self, person: int, was: Array, now: Array) -> float:
-        """How far apart the points of a person are in two poses, (n_values,), at most, metres."""
-        if was is now:
-            return 0.0
-        there, here = self._body(person, was), self._body(person, now)
-        return float(np.linalg.norm(here.points_world - there.points_world, axis=1).max())
+    def _recover(self, fits: dict[int, PersonFit]) -> None:
+        """Search for lost limbs and bodies, and move people to what was found.
 
-    def _stand(self, poses: Sequence[Array], within_m: Array) -> bool:
-        """Whether everybody stands as in some poses, (n_values,) each, each within some metres, (K,)."""
-        return all(
-            self._moved_m(i, was, now) < within_m[i] for i, (was, now) in enumerate(zip(poses, self.poses, strict=True))
-        )
-
-    def _recover(self, seen: dict[int, _Seen]) -> None:
-        """Search what the refinement alone did not find, if anything, and put people there.
-
-        They are searched side by side, each with the others as they were refined, so that nothing depends on who is
-        done first.
+        People are searched in parallel, each with the others as they were refined, so that the result does not depend
+        on the order.
         """
-        told = dict(zip(seen, side_by_side(lambda p: self._told(p, seen[p]), [*seen]), strict=True))
-        seen.update({p: s._replace(told=told[p]) for p, s in seen.items()})
-        blind = not any(len(v.points_px) for v in self._views)  # then there is nothing to search in
-        if self._settings.recover is None or blind:
+        problem, alone = self._problem, len(self.bodies) == 1
+        assessments = map_parallel(lambda p: assess(problem, p, self.bodies, fits[p]), [*fits])
+        fits.update({p: fits[p]._replace(assessment=a) for p, a in zip(list(fits), assessments, strict=True)})
+        has_edges = any(len(v.points_px) for v in problem.views)
+        if self._settings.recover is None or not has_edges:
             return
-        alone, due = len(self._models) == 1, dict[int, list[Limb]]()
-        for person, (found, _) in told.items():
-            limbs = self._memories[person].due(found)[:_AT_ONCE]
-            if limbs or (found.suspects(alone) if alone else found.doubted(alone)) or found.body_lost:
-                due[person] = limbs
-        if not due:
+        limbs_of = dict[int, list[Limb]]()
+        for person, (quality, _) in zip(fits, assessments, strict=True):
+            limbs = self._memories[person].limbs_to_search(quality)[:_MAX_LIMBS]
+            candidates = quality.search_candidates(alone) if alone else quality.doubtful_limbs(alone)
+            if limbs or candidates or quality.is_body_lost:
+                limbs_of[person] = limbs
+        if not limbs_of:
             return
-        own = dict(zip(due, self._own([*due], everywhere=True), strict=True))
-        anew = side_by_side(lambda p: self._recovered(p, seen[p], due[p], own[p]), [*due])
-        for person, recovered in zip(due, anew, strict=True):
-            seen[person], self.poses[person] = recovered, recovered.fit.values
+        people = [*limbs_of]
+        own = dict(zip(people, problem.own_evidence(people, self.bodies, everywhere=True), strict=True))
+        recovered = map_parallel(lambda p: self._recover_person(p, fits[p], limbs_of[p], own[p]), people)
+        for person, found in zip(people, recovered, strict=True):
+            fits[person] = self._move(person, found)
 
-    def _recovered(self, person: int, seen: _Seen, due: Sequence[Limb], own: Sequence[ViewEvidence]) -> _Seen:
-        """Search limbs whose turn it is, and the body if it is lost, among all edges.
+    def _recover_person(
+        self, person: int, before: PersonFit, limbs: Sequence[Limb], own: Sequence[ViewEvidence]
+    ) -> PersonFit:
+        """Search some limbs of a person, and the body if it is lost.
 
-        The prediction may have refused the right ones.
+        Args:
+            person: whom to search.
+            before: the refined and assessed fit.
+            limbs: which are searched in this frame.
+            own: evidence of the person with all edges; the prediction may have refused the right ones.
         """
-        memory, settings = self._memories[person], self._settings
-        assert settings.recover is not None
-        assert seen.told is not None
-        found, alone = seen.told[0], len(self._models) == 1
-        model, free, suspects = memory.model, memory.free, tuple(memory.suspects(found))
-        priors = self._priors(person, suspects)
-        match, poses = self._match_on(own, person, everywhere=True), tuple(self.poses)
-        fit = solve(model, seen.fit.values, [match, *priors], free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
-        if not due and not found.body_lost:  # whose turn it is not yet are no longer drawn to what was predicted
-            return _Seen(match, poses, fit, suspects)
-        colors = Colors(own, *self._around(person))
-        how = settings.recover if alone else for_several(settings.recover)
-        judge = Judge(match, priors, colors, memory.known, how, free)
-        remarks: list[str] = []
-        evaluations = 0
-        if found.body_lost:
-            evaluations, fit = self._search_body(person, fit, judge)
-            remarks.append("body searched anew")
-        others = (memory.past[-1], self._predicted[person])
-        better, rivals = search_limbs(model, due, fit, others, judge, _ITERATIONS)
-        turned = np.abs(model.difference(better.values, fit.values))
-        for limb in due:
-            memory.searched(limb, found, turned[limb.dofs].max() > _MOVED_RAD)
-            if turned[limb.dofs].max() > _ANEW_RAD:
-                remarks.append(f"{limb_display_name(limb.name)} searched anew")
-        return _Seen(match, poses, better, suspects, None, evaluations, tuple(remarks), tuple(r.values for r in rivals))
-
-    def _judged(self, person: int, seen: _Seen) -> Found:
-        """What was found of a person, with the judgement of it."""
-        found, costs = seen.told or self._told(person, seen)
-        out = Found(
-            confidence.judge(found), ", ".join(seen.remarks) or confidence.reason(found), self._parts_px(costs),
-            covariance(self._models[person], seen.fit), seen.evaluations, found,
+        problem, memory, bodies, recover = self._problem, self._memories[person], self.bodies, self._settings.recover
+        assert recover is not None
+        assert before.assessment is not None
+        quality, model = before.assessment.quality, memory.model
+        untrusted = tuple(memory.search_candidates(quality))
+        priors = problem.priors(person, bodies, untrusted)
+        residuals = problem.residuals_on(own, person, bodies, everywhere=True)
+        fit = problem.solve(person, before.fit.pose, [residuals, *priors], MAX_ITERATIONS, MIN_DECREASE)
+        # Limbs that wait for their search are no longer drawn to their prediction.
+        found = PersonFit(residuals, bodies, fit, PosedBody(model, fit.pose), untrusted)
+        if not limbs and not quality.is_body_lost:
+            return found
+        scorer = PoseScorer.of(
+            residuals, priors, Colors(own, *problem.around(person, bodies)), memory.part_colors,
+            recover if len(bodies) == 1 else for_several(recover), memory.active_dofs,
         )  # fmt: skip
-        if not seen.rivals:
-            return out
-        model = self._models[person]
-        turned = np.abs([model.difference(rival, seen.fit.values) for rival in seen.rivals]).max(axis=0)
-        names = [limb_display_name(x.name) for x in confidence.limbs(model) if turned[x.dofs].max() > _ANEW_RAD]
-        remark = f"{' and '.join(names) or 'body'} may be elsewhere"
-        return _in_doubt(out, remark, [self._with(person, rival) for rival in seen.rivals])
+        notes, evaluations = list[str](), 0
+        if quality.is_body_lost:
+            evaluations, fit = self._search_body(person, fit, scorer)
+            notes.append("body searched")
+        others = (memory.history[-1], problem.people[person].predicted)
+        best, alternatives = search_limbs(model, limbs, fit, others, scorer)
+        turned = np.abs(model.difference(best.pose, fit.pose))
+        for limb in limbs:
+            memory.record_search(limb, quality, turned[limb.dofs].max() > _MOVED_RAD)
+            if turned[limb.dofs].max() > ELSEWHERE_RAD:
+                notes.append(f"{limb_display_name(limb.name)} relocated")
+        return found._replace(
+            fit=best, body=PosedBody(model, best.pose), evaluations=evaluations, notes=tuple(notes),
+            alternatives=tuple(a.pose for a in alternatives),
+        )  # fmt: skip
 
-    def _exchanges(self, seen: Mapping[int, _Seen]) -> dict[tuple[int, int], tuple[Array, ...]]:
-        """Pairs of people who might as well be each other, and the poses of everybody if they were.
-
-        Each takes the other's pose and is refined there, held by the own prediction and the own colours.
-        """
-        exchanges = {}
-        for p, q in combinations(seen, 2):
-            if self._models[p].value_names != self._models[q].value_names or not self._may_be_exchanged(p, q):
-                continue
-            before, colors = list(self.poses), self._settings.recover.colors if self._settings.recover else 0.0
-            here = sum(seen[i].fit.cost - colors * self._nats(i) for i in (p, q))
-            self.poses[p], self.poses[q] = self.poses[q], self.poses[p]
-            there = 0.0
-            for i in (p, q):
-                there += self._refined(i, seen[i]).fit.cost - colors * self._nats(i)
-            if there < here + LEAST_GAIN:
-                exchanges[p, q] = tuple(self.poses)
-            self.poses = before
-        return exchanges
-
-    def _may_be_exchanged(self, p: int, q: int) -> bool:
-        """Whether two people are where each was expected to be about as much as where the other was."""
-        excess = 0.0
-        for i, other in ((p, q), (q, p)):
-            model, expected = self._models[i], self._priors(i)[0]
-            costs = [expected.normal(model, self.poses[k], model.kinematics(self.poses[k])).cost for k in (other, i)]
-            excess += costs[0] - costs[1]
-        return excess < _MOST_EXCESS
-
-    def _nats(self, person: int) -> float:
-        """What the colours say for a person where they stand; nothing where nobody has shown them."""
-        known = self._memories[person].known
-        return 0.0 if known is None else float(self.colors(person).nats(self.poses[person][None], known)[0])
-
-    def _with(self, person: int, values: Array) -> tuple[Array, ...]:
-        """Where everybody stands, but for one person."""
-        return (*self.poses[:person], values, *self.poses[person + 1 :])
-
-    def _priors(self, person: int, suspects: Sequence[Limb] = ()) -> list[Block]:
-        """What holds a pose besides the image: its prediction, but for limbs that seem lost, how people bend, and the
-        others."""
-        settings, model = self._settings, self._models[person]
-        sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
-        for limb in suspects:
-            assert settings.recover is not None
-            sigma[limb.dofs] = settings.recover.trust_rad
-        blocks = prior_blocks(model, self._predicted[person], sigma)
-        if len(self._models) > 1 and settings.apart > 0:
-            blocks.append(KeepBodiesApart(self._bodies(), person, settings.apart))
-        return blocks
-
-    def _search_body(self, person: int, fit: Fit, judge: Judge) -> tuple[int, Fit]:
-        """Best-first search from the prediction and from the last good pose; the best of what refines from there."""
-        memory, predicted, best, evaluations = self._memories[person], self._predicted[person], fit, 0
+    def _search_body(self, person: int, fit: Fit, scorer: PoseScorer) -> tuple[int, Fit]:
+        """Search from the prediction and from the last good pose; return the evaluations and the best refined fit."""
+        memory, predicted, best, evaluations = self._memories[person], self._problem.people[person].predicted, fit, 0
         for start in (predicted, memory.last_good):
-            scored, values = self._search(person, held(memory.model, start, predicted, memory.free), BEFORE_REFINEMENT)
+            locked = with_locked_dofs(memory.model, start, predicted, memory.active_dofs)
+            scored, pose = self._search(person, locked, COARSE_SEARCH)
             evaluations += scored
-            refined = solve(memory.model, values, judge.blocks, memory.free, _ITERATIONS, _TOLERANCE, gain=WORTH_A_STEP)
-            if judge.cost(refined) < judge.cost(best):
+            refined = self._problem.solve(person, pose, scorer.blocks, MAX_ITERATIONS, MIN_DECREASE)
+            if scorer.cost(refined) < scorer.cost(best):
                 best = refined
         return evaluations, best
 
     def _search(self, person: int, start: Array, how: SearchSettings) -> tuple[int, Array]:
-        """Best-first search of one person from a pose, (n_values,): how many poses were scored, and the best."""
-        evaluations, found, free = 0, start, self._memories[person].free
-        bodies, index = self._around(person)
-        models, poses = [b.model for b in bodies], [b.values for b in bodies]
+        """Search one person from a pose, (n_values,), best first; return the number of poses scored and the best."""
+        around, index = self._problem.around(person, self.bodies)
+        active = self._problem.people[person].active_dofs
+        subjects = Subjects.of([b.model for b in around], [index], [active] * len(around))  # only the person's counts
+        poses = [b.values for b in around]
         poses[index] = start
-        masks = None if free is None else [free] * len(bodies)  # only that of the person counts
-        for step in search_frame(self._views, models, poses, replace(self._settings, search=how), [index], masks):
+        evaluations, found = 0, start
+        for step in search_frame(self._problem.views, subjects, poses, replace(self._settings, search=how)):
             found, evaluations = step.best[index], step.evaluations
-        return evaluations, held(self._models[person], found, start, free)
-
-    def _told(self, person: int, seen: _Seen) -> tuple[Quality, PartCosts]:
-        known, colors = self._memories[person].known, None
-        if known is not None:
-            colors = self.colors(person).score(seen.fit.values, known), known
-        trusts = np.array([0.0 if v.silhouette is None else v.silhouette.trust for v in self._views])
-        body = self._body(person, seen.fit.values)
-        scale = px_per_m([v.camera for v in self._views], body)
-        costs = seen.match.part_costs(seen.fit.values)
-        return confidence.quality(body, seen.fit, costs, self._thetas, trusts, scale, colors), costs
-
-    def _parts_px(self, costs: PartCosts) -> Array:
-        """Mean distance of each part's contour to the edges, (n_parts,), px of the footage."""
-        scales = np.array([v.scale for v in self._views])
-        length = (costs.length_px / scales[:, None]).sum(axis=0)
-        far = np.nansum(costs.forward_px * costs.length_px / scales[:, None] ** 2, axis=0)
-        return np.divide(far, length, out=np.full_like(length, np.nan), where=length > 0)
-
-    def _match(self, person: int, everywhere: bool = False) -> ContourMatch:
-        """The residuals of a person's contours against evidence of their own, the others where they stand."""
-        (own,) = self._own([person], everywhere)
-        return self._match_on(own, person, everywhere)
-
-    def _match_on(self, own: Sequence[ViewEvidence], person: int, everywhere: bool) -> ContourMatch:
-        bodies, index = self._around(person)
-        settings = self._settings
-        # Of segments a prediction accepts those near it: to look for what is farther costs more than it saves.
-        everywhere = everywhere or settings.segments
-        return ContourMatch(own, bodies, index, settings.match, settings.theta_px, everywhere)
-
-    def _own(self, people: Sequence[int], everywhere: bool = False) -> list[tuple[ViewEvidence, ...]]:
-        """Of each of some people the evidence without what the others explain, as it was shared out when everybody
-        stood about here."""
-        bodies = self._bodies()
-        if len(bodies) == 1 or not self._settings.occlusion:
-            return [self._sharing.everything if everywhere else self._sharing.views] * len(people)
-        for shares in reversed(self._shares):
-            if self._stand(shares.poses, np.full(len(bodies), _SHARED_M)):
-                return [shares.own(p, everywhere) for p in people]
-        self._shares.append(Shares(self._sharing, bodies))
-        return [self._shares[-1].own(p, everywhere) for p in people]
-
-    def _around(self, person: int) -> tuple[list[PosedBody], int]:
-        """Who is in the scene for a person, and their index there."""
-        bodies = self._bodies()
-        return (bodies, person) if self._settings.occlusion else ([bodies[person]], 0)
-
-    def _bodies(self) -> list[PosedBody]:
-        """Everybody where they stand so far."""
-        return [self._body(i, pose) for i, pose in enumerate(self.poses)]
-
-    def _body(self, person: int, values: Array) -> PosedBody:
-        """A person in a pose, (n_values,); each is asked for many times."""
-        key = person, id(values)  # people who are exchanged take each other's poses
-        if key not in self._placed:
-            self._placed[key] = PosedBody(self._models[person], values)
-        return self._placed[key]
+        return evaluations, with_locked_dofs(self.bodies[person].model, found, start, active)

@@ -1,14 +1,14 @@
-"""Lost limbs found again: a limb is tried everywhere it can be, the best places refined (DESIGN section 10).
+"""Recover lost limbs: try a limb everywhere it can be, and refine the best poses.
 
-Some thousand poses of the limb are ranked by a quick look along its axis: the colours under it, and edges at both its
-sides. The best that are not all in one place improve by small random steps, each by itself, by the same look; then they
-go through the costs that all poses go through, and the cheapest are refined. Limbs that are lost together are searched
-together.
+Some thousand poses of the limb are ranked by a quick score along its axis, of the colours under it and the edges at
+both its sides. The best, no two in one place, improve by random perturbation under the same score. Their contours are
+then scored like those of any pose, and the cheapest are refined. Limbs that are lost together are searched together, by
+beam search.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -19,240 +19,217 @@ from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.kinematics import chain_poses
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
-from tracker.compute.threads import N_HELPERS, dealt_out, helpers
-from tracker.fitting.contour_residuals import WORTH_A_STEP, ContourMatch
-from tracker.fitting.gauss_newton import Block, Fit
-from tracker.fitting.gauss_newton_compiled import solve
+from tracker.compute.threads import N_HELPERS, kernel_pool, map_chunked
+from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals
+from tracker.fitting.gauss_newton import Fit, ResidualBlock
+from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.geometry.arrays import Array, IntArray
+from tracker.tracking.chamfer.settings import MAX_ITERATIONS, TOLERANCE, RecoverSettings
 
 T = TypeVar("T")
 
-APART_M, _SAME_M = 0.12, 0.06
-"""How far apart the places are that are improved; poses nearer to each other than the second lead to the same one."""
-LEAST_GAIN = 3.0
-"""What a pose must cost less to take the place of the one at hand: it must be some 20 times likelier. Poses whose costs
-differ by less are about equally good."""
-
-
-@dataclass(frozen=True)
-class RecoverSettings:
-    """How lost limbs are searched for."""
-
-    proposals: int = 1024
-    """Poses of a limb that are looked at; a power of two, so that they fill the space evenly."""
-    reach_rad: float = float(np.radians(35))
-    """Spread of those proposals that lie around the pose, rad; half of them lie anywhere within the joint limits."""
-    improved: int = 48
-    """Of these, how many are improved."""
-    scored: int = 48
-    """Of those, how many are improved to the end and have their contours scored."""
-    shakes: int = 16
-    """Steps that are tried around each of them in a round."""
-    shakes_rad: tuple[float, ...] = tuple(np.radians([16.0, 11.0, 7.0, 4.0]).tolist())
-    """Their size, rad, round by round."""
-    refined: int = 10
-    """Proposals whose limb is refined alone."""
-    finished: int = 3
-    """Of these, how many go through a refinement of the whole body."""
-    kept: int = 3
-    """Poses that are kept while the next limb is searched, at most."""
-    anew: bool = True
-    """Whether places for that limb are looked for anew from each of them; else once, and scored with each."""
-    gain: float = 0.0
-    """Decrease of the cost that is worth another step of a refinement of the whole body."""
-    margin: float = 40.0
-    """What they may cost more than the best: more than another limb can make good."""
-    colors: float = 0.2
-    """Weight of the colours against edges; neighbouring pixels say the same, so it is well below 1."""
-    trust_rad: float = 1.0
-    """Standard deviation of the prediction of a limb that seems lost, rad: nearly none."""
-    finish: float = np.inf
-    """What a proposal may cost more than the best pose, its limb refined alone, to be refined with the whole body; the
-    margin, if that is more, where another limb is searched after it."""
+DISTINCT_POSE_M = 0.12
+"""Poses are distinct if some point differs by more, metres."""
+_SAME_M = 0.06
+"""Poses nearer to each other lead to the same refined pose, metres."""
+MIN_COST_GAIN = 3.0
+"""Smallest decrease of the cost (nats) for a pose to replace another: it is then about 20 times more likely. Poses with
+a smaller difference are about equally good."""
 
 
 @dataclass(frozen=True, eq=False)
-class Judge:
-    """Compares poses of one person on one frame: contours, colours and priors together."""
+class PoseScorer:
+    """Scores poses of one person on one frame by contours, colours and priors together.
 
-    match: ContourMatch
-    priors: Sequence[Block]
+    It shares its thread clones with the scorers made from it; use one of them at a time.
+    """
+
+    residuals: ContourResiduals
+    priors: Sequence[ResidualBlock]
     colors: Colors
-    known: PartColors | None
-    """Colours of the parts; None where nobody has shown them."""
+    part_colors: PartColors | None
+    """Colours of the parts; None where they are unknown."""
     settings: RecoverSettings
-    free: NDArray[np.bool_] | None = None
+    active_dofs: NDArray[np.bool_] | None
     """The degrees of freedom that may move, (n_dofs,); None: all. Limbs are given without the others."""
+    clones: tuple[ContourResiduals, ...]
+    """The residuals once for each helper thread, each with scratch of its own."""
+
+    @classmethod
+    def of(
+        cls, residuals: ContourResiduals, priors: Sequence[ResidualBlock], colors: Colors,
+        part_colors: PartColors | None, settings: RecoverSettings, active_dofs: NDArray[np.bool_] | None = None,
+    ) -> "PoseScorer":  # fmt: skip
+        """Return a scorer with a clone for each helper thread."""
+        clones = tuple(residuals.clone_for_thread() for _ in range(N_HELPERS))
+        return cls(residuals, priors, colors, part_colors, settings, active_dofs, clones)
 
     @property
-    def blocks(self) -> list[Block]:
-        """What `fit.solve` is to minimize."""
-        return [self.match, *self.priors]
+    def blocks(self) -> list[ResidualBlock]:
+        """The residual blocks to minimize."""
+        return [self.residuals, *self.priors]
 
-    @cached_property
-    def _for_threads(self) -> list["Judge"]:
-        return [replace(self, match=self.match.twin()) for _ in range(N_HELPERS)]
+    def restricted_to(self, limb: Limb) -> "PoseScorer":
+        """Return a faster scorer for poses that differ in a limb alone. It works in the room of this one's clones."""
+        return replace(self, clones=tuple(c.restricted_to(limb.parts, c.workspace) for c in self.clones))
 
-    def of_limb(self, limb: Limb) -> "Judge":
-        """The same, quicker, for poses that differ in a limb alone; not to be used beside this one."""
-        out = replace(self)
-        out.__dict__["_for_threads"] = [replace(j, match=j.match.of_parts(limb.parts)) for j in self._for_threads]
-        return out
-
-    def each(self, work: Callable[["Judge", Array], T], poses: Sequence[Array] | Array) -> list[T]:
-        """What some work makes of each of several poses, (n_values,) each, in threads side by side, each with a judge
-        of its own."""
-        return dealt_out(work, self._for_threads, list(poses))
+    def each(self, work: Callable[["PoseScorer", Array], T], poses: Sequence[Array] | Array) -> list[T]:
+        """Apply work to each of several poses, (n_values,) each, in parallel; each thread has a scorer of its own."""
+        return map_chunked(work, [replace(self, residuals=c) for c in self.clones], list(poses))
 
     def cost(self, fit: Fit) -> float:
-        """Cost of a refined pose with its colours."""
-        return fit.cost + float(self._of_colors(fit.values[None])[0])
+        """Return the cost of a refined pose with its colours."""
+        return fit.cost + float(self._color_costs(fit.pose[None])[0])
 
     def costs(self, candidates: Array) -> Array:
-        """Costs of poses, (n, n_values), without refinement, (n,); priors are left to the refinement."""
-        costs = np.empty(len(candidates))
+        """Return the costs of poses, (n, n_values), without refinement and without priors, (n,)."""
+        costs, n = np.empty(len(candidates)), len(self.clones)
 
-        def score(i: int, judge: Judge) -> None:
-            own = candidates[i::N_HELPERS]
-            costs[i::N_HELPERS] = judge.match.costs(own) + judge._of_colors(own)
+        def score(i: int, residuals: ContourResiduals) -> None:
+            own = candidates[i::n]
+            costs[i::n] = residuals.costs(own) + self._color_costs(own)
 
-        list(helpers().map(score, range(N_HELPERS), self._for_threads))
+        list(kernel_pool().map(score, range(n), self.clones))
         return costs
 
-    def _of_colors(self, poses: Array) -> Array:
-        """What the colours add to the costs of poses, (n, n_values), (n,)."""
-        if self.known is None or not len(poses):
+    def _color_costs(self, poses: Array) -> Array:
+        """Return what the colours add to the costs of poses, (n, n_values), (n,)."""
+        if self.part_colors is None or not len(poses):
             return np.zeros(len(poses))
-        return -self.settings.colors * self.colors.nats(poses, self.known)
+        return -self.settings.colors * self.colors.nats(poses, self.part_colors)
 
 
-class Searched(NamedTuple):
-    """What a search of limbs came to."""
-
-    best: Fit
-    """What is cheapest; the pose at hand where nothing is by far."""
-    others: tuple[Fit, ...] = ()
-    """Poses about as good, with a limb elsewhere, cheapest first."""
-
-
-def for_several(settings: RecoverSettings) -> RecoverSettings:
-    """The same with half the work in each search: limbs of people who hide each other are searched several times as
-    often, and who is found is refined again with the others where they are.
-
-    (Where 86 searches on three recordings found something better, it was always among the 32 that looked best. Of 724
-    searches on 17 simulated couples 64 brought a limb nearer to the truth by 5 cm or more: those that did cost 4 more
-    than the pose at hand at most before the whole body was refined, and of 44 of them all were among the 32 that looked
-    best after half of the rounds. How places look is no reason to give up: a leg that stands where the other belongs
-    looks best where it is.)
-    """
-    return replace(settings, scored=min(32, settings.scored), anew=False, gain=WORTH_A_STEP, finish=10.0)
-
-
-def search_limbs(
-    model: BodyModel, suspects: Sequence[Limb], here: Fit, others: Sequence[Array], judge: Judge, iterations: int
-) -> Searched:
-    """Search the limbs that seem lost, one after the other.
-
-    A limb may stand where another belongs, and each alone looks best as it is: therefore the best few poses of each,
-    worse ones too, are kept while the next is searched.
-
-    Args:
-        model: the body.
-        suspects: the limbs that seem lost.
-        here: the pose at hand.
-        others: poses whose limbs are tried as they are, e.g. that of the frame before, (n_values,) each.
-        judge: compares poses.
-        iterations: most steps of a refinement of the whole body.
-    """
-    start = _Found(here, judge.cost(here))
-    kept = [start]
-    for limb in suspects:
-        margin, finish = judge.settings.margin, judge.settings.finish
-        kept = [x for x in kept if x.cost < kept[0].cost + margin]
-        enough = kept[0].cost + (finish if limb is suspects[-1] else max(finish, margin))
-        away = [p for x in suspects if x is not limb for p in x.parts]
-        poses = [x.fit.values for x in kept]
-        together = [[pose] for pose in poses] if judge.settings.anew else [poses]
-        found = [
-            x for some in together for x in _search_limb(model, limb, away, some, others, judge, iterations, enough)
-        ]
-        kept = _distinct(model, [*kept, *found], judge.settings.kept, _SAME_M)
-    best = kept[0] if kept[0].cost < start.cost - LEAST_GAIN else start
-    rivals = [x for x in (*kept, start) if x is not best and x.cost < best.cost + LEAST_GAIN]
-    places = _distinct(model, [best._replace(cost=-np.inf), *rivals], judge.settings.kept, APART_M)
-    return Searched(best.fit, tuple(x.fit for x in places[1:]))
-
-
-class _Found(NamedTuple):
+class ScoredFit(NamedTuple):
     """A refined pose."""
 
     fit: Fit
     cost: float
-    """With its colours."""
+    """Cost with the colours, nats."""
 
 
-def _search_limb(
-    model: BodyModel, limb: Limb, away: list[int], kept: Sequence[Array], others: Sequence[Array], judge: Judge,
-    iterations: int, enough: float,
-) -> list[_Found]:  # fmt: skip
-    """The best poses of one limb, refined with the whole body; parts that are `away` hide nothing at first.
+class LimbSearch(NamedTuple):
+    """The result of a search of limbs."""
 
-    What costs `enough` or more where the limb is refined alone is left out.
+    best: Fit
+    """The cheapest fit; the initial one unless another is cheaper by `MIN_COST_GAIN`."""
+    alternatives: tuple[Fit, ...] = ()
+    """Fits that are about as good, with a limb elsewhere, cheapest first."""
 
-    Places are looked for around the first of the poses that are `kept`, (n_values,) each. They differ in limbs that are
-    away, so that the places are as good for all of them; which go together their contours tell.
+
+def for_several(settings: RecoverSettings) -> RecoverSettings:
+    """Return the settings for one of several people, with about half the work in each search.
+
+    Limbs of people who occlude each other are searched several times as often, and a person who is found is refined
+    again with the others.
     """
-
-    def alone(judge: Judge, pose: Array) -> _Found:
-        fit = solve(model, pose, judge.blocks, limb.dofs, max_iterations=4, tolerance=1e-2, gain=WORTH_A_STEP)
-        return _Found(fit, judge.cost(fit))
-
-    def whole(judge: Judge, pose: Array) -> _Found:
-        fit = solve(model, pose, judge.blocks, judge.free, iterations, tolerance=1e-3, gain=judge.settings.gain)
-        return _Found(fit, judge.cost(fit))
-
-    of_limb = judge.of_limb(limb)
-    poses = _candidates(model, limb, away, kept[0], others, of_limb)
-    if len(kept) > 1:
-        poses = np.array([*poses, *(_with_limb(model, k, pose, limb) for k in kept[1:] for pose in poses)])
-        poses = poses[np.argsort(of_limb.costs(poses), kind="stable")[: judge.settings.refined]]
-    tried = [x for x in of_limb.each(alone, poses) if x.cost < enough]
-    return judge.each(whole, [x.fit.values for x in _distinct(model, tried, judge.settings.finished, _SAME_M)])
+    return replace(
+        settings, scored=min(32, settings.scored), restart_per_candidate=False, min_decrease=MIN_DECREASE,
+        refine_margin=10.0,
+    )  # fmt: skip
 
 
-def _candidates(
-    model: BodyModel, limb: Limb, away: list[int], here: Array, others: Sequence[Array], judge: Judge
-) -> Array:
-    """The few poses of a limb that are worth a refinement, (n, n_values)."""
-    settings = judge.settings
-    look = judge.colors.look(here, limb.parts, judge.known, away)
-    proposals = _proposals(model, limb, here, settings)
-    looks = np.concatenate(_in_parts(look, proposals))
-    best = _best_apart(model, limb, proposals, looks, settings.improved, APART_M)
-    dofs, n_rounds = np.flatnonzero(limb.dofs), len(settings.shakes_rad)
-    # Each improves by itself, so that threads need not wait for one another in between.
-    for rounds in (range(n_rounds // 2), range(n_rounds // 2, n_rounds)):
-        steps = [
-            np.random.default_rng(i).normal(0.0, settings.shakes_rad[i], (len(best), settings.shakes, len(dofs)))
-            for i in rounds
-        ]
-        improved = _in_parts(lambda *some: _improved(model, dofs, look, *some), best, *steps)
-        best, looks = (np.concatenate(x) for x in zip(*improved, strict=True))
-        best = best[np.sort(np.argsort(-looks, kind="stable")[: settings.scored])]
-    best = np.array([*best, *(_with_limb(model, here, other, limb) for other in others)])
-    return _best_apart(model, limb, best, -judge.costs(best), settings.refined, _SAME_M)
+def search_limbs(
+    model: BodyModel, limbs: Sequence[Limb], initial: Fit, others: Sequence[Array], scorer: PoseScorer
+) -> LimbSearch:
+    """Search limbs that seem lost, one after the other, by beam search.
 
-
-def _best_apart(model: BodyModel, limb: Limb, poses: Array, scores: Array, n: int, apart_m: float) -> Array:
-    """The best of many poses of a limb, no two of them near each other: one good place does not crowd out all others.
+    A limb may be where another belongs, and each alone fits best as it is. Therefore the best poses of each limb, worse
+    ones included, are kept while the next is searched.
 
     Args:
         model: the body.
-        limb: the one whose joints are compared.
-        poses: (m, n_values); they differ in the limb alone, as far as it matters.
-        scores: of each, (m,); more is better.
-        n: how many are wanted.
-        apart_m: least distance of the joint that is farthest from its place in the other pose, metres.
+        limbs: the limbs to search.
+        initial: the refined pose.
+        others: poses whose limbs are tried as they are, such as that of the frame before, (n_values,) each.
+        scorer: compares poses.
+    """
+    settings, start = scorer.settings, ScoredFit(initial, scorer.cost(initial))
+    beam = [start]
+    for limb in limbs:
+        beam = [x for x in beam if x.cost < beam[0].cost + settings.margin]
+        last = limb is limbs[-1]
+        max_cost = beam[0].cost + (settings.refine_margin if last else max(settings.refine_margin, settings.margin))
+        away = [p for x in limbs if x is not limb for p in x.parts]
+        poses = [x.fit.pose for x in beam]
+        groups = [[pose] for pose in poses] if settings.restart_per_candidate else [poses]
+        found = [x for group in groups for x in _search_limb(model, limb, away, group, others, scorer, max_cost)]
+        beam = _distinct(model, [*beam, *found], settings.beam_width, _SAME_M)
+    best = beam[0] if beam[0].cost < start.cost - MIN_COST_GAIN else start
+    rest = [x for x in (*beam, start) if x is not best and x.cost < best.cost + MIN_COST_GAIN]
+    places = _distinct(model, [best._replace(cost=-np.inf), *rest], settings.beam_width, DISTINCT_POSE_M)
+    return LimbSearch(best.fit, tuple(x.fit for x in places[1:]))
+
+
+def _search_limb(
+    model: BodyModel, limb: Limb, away: list[int], beam: Sequence[Array], others: Sequence[Array], scorer: PoseScorer,
+    max_cost: float,
+) -> list[ScoredFit]:  # fmt: skip
+    """Return the best poses of one limb, refined with the whole body.
+
+    Args:
+        model: the body.
+        limb: the limb to search.
+        away: indices of parts that occlude nothing while poses are ranked: those of other lost limbs.
+        beam: poses of the body, (n_values,) each. They differ in parts that are away. Places of the limb are ranked
+            around the first, and then scored with each.
+        others: poses whose limb is tried as it is.
+        scorer: compares poses.
+        max_cost: a pose whose limb, refined alone, costs as much is discarded.
+    """
+
+    def limb_only(scorer: PoseScorer, pose: Array) -> ScoredFit:
+        fit = solve_compiled(model, pose, scorer.blocks, limb.dofs, 4, 1e-2, MIN_DECREASE)
+        return ScoredFit(fit, scorer.cost(fit))
+
+    def whole_body(scorer: PoseScorer, pose: Array) -> ScoredFit:
+        min_decrease = scorer.settings.min_decrease
+        fit = solve_compiled(model, pose, scorer.blocks, scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, min_decrease)
+        return ScoredFit(fit, scorer.cost(fit))
+
+    of_limb = scorer.restricted_to(limb)
+    poses = _candidates(model, limb, away, beam[0], others, of_limb)
+    if len(beam) > 1:
+        poses = np.array([*poses, *(_with_limb(model, k, pose, limb) for k in beam[1:] for pose in poses)])
+        poses = poses[np.argsort(of_limb.costs(poses), kind="stable")[: scorer.settings.n_limb_refined]]
+    tried = [x for x in of_limb.each(limb_only, poses) if x.cost < max_cost]
+    return scorer.each(whole_body, [x.fit.pose for x in _distinct(model, tried, scorer.settings.n_refined, _SAME_M)])
+
+
+def _candidates(
+    model: BodyModel, limb: Limb, away: list[int], here: Array, others: Sequence[Array], scorer: PoseScorer
+) -> Array:
+    """Return the few poses of a limb that are worth a refinement, (n, n_values), best first."""
+    settings = scorer.settings
+    score = scorer.colors.limb_scorer(here, limb.parts, scorer.part_colors, away)
+    proposals = _proposals(model, limb, here, settings)
+    scores = np.concatenate(_map_split(score, proposals))
+    best = _best_apart(model, limb, proposals, scores, settings.n_local_search, DISTINCT_POSE_M)
+    dofs, n_rounds = np.flatnonzero(limb.dofs), len(settings.perturbations_rad)
+    # Each pose improves by itself, so that threads do not wait for one another between rounds.
+    for rounds in (range(n_rounds // 2), range(n_rounds // 2, n_rounds)):
+        steps = [
+            np.random.default_rng(i).normal(
+                0.0, settings.perturbations_rad[i], (len(best), settings.perturbations, len(dofs))
+            )
+            for i in rounds
+        ]
+        improved = _map_split(lambda *share: _perturbed(model, dofs, score, *share), best, *steps)
+        best, scores = (np.concatenate(x) for x in zip(*improved, strict=True))
+        best = best[np.sort(np.argsort(-scores, kind="stable")[: settings.scored])]
+    best = np.array([*best, *(_with_limb(model, here, other, limb) for other in others)])
+    return _best_apart(model, limb, best, -scorer.costs(best), settings.n_limb_refined, _SAME_M)
+
+
+def _best_apart(model: BodyModel, limb: Limb, poses: Array, scores: Array, n: int, apart_m: float) -> Array:
+    """Return the best of many poses of a limb, no two near each other, so that one good place leaves room for others.
+
+    Args:
+        model: the body.
+        limb: whose points are compared.
+        poses: (m, n_values); only the limb is compared.
+        scores: of each, (m,); higher is better.
+        n: largest number of poses to return.
+        apart_m: some point differs by more in each two of them, metres.
     """
     points = np.flatnonzero(np.isin(model.point_parts, limb.parts))
     Ts = chain_poses(model.tree, model.kinematics(poses[0]), limb.parts, poses)
@@ -261,18 +238,18 @@ def _best_apart(model: BodyModel, limb: Limb, poses: Array, scores: Array, n: in
     return poses[_apart(places, np.argsort(-scores), n, apart_m)]
 
 
-def _distinct(model: BodyModel, found: Sequence[_Found], n: int, apart_m: float) -> list[_Found]:
-    """The cheapest of several poses, no two of them nearer to each other than that, cheapest first."""
+def _distinct(model: BodyModel, found: Sequence[ScoredFit], n: int, apart_m: float) -> list[ScoredFit]:
+    """Return the n cheapest fits, cheapest first, some point of each two of them more than a distance apart, metres."""
     if not found:
         return []
-    places = np.array([model.points_world(x.fit.values) for x in found])
+    places = np.array([model.points_world(x.fit.pose) for x in found])
     order = np.argsort([x.cost for x in found], kind="stable")
     return [found[i] for i in _apart(places, order, n, apart_m)]
 
 
 @njit(nogil=True, cache=True)
 def _apart(places: Array, order: IntArray, n: int, apart_m: float) -> IntArray:
-    """The first few indices, in an order, of places (m, k, 3) that all differ by more than `apart_m` in some point."""
+    """Return the first n indices, in an order, of places (m, k, 3) of which each two differ by more than `apart_m`."""
     kept = np.empty(min(n, len(order)), np.int64)
     n_kept = 0
     for i in order:
@@ -295,7 +272,7 @@ def _apart(places: Array, order: IntArray, n: int, apart_m: float) -> IntArray:
 
 @njit(nogil=True, cache=True)
 def _put(Ts: Array, parts: IntArray, points: Array, places: Array) -> None:
-    """Fill where points (k, 3) of parts, indices (k,), are in poses of these, (m, n, 4, 4), in the world, (m, k, 3)."""
+    """Transform points (k, 3) of parts, indices (k,), by part poses (m, n, 4, 4) to the world, (m, k, 3)."""
     for m in range(places.shape[0]):
         for k in range(places.shape[1]):
             T, x, y, z = Ts[m, parts[k]], points[k, 0], points[k, 1], points[k, 2]
@@ -304,13 +281,13 @@ def _put(Ts: Array, parts: IntArray, points: Array, places: Array) -> None:
 
 
 def _with_limb(model: BodyModel, values: Array, other: Array, limb: Limb) -> Array:
-    """A pose with the limb of another."""
+    """Return a pose, (n_values,), with the limb of another."""
     change = np.where(limb.dofs, model.difference(other, values), 0.0)
     return model.clip(model.retract(values, change))
 
 
 def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSettings) -> Array:
-    """Poses with the limb elsewhere, (n, n_values): every other one nearby, the others anywhere."""
+    """Return poses with the limb elsewhere, (n, n_values): every other one nearby, the rest within the joint limits."""
     dofs = np.flatnonzero(limb.dofs)
     even, normal = _even(settings.proposals, len(dofs))
     low, high = model.limits[dofs].T
@@ -318,36 +295,46 @@ def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSet
     now = model.difference(values, model.neutral())[dofs]
     near = normal * settings.reach_rad
     anywhere = low + even * (high - low) - now
-    # Joints that people bend little stay near: a collarbone needs no search of its own.
+    # Joints of little spread, such as collarbones, stay near.
     anywhere = np.where(np.isfinite(model.spreads[dofs]), near, anywhere)
     steps = np.where(np.arange(len(even))[:, None] % 2, near, anywhere)
     steps[1::4] *= 0.5
     return _moved(model, np.repeat(values[None], len(steps), axis=0), dofs, steps)
 
 
-def _in_parts(work: Callable[..., T], *arrays: Array) -> list[T]:
-    """What some work makes of parts of arrays of the same length, in order, one for each of the threads."""
-    return list(helpers().map(work, *(np.array_split(a, N_HELPERS) for a in arrays)))
+def _map_split(work: Callable[..., T], *arrays: Array) -> list[T]:
+    """Apply work to shares of arrays of the same length, one for each helper thread; return the results in order."""
+    return list(kernel_pool().map(work, *(np.array_split(a, N_HELPERS) for a in arrays)))
 
 
-def _improved(
-    model: BodyModel, dofs: IntArray, look: Callable[[Array], Array], poses: Array, *rounds: Array
+def _perturbed(
+    model: BodyModel, dofs: IntArray, score: Callable[[Array], Array], poses: Array, *rounds: Array
 ) -> tuple[Array, Array]:
-    """Poses, (n, n_values), after rounds of steps, (n, shakes, len(dofs)) each, of which each takes its best; how they
-    look, (n,)."""
-    looks = np.empty(0) if rounds else look(poses)
+    """Improve poses by random perturbation: in each round each pose takes its best step, or none.
+
+    Args:
+        model: the body.
+        dofs: indices of the degrees of freedom that are perturbed.
+        score: returns the scores of poses, (n,).
+        poses: (n, n_values).
+        rounds: steps of each round, (n, n_steps, len(dofs)).
+
+    Returns:
+        The poses, (n, n_values), and their scores, (n,).
+    """
+    scores = np.empty(0) if rounds else score(poses)
     for steps in rounds:
-        (n, shakes), n_values = steps.shape[:2], poses.shape[1]
-        moved = _moved(model, np.repeat(poses, shakes, axis=0), dofs, steps.reshape(n * shakes, len(dofs)))
-        around = np.concatenate([poses[:, None], moved.reshape(n, shakes, n_values)], axis=1)
-        of_each = look(around.reshape(n * (1 + shakes), n_values)).reshape(n, 1 + shakes)
+        (n, n_steps), n_values = steps.shape[:2], poses.shape[1]
+        moved = _moved(model, np.repeat(poses, n_steps, axis=0), dofs, steps.reshape(n * n_steps, len(dofs)))
+        around = np.concatenate([poses[:, None], moved.reshape(n, n_steps, n_values)], axis=1)
+        of_each = score(around.reshape(n * (1 + n_steps), n_values)).reshape(n, 1 + n_steps)
         at = np.arange(n), of_each.argmax(axis=1)
-        poses, looks = around[at], of_each[at]
-    return poses, looks
+        poses, scores = around[at], of_each[at]
+    return poses, scores
 
 
 def _moved(model: BodyModel, poses: Array, dofs: IntArray, steps: Array) -> Array:
-    """Poses (n, n_values) after steps (n, len(dofs)) in some degrees of freedom, within the joint limits."""
+    """Return poses, (n, n_values), after steps, (n, len(dofs)), in some degrees of freedom, within the joint limits."""
     if all(model.joints[j].kind == "revolute" for j in model.dof_joint[dofs]):
         out, at = poses.copy(), model.dof_value[dofs]
         out[:, at] = np.clip(poses[:, at] + steps, *model.limits[dofs].T)
@@ -359,8 +346,8 @@ def _moved(model: BodyModel, poses: Array, dofs: IntArray, steps: Array) -> Arra
 
 @lru_cache(maxsize=16)
 def _even(n: int, dims: int) -> tuple[Array, Array]:
-    """Points that fill the unit cube evenly, the same ones each time, (n, dims); the same normally distributed."""
-    # Take a third of a second, which who searches nothing need not wait.
+    """Return points that fill the unit cube evenly, (n, dims), and the same normally distributed (Sobol sequence)."""
+    # Imported lazily: these take 0.3 s to load.
     from scipy.special import ndtri
     from scipy.stats import qmc
 

@@ -40,7 +40,7 @@ def ghosts(controller):
 
 
 def ambiguous(controller, person=None):
-    return [frame for frame, cell in controller.timeline(0, person).items() if cell["ambiguous"]]
+    return [frame for frame, cell in controller.stored_poses.timeline(0, person).items() if cell["ambiguous"]]
 
 
 def test_frames_with_another_pose_are_marked_and_show_it(tracked):
@@ -48,50 +48,50 @@ def test_frames_with_another_pose_are_marked_and_show_it(tracked):
     assert [ambiguous(controller, p) for p in (None, ANN, BOB)] == [[0, 1], [0], [0, 1]]
     assert [len(p.others) for p in controller.state.people] == [1, 2]
     assert ghosts(controller) == {ANN, BOB}
-    controller.casting.show(ANN, False)
+    controller.visibility.show(ANN, False)
     assert ghosts(controller) == {BOB}
-    controller.seek(2)
+    controller.navigation.seek(2)
     assert ghosts(controller) == set()
 
 
 def test_the_other_pose_is_taken_vouched_for_and_left_again(tracked):
     controller, _, bob, lifted = tracked
-    controller.seek(1)
-    controller.choosing.exchange(ANN)  # who has none: bob is meant
+    controller.navigation.seek(1)
+    controller.alternatives.take_alternative(ANN)  # who has none: bob is meant
     np.testing.assert_array_equal(controller.state.poses[BOB], lifted)
     assert (controller.state.people[BOB].source, controller.state.people[ANN].source) == ("manual", "tracked")
     assert controller.state.undo == "take the other pose of bob, frame 1"
-    assert controller.timeline(0, BOB)[1]["keyframe"]
+    assert controller.stored_poses.timeline(0, BOB)[1]["keyframe"]
     assert (ambiguous(controller, BOB), ghosts(controller)) == ([0], set())
-    controller.choosing.exchange(BOB)
+    controller.alternatives.take_alternative(BOB)
     np.testing.assert_array_equal(controller.state.poses[BOB], bob)
-    controller.undo()
-    controller.undo()
+    controller.history.undo()
+    controller.history.undo()
     assert (ambiguous(controller, BOB), ghosts(controller)) == ([0, 1], {BOB})
     assert controller.state.people[BOB].source == "tracked"
 
 
 def test_people_who_may_be_each_other_are_exchanged_together(tracked):
     controller, ann, bob, lifted = tracked
-    controller.choosing.exchange(ANN)
+    controller.alternatives.take_alternative(ANN)
     np.testing.assert_array_equal(controller.state.poses[ANN], bob)
     np.testing.assert_array_equal(controller.state.poses[BOB], ann)
-    controller.undo()
-    controller.choosing.exchange(BOB)  # whose best other pose is another arm
+    controller.history.undo()
+    controller.alternatives.take_alternative(BOB)  # whose best other pose is another arm
     np.testing.assert_array_equal(controller.state.poses[ANN], ann)
     np.testing.assert_array_equal(controller.state.poses[BOB], lifted)
 
 
 def test_who_vouches_for_a_pose_has_chosen(tracked):
     controller, *_ = tracked
-    controller.seek(1)
-    controller.select(BOB, None)
+    controller.navigation.seek(1)
+    controller.navigation.select(BOB, None)
     controller.ranges.toggle_keyframe()
     assert (ambiguous(controller, BOB), ghosts(controller)) == ([0], set())
 
 
 def test_without_another_pose_there_is_nothing_to_take(tracked):
     controller, *_ = tracked
-    controller.seek(2)
+    controller.navigation.seek(2)
     with pytest.raises(TrackerError, match="expected another pose to take on frame 2, found none"):
-        controller.choosing.exchange(ANN)
+        controller.alternatives.take_alternative(ANN)

@@ -8,7 +8,7 @@ from gestures import PAGE, drag, pixel_of, wait_for
 
 from app.page import messages
 from app.state.page_view import View
-from tracker.body.dimensions import PartDimensions, sizes_of
+from tracker.body.dimensions import PartDimensions, dimensions_of
 from tracker.errors import TrackerError
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
@@ -17,16 +17,16 @@ FRAMES = (0, 3)
 
 
 def length(model, part="left_forearm"):
-    return sizes_of(model).parts[part].length_m
+    return dimensions_of(model).parts[part].length_m
 
 
 def lengthen(controller, by_m=0.01, part="left_forearm"):
-    own = sizes_of(controller.sizing.model(0)).parts[part]
-    controller.sizing.set_part(0, part, PartDimensions(own.length_m + by_m, own.girths_m))
+    own = dimensions_of(controller.body_sizes.model(0)).parts[part]
+    controller.body_sizes.set_part(0, part, PartDimensions(own.length_m + by_m, own.girths_m))
 
 
 def joints(controller, frame):
-    controller.seek(frame)
+    controller.navigation.seek(frame)
     return controller.models[0].points_world(controller.state.poses[0])
 
 
@@ -35,7 +35,7 @@ def posed(opened):
     """Two keyframes, set by hand."""
     controller = opened()
     for frame in FRAMES:
-        controller.seek(frame)
+        controller.navigation.seek(frame)
         drag(controller, "left_wrist", (6.0, -9.0))
     return controller
 
@@ -43,29 +43,31 @@ def posed(opened):
 def test_a_draft_is_drawn_and_changes_nothing(posed, session):
     before = posed.models[0]
     lengthen(posed)
-    assert length(posed.sizing.model(0)) == pytest.approx(length(before) + 0.01)
-    assert length(posed.sizing.model(0), "right_forearm") == pytest.approx(length(before) + 0.01)  # both sides alike
+    assert length(posed.body_sizes.model(0)) == pytest.approx(length(before) + 0.01)
+    assert length(posed.body_sizes.model(0), "right_forearm") == pytest.approx(
+        length(before) + 0.01
+    )  # both sides alike
     view = View(frozenset(["contours"]), (1.0,) * 4)
     drawn = messages.overlay(posed.session_of(posed.state), posed.state, PAGE, view, None)
     assert b'"ghost"' in drawn
     assert posed.models == (before,)
-    posed.sizing.discard()
-    assert posed.sizing.model(0) is before
+    posed.body_sizes.discard()
+    assert posed.body_sizes.model(0) is before
     assert length(load_session(session).people[0].model) == length(before)
 
 
 def test_each_side_by_itself(posed):
     before = posed.models[0]
-    posed.sizing.couple(False)
+    posed.body_sizes.couple(False)
     lengthen(posed, part="right_thigh")
-    assert length(posed.sizing.model(0), "right_thigh") == pytest.approx(length(before, "right_thigh") + 0.01)
-    assert length(posed.sizing.model(0), "left_thigh") == pytest.approx(length(before, "left_thigh"))
+    assert length(posed.body_sizes.model(0), "right_thigh") == pytest.approx(length(before, "right_thigh") + 0.01)
+    assert length(posed.body_sizes.model(0), "left_thigh") == pytest.approx(length(before, "left_thigh"))
 
 
 def test_keyframes_are_refitted_to_their_joints_as_one_edit(posed, session):
     was = {frame: joints(posed, frame) for frame in FRAMES}
     lengthen(posed)
-    posed.sizing.apply(0, refit=True)
+    posed.body_sizes.apply(0, refit=True)
     assert posed.state.draft is None
     assert posed.state.sizes_message.startswith("Applied, 2 keyframes refitted, joints")
     for frame in FRAMES:
@@ -81,7 +83,7 @@ def test_keyframes_are_refitted_to_their_joints_as_one_edit(posed, session):
 def test_poses_that_are_kept_are_shown_with_their_own_body_and_marked(posed):
     old, was = posed.models[0], {frame: joints(posed, frame) for frame in FRAMES}
     lengthen(posed)
-    posed.sizing.apply(0, refit=False)
+    posed.body_sizes.apply(0, refit=False)
     assert posed.session.people[0].model is not old
     for frame in FRAMES:
         np.testing.assert_array_equal(joints(posed, frame), was[frame])
@@ -93,11 +95,11 @@ def test_poses_that_are_kept_are_shown_with_their_own_body_and_marked(posed):
     assert np.linalg.norm(draft - was[3], axis=1).max() < 0.01
     assert not messages.state(posed.session, posed.state).other_sizes
     # An edit of a kept pose leaves it its body; refitting afterwards is a second edit.
-    posed.seek(3)
+    posed.navigation.seek(3)
     drag(posed, "left_wrist", (3.0, 0.0))
     assert posed.models == (old,)
     assert posed.state.revisions != posed.state.present
-    posed.sizing.apply(0, refit=True)
+    posed.body_sizes.apply(0, refit=True)
     assert posed.state.sizes_message.startswith("Applied, 2 keyframes refitted")
     assert posed.state.revisions == posed.state.present
 
@@ -107,16 +109,16 @@ def test_undo_brings_the_old_body_back_also_after_a_restart(posed, opened, sessi
     was = {frame: joints(posed, frame) for frame in FRAMES}
     before = length(posed.models[0])
     lengthen(posed)
-    posed.sizing.apply(0, refit=refit)
+    posed.body_sizes.apply(0, refit=refit)
     again = opened()
     assert length(again.session.people[0].model) == pytest.approx(before + 0.01)
-    again.undo()
+    again.history.undo()
     assert length(again.session.people[0].model) == pytest.approx(before)
     assert length(load_session(session).people[0].model) == pytest.approx(before)
     for frame in FRAMES:
         np.testing.assert_array_equal(joints(again, frame), was[frame])
         assert again.state.revisions == again.state.present
-    again.redo()
+    again.history.redo()
     assert length(load_session(session).people[0].model) == pytest.approx(before + 0.01)
     assert opened().state.undo.startswith("sizes of person")
 
@@ -124,12 +126,12 @@ def test_undo_brings_the_old_body_back_also_after_a_restart(posed, opened, sessi
 def test_previous_sizes_are_one_click_away(posed):
     before = length(posed.models[0])
     with pytest.raises(TrackerError, match="sizes that person had before, found none"):
-        posed.sizing.recall(0)
+        posed.body_sizes.recall(0)
     lengthen(posed)
-    posed.sizing.apply(0, refit=True)
-    posed.sizing.recall(0)
-    assert length(posed.sizing.model(0)) == pytest.approx(before)
-    posed.sizing.apply(0, refit=True)
+    posed.body_sizes.apply(0, refit=True)
+    posed.body_sizes.recall(0)
+    assert length(posed.body_sizes.model(0)) == pytest.approx(before)
+    posed.body_sizes.apply(0, refit=True)
     assert length(posed.session.people[0].model) == pytest.approx(before)
     with closing(AnnotationStore(posed.session.annotations_path, read_only=True)) as store:
         assert len(store.model_revisions("person")) == 2  # the body that was there before, not a third
@@ -139,36 +141,36 @@ def test_wrong_sizes_are_refused_in_a_sentence(posed):
     with pytest.raises(TrackerError, match="enter a length of a body"):
         lengthen(posed, 9.0)
     with pytest.raises(TrackerError, match="height of 30 to 300 cm, found 0"):
-        posed.sizing.set_height(0, 0.0)
+        posed.body_sizes.set_height(0, 0.0)
     with pytest.raises(TrackerError, match="distance of the hips"):
-        posed.sizing.set_width(0, "hip", -0.1)
+        posed.body_sizes.set_width(0, "hip", -0.1)
     assert posed.state.draft is None
     with pytest.raises(TrackerError, match="expected other sizes of person"):
-        posed.sizing.apply(0, refit=True)
+        posed.body_sizes.apply(0, refit=True)
 
 
 def test_tracking_goes_on_in_the_new_body(placed, tracker):
     was = joints(placed, 2)
     lengthen(placed)
-    placed.sizing.apply(0, refit=False)
-    placed.track(backward=False, until=3)
+    placed.body_sizes.apply(0, refit=False)
+    placed.tracking.start(backward=False, until=3)
     tracker.let_go(1)
     wait_for(lambda: placed.state.track.message)
     assert placed.models == (placed.session.people[0].model,)
     assert placed.state.revisions == placed.state.present
     assert np.linalg.norm(joints(placed, 3) - was - (0.01, 0, 0), axis=1).max() < 0.01
-    placed.seek(2)
+    placed.navigation.seek(2)
     assert placed.state.revisions != placed.state.present
-    assert placed.poses(0, range(2, 4)).keys() == {2, 3}
+    assert placed.stored_poses.in_present_body(0, range(2, 4)).keys() == {2, 3}
 
 
 def test_a_drag_in_the_new_body_is_stored_with_it(posed):
     lengthen(posed)
-    posed.sizing.apply(0, refit=True)
+    posed.body_sizes.apply(0, refit=True)
     drag(posed, "left_wrist", (5.0, 5.0))
     shown = posed.state.poses[0]
-    posed.seek(0)
-    posed.seek(3)
+    posed.navigation.seek(0)
+    posed.navigation.seek(3)
     assert posed.state.revisions == posed.state.present
     np.testing.assert_array_equal(posed.state.poses[0], shown)
     assert pixel_of(posed, "left_wrist").shape == (2,)

@@ -16,7 +16,7 @@ def test_a_drag_moves_what_is_not_locked(opened):
     controller = opened()
     locked = dofs_of(controller, "left_shoulder")
     controller.pose_edits.set_dof(0, dofs_of(controller, "left_elbow")[0], 1.0)
-    controller.locks.set(0, locked, True)
+    controller.dof_locks.set(0, locked, True)
     before = controller.state.poses[0]
     drag(controller, "left_wrist", (0.0, -15.0))
     after = controller.state.poses[0]
@@ -26,14 +26,14 @@ def test_a_drag_moves_what_is_not_locked(opened):
 
 def test_a_point_whose_limb_is_locked_is_refused(opened):
     controller = opened()
-    controller.locks.set(0, dofs_of(controller, "left_shoulder", "left_elbow"), True)
+    controller.dof_locks.set(0, dofs_of(controller, "left_shoulder", "left_elbow"), True)
     before = controller.state.poses[0]
     with pytest.raises(TrackerError, match="left_wrist with all of that locked"):
-        controller.hand.begin_drag(PAGE, FRONT, 0, "left_wrist", tuple(pixel_of(controller, "left_wrist")))
-    controller.hand.move_drag(PAGE, (10.0, 10.0), 1)
-    controller.hand.end_drag(PAGE)
+        controller.dragging.begin(PAGE, FRONT, 0, "left_wrist", tuple(pixel_of(controller, "left_wrist")))
+    controller.dragging.move(PAGE, (10.0, 10.0), 1)
+    controller.dragging.end(PAGE)
     np.testing.assert_array_equal(controller.state.poses[0], before)
-    controller.locks.set(0, dofs_of(controller, "left_shoulder"), False)
+    controller.dof_locks.set(0, dofs_of(controller, "left_shoulder"), False)
     drag(controller, "left_wrist", (5.0, 0.0))
     assert controller.state.undo == "drag left wrist, frame 0"
 
@@ -41,7 +41,7 @@ def test_a_point_whose_limb_is_locked_is_refused(opened):
 def test_a_locked_body_stays_where_it_is(opened):
     controller = opened()
     depth = controller.models[0].dof_names.index("torso.x")
-    controller.locks.set(0, [depth], True)
+    controller.dof_locks.set(0, [depth], True)
     before = controller.state.poses[0]
     drag(controller, "torso", (40.0, 0.0))
     assert controller.state.poses[0][depth] == before[depth]
@@ -51,7 +51,7 @@ def test_a_locked_body_stays_where_it_is(opened):
 def test_a_locked_number_is_not_set(opened):
     controller = opened()
     (dof,) = dofs_of(controller, "left_elbow")
-    controller.locks.set(0, [dof], True)
+    controller.dof_locks.set(0, [dof], True)
     with pytest.raises(TrackerError, match="left elbow extension is locked"):
         controller.pose_edits.set_dof(0, dof, 0.4)
     assert controller.state.undo is None
@@ -61,12 +61,12 @@ def test_a_search_leaves_locked_degrees_of_freedom_alone(opened):
     controller = opened()
     drag(controller, "torso", (4.0, 0.0))
     locked = dofs_of(controller, "torso", "neck", "left_shoulder")
-    controller.locks.set(0, locked, True)
+    controller.dof_locks.set(0, locked, True)
     before = controller.state.poses[0]
-    controller.search_frame()
-    assert controller.state.job.stages[0].startswith("arms")
-    wait_for(lambda: controller.state.job.evaluations > 200 or controller.state.job.message)
-    controller.stop()
+    controller.search.run()
+    assert controller.state.search.stages[0].startswith("arms")
+    wait_for(lambda: controller.state.search.evaluations > 200 or controller.state.search.message)
+    controller.activities.stop()
     after = controller.state.poses[0]
     np.testing.assert_array_equal(after[locked], before[locked])
     assert not np.array_equal(after, before)
@@ -74,28 +74,28 @@ def test_a_search_leaves_locked_degrees_of_freedom_alone(opened):
 
 def test_a_tracking_run_is_told_what_is_locked(placed, tracker):
     locked = dofs_of(placed, "left_shoulder")
-    placed.locks.set(0, locked, True)
-    placed.track(backward=False, until=4)
+    placed.dof_locks.set(0, locked, True)
+    placed.tracking.start(backward=False, until=4)
     tracker.let_go(2)
     wait_for(lambda: placed.state.track.message)
-    (free,) = tracker.told["free"]
+    (free,) = tracker.run.subjects.active_dofs
     assert set(np.flatnonzero(~free)) == set(locked)
 
 
 def test_with_all_locked_a_search_says_so(opened):
     controller = opened()
-    controller.locks.set(0, range(controller.models[0].n_dofs), True)
+    controller.dof_locks.set(0, range(controller.models[0].n_dofs), True)
     with pytest.raises(TrackerError, match="everything locked"):
-        controller.search_frame()
-    assert controller.state.job.kind is None
+        controller.search.run()
+    assert controller.state.search.kind is None
 
 
 def test_locks_survive_a_restart_and_are_no_entry_of_the_history(opened):
     controller = opened()
     locked = frozenset(dofs_of(controller, "right_knee", "torso"))
-    controller.locks.set(0, locked, True)
+    controller.dof_locks.set(0, locked, True)
     assert controller.state.undo is None
     controller = opened()
     assert controller.state.locked == (locked,)
-    controller.locks.set(0, locked, False)
+    controller.dof_locks.set(0, locked, False)
     assert opened().state.locked == (frozenset(),)

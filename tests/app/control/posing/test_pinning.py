@@ -39,13 +39,13 @@ def test_a_pin_is_one_entry_and_leaves_the_pose_alone(opened, session):
     assert pins_of(controller) == {("left_wrist", FRONT): (200.25, 150.5)}
     assert controller.state.undo == "set pin left wrist in FRONT, frame 0"
     assert controller.state.point == "left_wrist"
-    assert not controller.state.holds_pin
+    assert not controller.state.is_pin_held
     assert controller.state.poses[0] is values
     assert controller.state.people[0].source is None  # the pose is still a draft
     assert [(p.point, p.camera) for p in stored_pins(session)] == [("left_wrist", "FRONT")]
-    controller.undo()
+    controller.history.undo()
     assert (pins_of(controller), stored_pins(session)) == ({}, [])
-    controller.redo()
+    controller.history.redo()
     assert pins_of(controller) == {("left_wrist", FRONT): (200.25, 150.5)}
 
 
@@ -69,20 +69,20 @@ def test_pins_and_their_history_outlast_a_restart(opened):
     pin(controller, "left_wrist", (210.0, 160.0), camera=RIGHT)
     pin(controller, "left_wrist", (200.0, 150.0), to_px=(230.0, 170.0))
     assert controller.state.undo == "move pin left wrist in FRONT, frame 0"
-    controller.seek(3)
+    controller.navigation.seek(3)
     assert pins_of(controller) == {}
     controller = opened()
     assert pins_of(controller) == {("left_wrist", FRONT): (230.0, 170.0), ("left_wrist", RIGHT): (210.0, 160.0)}
-    controller.seek(3)
-    controller.undo()
+    controller.navigation.seek(3)
+    controller.history.undo()
     assert controller.state.frame == 0  # where the pin is that was taken back
     assert pins_of(controller)["left_wrist", FRONT] == (200.0, 150.0)
-    controller.undo()
-    controller.undo()
+    controller.history.undo()
+    controller.history.undo()
     assert pins_of(controller) == {}
     controller = opened()
     for _ in range(3):
-        controller.redo()
+        controller.history.redo()
     assert pins_of(controller)["left_wrist", FRONT] == (230.0, 170.0)
 
 
@@ -96,11 +96,11 @@ def test_pins_are_removed_one_by_one_by_joint_or_all(opened, session):
     assert len(stored_pins(session)) == len(pins_of(controller)) == 3
     controller.pinning.remove(0, 0, "head")
     assert set(pins_of(controller)) == {("left_wrist", FRONT)}
-    controller.undo()
+    controller.history.undo()
     controller.pinning.remove(0, 0)
     assert controller.state.undo == "remove all pins, frame 0"
     assert (pins_of(controller), stored_pins(session)) == ({}, [])
-    controller.undo()
+    controller.history.undo()
     assert len(pins_of(controller)) == 3
     controller.pinning.remove(0, 0, "right_knee")  # has none: nothing happens
     assert controller.state.undo == "remove pin left wrist in RIGHT, frame 0"
@@ -115,10 +115,10 @@ def test_the_body_follows_a_live_pin_in_one_entry(opened, session):
     assert np.linalg.norm(pixel_of(controller, "left_wrist") - start - (30.0, -20.0)) < 6
     assert controller.state.undo == "set pin left wrist in FRONT, frame 0"
     assert controller.state.people[0].source == "pinned"
-    controller.undo()
+    controller.history.undo()
     np.testing.assert_array_equal(controller.state.poses[0], before.values)
     assert pins_of(controller) == {}
-    controller.redo()
+    controller.history.redo()
     assert np.linalg.norm(pixel_of(controller, "left_wrist") - start - (30.0, -20.0)) < 6
     assert len(stored_pins(session)) == 1
 
@@ -150,7 +150,7 @@ def test_a_cancelled_pin_leaves_nothing(opened, session, monkeypatch, checkpoint
     np.testing.assert_array_equal(controller.state.poses[0], values)
     assert (pins_of(controller), stored_pins(session)) == ({}, [])
     assert controller.state.undo == "drag torso, frame 0"
-    assert not controller.state.holds_pin
+    assert not controller.state.is_pin_held
 
 
 def test_another_page_cannot_move_what_this_one_holds(opened):
@@ -158,7 +158,7 @@ def test_another_page_cannot_move_what_this_one_holds(opened):
     controller.pinning.begin(PAGE, 0, FRONT, 0, "head", (100.0, 100.0), False)
     controller.pinning.move(PAGE + 1, (200.0, 200.0))
     controller.pinning.end(PAGE + 1)
-    assert controller.state.holds_pin
+    assert controller.state.is_pin_held
     assert pins_of(controller) == {("head", FRONT): (100.0, 100.0)}
 
 
@@ -168,12 +168,12 @@ def test_whatever_comes_in_between_ends_and_saves_the_gesture(opened, session, i
     drag(controller, "torso", (4.0, 0.0))
     controller.pinning.begin(PAGE, 0, FRONT, 0, "head", (100.0, 100.0), False)
     {
-        "seek": lambda: controller.seek(3),
+        "seek": lambda: controller.navigation.seek(3),
         "drag": lambda: drag(controller, "left_knee", (3.0, 3.0)),
-        "undo": controller.undo,
+        "undo": controller.history.undo,
         "fit": lambda: controller.pinning.fit(0),
     }[interruption]()
-    assert not controller.state.holds_pin
+    assert not controller.state.is_pin_held
     assert len(stored_pins(session)) == (interruption != "undo")
     controller.pinning.move(PAGE, (200.0, 200.0))  # too late
     assert ("head", FRONT) not in pins_of(controller) or pins_of(controller)["head", FRONT] == (100.0, 100.0)
@@ -217,12 +217,12 @@ def test_fit_without_pins_is_to_the_edges(opened):
     assert controller.state.undo == "fit to edges, frame 0"
     assert controller.state.people[0].source == "fitted"
     assert controller.state.cost_px < cost_px
-    assert controller.timeline()[0]["keyframe"]  # a person asked for it
+    assert controller.stored_poses.timeline()[0]["keyframe"]  # a person asked for it
 
 
 def test_fit_without_edges_is_to_the_pins(opened, monkeypatch):
     controller = opened()
-    monkeypatch.setattr(controller.frames, "evidence_at_hand", lambda _: None)
+    monkeypatch.setattr(controller.frames, "cached_evidence", lambda _: None)
     with pytest.raises(TrackerError, match="no pin on this frame"):
         controller.pinning.fit(0)
     target = pixel_of(controller, "left_wrist") + np.array([20.0, -10.0])
@@ -238,7 +238,7 @@ def test_fit_leaves_locked_degrees_of_freedom_alone(opened):
     locked = [
         i for i, n in enumerate(controller.models[0].dof_names) if n.startswith(("left_shoulder", "root", "right"))
     ]
-    controller.locks.set(0, locked, True)
+    controller.dof_locks.set(0, locked, True)
     before = controller.state.poses[0]
     pin(controller, "left_wrist", pixel_of(controller, "left_wrist") + 30.0)
     controller.pinning.fit(0)
@@ -271,9 +271,9 @@ def test_a_live_pin_costs_a_few_steps_of_the_solver_a_move(opened, monkeypatch):
 def test_pins_belong_to_the_frame_that_a_tracker_shows(placed, tracker):
     controller = placed
     pin(controller, "head", (100.0, 100.0))
-    controller.track(False, 4)
+    controller.tracking.start(False, 4)
     tracker.let_go(1000)
     wait_for(lambda: controller.state.frame == 4 and not controller.state.track.running)
     assert pins_of(controller) == {}
-    controller.seek(2)
+    controller.navigation.seek(2)
     assert pins_of(controller) == {("head", FRONT): (100.0, 100.0)}

@@ -38,12 +38,12 @@ def test_nudges_in_quick_succession_are_one_entry(opened, monkeypatch):
     for _ in range(5):
         controller.pose_edits.nudge(0, LEFT_WRIST, FRONT, 0.01, 0.0)
     assert controller.state.undo == "nudge left wrist, frame 0"
-    controller.undo()
+    controller.history.undo()
     assert controller.state.undo is None
     for _ in range(2):
         controller.pose_edits.nudge(0, LEFT_WRIST, FRONT, 0.01, 0.0)
         monkeypatch.setattr("app.control.posing.pose_edits._SAME_GESTURE_S", 0.0)
-    controller.undo()
+    controller.history.undo()
     assert controller.state.undo == "nudge left wrist, frame 0"  # another second, another entry
 
 
@@ -75,8 +75,8 @@ def test_mirror_and_back(opened):
     assert np.abs(controller.models[0].points_world(controller.state.poses[0]) - before).max() > 0.1
     controller.pose_edits.mirror(0)
     np.testing.assert_allclose(controller.models[0].points_world(controller.state.poses[0]), before, atol=1e-9)
-    controller.undo()
-    controller.undo()
+    controller.history.undo()
+    controller.history.undo()
     assert controller.state.undo == "drag left wrist, frame 0"
 
 
@@ -84,10 +84,10 @@ def test_a_pose_is_copied_and_locks_hold(opened):
     controller = opened()
     drag(controller, LEFT_WRIST, (25.0, -25.0))
     model, source = controller.models[0], controller.state.poses[0]
-    controller.seek(5)
+    controller.navigation.seek(5)
     controller.pose_edits.reset(0, None)
     locked = [i for i, name in enumerate(model.dof_names) if name.startswith("left_elbow")]
-    controller.locks.set(0, locked, True)
+    controller.dof_locks.set(0, locked, True)
     before = controller.state.poses[0]
     controller.pose_edits.copy_from(0, 0)
     free = np.setdiff1d(np.arange(model.n_dofs), locked)
@@ -119,7 +119,7 @@ def test_a_limb_is_reset_alone(opened):
 def test_nudging_what_is_locked_says_so(opened):
     controller = opened()
     model = controller.models[0]
-    controller.locks.set(0, range(model.n_dofs), True)
+    controller.dof_locks.set(0, range(model.n_dofs), True)
     with pytest.raises(TrackerError, match="locked"):
         controller.pose_edits.nudge(0, LEFT_WRIST, FRONT, 0.01, 0.0)
     with pytest.raises(TrackerError, match="left elbow extension is locked"):

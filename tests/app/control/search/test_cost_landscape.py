@@ -28,7 +28,7 @@ def test_it_is_what_the_cost_says_one_by_one(opened, name):
         pose[dof] = found.values[i]
         one = cost((pose,))
         assert found.totals_px[i] == pytest.approx(one.total_px, rel=1e-9)
-        np.testing.assert_allclose(found.views_px[i], one.views_px, rtol=1e-9)
+        np.testing.assert_allclose(found.view_costs_px[i], one.view_costs_px, rtol=1e-9)
     assert found.current_px == pytest.approx(state.cost_px)
 
 
@@ -36,15 +36,15 @@ def test_it_follows_the_pose_while_a_page_looks(opened):
     controller = opened()
     drag(controller, "torso", (4.0, 0.0))
     assert controller.state.landscape is None  # nobody looks
-    controller.landscape.watch(7, True)
-    controller.landscape.choose("left_elbow.extension")
+    controller.cost_landscape.watch(7, True)
+    controller.cost_landscape.choose("left_elbow.extension")
     dof = controller.models[0].dof_names.index("left_elbow.extension")
     wait_for(lambda: controller.state.landscape is not None and controller.state.landscape.dof == dof)
     controller.pose_edits.set_dof(0, dof, 0.5)
     wait_for(lambda: controller.state.landscape.current == pytest.approx(0.5))
-    controller.landscape.watch(7, False)
+    controller.cost_landscape.watch(7, False)
     controller.pose_edits.set_dof(0, dof, 0.9)
-    controller.seek(1)
+    controller.navigation.seek(1)
     assert controller.state.landscape.current == pytest.approx(0.5)
 
 
@@ -52,15 +52,15 @@ def test_a_value_is_set_as_an_edit(opened):
     controller = opened()
     dof = controller.models[0].dof_names.index("left_elbow.extension")
     before = controller.state.poses[0][dof]
-    controller.landscape.set_value(0, dof, 0.4)
+    controller.cost_landscape.set_value(0, dof, 0.4)
     assert controller.state.poses[0][dof] == pytest.approx(0.4)
     assert controller.state.undo == "set left elbow extension, frame 0"
-    controller.undo()
+    controller.history.undo()
     assert controller.state.poses[0][dof] == before
-    controller.locks.set(0, [dof], True)
+    controller.dof_locks.set(0, [dof], True)
     with pytest.raises(TrackerError, match="unlock it first"):
-        controller.landscape.set_value(0, dof, 0.4)
+        controller.cost_landscape.set_value(0, dof, 0.4)
     with pytest.raises(TrackerError, match="found another"):
-        controller.landscape.set_value(0, 0, float("nan"))
+        controller.cost_landscape.set_value(0, 0, float("nan"))
     with pytest.raises(TrackerError, match="choose one from the list"):
-        controller.landscape.choose("tail.wag")
+        controller.cost_landscape.choose("tail.wag")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.control.search import search_runs
-from app.control.search.search_runs import Run, Runs
+from app.control.search.search_runs import SearchRun, SearchRuns
 from tracker.formats.model_toml import load_model
 from tracker.search.best_first import SearchStep
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -20,7 +20,7 @@ def step_of(run, stage, px, best_px, evaluations, done=False, shift_m=0.0):
 
 
 def begun():
-    return Run(1, 0, [MODEL], (START,), 9.0, TrackSettings())
+    return SearchRun(1, 0, [MODEL], (START,), 9.0, TrackSettings())
 
 
 def test_long_searches_are_thinned_and_keep_what_matters(monkeypatch):
@@ -56,7 +56,7 @@ def test_candidates_differ_and_the_best_of_those_alike_is_kept():
 
 
 def test_few_runs_of_few_frames_are_kept():
-    kept = Runs()
+    kept = SearchRuns()
     for frame in range(20):
         for _ in range(9):
             kept.begin(frame, [MODEL], (START,), 1.0, TrackSettings())

@@ -15,25 +15,25 @@ QUICK = TrackSettings(search=SearchSettings(passes=(1.0,), max_expansions=3))
 
 def searched(controller, settings=QUICK):
     """Search the shown frame to its end; gives the run."""
-    controller.set_settings(settings)
-    controller.search_frame()
-    wait_for(lambda: controller.state.job.message)
-    with controller.locked():  # its last words and its saving are under one lock
+    controller.search.set_settings(settings)
+    controller.search.run()
+    wait_for(lambda: controller.state.search.message)
+    with controller.lock:  # its last words and its saving are under one lock
         return controller.replay.runs()[-1]
 
 
 def test_a_stage_ends_where_the_next_begins_and_goes_on_from_there(opened):
     controller = opened()
-    controller.set_settings(QUICK)
+    controller.search.set_settings(QUICK)
     ends = []
     for stage in range(2):
-        controller.search_stage()
+        controller.search.run_stage()
         run = controller.replay.runs()[-1]
-        wait_for(lambda r=run, s=stage: r.counts[s].done and not controller.state.job.running)
+        wait_for(lambda r=run, s=stage: r.counts[s].done and not controller.state.search.running)
         ends.append(run.evaluations)
         assert [count.done for count in run.counts] == [i <= stage for i in range(3)]
         assert run.counts[stage + 1].expansions == 0
-    assert controller.state.job.kind == "search"  # it stands
+    assert controller.state.search.kind == "search"  # it stands
     assert ends == [sum(c.evaluations for c in run.counts[: i + 1]) for i in range(2)]
     assert run.start_px - run.best_px == pytest.approx(sum(c.gain_px for c in run.counts))
     assert len(controller.replay.runs()) == 1
@@ -41,16 +41,16 @@ def test_a_stage_ends_where_the_next_begins_and_goes_on_from_there(opened):
 
 def test_the_speed_is_kept_and_a_change_takes_effect_at_once(opened):
     controller = opened()
-    controller.set_settings(QUICK)
-    controller.pace_search(0.05)  # one expansion in 20 s
-    controller.search_frame()
+    controller.search.set_settings(QUICK)
+    controller.search.set_speed(0.05)  # one expansion in 20 s
+    controller.search.run()
     wait_for(lambda: controller.replay.runs() and controller.replay.runs()[-1].steps)
     time.sleep(0.3)
     assert len(controller.replay.runs()[-1].steps) == 1
-    controller.pace_search(None)
-    wait_for(lambda: controller.state.job.message, 15.0)
+    controller.search.set_speed(None)
+    wait_for(lambda: controller.state.search.message, 15.0)
     with pytest.raises(TrackerError, match="expected a speed above 0"):
-        controller.pace_search(0.0)
+        controller.search.set_speed(0.0)
 
 
 def test_a_replay_shows_every_step_and_changes_nothing(opened):
@@ -63,11 +63,11 @@ def test_a_replay_shows_every_step_and_changes_nothing(opened):
         expected = run.start[0] if step < 0 else kept.best
         np.testing.assert_allclose(drawn.poses[0], expected, atol=1e-6)
         assert drawn.cost_px == pytest.approx(run.start_px if step < 0 else kept.best_px)
-        assert (drawn.job.candidate is None) == (step < 0)
+        assert (drawn.search.candidate is None) == (step < 0)
         assert controller.state.people is true
     np.testing.assert_allclose(drawn.poses[0], controller.state.poses[0], atol=1e-6)
     controller.replay.show(run.number, 10**6)  # beyond the last is the last
-    assert controller.state.look.replay.step == len(run.steps) - 1
+    assert controller.state.search_view.replay.step == len(run.steps) - 1
     controller.replay.leave()
     assert controller.state.drawn is controller.state
     assert (controller.state.undo, controller.state.timeline_version) == (undo, version)
@@ -80,18 +80,18 @@ def test_whatever_happens_to_the_frame_ends_the_replay(opened, what):
     controller.replay.show(run.number, 0)
     {
         "drag": lambda: drag(controller, "left_knee", (3.0, 3.0)),
-        "seek": lambda: controller.seek(3),
-        "step": controller.search_step,
-        "undo": controller.undo,
+        "seek": lambda: controller.navigation.seek(3),
+        "step": controller.search.step,
+        "undo": controller.history.undo,
     }[what]()
-    assert controller.state.look.replay is None
+    assert controller.state.search_view.replay is None
 
 
 def test_a_run_is_compared_with_one_by_other_settings_and_taken_back(opened):
     controller = opened()
     first = searched(controller)
-    controller.set_settings(TrackSettings(theta_px=8.0, search=QUICK.search))
-    controller.search_again()
+    controller.search.set_settings(TrackSettings(theta_px=8.0, search=QUICK.search))
+    controller.search.run_again()
     second = controller.replay.runs()[-1]
     wait_for(lambda: second.over)
     assert second.number != first.number
@@ -99,17 +99,17 @@ def test_a_run_is_compared_with_one_by_other_settings_and_taken_back(opened):
     assert not np.array_equal(second.best[0], first.best[0])
     np.testing.assert_array_equal(controller.state.poses[0], second.best[0])
     controller.replay.compare(first.number)
-    np.testing.assert_array_equal(controller.state.look.compared[0], first.best[0])
+    np.testing.assert_array_equal(controller.state.search_view.compared[0], first.best[0])
     controller.replay.take(first.number, None)
     np.testing.assert_array_equal(controller.state.poses[0], first.best[0])
     assert controller.state.undo == f"take run {first.number}, frame 0"
-    controller.undo()
+    controller.history.undo()
     np.testing.assert_array_equal(controller.state.poses[0], second.best[0])
-    controller.seek(1)
-    assert controller.state.look.compared is None
-    with pytest.raises(TrackerError, match="expected a run of frame 1"):
+    controller.navigation.seek(1)
+    assert controller.state.search_view.compared is None
+    with pytest.raises(TrackerError, match="expected a recorded run of frame 1"):
         controller.replay.show(first.number, 0)
-    controller.seek(0)
+    controller.navigation.seek(0)
     assert [r.number for r in controller.replay.runs()] == [first.number, second.number]
 
 
@@ -122,9 +122,9 @@ def test_a_candidate_is_previewed_and_taken(opened):
     assert costs[0] == pytest.approx(run.best_px)
     before = controller.state.people
     controller.replay.preview(run.number, 1)
-    assert controller.state.look.preview is run.candidates[1].poses
+    assert controller.state.search_view.preview is run.candidates[1].poses
     controller.replay.preview(run.number, 99)
-    assert controller.state.look.preview is None
+    assert controller.state.search_view.preview is None
     assert controller.state.people is before
     controller.replay.take(run.number, 1)
     np.testing.assert_array_equal(controller.state.poses[0], run.candidates[1].poses[0])
@@ -138,11 +138,11 @@ def test_what_is_locked_stays_in_a_run_again_and_in_what_is_taken(opened):
     dof = model.dof_names.index("left_shoulder.abduction")
     run = searched(controller)
     controller.pose_edits.set_dof(0, dof, 0.7)
-    controller.locks.set(0, [dof], True)
+    controller.dof_locks.set(0, [dof], True)
     controller.replay.take(run.number, None)
     assert controller.state.poses[0][dof] == pytest.approx(0.7)
     assert controller.state.poses[0][0] == run.best[0][0]
-    controller.search_again(run.number)
+    controller.search.run_again(run.number)
     again = controller.replay.runs()[-1]
     wait_for(lambda: again.over)
     assert again.best[0][dof] == pytest.approx(0.7)

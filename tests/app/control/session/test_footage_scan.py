@@ -6,8 +6,8 @@ import pytest
 from gestures import wait_for
 
 from app.control.controller import Controller
-from app.session.frame_cache import Frames
-from app.state.state import FootageState
+from app.session.frame_cache import FrameCache
+from app.state.progress import FootageState
 from app.storage.saver import Saver
 from tracker.errors import RecordingError, TrackerError
 from tracker.evidence.observer import Observer
@@ -40,7 +40,7 @@ def fresh(session, gate):
     loaded = load_session(session)
     with Recording(loaded.cameras, in_background=True) as recording:
         store = AnnotationStore(loaded.annotations_path)
-        controller = Controller(loaded, Saver(loaded, store), Frames(Observer(loaded.cameras, recording)))
+        controller = Controller(loaded, Saver(loaded, store), FrameCache(Observer(loaded.cameras, recording)))
         yield controller
         gate.set()
         controller.close()
@@ -52,14 +52,14 @@ def test_what_is_listed_is_shown_and_the_rest_follows(fresh, gate):
     assert 0 < fresh.state.footage.listed < 1
     assert fresh.frames.listed(0)
     last = fresh.session.n_frames - 1
-    fresh.seek(last)
+    fresh.navigation.seek(last)
     assert fresh.state.frame == last
     assert not fresh.frames.listed(last)
     with pytest.raises(TrackerError, match="is being indexed"):
         fresh.frames.evidence(last)
-    fresh.seek(3)  # nothing waits for the other frame
+    fresh.navigation.seek(3)  # nothing waits for the other frame
     wait_for(lambda: fresh.state.cost_px is not None)
-    fresh.seek(last)
+    fresh.navigation.seek(last)
     gate.set()
     wait_for(lambda: fresh.state.cost_px is not None)
     assert fresh.state.frame == last
@@ -74,7 +74,7 @@ def test_what_is_wrong_with_a_file_is_said_when_it_comes_out(session, monkeypatc
     loaded = load_session(session)
     with Recording(loaded.cameras, in_background=True) as recording:
         store = AnnotationStore(loaded.annotations_path)
-        controller = Controller(loaded, Saver(loaded, store), Frames(Observer(loaded.cameras, recording)))
+        controller = Controller(loaded, Saver(loaded, store), FrameCache(Observer(loaded.cameras, recording)))
         wait_for(lambda: controller.state.footage.error is not None)
         assert "is truncated; copy it again" in controller.state.footage.error
         controller.close()

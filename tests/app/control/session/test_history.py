@@ -30,7 +30,7 @@ def edited(opened):
     """A controller with five edits on as many frames."""
     controller = opened()
     for frame in range(5):
-        controller.seek(frame)
+        controller.navigation.seek(frame)
         drag(controller, "torso", (5.0 + frame, 0.0))
     return controller
 
@@ -40,12 +40,12 @@ def test_the_history_can_be_gone_along_to_any_entry(edited):
     assert [e.label for e in entries] == [f"drag torso, frame {k}" for k in (4, 3, 2, 1, 0)]
     edited.history.go_to(entries[3].edit)
     assert labels(edited) == [(f"drag torso, frame {k}", k > 1) for k in (4, 3, 2, 1, 0)]
-    assert set(edited.timeline()) == {0, 1}
+    assert set(edited.stored_poses.timeline()) == {0, 1}
     assert edited.state.frame == 4  # the nearest frame that changed
     edited.history.go_to(entries[0].edit)
-    assert set(edited.timeline()) == {0, 1, 2, 3, 4}
+    assert set(edited.stored_poses.timeline()) == {0, 1, 2, 3, 4}
     edited.history.go_to(None)
-    assert set(edited.timeline()) == set()
+    assert set(edited.stored_poses.timeline()) == set()
     assert edited.state.redo == "drag torso, frame 0"
     with pytest.raises(SessionError, match="cannot be reached"):
         edited.history.go_to(987)
@@ -57,24 +57,24 @@ def test_the_history_lives_on_after_a_restart(edited, opened):
     assert labels(controller)[2] == ("drag torso, frame 2", False)
     assert labels(controller)[1] == ("drag torso, frame 3", True)
     controller.history.go_to(controller.history.entries(100)[0].edit)
-    assert set(controller.timeline()) == {0, 1, 2, 3, 4}
+    assert set(controller.stored_poses.timeline()) == {0, 1, 2, 3, 4}
 
 
 def test_what_a_full_disk_refuses_is_shown_waits_and_is_saved_by_hand(edited, opened):
     with full_disk():
-        edited.seek(6)
+        edited.navigation.seek(6)
         drag(edited, "torso", (30.0, 0.0))
         moved = edited.state.poses[0]
         edited.pinning.begin(1, 6, 0, 0, "left_wrist", (200.0, 200.0), False)
         edited.pinning.end(1)
         assert "check the disk" in edited.state.save_error
-        edited.seek(2)
+        edited.navigation.seek(2)
         drag(edited, "torso", (30.0, 0.0))
-        edited.seek(6)
+        edited.navigation.seek(6)
         assert np.array_equal(edited.state.poses[0], moved)
         assert len(edited.state.pins[0]) == 1
         with pytest.raises(SessionError, match="not saved"):
-            edited.undo()
+            edited.history.undo()
         edited.history.save()
         assert edited.state.save_error is not None
     edited.history.save()
@@ -83,7 +83,7 @@ def test_what_a_full_disk_refuses_is_shown_waits_and_is_saved_by_hand(edited, op
         "drag torso, frame 2", "set pin left wrist in FRONT, frame 6", "drag torso, frame 6",
     ]  # fmt: skip
     controller = opened()
-    controller.seek(6)
+    controller.navigation.seek(6)
     assert np.array_equal(controller.state.poses[0], moved)
     assert len(controller.state.pins[0]) == 1
 
@@ -91,7 +91,7 @@ def test_what_a_full_disk_refuses_is_shown_waits_and_is_saved_by_hand(edited, op
 def test_a_gesture_that_goes_on_after_the_disk_has_room_is_one_entry(edited):
     pixel = (200.0, 200.0)
     for frame in (8, 7):  # the first has the kernels compiled, whose cache wants a disk too
-        edited.seek(frame)
+        edited.navigation.seek(frame)
         edited.pinning.begin(1, frame, 0, 0, "left_wrist", pixel, True)
         edited.pinning.move(1, (210.0, 205.0))
         edited.pinning.end(1)

@@ -12,7 +12,7 @@ from gestures import wait_for
 
 from app.bench import compile_kernels
 from app.control.session.kernel_warmup import Compiling
-from app.control.session.session_state import Screen
+from app.control.session.session_state import SessionState
 from tracker.compute.kernel_cache import compiled_mark
 
 WAITS = (sys.executable, "-c", "import time; time.sleep(100)")
@@ -27,8 +27,8 @@ def empty_cache(monkeypatch, tmp_path):
 
 
 @pytest.fixture
-def screen(opened) -> Screen:
-    screen = opened()._screen
+def screen(opened) -> SessionState:
+    screen = opened()._session_state
     wait_for(lambda: screen.state.cost_px is not None)
     return screen
 

@@ -14,15 +14,17 @@ from tracker.store.annotation_store import AnnotationStore
 def two_keys(opened):
     """A controller whose body stands on frames 2 and 12."""
     controller = opened()
-    controller.seek(2)
+    controller.navigation.seek(2)
     drag(controller, "torso", (4.0, 0.0))
-    controller.seek(12)
+    controller.navigation.seek(12)
     drag(controller, "left_wrist", (40.0, -60.0))
     return controller
 
 
 def cells(controller):
-    return {frame: (c["source"], c["keyframe"], c["reviewed"]) for frame, c in controller.timeline().items()}
+    return {
+        frame: (c["source"], c["keyframe"], c["reviewed"]) for frame, c in controller.stored_poses.timeline().items()
+    }
 
 
 def stored(session, frame):
@@ -44,14 +46,14 @@ def test_interpolating_fills_between_the_ends_as_one_entry(two_keys, session):
     truth = interpolate_pose(model, ends[0].values, ends[1].values, np.array([0.3]))[0]
     np.testing.assert_allclose(stored(session, 5).values, truth)
     assert stored(session, 5).settings == {"method": "interpolate", "between": [2, 12]}
-    two_keys.undo()
+    two_keys.history.undo()
     assert set(cells(two_keys)) == {2, 12}
-    two_keys.redo()
+    two_keys.history.redo()
     assert len(cells(two_keys)) == 11
 
 
 def test_keyframes_within_are_passed_through_and_stay(two_keys, session):
-    two_keys.seek(6)
+    two_keys.navigation.seek(6)
     drag(two_keys, "right_wrist", (-30.0, -30.0))
     before = stored(session, 6)
     two_keys.ranges.interpolate(12, 2)  # whichever way round it is said
@@ -83,7 +85,7 @@ def test_clearing_leaves_keyframes(two_keys):
     assert two_keys.state.undo == "clear frames 0 to 8"
     with pytest.raises(TrackerError, match="no keyframes"):
         two_keys.ranges.clear(0, 8)
-    two_keys.undo()
+    two_keys.history.undo()
     assert len(cells(two_keys)) == 11
 
 
@@ -102,7 +104,7 @@ def test_marks_of_a_range(two_keys, session):
     two_keys.ranges.mark(2, 12, "none")
     assert not any(key or seen for _, key, seen in cells(two_keys).values())
     for _ in range(4):
-        two_keys.undo()
+        two_keys.history.undo()
     assert [f for f, (_, key, _) in sorted(cells(two_keys).items()) if key] == [2, 12]
     with pytest.raises(TrackerError, match="to mark"):
         two_keys.ranges.mark(20, 30, "reviewed")
@@ -110,7 +112,7 @@ def test_marks_of_a_range(two_keys, session):
 
 def test_verifying_the_shown_frame_and_taking_it_back(two_keys):
     two_keys.ranges.interpolate(2, 12)
-    two_keys.seek(7)
+    two_keys.navigation.seek(7)
     two_keys.ranges.toggle_reviewed()
     assert cells(two_keys)[7] == ("interpolated", False, True)
     two_keys.ranges.toggle_keyframe()
@@ -122,7 +124,7 @@ def test_verifying_the_shown_frame_and_taking_it_back(two_keys):
 
 
 def test_verifying_a_draft_stores_it(two_keys, session):
-    two_keys.seek(30)
+    two_keys.navigation.seek(30)
     assert two_keys.state.people[0].source is None
     shown = two_keys.state.poses[0]
     two_keys.ranges.toggle_keyframe()
@@ -132,21 +134,21 @@ def test_verifying_a_draft_stores_it(two_keys, session):
 
 
 def test_a_verified_frame_stays_when_a_program_comes_by(placed, tracker):
-    placed.seek(2)
-    placed.track(backward=False, until=6)
+    placed.navigation.seek(2)
+    placed.tracking.start(backward=False, until=6)
     tracker.let_go(10)
     wait_for(lambda: placed.state.track.first is None)
-    placed.seek(5)
+    placed.navigation.seek(5)
     placed.ranges.toggle_keyframe()
     placed.ranges.track(2, 8, backward=False)
-    wait_for(lambda: tracker.told["frames"] == range(3, 9))
-    assert set(tracker.told["fixed"]) == {5}
+    wait_for(lambda: tracker.run and tracker.run.frames == range(3, 9))
+    assert set(tracker.run.subjects.keyframes) == {5}
     tracker.let_go(20)
     wait_for(lambda: placed.state.track.first is None)
     assert cells(placed)[5] == ("tracked", True, True)
     placed.ranges.track(2, 8, backward=True)
     assert placed.state.frame == 8
-    wait_for(lambda: tracker.told["frames"] == range(7, 1, -1))
+    wait_for(lambda: tracker.run and tracker.run.frames == range(7, 1, -1))
     tracker.let_go(20)
     wait_for(lambda: placed.state.track.first is None)
 
@@ -159,12 +161,12 @@ def test_long_work_is_watched_and_stopped_as_one_entry(two_keys, monkeypatch):
     wait_for(lambda: not two_keys.state.ranges.running)
     assert any(r.running and r.what == "interpolating" and 0 < r.done < r.total == 9 for r in seen)
     assert len(cells(two_keys)) == 11
-    two_keys.undo()
+    two_keys.history.undo()
     assert set(cells(two_keys)) == {2, 12}
     two_keys.ranges.interpolate(2, 12)
-    two_keys.seek(4)  # looking around does not stop it
+    two_keys.navigation.seek(4)  # looking around does not stop it
     wait_for(lambda: len(cells(two_keys)) > 2)
-    two_keys.undo()  # taking back what it stands on does
+    two_keys.history.undo()  # taking back what it stands on does
     assert set(cells(two_keys)) == {2, 12}
     assert not two_keys.state.ranges.running
 
@@ -172,9 +174,9 @@ def test_long_work_is_watched_and_stopped_as_one_entry(two_keys, monkeypatch):
 def test_a_frame_that_jumps_is_named_and_no_longer_once_it_is_mended(two_keys):
     two_keys.ranges.interpolate(2, 12)
     assert two_keys.state.disagreeing == ()
-    two_keys.seek(7)
+    two_keys.navigation.seek(7)
     drag(two_keys, "torso", (120.0, 0.0))
     wait_for(lambda: two_keys.state.disagreeing)
     assert set(two_keys.state.disagreeing) <= {6, 7, 8}
-    two_keys.undo()
+    two_keys.history.undo()
     wait_for(lambda: not two_keys.state.disagreeing)

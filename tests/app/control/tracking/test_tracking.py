@@ -19,7 +19,7 @@ def at(controller, frame):
 
 
 def end_the_step_soon(tracker):
-    """Whoever stops a run waits for the step at hand."""
+    """To stop a run waits for the current step."""
     threading.Timer(0.2, tracker.let_go, (1,)).start()
 
 
@@ -29,15 +29,15 @@ def x_of(controller):
 
 def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, session):
     start = x_of(placed)
-    placed.track(backward=False, until=9)
+    placed.tracking.start(backward=False, until=9)
     assert placed.state.track.running
     assert (placed.state.track.first, placed.state.track.last, placed.state.track.total) == (3, 9, 7)
     tracker.let_go(2)
     wait_for(at(placed, 4))
     shown = placed.state.people[0]
     assert placed.state.frame == 4
-    assert (shown.source, shown.status, shown.remark) == ("tracked", "doubtful", "left arm searched anew")
-    assert shown.parts_px == (0.5,) * 9 + (None,)
+    assert (shown.source, shown.status, shown.remark) == ("tracked", "doubtful", "left arm relocated")
+    assert shown.part_costs_px == (0.5,) * 9 + (None,)
     assert (placed.state.cost_px, placed.state.view_costs_px) == (pytest.approx(1.4), (1.0, None, 2.0, 3.0))
     assert x_of(placed) == pytest.approx(start + 2 * STEP_M)
     tracker.let_go(5)
@@ -51,16 +51,20 @@ def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, sess
         (6, "tracked", "good"), (7, "tracked", "lost"), (8, "tracked", "good"), (9, "tracked", "good"),
     ]  # fmt: skip
     record = store.pose("person", 4)
-    assert (record.view_costs_px, record.part_costs_px, record.remark) == (shown_costs(), shown.parts_px, shown.remark)
+    assert (record.view_costs_px, record.part_costs_px, record.remark) == (
+        shown_costs(),
+        shown.part_costs_px,
+        shown.remark,
+    )
     assert record.settings["method"]
     store.close()
-    assert placed.timeline()[4] == {
+    assert placed.stored_poses.timeline()[4] == {
         "source": "tracked", "cost_px": 1.4, "keyframe": False, "status": "doubtful", "remark": shown.remark,
         "reviewed": False,
         "ambiguous": False,
     }  # fmt: skip
-    placed.undo()
-    assert set(placed.timeline()) == {2}
+    placed.history.undo()
+    assert set(placed.stored_poses.timeline()) == {2}
     assert placed.state.redo == "track forward from frame 3"
 
 
@@ -69,7 +73,7 @@ def shown_costs():
 
 
 def test_backward_runs_to_the_first_frame(placed, tracker):
-    placed.track(backward=True, until=None)
+    placed.tracking.start(backward=True, until=None)
     tracker.let_go(2)
     wait_for(lambda: placed.state.track.message)
     assert tracker.seen == [1, 0]
@@ -78,20 +82,20 @@ def test_backward_runs_to_the_first_frame(placed, tracker):
 
 
 def test_a_draft_is_tracked_itself(placed, tracker):
-    placed.seek(5)
+    placed.navigation.seek(5)
     assert placed.state.people[0].source is None
-    placed.track(backward=False, until=6)
+    placed.tracking.start(backward=False, until=6)
     tracker.let_go(2)
     wait_for(lambda: placed.state.track.message)
     assert tracker.seen == [5, 6]
 
 
 def test_keyframes_are_taken_as_they_are(placed, tracker):
-    placed.seek(4)
+    placed.navigation.seek(4)
     drag(placed, "torso", (0.0, 9.0))
     keyframe = placed.state.poses[0]
-    placed.seek(2)
-    placed.track(backward=False, until=5)
+    placed.navigation.seek(2)
+    placed.tracking.start(backward=False, until=5)
     np.testing.assert_array_equal(tracker_fixed(placed, tracker)[4][0], keyframe)
     tracker.let_go(2)
     wait_for(at(placed, 4))
@@ -99,7 +103,7 @@ def test_keyframes_are_taken_as_they_are(placed, tracker):
     np.testing.assert_array_equal(placed.state.poses[0], keyframe)
     tracker.let_go(1)
     wait_for(lambda: placed.state.track.message)
-    cells = placed.timeline()
+    cells = placed.stored_poses.timeline()
     assert cells[4]["keyframe"]
     assert (cells[4]["source"], cells[5]["source"]) == ("manual", "tracked")
 
@@ -110,47 +114,47 @@ def tracker_fixed(controller, tracker):
 
 
 def test_a_run_over_keyframes_alone_is_no_entry(placed, tracker):
-    placed.seek(3)
+    placed.navigation.seek(3)
     drag(placed, "torso", (0.0, 9.0))
-    placed.seek(2)
-    placed.track(backward=False, until=3)
+    placed.navigation.seek(2)
+    placed.tracking.start(backward=False, until=3)
     tracker.let_go(1)
     wait_for(lambda: placed.state.track.message)
     assert placed.state.undo == "drag torso, frame 3"
 
 
 def test_pause_and_go_on_are_one_entry(placed, tracker, session):
-    placed.track(backward=False, until=8)
+    placed.tracking.start(backward=False, until=8)
     tracker.let_go(2)
     wait_for(at(placed, 4))
     end_the_step_soon(tracker)
-    placed.pause_tracking()
+    placed.tracking.pause()
     assert not placed.state.track.running
     assert placed.state.track.at == 5
     store = AnnotationStore(session / "annotations.sqlite", read_only=True)
     assert [row.frame for row in store.frames("person")] == [2, 3, 4, 5]
     store.close()
-    placed.seek(3)
-    placed.go_on_tracking()
+    placed.navigation.seek(3)
+    placed.tracking.resume()
     tracker.let_go(3)
     wait_for(lambda: placed.state.track.message)
     assert tracker.seen == [3, 4, 5, 6, 7, 8]
     assert placed.state.frame == 8
-    placed.undo()
-    assert set(placed.timeline()) == {2}
+    placed.history.undo()
+    assert set(placed.stored_poses.timeline()) == {2}
 
 
 def test_stop_ends_a_run_and_keeps_what_it_found(placed, tracker):
-    placed.track(backward=False, until=None)
+    placed.tracking.start(backward=False, until=None)
     tracker.let_go(3)
     wait_for(at(placed, 5))
     end_the_step_soon(tracker)
-    placed.stop()
+    placed.activities.stop()
     assert placed.state.track.first is None
     assert placed.state.track.message.startswith("stopped: ")
-    assert {2, 3, 4, 5} <= set(placed.timeline())
+    assert {2, 3, 4, 5} <= set(placed.stored_poses.timeline())
     seen = list(tracker.seen)
-    placed.go_on_tracking()
+    placed.tracking.resume()
     tracker.let_go(1)
     time.sleep(0.1)
     assert tracker.seen == seen
@@ -158,17 +162,17 @@ def test_stop_ends_a_run_and_keeps_what_it_found(placed, tracker):
 
 def test_looking_around_does_not_stop_a_run(placed, tracker, monkeypatch):
     monkeypatch.setattr("app.control.tracking.tracking._SAVE_S", 1e9)
-    placed.track(backward=False, until=None)
+    placed.tracking.start(backward=False, until=None)
     tracker.let_go(3)
     wait_for(at(placed, 5))
-    placed.seek(4)  # tracked, and not written of its own accord
+    placed.navigation.seek(4)  # tracked, and not written of its own accord
     assert not placed.state.follow
     assert placed.state.people[0].status == "doubtful"
     tracker.let_go(2)
     wait_for(at(placed, 7))
     assert placed.state.frame == 4
     assert placed.state.track.running
-    placed.follow(True)
+    placed.tracking.follow(True)
     assert placed.state.frame == 7
     assert placed.state.people[0].source == "tracked"
     tracker.let_go(1)
@@ -177,28 +181,28 @@ def test_looking_around_does_not_stop_a_run(placed, tracker, monkeypatch):
 
 
 def test_seeking_while_nothing_runs_leaves_following_as_it_is(placed):
-    placed.seek(9)
+    placed.navigation.seek(9)
     assert placed.state.follow
 
 
 @pytest.mark.parametrize("edit", ["drag", "set", "search", "undo"])
 def test_edits_stop_a_run(placed, tracker, edit):
-    placed.track(backward=False, until=None)
+    placed.tracking.start(backward=False, until=None)
     tracker.let_go(3)
     wait_for(at(placed, 5))
     end_the_step_soon(tracker)
     {
         "drag": lambda: drag(placed, "left_knee", (3.0, 3.0)),
         "set": lambda: placed.pose_edits.set_dof(0, 8, 0.3),
-        "search": placed.search_step,
-        "undo": placed.undo,
+        "search": placed.search.step,
+        "undo": placed.history.undo,
     }[edit]()
     assert placed.state.track.first is None
     assert placed.state.frame == 5  # where the hand was
     if edit == "undo":
-        assert set(placed.timeline()) == {2}
+        assert set(placed.stored_poses.timeline()) == {2}
     else:
-        assert {2, 3, 4, 5} <= set(placed.timeline())
+        assert {2, 3, 4, 5} <= set(placed.stored_poses.timeline())
     seen = list(tracker.seen)
     tracker.let_go(5)
     time.sleep(0.1)
@@ -206,26 +210,26 @@ def test_edits_stop_a_run(placed, tracker, edit):
 
 
 def test_undo_goes_to_the_nearest_frame_of_the_run(placed, tracker):
-    placed.track(backward=False, until=6)
+    placed.tracking.start(backward=False, until=6)
     tracker.let_go(4)
     wait_for(lambda: placed.state.track.message)
     for here, there in ((30, 6), (4, 4), (0, 3)):
-        placed.seek(here)
-        placed.undo()
+        placed.navigation.seek(here)
+        placed.history.undo()
         assert placed.state.frame == there
-        placed.redo()
+        placed.history.redo()
 
 
 def test_a_hand_takes_hold_of_the_frame_that_it_saw(placed, tracker):
-    placed.track(backward=False, until=None)
+    placed.tracking.start(backward=False, until=None)
     tracker.let_go(4)
     wait_for(at(placed, 6))
     end_the_step_soon(tracker)
-    placed.hand.begin_drag(PAGE, FRONT, 0, "torso", (320.0, 240.0), frame=4)
+    placed.dragging.begin(PAGE, FRONT, 0, "torso", (320.0, 240.0), frame=4)
     assert placed.state.frame == 4
     assert placed.state.people[0].status == "doubtful"
-    placed.hand.move_drag(PAGE, (330.0, 240.0), 1)
-    placed.hand.end_drag(PAGE)
+    placed.dragging.move(PAGE, (330.0, 240.0), 1)
+    placed.dragging.end(PAGE)
     assert placed.state.undo == "drag torso, frame 4"
 
 
@@ -235,30 +239,30 @@ def test_a_run_writes_no_more_often_than_it_should(placed, tracker, monkeypatch)
         real = getattr(AnnotationStore, name)
         monkeypatch.setattr(AnnotationStore, name, lambda *a, real=real, **k: written.append(1) or real(*a, **k))
     began = time.monotonic()
-    placed.track(backward=False, until=None)
+    placed.tracking.start(backward=False, until=None)
     tracker.let_go(47)
     wait_for(lambda: placed.state.track.message)
-    assert len(placed.timeline()) == 48
+    assert len(placed.stored_poses.timeline()) == 48
     assert len(written) <= 2 + (time.monotonic() - began) / 0.5
 
 
 def test_what_cannot_be_tracked_is_said(opened, tracker):
     controller = opened()
     with pytest.raises(TrackerError, match="pose the body"):
-        controller.track(backward=False, until=None)
+        controller.tracking.start(backward=False, until=None)
     drag(controller, "torso", (4.0, 0.0))
     with pytest.raises(TrackerError, match="frames to track before frame 0"):
-        controller.track(backward=True, until=None)
+        controller.tracking.start(backward=True, until=None)
 
 
 def test_a_tracker_that_fails_says_so_and_loses_nothing(placed, tracker):
     tracker.fails_at = 6
-    placed.track(backward=False, until=None)
+    placed.tracking.start(backward=False, until=None)
     tracker.let_go(4)
     wait_for(lambda: placed.state.track.message)
     assert placed.state.track.message == "stopped, because the tracker failed: no light: 3 frames, 1 doubtful"
     assert placed.state.track.failed
-    assert set(placed.timeline()) == {2, 3, 4, 5}
+    assert set(placed.stored_poses.timeline()) == {2, 3, 4, 5}
 
 
 def test_what_a_full_disk_refused_is_written_later(placed, tracker, monkeypatch):
@@ -269,7 +273,7 @@ def test_what_a_full_disk_refused_is_written_later(placed, tracker, monkeypatch)
 
     monkeypatch.setattr(AnnotationStore, "commit", full)
     monkeypatch.setattr("app.control.tracking.tracking._SAVE_S", 0.0)
-    placed.track(backward=False, until=6)
+    placed.tracking.start(backward=False, until=6)
     tracker.let_go(2)
     wait_for(at(placed, 4))
     assert placed.state.save_error == "the disk is full; make room"
@@ -277,21 +281,21 @@ def test_what_a_full_disk_refused_is_written_later(placed, tracker, monkeypatch)
     tracker.let_go(2)
     wait_for(lambda: placed.state.track.message)
     assert placed.state.save_error is None
-    assert set(placed.timeline()) == {2, 3, 4, 5, 6}
+    assert set(placed.stored_poses.timeline()) == {2, 3, 4, 5, 6}
 
 
 def test_a_run_survives_a_restart(placed, tracker, opened):
-    placed.track(backward=False, until=6)
+    placed.tracking.start(backward=False, until=6)
     tracker.let_go(4)
     wait_for(lambda: placed.state.track.message)
     controller = opened()
-    controller.seek(4)
+    controller.navigation.seek(4)
     assert (controller.state.people[0].status, controller.state.people[0].remark) == (
         "doubtful",
-        "left arm searched anew",
+        "left arm relocated",
     )
-    controller.undo()
-    assert set(controller.timeline()) == {2}
+    controller.history.undo()
+    assert set(controller.stored_poses.timeline()) == {2}
 
 
 def followed_back(tracker, steps):
@@ -304,7 +308,7 @@ def followed_back(tracker, steps):
             better = ()
             if i == steps - 1:
                 poses = tuple(p + STEP_M * (np.arange(len(p)) == 1) for p in found[4].poses)
-                better = (tracker.last[7]._replace(poses=poses, statuses=("good",), remarks=("followed back",)),)
+                better = (tracker.last[7]._replace(poses=poses, statuses=("good",), notes=("followed back",)),)
             yield BackwardStep(7, 0, i + 1, steps, better)
 
     tracker.back = back
@@ -313,29 +317,29 @@ def followed_back(tracker, steps):
 
 def test_the_second_pass_takes_the_place_of_what_was_lost(placed, tracker):
     offered = followed_back(tracker, 3)
-    placed.track(backward=False, until=9)
+    placed.tracking.start(backward=False, until=9)
     tracker.let_go(7)
     wait_for(lambda: placed.state.track.message)
     (found,) = offered
     assert [(f.frame, f.statuses) for f in found][3:5] == [(6, ("good",)), (7, ("lost",))]
     assert placed.state.track.message == "done: 7 frames, 1 doubtful"
     assert placed.state.frame == 9  # nobody is taken elsewhere
-    placed.seek(7)
+    placed.navigation.seek(7)
     shown = placed.state.people[0]
     assert (shown.source, shown.status, shown.remark) == ("tracked", "good", "followed back")
     np.testing.assert_array_equal(placed.state.poses[0], found[4].poses[0] + STEP_M * (np.arange(22) == 1))
-    placed.undo()
-    assert set(placed.timeline()) == {2}  # one entry with the first pass
+    placed.history.undo()
+    assert set(placed.stored_poses.timeline()) == {2}  # one entry with the first pass
 
 
 def test_a_frame_that_is_looked_at_shows_what_the_second_pass_found(placed, tracker):
     seen = []
     placed.subscribe(lambda state: seen.append(state.track))
     followed_back(tracker, 2)
-    placed.track(backward=False, until=8)
+    placed.tracking.start(backward=False, until=8)
     tracker.let_go(5)
     wait_for(at(placed, 7))
-    placed.follow(False)
+    placed.tracking.follow(False)
     assert (placed.state.frame, placed.state.people[0].status) == (7, "lost")
     tracker.let_go(1)
     wait_for(lambda: placed.state.track.message)
@@ -346,8 +350,8 @@ def test_a_frame_that_is_looked_at_shows_what_the_second_pass_found(placed, trac
 
 def test_the_second_pass_can_be_switched_off(placed, tracker):
     offered = followed_back(tracker, 1)
-    placed.set_settings(replace(placed.state.settings, second_pass=False))
-    placed.track(backward=False, until=9)
+    placed.search.set_settings(replace(placed.state.settings, second_pass=False))
+    placed.tracking.start(backward=False, until=9)
     tracker.let_go(7)
     wait_for(lambda: placed.state.track.message)
     assert offered == []

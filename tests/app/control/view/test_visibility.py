@@ -28,9 +28,9 @@ def drawn_people(controller):
 
 
 def searched(controller, person):
-    controller.set_settings(QUICK)
-    controller.search_frame(person)
-    wait_for(lambda: controller.state.job.message)
+    controller.search.set_settings(QUICK)
+    controller.search.run(person)
+    wait_for(lambda: controller.state.search.message)
 
 
 def test_people_whom_nobody_has_placed_stand_beside_each_other(couple):
@@ -46,11 +46,11 @@ def test_who_is_hidden_is_drawn_nowhere_and_stays_as_he_is(couple):
         couple.pinning.end(PAGE)
     before = couple.state
     assert drawn_people(couple) == [{ANN, BOB}] * 4
-    couple.casting.show(BOB, False)
+    couple.visibility.show(BOB, False)
     assert drawn_people(couple) == [{ANN}] * 4
     now = couple.state
     assert (now.people, now.undo, now.cost_px) == (before.people, before.undo, before.cost_px)
-    couple.casting.show(BOB, True)
+    couple.visibility.show(BOB, True)
     assert drawn_people(couple) == [{ANN, BOB}] * 4
 
 
@@ -64,16 +64,16 @@ def test_what_the_other_hides_is_dashed_even_while_he_is_hidden(couple):
         return np.hypot(rows[:, 2] - rows[:, 0], rows[:, 3] - rows[:, 1]).sum()
 
     beside = visible_px()
-    couple.casting.show(BOB, False)
+    couple.visibility.show(BOB, False)
     assert visible_px() == beside
 
 
 def test_solo_lasts_until_it_is_taken_back(couple):
-    couple.casting.solo(True)
-    couple.select(BOB, None)
-    assert couple.state.cast.solo
-    couple.casting.solo(False)
-    assert not couple.state.cast.solo
+    couple.visibility.solo(True)
+    couple.navigation.select(BOB, None)
+    assert couple.state.visibility.solo
+    couple.visibility.solo(False)
+    assert not couple.state.visibility.solo
 
 
 @pytest.mark.parametrize("person", [ANN, BOB])
@@ -84,14 +84,14 @@ def test_one_is_searched_and_the_other_stays_a_draft(couple, person):
     assert {stage.person for stage in run.stages} == {person}
     assert couple.state.people[1 - person] is before[1 - person]
     assert couple.state.people[person].source == "searched"
-    assert set(couple.timeline(0, person)) == {0}
-    assert couple.timeline(0, 1 - person) == {}
+    assert set(couple.stored_poses.timeline(0, person)) == {0}
+    assert couple.stored_poses.timeline(0, 1 - person) == {}
 
 
 def test_a_search_of_others_takes_the_place_of_the_one_that_stands(couple):
-    couple.set_settings(QUICK)
+    couple.search.set_settings(QUICK)
     for done, person in enumerate((None, ANN, ANN), 1):
-        couple.search_step(person)
+        couple.search.step(person)
         wait_for(lambda n=done: sum(len(r.steps) for r in couple.replay.runs()) == n)
     first, second = couple.replay.runs()
     assert (first.over, {s.person for s in first.stages}) == (True, {ANN, BOB})
@@ -123,7 +123,7 @@ def test_a_pose_is_bent_as_the_others_and_stays_in_its_place(couple):
     np.testing.assert_allclose(bent[6:], ann[6:])
     assert couple.state.people[BOB].source == "manual"
     assert couple.state.undo == "copy the pose of ann, frame 0"
-    couple.undo()
+    couple.history.undo()
     assert couple.state.people[BOB].source is None
     with pytest.raises(TrackerError, match="expected another person"):
         couple.pose_edits.copy_person(BOB, BOB)
@@ -132,10 +132,10 @@ def test_a_pose_is_bent_as_the_others_and_stays_in_its_place(couple):
 def test_each_person_has_a_lane_of_the_timeline(couple):
     version = couple.state.timeline_version
     drag(couple, "torso", (5.0, 0.0), person=BOB)
-    assert couple.timeline(0, ANN) == {}
-    assert couple.timeline(0, BOB)[0]["keyframe"]
-    couple.seek(1)
+    assert couple.stored_poses.timeline(0, ANN) == {}
+    assert couple.stored_poses.timeline(0, BOB)[0]["keyframe"]
+    couple.navigation.seek(1)
     drag(couple, "torso", (5.0, 0.0), person=ANN)
-    assert [sorted(couple.timeline(version, p)) for p in (None, ANN, BOB)] == [[0, 1]] * 3
-    assert couple.timeline(version, ANN)[0] is None
-    assert set(couple.timeline()) == {0, 1}
+    assert [sorted(couple.stored_poses.timeline(version, p)) for p in (None, ANN, BOB)] == [[0, 1]] * 3
+    assert couple.stored_poses.timeline(version, ANN)[0] is None
+    assert set(couple.stored_poses.timeline()) == {0, 1}

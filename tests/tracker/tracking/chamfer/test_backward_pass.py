@@ -6,7 +6,7 @@ from staging import SUIT, Shown, cameras_around, dressed, posed
 from tracking_runs import track_back
 
 from tracker.body.model import PosedBody
-from tracker.tracking.chamfer.backward_pass import stretches
+from tracker.tracking.chamfer.backward_pass import lost_intervals
 from tracker.tracking.chamfer.pose_paths import ROUNDS
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimate import BackwardStep, TrackedFrame
@@ -54,7 +54,7 @@ def test_a_lost_arm_is_followed_back_from_where_it_is_trusted_again(scene, backw
     for estimate in better:
         assert off_m(model, estimate.poses[0], truth[estimate.frame]) < 0.03
         assert estimate.statuses == ("good",)
-        assert estimate.remarks == (f"followed back from frame {1 if backward else 5}",)
+        assert estimate.notes == (f"tracked back from frame {1 if backward else 5}",)
 
 
 def test_where_nobody_is_lost_nothing_is_looked_at(scene):
@@ -85,7 +85,7 @@ def test_what_was_right_on_one_frame_is_carried_to_those_that_both_passes_lost(s
     for estimate in better:
         assert off_m(model, estimate.poses[0], truth[estimate.frame]) < 0.03
         assert estimate.statuses == ("good",)
-        assert estimate.remarks == ("carried over from frames around it",)
+        assert estimate.notes == ("taken over from neighbouring frames",)
         assert estimate.covariances[0].any()
         assert estimate.qualities[0] is not None
 
@@ -122,7 +122,7 @@ def test_the_others_stay_as_they_were_found(scene):
     for estimate in steps[-1].better:
         np.testing.assert_array_equal(estimate.poses[0], odd[estimate.frame])
         assert off_m(model, estimate.poses[1], truth[estimate.frame]) < 0.05
-        assert (estimate.remarks[0], estimate.statuses[0]) == ("", "doubtful")
+        assert (estimate.notes[0], estimate.statuses[0]) == ("", "doubtful")
 
 
 def test_what_an_end_of_the_run_leaves_open_is_followed_back_from_the_last_frame_that_is_not_lost(scene):
@@ -150,7 +150,7 @@ def test_what_an_end_of_the_run_leaves_open_is_followed_back_from_the_last_frame
         ("glgKl", [(1, 2), (4, 5)]),
     ],
 )
-def test_stretches(statuses, expected):
+def test_lost_intervals(statuses, expected):
     names = {"g": "good", "d": "doubtful", "l": "lost", "K": "good"}
-    found = stretches([names[s] for s in statuses], [s == "K" for s in statuses])
+    found = lost_intervals([names[s] for s in statuses], [s == "K" for s in statuses])
     assert [(r.start, r.stop) for r in found] == expected

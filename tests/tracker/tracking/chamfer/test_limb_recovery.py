@@ -8,11 +8,12 @@ from staging import SUIT, cameras_around, dressed, own_evidence, posed
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
-from tracker.fitting.contour_residuals import ContourMatch
-from tracker.fitting.gauss_newton import StayNear, solve
+from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.formats.model_toml import load_model
 from tracker.tracking.chamfer import limb_recovery
-from tracker.tracking.chamfer.limb_recovery import Judge, RecoverSettings, for_several, search_limbs
+from tracker.tracking.chamfer.limb_recovery import PoseScorer, for_several, search_limbs
+from tracker.tracking.chamfer.settings import RecoverSettings
 
 
 def limb_of(model, name):
@@ -34,10 +35,10 @@ class Staged:
         bodies = [PosedBody(model, truth)]
         views = dressed(bodies, cameras_around(4), SUIT)
         self.model, self.truth = model, truth
-        match = ContourMatch(views, [PosedBody(model, wrong)])
-        priors = [StayNear(wrong, np.full(model.n_dofs, 1.0))]
+        match = ContourResiduals(views, [PosedBody(model, wrong)])
+        priors = [PosePrior(wrong, np.full(model.n_dofs, 1.0))]
         known = Colors(views, bodies).learn() if colors else None
-        self.judge = Judge(match, priors, Colors(views, [PosedBody(model, wrong)]), known, RecoverSettings())
+        self.scorer = PoseScorer.of(match, priors, Colors(views, [PosedBody(model, wrong)]), known, RecoverSettings())
         self.blocks = [match, *priors]
         # As a tracker would bring it: refined from there, which does not lead out.
         self.here = solve(model, wrong, self.blocks, max_iterations=15, tolerance=1e-3)
@@ -46,12 +47,12 @@ class Staged:
         return self.searched(limb, others).best
 
     def searched(self, limb, others=()):
-        return search_limbs(self.model, [limb], self.here, others, self.judge, 15)
+        return search_limbs(self.model, [limb], self.here, others, self.scorer)
 
     def off_m(self, fit, parts):
         """Largest distance of the points of some parts from the truth, metres."""
         points = np.isin(self.model.point_parts, parts)
-        found, true = self.model.points_world(fit.values), self.model.points_world(self.truth)
+        found, true = self.model.points_world(fit.pose), self.model.points_world(self.truth)
         return np.linalg.norm(found - true, axis=1)[points].max()
 
 
@@ -79,8 +80,8 @@ def test_lost_arms_are_found(name, colors, least):
         staged = Staged(model, truth, turned(model, truth, **lost), colors)
         assert staged.off_m(staged.here, arm.parts) > 0.15
         found = staged.search(arm)
-        assert found is staged.here or staged.judge.cost(found) < staged.judge.cost(staged.here)
-        np.testing.assert_allclose(model.clip(found.values), found.values, atol=1e-9)
+        assert found is staged.here or staged.scorer.cost(found) < staged.scorer.cost(staged.here)
+        np.testing.assert_allclose(model.clip(found.pose), found.pose, atol=1e-9)
         # The others are where they were, which is where they belong.
         for other in limbs(model):
             if other.name not in (arm.name, "head"):
@@ -107,8 +108,8 @@ def test_limbs_that_are_lost_together(gavrila, settings):
         staged = Staged(gavrila, truth, wrong)
         suspects = [limb_of(gavrila, n) for n in ("left_forearm", "left_calf")]
         assert all(staged.off_m(staged.here, x.parts) > 0.15 for x in suspects)
-        judge = replace(staged.judge, settings=settings)
-        found = search_limbs(gavrila, suspects, staged.here, (), judge, 15).best
+        scorer = replace(staged.scorer, settings=settings)
+        found = search_limbs(gavrila, suspects, staged.here, (), scorer).best
         n_found += all(staged.off_m(found, x.parts) < 0.03 for x in suspects)
     assert n_found >= 2
 
@@ -122,8 +123,8 @@ def test_for_several_places_are_looked_for_once(gavrila, monkeypatch):
     suspects, n_looked = [limb_of(gavrila, n) for n in ("left_forearm", "left_calf")], []
     for settings in (RecoverSettings(), for_several(RecoverSettings())):
         looked.clear()
-        staged.judge = replace(staged.judge, settings=replace(settings, margin=1e6))
-        found = search_limbs(gavrila, suspects, staged.here, (), staged.judge, 15).best
+        staged.scorer = replace(staged.scorer, settings=replace(settings, margin=1e6))
+        found = search_limbs(gavrila, suspects, staged.here, (), staged.scorer).best
         assert staged.off_m(found, suspects[0].parts) < 0.03
         n_looked.append(len(looked))
     assert n_looked[0] > n_looked[1] == 2
@@ -132,36 +133,38 @@ def test_for_several_places_are_looked_for_once(gavrila, monkeypatch):
 def test_the_whole_body_is_refined_only_with_what_comes_near_the_best(gavrila, monkeypatch):
     truth, n_refined = posed(gavrila, 1), []
     staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["60 degrees off"]))
-    each = Judge.each
+    each = PoseScorer.each
     monkeypatch.setattr(
-        Judge, "each", lambda self, work, poses: n_refined.append(len(poses)) or each(self, work, poses)
+        PoseScorer, "each", lambda self, work, poses: n_refined.append(len(poses)) or each(self, work, poses)
     )
     arm, leg = (limb_of(gavrila, n) for n in ("left_forearm", "left_calf"))
 
     def refined(limbs, **settings):
         """Whether poses were refined, the limb alone and the whole body, limb by limb; whether the arm was found."""
         n_refined.clear()
-        judge = replace(staged.judge, settings=replace(for_several(RecoverSettings()), **settings))
-        best = search_limbs(gavrila, limbs, staged.here, (), judge, 15).best
+        scorer = replace(staged.scorer, settings=replace(for_several(RecoverSettings()), **settings))
+        best = search_limbs(gavrila, limbs, staged.here, (), scorer).best
         return [n > 0 for n in n_refined], staged.off_m(best, arm.parts) < 0.03
 
     assert refined([arm]) == ([True, True], True)
-    assert refined([arm], finish=-np.inf) == ([True, False], False)
+    assert refined([arm], refine_margin=-np.inf) == ([True, False], False)
     # What one limb leaves may be made good by the next.
-    assert refined([arm, leg], finish=-np.inf) == ([True, True, True, False], True)
+    assert refined([arm, leg], refine_margin=-np.inf) == ([True, True, True, False], True)
     # Of somebody alone nothing is left out, whatever the limb: three of a leg that stands where it should.
-    refined([leg, arm], finish=np.inf, margin=1e-6)
-    assert n_refined[1] == RecoverSettings().finished
+    refined([leg, arm], refine_margin=np.inf, margin=1e-6)
+    assert n_refined[1] == RecoverSettings().n_refined
 
 
-def test_the_best_places_are_improved_to_the_end(gavrila, monkeypatch):
+def test_the_best_places_are_perturbed_to_the_end(gavrila, monkeypatch):
     """As many as are scored; before, all."""
     truth, rows = posed(gavrila, 1), []
     staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["60 degrees off"]))
-    improved = limb_recovery._improved
-    monkeypatch.setattr(limb_recovery, "_in_parts", lambda work, *arrays: [work(*arrays)])
-    monkeypatch.setattr(limb_recovery, "_improved", lambda *a: rows.append([len(x) for x in a[3:]]) or improved(*a))
-    staged.judge = replace(staged.judge, settings=RecoverSettings(improved=24, scored=6, shakes_rad=(0.2, 0.1, 0.1)))
+    improved = limb_recovery._perturbed
+    monkeypatch.setattr(limb_recovery, "_map_split", lambda work, *arrays: [work(*arrays)])
+    monkeypatch.setattr(limb_recovery, "_perturbed", lambda *a: rows.append([len(x) for x in a[3:]]) or improved(*a))
+    staged.scorer = replace(
+        staged.scorer, settings=RecoverSettings(n_local_search=24, scored=6, perturbations_rad=(0.2, 0.1, 0.1))
+    )
     assert staged.off_m(staged.search(limb_of(gavrila, "left_forearm")), limb_of(gavrila, "left_forearm").parts) < 0.03
     assert rows == [[24, 24], [6, 6, 6]]
 
@@ -209,17 +212,19 @@ def test_two_places_that_are_about_as_good_are_both_told(gavrila):
     arm, cameras = limb_of(gavrila, "left_forearm"), cameras_around(4)
     views = both_shown(*(own_evidence([PosedBody(gavrila, v)], cameras) for v in (here, there)))
     body = [PosedBody(gavrila, here)]
-    judge = Judge(ContourMatch(views, body, everywhere=True), [], Colors(views, body), None, RecoverSettings())
-    fit = solve(gavrila, here, [judge.match], max_iterations=15, tolerance=1e-3)
-    found = search_limbs(gavrila, [arm], fit, (), judge, 15)
+    scorer = PoseScorer.of(
+        ContourResiduals(views, body, everywhere=True), [], Colors(views, body), None, RecoverSettings()
+    )
+    fit = solve(gavrila, here, [scorer.residuals], max_iterations=15, tolerance=1e-3)
+    found = search_limbs(gavrila, [arm], fit, (), scorer)
     wrist = gavrila.point_names.index("left_wrist")
-    ends = np.array([gavrila.points_world(f.values)[wrist] for f in (found.best, *found.others)])
+    ends = np.array([gavrila.points_world(f.pose)[wrist] for f in (found.best, *found.alternatives)])
     wanted = np.array([gavrila.points_world(v)[wrist] for v in (here, there)])
     assert np.linalg.norm(ends[:, None] - wanted, axis=-1).min(axis=0).max() < 0.05  # both are there
-    assert all(judge.cost(f) < judge.cost(found.best) + limb_recovery.LEAST_GAIN for f in found.others)
+    assert all(scorer.cost(f) < scorer.cost(found.best) + limb_recovery.MIN_COST_GAIN for f in found.alternatives)
     # Where the edges show it once there is nothing to choose from.
     once = Staged(gavrila, here, turned(gavrila, here, **LOST["inside the trunk"]))
-    assert once.searched(arm).others == ()
+    assert once.searched(arm).alternatives == ()
 
 
 def test_the_same_every_time(gavrila):
@@ -229,7 +234,7 @@ def test_the_same_every_time(gavrila):
     for _ in range(2):
         limb_recovery._even.cache_clear()  # as in another run of the program
         twice.append(Staged(gavrila, truth, wrong).search(limb_of(gavrila, "left_forearm")))
-    np.testing.assert_array_equal(twice[0].values, twice[1].values)
+    np.testing.assert_array_equal(twice[0].pose, twice[1].pose)
     assert twice[0].cost == twice[1].cost
 
 
@@ -238,11 +243,12 @@ def test_the_same_however_many_threads_look(gavrila, monkeypatch, threads):
     """Also where there are more threads than poses."""
     truth = posed(gavrila, 1)
     wrong = turned(gavrila, truth, **LOST["60 degrees off"])
-    limb, judge = limb_of(gavrila, "left_forearm"), Staged(gavrila, truth, wrong).judge
+    limb, usual = limb_of(gavrila, "left_forearm"), Staged(gavrila, truth, wrong).scorer
 
     def candidates(n):
         monkeypatch.setattr(limb_recovery, "N_HELPERS", n)
-        return limb_recovery._candidates(gavrila, limb, [], wrong, [], replace(judge).of_limb(limb))
+        with_threads = PoseScorer.of(usual.residuals, usual.priors, usual.colors, usual.part_colors, usual.settings)
+        return limb_recovery._candidates(gavrila, limb, [], wrong, [], with_threads.restricted_to(limb))
 
     np.testing.assert_array_equal(candidates(threads), candidates(1))
 
@@ -252,9 +258,9 @@ def test_other_poses_are_tried_as_they_are(gavrila):
     truth = posed(gavrila, 1)
     arm = limb_of(gavrila, "left_forearm")
     staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["inside the trunk"]))
-    few = RecoverSettings(proposals=2, reach_rad=1e-3, improved=2, shakes_rad=(1e-3,))
-    staged.judge = Judge(staged.judge.match, staged.judge.priors, staged.judge.colors, staged.judge.known, few)
-    assert staged.search(arm, [staged.here.values]) is staged.here
+    few = RecoverSettings(proposals=2, reach_rad=1e-3, n_local_search=2, perturbations_rad=(1e-3,))
+    staged.scorer = replace(staged.scorer, settings=few)
+    assert staged.search(arm, [staged.here.pose]) is staged.here
     before = turned(gavrila, truth, left_knee__extension=100, right_hip__elevation=60)
     found = staged.search(arm, [before])
     assert staged.off_m(found, arm.parts) < 0.03
@@ -262,15 +268,15 @@ def test_other_poses_are_tried_as_they_are(gavrila):
 
 
 def test_colours_tell_limbs_apart_that_edges_do_not(gavrila):
-    """The judge prefers the pose whose parts are under their own colours; without them it goes by the cost alone."""
+    """The scorer prefers the pose whose parts are under their own colours; without them it goes by the cost alone."""
     truth = posed(gavrila, 1)
     with_colors, without = (Staged(gavrila, truth, truth, c) for c in (True, False))
     crossed = solve(gavrila, turned(gavrila, truth, **LOST["60 degrees off"]), without.blocks, max_iterations=0)
     for staged in (with_colors, without):
-        there, here = staged.judge.cost(crossed) - crossed.cost, staged.judge.cost(staged.here) - staged.here.cost
+        there, here = staged.scorer.cost(crossed) - crossed.cost, staged.scorer.cost(staged.here) - staged.here.cost
         assert (there > here) if staged is with_colors else (there == here == 0)
-    candidates = np.array([staged.here.values, crossed.values])
+    candidates = np.array([staged.here.pose, crossed.pose])
     np.testing.assert_allclose(
-        with_colors.judge.costs(candidates) - without.judge.costs(candidates),
-        [-0.2 * with_colors.judge.colors.score(v, with_colors.judge.known).nats for v in candidates],
+        with_colors.scorer.costs(candidates) - without.scorer.costs(candidates),
+        [-0.2 * with_colors.scorer.colors.score(v, with_colors.scorer.part_colors).nats for v in candidates],
     )

@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 from staging import posed
 
-from tracker.tracking.chamfer.limb_recovery import LEAST_GAIN
-from tracker.tracking.chamfer.pose_paths import _BENT_M, _MOST, _MOST_BENT, ROUNDS, Candidates, carry, cheapest_way
+from tracker.tracking.chamfer.limb_recovery import MIN_COST_GAIN
+from tracker.tracking.chamfer.pose_paths import (
+    _ACCELERATION_SIGMA_M,
+    _MAX_ACCELERATION_COST,
+    _MAX_CANDIDATES,
+    ROUNDS,
+    Candidates,
+    propagate_candidates,
+    viterbi_path,
+)
 
 
 def cost_of(points, costs, before, after, way):
@@ -16,8 +24,8 @@ def cost_of(points, costs, before, after, way):
     total = sum(c[k] for c, k in zip(costs, way, strict=True))
     for a, b, c in zip(path, path[1:], path[2:], strict=False):
         for x, y, z in zip(a, b, c, strict=True):
-            nats = np.sum((x - 2 * y + z) ** 2) / (2 * _BENT_M**2)
-            total += nats / (1 + nats / _MOST_BENT)
+            nats = np.sum((x - 2 * y + z) ** 2) / (2 * _ACCELERATION_SIGMA_M**2)
+            total += nats / (1 + nats / _MAX_ACCELERATION_COST)
     return total
 
 
@@ -31,22 +39,22 @@ def test_the_cheapest_way_is_that_of_all_ways_tried(seed, known):
     ways = list(product(*(range(len(p)) for p in points)))
     best = min(ways, key=lambda way: cost_of(points, costs, before, after, way))
     stay = cost_of(points, costs, before, after, (0,) * 6)
-    assert stay - cost_of(points, costs, before, after, best) > LEAST_GAIN
-    assert tuple(cheapest_way(points, costs, before, after)) == best
+    assert stay - cost_of(points, costs, before, after, best) > MIN_COST_GAIN
+    assert tuple(viterbi_path(points, costs, before, after)) == best
 
 
 def test_what_is_hardly_cheaper_changes_nothing():
     points = [np.zeros((2, 4, 3))] * 4
-    little, much = [np.array([0.0, -LEAST_GAIN / 5])] * 4, [np.array([0.0, -LEAST_GAIN / 3])] * 4
-    assert cheapest_way(points, little, [], []) == [0] * 4
-    assert cheapest_way(points, much, [], []) == [1] * 4
+    little, much = [np.array([0.0, -MIN_COST_GAIN / 5])] * 4, [np.array([0.0, -MIN_COST_GAIN / 3])] * 4
+    assert viterbi_path(points, little, [], []) == [0] * 4
+    assert viterbi_path(points, much, [], []) == [1] * 4
 
 
 @pytest.mark.parametrize("n", [1, 2])
 def test_of_few_frames_the_cheapest_poses_are_taken(n):
-    points, costs = [np.zeros((2, 4, 3))] * n, [np.array([2 * LEAST_GAIN, 0.0])] * n
-    assert cheapest_way(points, costs, [], []) == [1] * n
-    assert cheapest_way(points, [-c for c in costs], [], []) == [0] * n
+    points, costs = [np.zeros((2, 4, 3))] * n, [np.array([2 * MIN_COST_GAIN, 0.0])] * n
+    assert viterbi_path(points, costs, [], []) == [1] * n
+    assert viterbi_path(points, [-c for c in costs], [], []) == [0] * n
 
 
 class Valley:
@@ -67,7 +75,7 @@ def test_what_one_frame_knows_all_come_to_know(gavrila):
     step[gavrila.dof_names.index("left_shoulder.abduction")] = 0.5
     right, wrong = base, gavrila.retract(base, step)
     frames = [Candidates(gavrila, [right if i == 2 else wrong]) for i in range(5)]
-    visited = list(carry(frames, lambda i: Valley(right), (None, None)))
+    visited = list(propagate_candidates(frames, lambda i: Valley(right), (None, None)))
     assert visited == [0, 1, 2, 3, 4, 4, 3, 2, 1, 0] * ROUNDS
     for frame in frames:
         assert np.abs(frame.poses[int(np.argmin(frame.costs))] - right).max() < 1e-9
@@ -79,7 +87,7 @@ def test_poses_before_and_after_are_carried_in(gavrila):
     step[gavrila.dof_names.index("left_shoulder.abduction")] = 0.5
     for ends in ((base, None), (None, base)):
         frames = [Candidates(gavrila, [gavrila.retract(base, step)]) for _ in range(3)]
-        list(carry(frames, lambda i: Valley(base), ends))
+        list(propagate_candidates(frames, lambda i: Valley(base), ends))
         assert all(min(f.costs) < 1e-9 for f in frames)
 
 
@@ -93,14 +101,14 @@ def test_of_poses_that_are_alike_the_cheaper_is_kept_and_those_found_stay(gavril
 
     sight, frame = Valley(base), Candidates(gavrila, [turned(1.0), turned(0.9)])
     frame.score(sight)
-    frame.take(np.array([turned(1.001), turned(0.5), turned(0.52), turned(0.48)]), sight)
+    frame.add(np.array([turned(1.001), turned(0.5), turned(0.52), turned(0.48)]), sight)
     np.testing.assert_array_equal(frame.poses, [turned(1.0), turned(0.9), turned(0.48)])
     rng = np.random.default_rng(0)
-    many = [gavrila.retract(base, rng.normal(0, 0.5, gavrila.n_dofs)) for _ in range(3 * _MOST)]
-    frame.take(np.array(many), sight)
-    assert len(frame.poses) == len(frame.points) == len(frame.costs) == _MOST
+    many = [gavrila.retract(base, rng.normal(0, 0.5, gavrila.n_dofs)) for _ in range(3 * _MAX_CANDIDATES)]
+    frame.add(np.array(many), sight)
+    assert len(frame.poses) == len(frame.points) == len(frame.costs) == _MAX_CANDIDATES
     np.testing.assert_array_equal(frame.poses[:2], [turned(1.0), turned(0.9)])
-    expected = np.sort([*sight.costs([turned(0.48)]), *sight.costs(many)])[: _MOST - 2]
+    expected = np.sort([*sight.costs([turned(0.48)]), *sight.costs(many)])[: _MAX_CANDIDATES - 2]
     np.testing.assert_allclose(frame.costs[2:], expected)
 
 
@@ -120,6 +128,6 @@ def test_rivals_cost_hardly_more_and_are_elsewhere(gavrila):
     for pose, turn in zip(poses, (0.0, 0.05, 0.8, 0.85, -0.8), strict=True):
         pose[dof] += turn
     frame = Candidates(gavrila, poses)
-    frame.costs = [0.0, -1.0, LEAST_GAIN / 2, -2.0, 2 * LEAST_GAIN]
-    np.testing.assert_array_equal(frame.rivals(0), [poses[3]])
-    np.testing.assert_array_equal(frame.rivals(4), [poses[3], poses[1]])
+    frame.costs = [0.0, -1.0, MIN_COST_GAIN / 2, -2.0, 2 * MIN_COST_GAIN]
+    np.testing.assert_array_equal(frame.alternatives(0), [poses[3]])
+    np.testing.assert_array_equal(frame.alternatives(4), [poses[3], poses[1]])

@@ -2,23 +2,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_evidence, posed, shaken, solid
+from staging import SUIT, Shown, at, cameras_around, dressed, filmed, own_evidence, posed, shaken, solid, view_evidence
 from tracking_runs import track
 
 from tracker.body.model import PosedBody
+from tracker.contours import occluding_contours
 from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
-from tracker.evidence.view_evidence import view_evidence
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.motion.prediction import PredictSettings
+from tracker.search import chamfer_cost
 from tracker.search.best_first import SearchSettings
 from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
-from tracker.tracking.chamfer.limb_recovery import Searched
+from tracker.tracking.chamfer.limb_recovery import LimbSearch
 from tracker.tracking.chamfer.settings import TrackSettings, pose_cost, search_frame
+from tracker.tracking.subjects import Subjects
 
 COARSE = TrackSettings(
     estimate="search", search=SearchSettings(passes=(1.0,)), predict=PredictSettings(order=0), recover=None
@@ -49,7 +51,7 @@ def test_two_people_are_followed(balls):
     for k, estimate in enumerate(found):
         np.testing.assert_allclose(estimate.poses, values[k], atol=1e-9)
         assert estimate.cost_px < 0.5
-        assert estimate.cost_px == pytest.approx(np.mean(estimate.views_px))
+        assert estimate.cost_px == pytest.approx(np.mean(estimate.view_costs_px))
         assert estimate.evaluations > 10
 
 
@@ -96,7 +98,7 @@ def test_frames_are_read_one_at_a_time(balls):
     observer = Shown(views)
     running = track(observer, [model, model], values[0], range(5), COARSE)
     next(running)
-    assert observer.asked == [0]  # whoever stops here has cost no more
+    assert observer.asked == [0]  # a run that stops here has read no more
     running.close()
     assert list(track(observer, [model, model], values[0], [], COARSE)) == []
 
@@ -111,7 +113,7 @@ def test_settings_reach_the_cost(balls):
     paper = pose_cost(views[0], [model, model], values[0], TrackSettings(outliers="paper"))
     assert (paper.outliers, paper.models) == ("paper", tuple(b.model for b in bodies))
     twice = TrackSettings(search=SearchSettings(passes=(1.0, 0.5)))
-    steps = list(search_frame(views[0], [model, model], values[0], twice))
+    steps = list(search_frame(views[0], Subjects.of([model, model]), values[0], twice))
     assert [s.stage.factor for s in steps if s.stage_done] == [1.0, 1.0, 0.5, 0.5]
 
 
@@ -139,10 +141,10 @@ def test_refinement_follows_by_itself(gavrila):
     found = list(track(Shown(views), [gavrila], truth[:1], range(5), TrackSettings()))
     for estimate, values in zip(found, truth, strict=True):
         assert off_m(gavrila, estimate.poses[0], values).max() < 0.01
-        assert (estimate.statuses, estimate.remarks, estimate.evaluations) == (("good",), ("",), 0)
-        (parts_px,), (covariance,), (quality,) = estimate.parts_px, estimate.covariances, estimate.qualities
-        assert parts_px.shape == (10,)
-        assert np.nanmax(parts_px) < 1
+        assert (estimate.statuses, estimate.notes, estimate.evaluations) == (("good",), ("",), 0)
+        (part_costs_px,), (covariance,), (quality,) = estimate.part_costs_px, estimate.covariances, estimate.qualities
+        assert part_costs_px.shape == (10,)
+        assert np.nanmax(part_costs_px) < 1
         assert quality.views == 3
         # The pose is known to a degree or three and to a centimetre, less where an arm spins about itself.
         sigma = np.sqrt(np.diag(covariance))
@@ -155,15 +157,15 @@ def test_an_arm_that_jumps_is_searched_and_the_frame_says_so(gavrila):
     truth = dancing(gavrila, 5, jump_at=3)
     views = [dressed([PosedBody(gavrila, v)], cameras_around(4), SUIT) for v in truth]
     found = list(track(Shown(views), [gavrila], truth[:1], range(5), TrackSettings()))
-    assert [f.remarks[0] for f in found[:3]] == ["", "", ""]
-    assert "left arm searched anew" in found[3].remarks[0]
+    assert [f.notes[0] for f in found[:3]] == ["", "", ""]
+    assert "left arm relocated" in found[3].notes[0]
     for estimate, values in zip(found, truth, strict=True):
         assert off_m(gavrila, estimate.poses[0], values).max() < 0.03
     # Left alone it is not found, and not called good.
     alone = list(track(Shown(views), [gavrila], truth[:1], range(5), TrackSettings(recover=None)))
     assert off_m(gavrila, alone[3].poses[0], truth[3]).max() > 0.1
     assert alone[3].statuses[0] != "good"
-    assert alone[3].remarks == ("left arm uncertain",)
+    assert alone[3].notes == ("left arm uncertain",)
 
 
 def test_two_people_who_might_as_well_be_each_other_are_in_doubt():
@@ -177,8 +179,8 @@ def test_two_people_who_might_as_well_be_each_other_are_in_doubt():
                              [0], settings)  # fmt: skip
     np.testing.assert_allclose([p[:3] for p in found.poses], values[:, :3], atol=0.01)
     assert "lost" in found.statuses or set(found.statuses) == {"doubtful"}
-    assert [r.split(", ")[-1] for r in found.remarks] == [
-        "may be exchanged with person 2", "may be exchanged with person 1",
+    assert [r.split(", ")[-1] for r in found.notes] == [
+        "may be swapped with person 2", "may be swapped with person 1",
     ]  # fmt: skip
     for person in (0, 1):
         (other,) = found.alternatives[person]
@@ -198,7 +200,7 @@ def test_what_is_locked_is_neither_refined_nor_searched(gavrila, monkeypatch):
     searched = []
     monkeypatch.setattr(
         "tracker.tracking.chamfer.frame_estimator.search_limbs",
-        lambda m, due, fit, *_: searched.extend(due) or Searched(fit),
+        lambda m, due, fit, *_: searched.extend(due) or LimbSearch(fit),
     )
     free = ~np.array([name.startswith(("left_shoulder", "left_elbow")) for name in gavrila.dof_names])
     start = truth[0].copy()
@@ -238,7 +240,7 @@ def test_what_the_prediction_refused_is_looked_at_again(gavrila):
     found = list(
         track(filmed([[PosedBody(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(5), TrackSettings())
     )
-    assert found[3].remarks == ("left arm searched anew",)
+    assert found[3].notes == ("left arm relocated",)
     for estimate, values in zip(found, truth, strict=True):
         assert off_m(gavrila, estimate.poses[0], values).max() < 0.02
 
@@ -247,7 +249,7 @@ def test_a_body_that_is_elsewhere_is_searched(gavrila):
     truth = dancing(gavrila, 3)
     truth[2, 1] += 0.6
     *_, last = track(filmed([[PosedBody(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(3), TrackSettings())
-    assert "body searched anew" in last.remarks[0]
+    assert "body searched" in last.notes[0]
     assert last.evaluations > 100
     if off_m(gavrila, last.poses[0], truth[2]).max() > 0.1:  # so far it is beyond the reach of the search
         assert last.statuses[0] != "good"
@@ -260,9 +262,11 @@ def test_a_pose_that_is_given_is_certain(gavrila):
     found = list(track(Shown(views), [gavrila], truth[:1], range(4), TrackSettings(), keyframes={2: {0: keyframe}}))
     given = found[2]
     np.testing.assert_array_equal(given.poses[0], keyframe)
-    assert (given.statuses, given.remarks, given.qualities, given.evaluations) == (("good",), ("",), (None,), 0)
+    assert (given.statuses, given.notes, given.qualities, given.evaluations) == (("good",), ("",), (None,), 0)
     assert not given.covariances[0].any()
-    assert np.nanmax(given.parts_px[0]) > np.nanmax(found[1].parts_px[0])  # judged by its contours all the same
+    assert np.nanmax(given.part_costs_px[0]) > np.nanmax(
+        found[1].part_costs_px[0]
+    )  # judged by its contours all the same
     assert off_m(gavrila, found[3].poses[0], truth[3]).max() < 0.01
 
 
@@ -271,11 +275,11 @@ def test_the_prediction_stands_while_nothing_is_seen(gavrila):
     truth = dancing(gavrila, 4)
     cameras = cameras_around()
     views = [dressed([PosedBody(gavrila, v)], cameras, SUIT) for v in truth]
-    views[3] = tuple(view_evidence(c, 1.0, np.zeros((480, 640), dtype=bool)) for c in cameras)
+    views[3] = tuple(view_evidence(c, np.zeros((480, 640), dtype=bool)) for c in cameras)
     settings = TrackSettings(trust_rad=0.1, trust_m=0.03)
     *_, last = track(Shown(views), [gavrila], truth[:1], range(4), settings)
     assert last.statuses == ("lost",)
-    assert np.isnan(last.views_px).all()
+    assert np.isnan(last.view_costs_px).all()
     assert off_m(gavrila, last.poses[0], truth[3]).max() < 0.02
     sigma = np.where(gavrila.dof_is_length, 0.03, 0.1)
     assert (np.sqrt(np.diag(last.covariances[0])) > 0.9 * sigma).all()
@@ -285,7 +289,7 @@ def test_a_sample_frame_is_drawn_to_its_truth(real_frame, sample_folder):
     """From 4 degrees and 2 cm beside, in every degree of freedom, the search comes as near as another body can."""
     model, values, views = real_frame
     start = shaken(model, values, np.random.default_rng(1), np.radians(4), 0.02)
-    *_, last = search_frame(views, [model], [start], TrackSettings())
+    *_, last = search_frame(views, Subjects.of([model]), [start], TrackSettings())
     joints = [model.point_names.index(n) for n in LIMB_JOINTS]
 
     def off(v):
@@ -302,7 +306,7 @@ def test_poses_do_not_depend_on_what_was_looked_at_ahead(sample_folder, monkeypa
     session, frames = load_session(sample_folder), range(25, 28)
     joints = read_joints(sample_folder / "truth.trc", session.fps)
     model, ahead = session.people[0].model, []
-    start = fit_to_points(model, dict(zip(joints.names, joints.points[24], strict=True))).values
+    start = fit_to_points(model, dict(zip(joints.names, joints.points[24], strict=True))).pose
     aside = model.neutral() * 0
     aside[0] = 0.8
     starts = [start, start + aside][:n_people]
@@ -340,7 +344,7 @@ def test_a_real_recording(data_folder, tmp_path):
     start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS})
     with Recording(session.cameras) as recording:
         observer = Observer(session.cameras, recording)
-        found = list(track(observer, [model], [start.values], range(3), TrackSettings()))
+        found = list(track(observer, [model], [start.pose], range(3), TrackSettings()))
     poses = {f.frame: f.poses[0] for f in found}
     errors = evaluate_joints(joints_of_poses(model, poses, session.fps), reference, range(3))
     assert errors.mpjpe_mm < 90
@@ -356,7 +360,7 @@ def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folde
     model, frames = session.people[0].model, range(12)
     reference = read_joints(folder / "ground_truth.trc", session.fps)
     places = dict(zip(reference.names, reference.points[0], strict=True))
-    start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).values
+    start = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).pose
     with Recording(session.cameras) as recording:
         observer = Observer(session.cameras, recording)
         found = list(track(observer, [model], [start], frames, TrackSettings(), keyframes={0: {0: start}}))
@@ -364,3 +368,21 @@ def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folde
     errors = evaluate_joints(joints_of_poses(model, poses, session.fps), reference, frames)
     assert errors.mpjpe_mm < 42
     assert (errors.missing_frames, errors.lost_frames) == (0, 0)
+
+
+@pytest.mark.parametrize("segments", [True, False])
+def test_contours_are_traced_once_per_pose(gavrila, monkeypatch, segments):
+    """Those of the prediction and those of the result, in each view; the cost of the result traces nothing."""
+    truth = dancing(gavrila, 3)
+    views = [dressed([PosedBody(gavrila, v)], cameras_around(), SUIT) for v in truth]
+    predicted, found, scored = [], [], []
+    trace, trace_views, score = occluding_contours.trace, chamfer_cost._trace_views, chamfer_cost._score_candidates
+    monkeypatch.setattr(occluding_contours, "trace", lambda *a: predicted.append(a) or trace(*a))
+    monkeypatch.setattr(chamfer_cost, "_trace_views", lambda *a: found.append(a) or trace_views(*a))
+    monkeypatch.setattr(chamfer_cost, "_score_candidates", lambda *a: scored.append(a) or score(*a))
+    for estimate in track(Shown(views), [gavrila], truth[:1], range(3), TrackSettings(segments=segments)):
+        assert estimate.statuses == ("good",)
+        assert (len(predicted), len(found), len(scored)) == (3, 1, 1)  # of three views, at one and all at once
+        assert len(scored[0][8].firsts) == 3 + 1  # it is handed the contours of all views
+        for calls in (predicted, found, scored):
+            calls.clear()

@@ -2,9 +2,9 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker.images.background_subtraction import smoothed
+from tracker.images.background_subtraction import smooth_image
 from tracker.images.edges import Levels, detect_edges
-from tracker.images.silhouette_outline import trace_outline, trust_outline
+from tracker.images.silhouette_contour import contour_trust, trace_silhouette
 
 BOUNDS = Levels(60.0, 30.0)
 
@@ -20,11 +20,11 @@ def picture(inside):
 
 
 def trusted(silhouette, image):
-    return trust_outline(trace_outline(silhouette), silhouette, detect_edges(smoothed(image), BOUNDS))
+    return contour_trust(trace_silhouette(silhouette), silhouette, detect_edges(smooth_image(image), BOUNDS))
 
 
 def test_points_lie_on_the_contour_and_normals_point_out():
-    outline = trace_outline(disc())
+    outline = trace_silhouette(disc())
     out = outline.points_px - np.array([80, 60], np.float32)
     radii = np.linalg.norm(out, axis=1)
     assert len(out) > 150
@@ -36,7 +36,7 @@ def test_points_lie_on_the_contour_and_normals_point_out():
 
 def test_normals_are_against_the_slope_of_the_softened_silhouette():
     blots = cv2.GaussianBlur(np.random.default_rng(3).normal(size=(120, 160)), (0, 0), 5) > 0
-    outline = trace_outline(blots)
+    outline = trace_silhouette(blots)
     assert len(outline.points_px) > 500
     u, v = outline.points_px.T.astype(int)
     soft = cv2.blur(blots.view(np.uint8) * np.uint8(255), (7, 7))
@@ -49,7 +49,7 @@ def test_trust_is_the_share_of_the_outline_with_an_edge_along_it():
     rng = np.random.default_rng(4)
     blots = cv2.GaussianBlur(rng.normal(size=(120, 160)), (0, 0), 9) > 0.02
     seen = blots & (cv2.GaussianBlur(rng.normal(size=(120, 160)), (0, 0), 6) > -0.04)
-    edges, outline = detect_edges(smoothed(picture(seen)), BOUNDS), trace_outline(blots)
+    edges, outline = detect_edges(smooth_image(picture(seen)), BOUNDS), trace_silhouette(blots)
     u, v = outline.points_px.T.astype(int)
     near = cv2.dilate(edges.found, np.ones((5, 5), np.uint8))[v, u] > 0
     gradients = edges.gradients[:, v, u].T.astype(np.float32)
@@ -57,27 +57,27 @@ def test_trust_is_the_share_of_the_outline_with_an_edge_along_it():
     share = np.mean(near & (across > 0.7 * np.linalg.norm(gradients, axis=-1)))
     assert 0.6 < share < 0.85
     assert np.mean(blots) < 0.5  # else it would count against the silhouette
-    assert trust_outline(outline, blots, edges) == pytest.approx((share - 0.5) / 0.4)
+    assert contour_trust(outline, blots, edges) == pytest.approx((share - 0.5) / 0.4)
 
 
 def test_holes_have_a_contour_too_and_specks_do_not():
     ring = disc(40) & ~disc(20)
-    inner = np.linalg.norm(trace_outline(ring).points_px - (80, 60), axis=1) < 25
+    inner = np.linalg.norm(trace_silhouette(ring).points_px - (80, 60), axis=1) < 25
     assert inner.sum() > 80
-    towards_middle = -(trace_outline(ring).points_px[inner] - (80, 60))
-    assert np.all(np.sum(trace_outline(ring).normals[inner] * towards_middle, axis=1) > 0)
+    towards_middle = -(trace_silhouette(ring).points_px[inner] - (80, 60))
+    assert np.all(np.sum(trace_silhouette(ring).normals[inner] * towards_middle, axis=1) > 0)
     specks = disc(40)
     specks[60:62, 80:83] = False
     specks[5, 5:9] = True
-    np.testing.assert_array_equal(trace_outline(specks).points_px, trace_outline(disc(40)).points_px)
+    np.testing.assert_array_equal(trace_silhouette(specks).points_px, trace_silhouette(disc(40)).points_px)
 
 
 def test_no_contour_where_the_silhouette_leaves_the_image():
-    points = trace_outline(disc(30, (5, 60))).points_px
+    points = trace_silhouette(disc(30, (5, 60))).points_px
     assert len(points) > 50
     assert points.min() > 0
-    assert trace_outline(np.ones((40, 50), dtype=bool)).points_px.shape == (0, 2)
-    assert trace_outline(np.zeros((40, 50), dtype=bool)).normals.shape == (0, 2)
+    assert trace_silhouette(np.ones((40, 50), dtype=bool)).points_px.shape == (0, 2)
+    assert trace_silhouette(np.zeros((40, 50), dtype=bool)).normals.shape == (0, 2)
 
 
 def test_a_silhouette_that_the_image_shows_is_trusted():

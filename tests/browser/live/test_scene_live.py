@@ -20,7 +20,7 @@ from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera, viewed_point
-from tracker.posing.default_pose import standing_pose
+from tracker.posing.default_pose import default_pose
 from tracker.session.session import Person, create_session, load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
@@ -65,7 +65,7 @@ def folder(tmp_path_factory):
     """A session in which the body stands still on frame 0 and has walked on a hand's breadth by each of the others."""
     home = tmp_path_factory.mktemp("scene")
     model = load_model("gavrila22")
-    values = standing_pose(model, CAMERAS)
+    values = default_pose(model, CAMERAS)
     sources = []
     for view in CAMERAS:
         (home / view.name).mkdir()

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from staging import camera_at
 
-from tracker.images.matching_view import MIN_REGION_PX, MatchedView, fit_region, region_around
+from tracker.images.working_view import MIN_REGION_PX, WorkingView, fit_region, region_around
 
 LENS = np.array([-0.1, 0.02, 0.001, -0.001])
 
@@ -21,7 +21,7 @@ def smooth_picture(size, seed=0):
 @pytest.mark.parametrize("size", [(640, 480), (1088, 1920), (1280, 960), (700, 500)])
 @pytest.mark.parametrize("lens", [np.zeros(0), LENS], ids=["pinhole", "lens"])
 def test_regions_are_parts_of_the_whole(size, lens):
-    view = MatchedView(replace(camera_at("c", (4, 0, 0), size=size), distortion=lens))
+    view = WorkingView(replace(camera_at("c", (4, 0, 0), size=size), distortion=lens))
     frame = smooth_picture(size)
     whole = view.image(frame, view.whole)
     assert whole.shape == (view.camera.height, view.camera.width, 3)
@@ -33,7 +33,7 @@ def test_regions_are_parts_of_the_whole(size, lens):
 @pytest.mark.parametrize("size", [(640, 480), (1088, 1920)])
 def test_matched_pixels_show_what_the_matched_camera_sees(size):
     source = replace(camera_at("c", (2.5, 0.7, 0.3), size=size, focal=0.8 * size[0]), distortion=LENS)
-    view = MatchedView(source)
+    view = WorkingView(source)
     # The colour of a pixel of the footage tells where it lies.
     u, v = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
     frame = np.stack([255 * u / size[0], 255 * v / size[1], 0 * u], axis=-1).astype(np.uint8)
@@ -47,7 +47,7 @@ def test_matched_pixels_show_what_the_matched_camera_sees(size):
 
 def test_a_mask_keeps_its_place():
     source = replace(camera_at("c", (4, 0, 0), size=(1280, 960)), distortion=LENS)
-    view = MatchedView(source)
+    view = WorkingView(source)
     mask = np.zeros((960, 1280), np.uint8)
     mask[300:500, 500:900] = 2
     inside = view.mask(mask, view.whole)
@@ -59,7 +59,7 @@ def test_a_mask_keeps_its_place():
 
 def test_no_black_frame_where_the_lens_leaves_the_picture():
     source = replace(camera_at("c", (4, 0, 0), focal=700.0), distortion=np.array([0.2, 0.0, 0.0, 0.0]))
-    view = MatchedView(source)
+    view = WorkingView(source)
     seen = view.image(np.full((480, 640, 3), 200, np.uint8), view.whole)
     assert (seen == 200).all()
 
@@ -68,7 +68,7 @@ def test_no_black_frame_where_the_lens_leaves_the_picture():
 @pytest.mark.parametrize("scale", [1.0, 0.61, 0.5, 0.23])
 def test_another_scale_shows_the_undistorted_image_reduced(lens, scale):
     source = replace(camera_at("c", (4, 0, 0)), distortion=lens)
-    view = MatchedView(source, scale, cv2.BORDER_CONSTANT)
+    view = WorkingView(source, scale, cv2.BORDER_CONSTANT)
     frame = smooth_picture((640, 480))
     seen = view.image(frame, view.whole).astype(float)
     simple = cv2.resize(source.undistort_image(frame), view.camera.size, interpolation=cv2.INTER_AREA)

@@ -1,6 +1,6 @@
-"""Footage to matched pixels: without lens distortion, at the scale of matching, and only the region asked for.
+"""Convert footage to working pixels: undistorted, at working scale, and only in the requested region.
 
-All image work is done in the region around the predicted bodies (GD96 Sect. 4.2); the rest is never computed.
+All image work is done in a region around the predicted bodies (GD96 Sect. 4.2).
 """
 
 from functools import cached_property
@@ -14,24 +14,24 @@ from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera, Region
 from tracker.images.background_subtraction import Mask
 
-MATCH_AREA_PX = 640 * 480
-"""Frames are matched at a scale at which they have about this many pixels, and never enlarged."""
+WORKING_AREA_PX = 640 * 480
+"""Largest number of pixels of a view at working scale. Smaller frames are not enlarged."""
 MIN_REGION_PX = 16
-"""Regions are at least this wide and high; edges and distances need neighbours."""
+"""Smallest width and height of a region, px; edges and distances need neighbours."""
 _REGION_STEP_PX = 8
-# Pixels around a region of the footage that bilinear interpolation may ask for.
+# Pixels around a region of the footage that bilinear interpolation may read.
 _MARGIN_PX = 2
 
 
-def match_scale(camera: Camera) -> float:
-    """Scale at which the frames of a camera are matched: 1 up to 640x480, smaller above."""
-    return min(1.0, float(np.sqrt(MATCH_AREA_PX / (camera.width * camera.height))))
+def working_scale(camera: Camera) -> float:
+    """Return the working scale of a camera: 1 up to 640x480, smaller above."""
+    return min(1.0, float(np.sqrt(WORKING_AREA_PX / (camera.width * camera.height))))
 
 
 def fit_region(region: Region, size: tuple[int, int]) -> Region:
-    """Bring a region into an image of a width and height, px, at least `MIN_REGION_PX` wide and high.
+    """Fit a region into an image of a width and height, px, at least `MIN_REGION_PX` wide and high.
 
-    A region beside the image becomes the nearest strip of it: edges there are none of the body's, but harmless.
+    A region beside the image becomes the nearest strip of it. The edges there are not the body's, but harmless.
     """
     spans = []
     for low, high, length in zip(region[:2], region[2:], size, strict=True):
@@ -42,17 +42,17 @@ def fit_region(region: Region, size: tuple[int, int]) -> Region:
 
 
 def region_around(points_px: Array, margin_px: float, size: tuple[int, int]) -> Region:
-    """The region of an image that holds points and a margin around them.
+    """Return the region of an image that holds points and a margin around them.
 
-    Its borders lie at multiples of 8 px, so that it does not change with every small motion.
+    Its borders lie at multiples of 8 px, so that small motions do not change it.
 
     Args:
-        points_px: (N, 2), N > 0, matched px; they may lie outside the image.
-        margin_px: what to add on each side, px.
+        points_px: (N, 2), N > 0, working px; they may lie outside the image.
+        margin_px: margin on each side, px.
         size: image width and height, px.
     """
     step = _REGION_STEP_PX
-    # Far outside, where a point near the plane of the camera may lie, integers would overflow.
+    # Points near the camera plane project far outside, where integers would overflow.
     reach = 2 * max(size)
     points = np.clip(points_px, -reach, reach)
     u0, v0 = np.floor((points.min(axis=0) - margin_px) / step).astype(int) * step
@@ -60,29 +60,29 @@ def region_around(points_px: Array, margin_px: float, size: tuple[int, int]) -> 
     return fit_region((int(u0), int(v0), int(u1), int(v1)), size)
 
 
-class MatchedView:
-    """One camera's way from footage to matched pixels. Immutable, so safe to use from several threads."""
+class WorkingView:
+    """Conversion of one camera's footage to working pixels. Immutable and therefore thread-safe."""
 
     source: Camera
-    """The camera as calibrated, of the size of the footage."""
+    """Camera as calibrated, at the size of the footage."""
     camera: Camera
-    """The same without lens distortion, at the scale of matching."""
+    """The same camera without lens distortion, at working scale."""
     scale: float
-    """Matched pixels per pixel of the footage, at most 1."""
+    """Working pixels per pixel of the footage, at most 1."""
 
     def __init__(self, source: Camera, scale: float | None = None, beyond: int = cv2.BORDER_REPLICATE) -> None:
-        """Compute the map of all pixels once; a region takes its part of it.
+        """Compute the map of all pixels once; a region uses a part of it.
 
         Args:
-            source: the camera as calibrated.
-            scale: another than that of matching, at most 1.
-            beyond: OpenCV's name for what lies beside the footage. That its border goes on there is for edges: a black
-                frame around the image would have some.
+            source: camera as calibrated.
+            scale: scale other than the working scale, at most 1.
+            beyond: OpenCV border mode for pixels beside the footage. Replication is for edges: a black frame around the
+                image would have some.
         """
         self.source, self._beyond = source, beyond
-        self.scale = match_scale(source) if scale is None else scale
+        self.scale = working_scale(source) if scale is None else scale
         self.camera = source.pinhole.scaled(self.scale)
-        # Larger footage is first reduced by a whole factor, averaging areas, which is fast; the map does the rest.
+        # Larger footage is first reduced by a whole factor with area averaging, which is fast; the map does the rest.
         self._reduction = int(1 / self.scale)
         self._plain = source.is_pinhole and self.scale == 1
         if self._plain:
@@ -92,7 +92,7 @@ class MatchedView:
         self._cells, self._fractions = cv2.convertMaps(u, v, cv2.CV_16SC2)
 
     def _map(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Where each matched pixel lies in the footage, u and v, (H, W) each, px."""
+        """Return where each working pixel lies in the footage, u and v, (H, W) each, px."""
         source, camera = self.source, self.camera
         return cv2.initUndistortRectifyMap(  # type: ignore[return-value]
             source.K, source.distortion, np.eye(3), camera.K, camera.size, cv2.CV_32FC1
@@ -100,16 +100,16 @@ class MatchedView:
 
     @cached_property
     def _nearest(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """The same as OpenCV takes it for the nearest pixel."""
+        """The same map in OpenCV's form for nearest-neighbour interpolation."""
         return cv2.convertMaps(*self._map(), cv2.CV_16SC2, nninterpolation=True)
 
     @property
     def whole(self) -> Region:
-        """The region of the whole image."""
+        """Region of the whole image."""
         return 0, 0, self.camera.width, self.camera.height
 
     def image(self, frame: Image, region: Region) -> Image:
-        """Region of a frame as filmed, `(H, W, 3)`, in matched pixels, (v1 - v0, u1 - u0, 3)."""
+        """Return a region of a frame as filmed, `(H, W, 3)`, in working pixels, (v1 - v0, u1 - u0, 3)."""
         u0, v0, u1, v1 = region
         if self._plain:
             return frame[v0:v1, u0:u1]
@@ -124,7 +124,8 @@ class MatchedView:
         return np.asarray(out, np.uint8)
 
     def mask(self, mask: NDArray[np.uint8], region: Region) -> Mask:
-        """Region of a mask as filmed, `(H, W)`, in matched pixels, (v1 - v0, u1 - u0); True where it is not 0."""
+        """Return a region of a mask as filmed, `(H, W)`, in working pixels, (v1 - v0, u1 - u0); True where it is not
+        0."""
         u0, v0, u1, v1 = region
         if self._plain:
             return mask[v0:v1, u0:u1] > 0
@@ -133,7 +134,8 @@ class MatchedView:
 
     @staticmethod
     def _needed(cells: NDArray[Any], width: int, height: int) -> Region:
-        """The part of the reduced footage that a map reads; a lens has its extremes on the border of a region."""
+        """Return the region of the reduced footage that a map reads. The extremes of a lens map lie on the region's
+        border."""
         border = np.concatenate([cells[0], cells[-1], cells[:, 0], cells[:, -1]])
         (left, top), (right, bottom) = border.min(axis=0).tolist(), border.max(axis=0).tolist()
         m = _MARGIN_PX

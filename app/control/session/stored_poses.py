@@ -1,0 +1,46 @@
+"""Read the stored poses of the session for views: timeline, curves, trails."""
+
+from app.control.session.session_state import SessionState
+from tracker.geometry.arrays import Array
+from tracker.store.records import FramePose
+
+
+class StoredPoses:
+    """The stored poses, read under the session's lock. Nothing is changed."""
+
+    def __init__(self, session_state: SessionState) -> None:
+        """Read what is stored of this session."""
+        self._session_state = session_state
+
+    def timeline(self, since: int = 0, person: int | None = None) -> dict[int, dict | None]:
+        """Return the cells of the frames whose stored poses changed after a version of the timeline.
+
+        Args:
+            since: the version; 0 returns all cells.
+            person: index of one of several people; None summarizes all people.
+        """
+        with self._session_state.lock:
+            return self._session_state.saver.timeline(since, person)
+
+    def rows(self, person: int, since: int = 0) -> tuple[list[int], list[FramePose]]:
+        """Return the frames on which a person's poses changed after a version of the timeline, and their present rows.
+
+        Args:
+            person: index of the person.
+            since: the version; 0 returns all frames on which the person has a pose.
+        """
+        saver = self._session_state.saver
+        with self._session_state.lock:
+            frames = sorted(saver.timeline(since)) if since > 0 else saver.frames(person)
+        return frames, saver.pose_rows(person, frames)
+
+    def in_present_body(self, person: int, frames: range) -> dict[int, Array]:
+        """Return a person's poses, (n_values,), in the present body by frame; frames without a pose are left out."""
+        saver = self._session_state.saver
+        with self._session_state.lock:
+            listed = saver.frames_within(person, frames)
+        return {
+            row.frame: saver.in_present_body(person, row.values, row.model_revision)
+            for row in saver.pose_rows(person, listed)
+            if saver.fits(person, row.model_revision)
+        }

@@ -1,0 +1,67 @@
+"""How people are shown and handled: their poses, a drag, a draft of sizes, who is visible."""
+
+from dataclasses import dataclass
+
+from tracker.body.model import BodyModel
+from tracker.geometry.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class ShownPose:
+    """The pose of one person on the shown frame."""
+
+    values: Array
+    """Pose, (n_values,)."""
+    source: str | None
+    """Where it comes from; None for a draft that is not stored: the pose of the nearest frame that has one."""
+    status: str = ""
+    """The tracker's assessment: `good`, `doubtful`, `lost`, or empty."""
+    remark: str = ""
+    """Note of the tracker about the frame, as text for the user."""
+    part_costs_px: tuple[float | None, ...] = ()
+    """Cost of each part, px; None for an unseen part, empty where unknown."""
+    sources: tuple[str, ...] = ()
+    """Source of each value of a pose that is not stored yet, (n_values,); empty if `source` applies to all."""
+    revision: int | None = None
+    """Model revision of a stored pose; None for a pose that is not stored as shown."""
+    others: tuple[Array, ...] = ()
+    """Alternatives that the tracker found, (n_values,) each, best first; empty for a keyframe."""
+
+
+@dataclass(frozen=True)
+class DragState:
+    """A drag of a point or of a part."""
+
+    camera: int
+    person: int
+    point: str
+    """Name of the point, or of the part if its surface is dragged."""
+    pointer_px: tuple[float, float]
+    """Undistorted px."""
+    part: int
+    """Index of the part that carries the dragged place."""
+    place_part: tuple[float, float, float]
+    """The dragged place in the frame of its part, metres."""
+    by_surface: bool = False
+    """Whether the surface of the part is dragged, not a point."""
+    mode: str = "move"
+    """`move`, `turn` or `push`, see `tracker.posing.drag`."""
+
+
+@dataclass(frozen=True, eq=False)
+class SizeDraft:
+    """Body sizes of a person that are being edited and are not applied yet."""
+
+    person: int
+    model: BodyModel
+    """The body with these sizes."""
+
+
+@dataclass(frozen=True)
+class Visibility:
+    """Which people the views show. Poses are unaffected: a hidden person still occludes others and counts in costs."""
+
+    hidden: frozenset[int] = frozenset()
+    """Indices of the people that no view shows."""
+    solo: bool = False
+    """Whether everybody but the selected person is dimmed and cannot be dragged."""

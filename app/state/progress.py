@@ -1,0 +1,57 @@
+"""Progress of long work: tracking, work on ranges of frames, indexing of footage."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class TrackState:
+    """The tracking run, running or paused."""
+
+    running: bool = False
+    first: int | None = None
+    """First frame of the run in the order of tracking; None if there is no run."""
+    last: int | None = None
+    """Last frame of the run; smaller than `first` for a backward run."""
+    at: int | None = None
+    """The frame tracked last; None before the first."""
+    done: int = 0
+    """Number of frames tracked."""
+    total: int = 0
+    """Number of frames to track."""
+    per_second: float = 0.0
+    """Frames tracked per second of work."""
+    doubtful: int = 0
+    """Number of doubtful frames."""
+    lost: int = 0
+    """Number of lost frames."""
+    back: bool = False
+    """Whether the run is in its second pass, tracking lost people backward; `done` and `total` count that pass."""
+    message: str = ""
+    """How the last run ended."""
+    failed: bool = False
+    """Whether it ended with an error."""
+
+
+@dataclass(frozen=True)
+class RangeState:
+    """Work on a range of frames: its progress, or how the last one ended."""
+
+    running: bool = False
+    what: str = ""
+    """The kind of work, as text for the user: `interpolating`."""
+    done: int = 0
+    """Number of frames written."""
+    total: int = 0
+    """Number of frames to write."""
+    message: str = ""
+    """How the last one ended."""
+
+
+@dataclass(frozen=True)
+class FootageState:
+    """How many frames of the videos are indexed; long footage is indexed in the background when it is first opened."""
+
+    listed: float | None = None
+    """Share of the footage, 0 to 1; None when all of it is indexed."""
+    error: str | None = None
+    """What is wrong with a file; None if nothing is."""

@@ -1,0 +1,58 @@
+/**
+ * Model: what the page knows and what it can ask of the program.
+ *
+ * The room holds the store, the connection with its messages, and the actions of a user. It imports only types of `widgets`.
+ */
+
+import { Actions } from "./actions.js";
+import { Connection } from "./connection.js";
+import { ImageTones } from "./image_tone.js";
+import { Latency } from "./latency.js";
+import { Layers } from "./layers.js";
+import { Navigation } from "./navigation.js";
+import { Receiver } from "./receiver.js";
+import { RecentImages } from "./recent_images.js";
+import { Store } from "./store.js";
+import { unavailableReasons } from "./unavailable_reasons.js";
+
+/**
+ * @typedef {import("./protocol.js").ClientMessage} ClientMessage
+ * @typedef {import("./protocol.js").NoticeMessage} NoticeMessage
+ * @typedef {ReturnType<typeof mount>} Context what all other rooms are mounted with
+ */
+
+/** Create the model. The page connects to the program only when `connect` is called, after all rooms are mounted. */
+export function mount() {
+  const store = new Store();
+  const latency = new Latency();
+  const recentImages = new RecentImages();
+  /** @type {((notice: NoticeMessage) => void)[]} */
+  const noticeListeners = [];
+  const notify = (/** @type {NoticeMessage} */ notice) => noticeListeners.forEach((listener) => listener(notice));
+  const receiver = new Receiver(store, notify, recentImages);
+  /** @type {Connection | null} */
+  let connection = null;
+  const send = (/** @type {ClientMessage} */ message) => connection?.send(message);
+  return {
+    store,
+    send,
+    notify,
+    latency,
+    recentImages,
+    actions: new Actions(store, send),
+    navigation: new Navigation(store, send),
+    layers: new Layers(store),
+    imageTones: new ImageTones(store),
+    reasons: unavailableReasons(store),
+
+    /** @param {(notice: NoticeMessage) => void} listener shows notices of the program and of the page */
+    onNotice(listener) {
+      noticeListeners.push(listener);
+    },
+
+    /** @param {ClientMessage | null} greeting sent first on every connection */
+    connect(greeting) {
+      connection = new Connection(receiver, greeting);
+    },
+  };
+}

@@ -1,0 +1,32 @@
+/**
+ * Panes: the camera images with everything drawn over them, and the pointer in them.
+ *
+ * The room imports `widgets` and `model`.
+ */
+
+import { byId } from "../widgets/elements.js";
+import { ViewRequest } from "../model/view_request.js";
+import { Gestures } from "./gestures.js";
+import { ImageToneMenu } from "./image_tone_menu.js";
+import { LayersMenu } from "./layers_menu.js";
+import { paneBindings } from "./pane_keys.js";
+import { PaneGrid } from "./pane_grid.js";
+import { PlaceholderFrames } from "./placeholder_frames.js";
+
+/** @typedef {ReturnType<typeof mount>} Panes */
+
+/**
+ * Build the grid of panes and its menus.
+ *
+ * @param {import("../model/index.js").Context} context
+ */
+export function mount({ store, send, latency, layers, imageTones, recentImages }) {
+  const gestures = new Gestures(store, send, latency);
+  const layersMenu = new LayersMenu(store, layers);
+  const toneMenu = new ImageToneMenu(store, imageTones);
+  const grid = new PaneGrid(byId("panes", HTMLElement), store, latency, toneMenu.toggle.bind(toneMenu));
+  grid.addPointerTarget(gestures);
+  new PlaceholderFrames(store, recentImages);
+  new ViewRequest(store, send);
+  return { grid, gestures, bindings: paneBindings({ grid, layers, layersMenu }) };
+}

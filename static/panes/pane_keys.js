@@ -1,0 +1,35 @@
+/** Keys of the camera panes and their layers. */
+
+import { BY_KEY } from "../model/layers.js";
+import { inArea, plain } from "../widgets/key_matching.js";
+
+/**
+ * @param {{grid: import("./pane_grid.js").PaneGrid, layers: import("../model/layers.js").Layers,
+ *   layersMenu: import("./layers_menu.js").LayersMenu}} parts
+ */
+export function paneBindings({ grid, layers, layersMenu }) {
+  return inArea("Views", [
+    { keys: ["A"], label: "Layers", matches: plain("a"), run: () => layersMenu.toggle() },
+    {
+      keys: ["Shift 1 – 9"],
+      label: "Show or hide a layer, by its number in the menu",
+      matches: (event) => plain("", event.code, true)(event) && /^Digit[1-9]$/.test(event.code),
+      run: (event) => layers.toggle([BY_KEY[Number(event.code.at(-1)) - 1]]),
+    },
+    { keys: ["I"], label: "Brightness and contrast of a pane", matches: plain("i"), run: () => grid.openToneMenu() },
+    {
+      keys: ["1 – 9"],
+      label: "Fill the grid with a camera (toggle); two digits for 10 to 16",
+      matches: (event) => plain(event.key.toLowerCase())(event) && /^[1-9]$/.test(event.key),
+      run: (event) => grid.typeCamera(Number(event.key)),
+    },
+    { keys: ["PageDown"], label: "Fill the grid with the next camera", matches: plain("pagedown"), run: () => grid.stepFill(1) },
+    { keys: ["PageUp"], label: "Fill the grid with the previous camera", matches: plain("pageup"), run: () => grid.stepFill(-1) },
+    {
+      keys: ["0"],
+      label: "Show the whole image",
+      matches: plain("0"),
+      run: () => grid.typeCamera(0) || grid.resetViews(),
+    },
+  ]);
+}

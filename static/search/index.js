@@ -1,0 +1,22 @@
+/**
+ * Search: watch, replay and compare searches, and the cost landscape.
+ *
+ * The room imports `widgets`, `model`, `panes` and `timeline`.
+ */
+
+import { CostLandscape } from "./cost_landscape.js";
+import { searchBindings } from "./search_keys.js";
+import { SearchPanel } from "./search_panel.js";
+
+/** @typedef {ReturnType<typeof mount>} SearchRoom */
+
+/**
+ * Build the tabs of the drawer that show searches.
+ *
+ * @param {import("../model/index.js").Context} context
+ */
+export function mount({ store, send, actions, reasons }) {
+  new SearchPanel(store, actions, send);
+  new CostLandscape(store, send);
+  return { bindings: searchBindings(store, actions, reasons) };
+}

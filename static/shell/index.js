@@ -1,0 +1,90 @@
+/**
+ * Shell: what surrounds the views: top bar, people, history, messages, command palette and keys.
+ *
+ * The room imports all other rooms.
+ */
+
+import { button, byId } from "../widgets/elements.js";
+import { makeSplitter } from "../widgets/splitter.js";
+import { watchTyping } from "../widgets/typing.js";
+import { Announcer } from "./announcer.js";
+import { FirstSteps } from "./first_steps.js";
+import { HistoryList } from "./history_list.js";
+import { KeyList } from "./key_list.js";
+import { listen, orderedByArea } from "./keys.js";
+import { Notices, watchConnection } from "./notices.js";
+import { Palette } from "./palette.js";
+import { People } from "./people.js";
+import { peopleBindings } from "./people_keys.js";
+import { showProgressMarks } from "./progress_marks.js";
+import { SavedMark } from "./saved_mark.js";
+import { escapeBinding, helpBindings } from "./shell_keys.js";
+import { TopBar } from "./top_bar.js";
+
+/**
+ * @typedef {object} Rooms
+ * @property {import("../panes/index.js").Panes} panes
+ * @property {import("../posing/index.js").PosingRoom} posing
+ * @property {import("../timeline/index.js").TimelineRoom} timeline
+ * @property {import("../search/index.js").SearchRoom} search
+ * @property {import("../scene/index.js").SceneRoom} scene
+ */
+
+/**
+ * Build the bars, lists and dialogs around the views, and obey the keys of all rooms.
+ *
+ * @param {import("../model/index.js").Context} context
+ * @param {Rooms} rooms
+ */
+export function mount(context, rooms) {
+  const { store, send, actions, navigation, layers, reasons } = context;
+  const { grid, gestures } = rooms.panes;
+  const { posing, pinning } = rooms.posing;
+  const notices = new Notices();
+  context.onNotice((notice) => notices.show(notice));
+  new TopBar(store, actions);
+  const people = new People(store, actions, posing);
+  showProgressMarks(store);
+  watchConnection(byId("banner", HTMLElement), store);
+  makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement));
+  const history = new HistoryList(store, send);
+  new SavedMark(store, send);
+  new Announcer(byId("announcer", HTMLElement), store);
+  const firstSteps = new FirstSteps(store);
+  const palette = new Palette({ store, navigation, grid, posing, layers, actions, away: reasons.away });
+  const keyList = new KeyList();
+  button("show-palette", () => palette.toggle());
+
+  const own = [
+    ...helpBindings({ actions, history, notices, palette, keyList, firstSteps, reasons }),
+    escapeBinding({ store, actions, notices, grid, gestures, pinning, floor: rooms.scene.floor }),
+    ...peopleBindings({ actions, posing, people, reasons }),
+  ];
+  const { panes, timeline, search, scene } = rooms;
+  const table = orderedByArea([
+    own,
+    ...[scene, search, timeline, rooms.posing, panes].map(({ bindings }) => bindings),
+  ]);
+  palette.setBindings(table);
+  keyList.setBindings(table);
+  obeyKeys(context, table, scene.frame);
+}
+
+/**
+ * Obey the keys that are pressed in the page or in the 3-D view.
+ *
+ * @param {import("../model/index.js").Context} context
+ * @param {import("../widgets/key_matching.js").Binding[]} table
+ * @param {HTMLIFrameElement} frame of the 3-D view
+ */
+function obeyKeys({ store, notify }, table, frame) {
+  const isDragging = () => store.facts.dragging;
+  const say = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
+  watchTyping(document);
+  listen(document, table, { viser: false, isDragging, say });
+  frame.addEventListener("load", () => {
+    if (!frame.contentDocument) return;
+    watchTyping(frame.contentDocument);
+    listen(frame.contentDocument, table, { viser: true, isDragging, say });
+  });
+}

@@ -1,0 +1,63 @@
+/** Keys of history, help and messages, and Esc. */
+
+import { hasSearch, hasTrack } from "../model/selectors.js";
+import { control, inArea, plain } from "../widgets/key_matching.js";
+import { closePopover } from "../widgets/popovers.js";
+
+/** @typedef {import("../widgets/key_matching.js").Binding} Binding */
+
+/**
+ * @param {{actions: import("../model/actions.js").Actions, history: import("./history_list.js").HistoryList,
+ *   notices: import("./notices.js").Notices, palette: import("./palette.js").Palette,
+ *   keyList: import("./key_list.js").KeyList, firstSteps: import("./first_steps.js").FirstSteps,
+ *   reasons: import("../model/unavailable_reasons.js").Reasons}} parts
+ */
+export function helpBindings({ actions, history, notices, palette, keyList, firstSteps, reasons }) {
+  const shift = (/** @type {string} */ key) => plain(key, undefined, true);
+  return inArea("History and help", [
+    { keys: ["Ctrl K"], label: "Commands", matches: control("k", false), anywhere: true, run: () => palette.toggle() },
+    { keys: ["Ctrl Z"], label: "Undo", matches: control("z", false), anywhere: true, why: reasons.undo, run: () => actions.undo() },
+    {
+      keys: ["Ctrl Shift Z", "Ctrl Y"],
+      label: "Redo",
+      anywhere: true,
+      why: reasons.redo,
+      matches: (event) => control("z", true)(event) || control("y", false)(event),
+      run: () => actions.redo(),
+    },
+    { keys: ["H"], label: "History of edits", matches: plain("h"), run: () => history.toggle() },
+    { keys: ["Shift H"], label: "Messages", matches: shift("h"), run: () => notices.toggleLog() },
+    { keys: ["Shift Esc"], label: "Dismiss all messages", matches: shift("escape"), run: () => notices.dismissAll() },
+    { keys: ["?"], label: "Keyboard shortcuts", matches: (event) => event.key === "?", run: () => keyList.show() },
+    {
+      keys: [],
+      label: "First steps with a new recording",
+      matches: () => false,
+      run: () => firstSteps.show(),
+    },
+  ]);
+}
+
+/**
+ * Esc ends the first of these that is going on.
+ *
+ * @param {{store: import("../model/store.js").Store, actions: import("../model/actions.js").Actions,
+ *   notices: import("./notices.js").Notices, grid: import("../panes/pane_grid.js").PaneGrid,
+ *   gestures: import("../panes/gestures.js").Gestures, pinning: import("../posing/pinning.js").Pinning,
+ *   floor: import("../scene/floor.js").Floor}} parts
+ * @returns {Binding}
+ */
+export function escapeBinding({ store, actions, notices, grid, gestures, pinning, floor }) {
+  const run = () => {
+    if (gestures.cancel() || closePopover() || floor.cancel() || pinning.cancel() || actions.leaveReplay()) return;
+    const { state, range, filled } = store.facts;
+    if (hasTrack(state)) actions.stopTracking();
+    else if (state?.range.running) actions.stopRange();
+    else if (hasSearch(state)) actions.search("stop");
+    else if (notices.dismiss()) return;
+    else if (range) store.set({ range: null });
+    else if (filled !== null) grid.toggleFill(filled);
+  };
+  const label = "Cancel a drag, exit the replay, stop a run, or unmark the range";
+  return { keys: ["Esc"], label, area: "Tracking", matches: plain("escape"), run };
+}

@@ -1,0 +1,45 @@
+/**
+ * Timeline: navigation through the recording, ranges of frames, tracking, and the drawer with its curves.
+ *
+ * The room imports `widgets`, `model` and `panes`.
+ */
+
+import { byId } from "../widgets/elements.js";
+import { Curves } from "./curves.js";
+import { Drawer } from "./drawer.js";
+import { FrameWindow } from "./frame_window.js";
+import { JumpMenu } from "./jump_menu.js";
+import { Jumps } from "./jumps.js";
+import { Playback } from "./playback.js";
+import { RangeBar } from "./range_bar.js";
+import { Timeline } from "./timeline.js";
+import { drawerBindings, frameBindings, timelineBindings, trackBindings } from "./timeline_keys.js";
+import { TrackBar } from "./track_bar.js";
+import { Transport } from "./transport.js";
+
+/** @typedef {ReturnType<typeof mount>} TimelineRoom */
+
+/**
+ * Build the bars below the views, the drawer and the timeline.
+ *
+ * @param {import("../model/index.js").Context} context
+ */
+export function mount({ store, actions, navigation, reasons }) {
+  const playback = new Playback(store, navigation);
+  const jumps = new Jumps(store, navigation);
+  const frameWindow = new FrameWindow(store);
+  new Transport(store, navigation, playback, actions);
+  new TrackBar(store, actions);
+  new JumpMenu(store, jumps);
+  new RangeBar(store, actions);
+  const drawer = new Drawer(store);
+  new Curves(store, navigation, actions, frameWindow);
+  new Timeline(byId("timeline", HTMLElement), { store, navigation, jumps, frameWindow });
+  const bindings = [
+    ...frameBindings(navigation, playback),
+    ...trackBindings(store, actions, reasons),
+    ...timelineBindings({ store, actions, playback, jumps, frameWindow, reasons }),
+    ...drawerBindings(drawer),
+  ];
+  return { bindings };
+}
