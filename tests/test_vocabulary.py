@@ -31,7 +31,7 @@ RETIRED = {
     "MatchedView": "WorkingView",
     "Probes": "SampleGrid",
     "Scenery": "StaticEdgeModel",
-    "NO_REFCOUNT": "NO_REFCOUNT",
+    "BORROW": "NO_REFCOUNT",
     "dealt_out": "map_chunked",
     "side_by_side": "map_parallel",
     "rebodied": "retarget_pose",

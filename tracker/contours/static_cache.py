@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import NO_REFCOUNT, FAST_MATH
+from tracker.compute.numba_options import FAST_MATH, NO_REFCOUNT
 from tracker.contours.generator import MAX_POINTS
 from tracker.contours.occluding_contours import Pieces, focal_px, mark_all_occluded, place_eye, trace_part
 from tracker.contours.surfaces import Surfaces

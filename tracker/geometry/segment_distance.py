@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import NO_REFCOUNT, FAST_MATH
+from tracker.compute.numba_options import FAST_MATH, NO_REFCOUNT
 from tracker.geometry.arrays import FloatArray, IntArray
 
 _ZERO, _HALF, _ONE = (
