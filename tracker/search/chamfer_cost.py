@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tracker.body.kinematics import Tree, forward_kinematics
 from tracker.body.model import BodyModel, PosedBody, parts_of
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.compute.threads import kernel_pool
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
@@ -297,7 +297,7 @@ def _near(view: ViewEvidence, pieces_px: FloatArray, occluded: NDArray[np.bool_]
     return within_reach(everything, pieces_px, occluded, theta)
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool) -> float:
     """Mean of n distances with weights w, outliers treated as `ChamferCost` says; theta where there are none."""
     total, weight = 0.0, 0.0
@@ -325,7 +325,7 @@ def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool
     return total / weight if weight >= 0.5 * everything else theta
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _distance(image: FloatArray, width: int, height: int, u: np.float32, v: np.float32) -> np.float32:
     """Distance at a pixel; outside the image, that of the nearest border pixel and the way to it."""
     inside = bilinear(image, width, height, u, v)[0]
@@ -335,7 +335,7 @@ def _distance(image: FloatArray, width: int, height: int, u: np.float32, v: np.f
     return inside + np.sqrt(off_u * off_u + off_v * off_v)
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, visible: FloatArray) -> float:
     """Mean distance of n visible pieces, see `_Scratch`, cut off at theta; theta where none is visible.
 
@@ -351,7 +351,7 @@ def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, v
     return theta - spared / weight if weight > 0.0 else theta
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: float, scratch: _Scratch) -> float:
     """The same by the paper's robust mean."""
     visible, lengths, d = scratch.visible, scratch.lengths, scratch.distances
@@ -361,7 +361,7 @@ def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: fl
     return _robust_mean(d, lengths, n, theta, True)
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _take_visible(
     n: int, pieces: occluding_contours.Pieces, visible: FloatArray, segments: Segments
 ) -> tuple[int, int]:
@@ -406,7 +406,7 @@ def _trace_views(
     return at
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _take_traced(view: int, contours: _Contours, pieces: occluding_contours.Pieces) -> int:
     """Copy the pieces of a view that are traced already; their number."""
     first, last = contours.firsts[view], contours.firsts[view + 1]
@@ -418,7 +418,7 @@ def _take_traced(view: int, contours: _Contours, pieces: occluding_contours.Piec
     return n
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _score(
     Ts: Array,
     surfaces: occluding_contours.Surfaces,

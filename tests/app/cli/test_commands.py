@@ -150,7 +150,7 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     assert {k: found[k].time for k in (1, 2)} == done
     assert {found[k].status for k in range(1, 6)} <= {"good", "doubtful"}
     assert len(found[3].view_costs_px) == 4
-    status, out, _ = run("track", session, "--frames", "0:6", "--json")  # and once done, it begins anew
+    status, out, _ = run("track", session, "--frames", "0:6", "--json")  # a finished run starts over
     assert (json.loads(out)["frames"], json.loads(out)["resumed_at"]) == (6, None)
 
 
@@ -203,7 +203,7 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
         np.testing.assert_array_equal(f.poses[0], found[k].values)
     np.testing.assert_array_equal(stored(session)[3].values, estimates[3].poses[0] + 0.01)
     monkeypatch.setattr(ChamferTracker, "estimates", tracked)
-    told = json.loads(run(*words)[1])  # once done it begins anew, all of it one entry
+    told = json.loads(run(*words)[1])  # a finished run starts over, as one entry
     assert (told["frames"], told["resumed_at"]) == (5, None)
     with closing(AnnotationStore(session / "annotations.sqlite")) as store:
         assert [store.undo() for _ in range(3)] == ["track frames 0:5"] * 3
