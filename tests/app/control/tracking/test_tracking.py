@@ -19,7 +19,7 @@ def at(controller, frame):
 
 
 def end_the_step_soon(tracker):
-    """Whoever stops a run waits for the step at hand."""
+    """To stop a run waits for the current step."""
     threading.Timer(0.2, tracker.let_go, (1,)).start()
 
 
