@@ -1,4 +1,4 @@
-/** Brightness, contrast and gamma of each camera's image: in this browser only, kept session by session. */
+/** Brightness, contrast and gamma of each camera's image, stored in this browser per session. */
 
 /**
  * @typedef {{brightness: number, contrast: number, gamma: number}} ImageTone
@@ -17,7 +17,7 @@ export function isPlain(tone) {
 }
 
 /**
- * The value that each of the 256 gray levels is shown with: gamma first, then contrast about the middle, then brightness.
+ * Map each of the 256 gray levels to its displayed value: gamma first, then contrast about the middle, then brightness.
  *
  * @param {ImageTone} tone
  */
@@ -73,7 +73,7 @@ export class ImageTones {
     try {
       stored = JSON.parse(localStorage.getItem(STORED + session.name) ?? "{}") ?? {};
     } catch {
-      // What is not understood is as good as nothing.
+      // Settings that cannot be read are ignored.
     }
     this.#store.set({ imageTones: session.cameras.map(({ name }) => known(stored[name])) });
   }

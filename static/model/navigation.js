@@ -1,6 +1,6 @@
 /**
- * Which frame is asked for. One request is under way at a time and the newest wish waits behind it: however fast a hand
- * scrubs or a clip plays, the program is never more than one frame behind.
+ * Request frames from the program. Only one request is pending at a time, and only the newest further request is kept.
+ * Scrubbing and playback are therefore never more than one frame ahead of the program.
  */
 
 const TIMEOUT_MS = 2000;
@@ -31,7 +31,7 @@ export class Navigation {
   }
 
   /**
-   * Go to a frame; one outside the recording means its nearest end.
+   * Go to a frame, clamped to the recording.
    *
    * @param {number} frame
    */
@@ -40,7 +40,7 @@ export class Navigation {
     this.request(Math.max(0, Math.min(this.#last, Math.round(frame))));
   }
 
-  /** @param {number} count frames forward, or backward where negative */
+  /** @param {number} count negative to go back */
   step(count) {
     this.pause();
     this.goTo(this.#store.facts.target + count);
@@ -58,13 +58,13 @@ export class Navigation {
     if (this.#store.facts.playing) this.#store.set({ playing: false });
   }
 
-  /** Whether a frame is on its way. */
+  /** Whether a request is pending. */
   get isWaiting() {
     return this.#pending !== null;
   }
 
   /**
-   * Ask for a frame of the recording.
+   * Request a frame of the recording.
    *
    * @param {number} frame
    */
@@ -84,7 +84,7 @@ export class Navigation {
     const request = { frame };
     this.#pending = request;
     this.#send({ type: "seek", frame });
-    // Another tab may have led the program elsewhere before it got there: then those images never come.
+    // Another tab may have requested a different frame. Then these images never arrive.
     setTimeout(() => {
       if (this.#pending !== request) return;
       this.#sendWish();
@@ -95,7 +95,7 @@ export class Navigation {
   #arrived() {
     const { shown, state, target } = this.#store.facts;
     if (this.#pending && shown?.frame === this.#pending.frame) this.#sendWish();
-    // Another tab, an undo or a tracker may have gone elsewhere.
+    // Another tab, an undo or a tracker may have changed the frame.
     if (!this.#pending && this.#wish === null && state && state.frame !== target) {
       this.#store.set({ target: state.frame });
     }

@@ -1,15 +1,15 @@
 /**
- * While a frame is on its way the nearest one at hand stands in for it: its images only, marked in each pane, and nothing that
- * a hand could take. Frames that come at once, as in playing, need none.
+ * Show the nearest cached frame while the requested frame is loading. Only its images are shown, marked in each pane, and
+ * nothing can be dragged. Frames that load quickly, as in playback, need no placeholder.
  */
 
-/** So far a frame may be away and so long take before another stands in: it may be decoded already. */
+/** Frames farther away than this get a placeholder immediately, nearer ones after a delay. */
 const [STEP, PATIENCE_MS] = [2, 25];
 
 export class PlaceholderFrames {
   #store;
   #recent;
-  /** @type {number | null} the frame that is waited for */
+  /** @type {number | null} the frame that is loading */
   #awaited = null;
 
   /**
@@ -24,10 +24,10 @@ export class PlaceholderFrames {
     });
   }
 
-  /** The frame to wait for, or null where nothing has to stand in. */
+  /** The frame that is loading; null if no placeholder is needed. */
   get #late() {
     const { connected, shown, state, target, playing } = this.#store.facts;
-    const follows = state?.track.running && state.follow; // then the program is always a little ahead
+    const follows = state?.track.running && state.follow; // then the program is always slightly ahead
     return connected && shown && !playing && !follows && shown.frame !== target ? target : null;
   }
 
@@ -36,12 +36,12 @@ export class PlaceholderFrames {
     if (late === this.#awaited) return;
     this.#awaited = late;
     if (late === null) this.#store.facts.placeholder && this.#store.set({ placeholder: null });
-    // A hand that scrubs on sees the next one at once, and so does who goes far: the true one takes its time.
+    // While scrubbing, and for distant frames, show the placeholder immediately.
     else if (this.#store.facts.placeholder || Math.abs(late - (this.#store.facts.shown?.frame ?? late)) > STEP) this.#stand();
     else setTimeout(() => this.#stand(), PATIENCE_MS);
   }
 
-  /** Let the nearest frame stand in. */
+  /** Show the nearest cached frame. */
   #stand() {
     const { shown, reductions } = this.#store.facts;
     const target = this.#awaited;

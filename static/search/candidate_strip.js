@@ -1,4 +1,4 @@
-/** The best poses that a search came by, as stick figures over the view that tells them apart best. */
+/** Best candidates of a search as stick figures, in the view where they differ most. */
 
 import { prepare } from "../panes/drawing.js";
 import { byId } from "../widgets/elements.js";
@@ -7,7 +7,7 @@ import { selectedRun } from "../model/search_runs.js";
 
 const WIDTH = 76;
 const HEIGHT = 58;
-/** Share of the figures' height that is left around them. */
+/** Margin as a fraction of the figures' size. */
 const MARGIN = 0.08;
 
 export class CandidateStrip {
@@ -16,7 +16,7 @@ export class CandidateStrip {
   #element = byId("candidates", HTMLElement);
   #list = document.createElement("div");
   #label = document.createElement("span");
-  /** @type {unknown[]} what is drawn: a search at work tells of every step, but seldom of other candidates */
+  /** @type {unknown[]} the arguments of the last drawing; candidates change less often than steps */
   #drawn = [];
 
   /**
@@ -135,7 +135,7 @@ export class CandidateStrip {
 }
 
 /**
- * Where all candidates lie in a view, with a margin.
+ * Box of all candidates in a view, with a margin.
  *
  * @param {import("../model/search_runs.js").Candidates} found
  * @param {number} camera

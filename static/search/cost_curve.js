@@ -1,5 +1,5 @@
 /**
- * Least and tested cost against the poses scored, with the stages marked; other runs beside it. A click goes to that step.
+ * Plot of best and tested costs by number of poses evaluated, with stages and other runs. A click replays that step.
  */
 
 import { colorName } from "../timeline/curve_drawing.js";
@@ -11,7 +11,7 @@ import { count } from "../widgets/text.js";
 
 /** @typedef {import("../model/search_runs.js").Steps} Steps */
 
-/** Costs above this share of all that were tested are cut off: a few bad ones would flatten the rest. */
+/** Quantile of the tested costs at the top of the plot, so that a few high ones do not flatten the rest. */
 const SHOWN_SHARE = 0.95;
 const NAME_GAP = 70;
 const READOUT_HEIGHT = 18;
@@ -134,7 +134,7 @@ export class CostCurve {
   }
 
   /**
-   * The step replayed, the step under the pointer, and what it says.
+   * Draw the replayed step and the step under the pointer, and show its figures.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {Plot} plot
@@ -164,7 +164,7 @@ export class CostCurve {
 }
 
 /**
- * Name of the style's colour of a run.
+ * CSS variable with the colour of a run.
  *
  * @param {number} number
  */
@@ -198,7 +198,7 @@ function drawTested(context, plot, steps, style) {
 }
 
 /**
- * Where stages begin, with their names as far as there is room.
+ * Draw the starts of stages, with their names where there is room.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {Plot} plot

@@ -1,4 +1,4 @@
-/** The landscape tab of the drawer: the cost over the range of one degree of freedom. Hovering reads it, a click sets the value. */
+/** Plot of the cost over the range of one degree of freedom. Hovering reads values, a click sets the value. */
 
 import { colorName } from "../timeline/curve_drawing.js";
 import { prepare } from "../panes/drawing.js";
@@ -22,7 +22,7 @@ export class CostLandscape {
   #hovered = /** @type {number | null} */ (null);
   #plot = /** @type {Plot | null} */ (null);
   #isOpen = false;
-  /** What the list of degrees of freedom was built for. */
+  /** The names that the list of degrees of freedom was built for. */
   #listed = "";
 
   /**
@@ -141,7 +141,7 @@ export class CostLandscape {
   }
 
   /**
-   * The current value, the least cost, and the value under the pointer.
+   * Draw the current value, the minimum and the value under the pointer.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {Plot} plot
@@ -191,7 +191,7 @@ export class CostLandscape {
 }
 
 /**
- * @param {string} label empty for the value itself
+ * @param {string} label empty for the value of the degree of freedom
  * @param {number} color
  */
 function legendEntry(label, color) {

@@ -1,4 +1,4 @@
-/** The runs of the shown frame: what each was told that differs, what it found and cost; to compare, take, or run again. */
+/** Search runs of the current frame: results, differing settings, and buttons to compare and apply. */
 
 import { runColor } from "./cost_curve.js";
 import { byId } from "../widgets/elements.js";

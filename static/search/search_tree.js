@@ -1,6 +1,6 @@
 /**
- * The decomposition of the search as a tree (GD96 Fig. 2), the passes beside it: what each stage searches, within which bounds
- * and by which steps, what it cost and gained, and which one is at work.
+ * Tree of the search stages (GD96 Fig. 2) with a column per pass: degrees of freedom, bounds, steps, cost and gain of each
+ * stage, and the running stage.
  */
 
 import { byId } from "../widgets/elements.js";
@@ -24,9 +24,9 @@ export class SearchTree {
   #store;
   #change;
   #element = byId("search-tree", HTMLElement);
-  /** What the tree was built for. */
+  /** The shape that the tree was built for. */
   #built = "";
-  /** @type {Map<string, HTMLElement>} cells by person, group and pass */
+  /** @type {Map<string, HTMLElement>} cells by person, stage and pass */
   #cells = new Map();
   /** @type {{field: ReturnType<typeof makeNumber>, read: (setup: import("../model/protocol.js").SearchSetupMessage) => number | null}[]} */
   #fields = [];
@@ -89,7 +89,7 @@ export class SearchTree {
   }
 
   /**
-   * The root of a person's tree; of the first it holds the bounds and steps that all follow.
+   * Root row of a person. The root of the first person has the default bounds and steps.
    *
    * @param {import("../model/protocol.js").SearchSetupMessage} setup
    * @param {string} name
@@ -145,7 +145,7 @@ export class SearchTree {
   }
 
   /**
-   * What is told to all stages.
+   * Settings of all stages.
    *
    * @param {import("../model/protocol.js").SearchSetupMessage} setup
    */

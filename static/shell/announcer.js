@@ -1,4 +1,4 @@
-/** Says in a live region what has changed, for those who do not see the page. */
+/** Announce changes in a live region for screen readers. */
 
 import { displayName } from "../widgets/text.js";
 
@@ -22,7 +22,7 @@ export class Announcer {
       if (!changed.has("state")) return;
       this.#told ??= store.facts.state;
       clearTimeout(this.#timer);
-      // While frames run past or a hand moves there would be no end of words.
+      // Wait until a sequence of changes has ended.
       this.#timer = setTimeout(() => this.#say(), SETTLED_MS);
     });
   }

@@ -1,4 +1,4 @@
-/** The people of the session: who is worked on, who is shown, who is dimmed, and whom searches and fits move. */
+/** People of the session: active person, visibility, solo, and the people that searches move. */
 
 import { button, byId, iconButton } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
@@ -60,10 +60,10 @@ export class People {
   }
 
   /**
-   * A switch among the people, in a person's colour.
+   * Make a switch for a person, in the person's colour.
    *
    * @param {HTMLElement} within
-   * @param {string} name of the group of switches
+   * @param {string} name of the radio group
    * @param {import("../model/protocol.js").PersonInfo} info
    * @param {number} person
    */

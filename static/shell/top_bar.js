@@ -1,4 +1,4 @@
-/** The bar at the top: search, cost, history. */
+/** Top bar: session, search or tracking progress, cost, undo and redo. */
 
 import { hasSearch, hasTrack } from "../model/selectors.js";
 import { button, byId } from "../widgets/elements.js";

@@ -1,4 +1,4 @@
-/** Draws plots of curves above one another, along the timeline's axis of frames. Sizes are CSS pixels. */
+/** Draw plots of curves below one another, on the axis of the timeline. Sizes are CSS pixels. */
 
 import { roundUp } from "../widgets/frame_axis.js";
 import { extent, trace } from "../model/series.js";
@@ -13,7 +13,7 @@ import { drawDiamond, markPositions } from "./timeline_drawing.js";
 const TICKS_HEIGHT = 16;
 const PLOT_GAP = 6;
 const TICK_GAP = 22;
-/** An angle that hardly moves must not look like one that swings. */
+/** Minimum range of a plot, so that small changes do not look large. */
 const MIN_SPAN = { deg: 20, cm: 10, px: 1 };
 const UNITS = { deg: "degrees", cm: "cm", px: "px" };
 
@@ -22,7 +22,7 @@ const UNITS = { deg: "degrees", cm: "cm", px: "px" };
  * @param {FrameAxis} axis
  * @param {number} height
  * @param {Curves} curves
- * @param {string[]} labels all names of curves, in the order of the colours
+ * @param {string[]} labels all names of curves, in the order of their colours
  * @param {Set<string>} hidden names of the curves that are switched off
  * @param {Iterable<number>} keyframes
  * @param {CSSStyleDeclaration} style
@@ -55,7 +55,7 @@ export function drawCurves(context, axis, height, curves, labels, hidden, keyfra
 }
 
 /**
- * Name of the style's colour of a curve.
+ * CSS variable with the colour of a curve.
  *
  * @param {number} index
  */
@@ -64,7 +64,7 @@ export function colorName(index) {
 }
 
 /**
- * Round limits round the values, with 0 among them for costs.
+ * Scale with a margin around the values. For costs it starts at 0.
  *
  * @param {import("../model/protocol.js").Plot["unit"]} unit
  * @param {Float32Array[]} curves
@@ -91,7 +91,7 @@ function toY({ top, bottom, least, most }, value) {
 }
 
 /**
- * The ground of a plot, with lines at round values and their numbers in the gutter.
+ * Draw the background of a plot, grid lines at round values and their labels.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
@@ -109,7 +109,7 @@ function drawFrame(context, axis, scale, style) {
     const y = Math.round(toY(scale, value));
     context.fillStyle = style.getPropertyValue("--line");
     context.fillRect(axis.left, y, axis.right - axis.left, 1);
-    // Numbers at the edges would touch those of the next plot.
+    // Labels at the edges would touch those of the next plot.
     if (y < scale.top + 5 || y > scale.bottom - 4) continue;
     context.fillStyle = style.getPropertyValue("--muted");
     context.fillText(String(Number(value.toPrecision(6))), axis.left - 6, y);

@@ -1,4 +1,4 @@
-/** The bar over a marked range of frames: what can be done with it, how far that is, and how it ended. */
+/** Bar over the marked range: actions, progress and result. */
 
 import { button, byId } from "../widgets/elements.js";
 import { FrameAxis } from "../widgets/frame_axis.js";
@@ -24,7 +24,7 @@ export class RangeBar {
   #scope = byId("range-scope", HTMLSelectElement);
   #buttons;
   #stop;
-  /** The message of the work that ended before this range was marked. */
+  /** Message of the work that ended before this range was marked. */
   #old = "";
 
   /**
@@ -80,7 +80,7 @@ export class RangeBar {
     this.#place();
   }
 
-  /** In the middle over the range, and within the window. */
+  /** Centre the bar over the range, within the window. */
   #place() {
     const { range, session, visible } = this.#store.facts;
     if (!range || !session) return;

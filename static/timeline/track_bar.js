@@ -1,4 +1,4 @@
-/** The buttons that track. */
+/** Buttons for tracking. */
 
 import { hasTrack } from "../model/selectors.js";
 import { button, byId } from "../widgets/elements.js";

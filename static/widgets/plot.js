@@ -1,4 +1,4 @@
-/** A plot with two axes of numbers, for what has no axis of frames. Sizes are CSS pixels. */
+/** Plot with two numeric axes. Sizes are CSS pixels. */
 
 import { roundUp } from "./frame_axis.js";
 
@@ -17,7 +17,7 @@ export class Plot {
    * @param {number} height
    * @param {Range} xs
    * @param {Range} ys
-   * @param {number} top room above the plot
+   * @param {number} top space above the plot
    */
   constructor(width, height, xs, ys, top = TOP) {
     this.xs = xs;
@@ -39,7 +39,7 @@ export class Plot {
   }
 
   /**
-   * The value at a place, the nearest end outside.
+   * Value at a position, clamped to the range.
    *
    * @param {number} x
    */
@@ -49,7 +49,7 @@ export class Plot {
   }
 
   /**
-   * Ground, lines at round values, and their numbers.
+   * Draw the background, grid lines at round values and their labels.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {CSSStyleDeclaration} style
@@ -79,12 +79,12 @@ export class Plot {
   }
 
   /**
-   * A line through points.
+   * Draw a line through points.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {ArrayLike<number>} xs
    * @param {ArrayLike<number>} ys NaN leaves a gap
-   * @param {boolean} isStepped whether a value holds until the next
+   * @param {boolean} isStepped whether a value applies until the next point
    */
   drawLine(context, xs, ys, isStepped = false) {
     const line = new Path2D();
@@ -104,7 +104,7 @@ export class Plot {
   }
 
   /**
-   * Draw only within the plot.
+   * Clip drawing to the plot.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {() => void} draw
@@ -121,7 +121,7 @@ export class Plot {
 
 /**
  * @param {Range} range
- * @param {number} share least distance of two, as a share of the range
+ * @param {number} share minimum distance of two ticks as a fraction of the range
  */
 function ticks({ least, most }, share) {
   const step = roundUp(Math.max(1e-12, (most - least) * share));

@@ -1,4 +1,4 @@
-/** The bar between panes and 3-D view: dragged, moved by arrow keys, put back by a double click; remembered. */
+/** Splitter between panes and 3-D view, moved by pointer or arrow keys and reset by a double-click. Its position is stored. */
 
 const STORED = "quadrille.panes-fraction";
 const DEFAULT_FRACTION = 0.62;
