@@ -117,7 +117,7 @@ export class Layers {
   constructor(store) {
     this.#store = store;
     store.subscribe((changed) => {
-      if (changed.has("session")) this.#recall();
+      if (changed.has("session")) this.#restore();
     });
   }
 
@@ -132,7 +132,7 @@ export class Layers {
     const show = isShown ?? !ids.every((id) => layers.shown[id]);
     const shown = { ...layers.shown };
     for (const id of ids) shown[id] = show;
-    this.#keep({ ...layers, shown });
+    this.#save({ ...layers, shown });
   }
 
   /**
@@ -141,29 +141,29 @@ export class Layers {
    */
   setOpacity(id, opacity) {
     const { layers } = this.#store.facts;
-    this.#keep({ ...layers, opacity: { ...layers.opacity, [id]: opacity } });
+    this.#save({ ...layers, opacity: { ...layers.opacity, [id]: opacity } });
   }
 
   /** @param {ContourColors} colors */
   setColors(colors) {
-    this.#keep({ ...this.#store.facts.layers, colors });
+    this.#save({ ...this.#store.facts.layers, colors });
   }
 
   reset() {
-    this.#keep(defaultLayers(this.#store.facts.session?.people.length));
+    this.#save(defaultLayers(this.#store.facts.session?.people.length));
   }
 
   /** @param {LayerChoice} layers */
-  #keep(layers) {
+  #save(layers) {
     this.#store.set({ layers });
     localStorage.setItem(STORED + this.#session, JSON.stringify(layers));
   }
 
-  #recall() {
+  #restore() {
     const { name = "", people = [] } = this.#store.facts.session ?? {};
     if (name === this.#session) return;
     this.#session = name;
-    this.#store.set({ layers: known(localStorage.getItem(STORED + name), people.length) });
+    this.#store.set({ layers: restored(localStorage.getItem(STORED + name), people.length) });
   }
 }
 
@@ -173,7 +173,7 @@ export class Layers {
  * @param {string | null} stored
  * @param {number} people number of people of the session
  */
-function known(stored, people) {
+function restored(stored, people) {
   const layers = defaultLayers(people);
   /** @type {Partial<LayerChoice>} */
   let found;

@@ -11,7 +11,7 @@ export class Navigation {
   /** @type {{frame: number} | null} */
   #pending = null;
   /** @type {number | null} */
-  #wish = null;
+  #next = null;
 
   /**
    * @param {import("./store.js").Store} store
@@ -70,15 +70,15 @@ export class Navigation {
    */
   request(frame) {
     this.#store.set({ target: frame });
-    this.#wish = frame;
-    if (!this.#pending) this.#sendWish();
+    this.#next = frame;
+    if (!this.#pending) this.#sendNext();
   }
 
-  #sendWish() {
+  #sendNext() {
     this.#pending = null;
-    if (this.#wish === null) return;
-    const frame = this.#wish;
-    this.#wish = null;
+    if (this.#next === null) return;
+    const frame = this.#next;
+    this.#next = null;
     const { shown, state } = this.#store.facts;
     if (shown?.frame === frame && state?.frame === frame) return;
     const request = { frame };
@@ -87,23 +87,23 @@ export class Navigation {
     // Another tab may have requested a different frame. Then these images never arrive.
     setTimeout(() => {
       if (this.#pending !== request) return;
-      this.#sendWish();
+      this.#sendNext();
       this.#arrived();
     }, TIMEOUT_MS);
   }
 
   #arrived() {
     const { shown, state, target } = this.#store.facts;
-    if (this.#pending && shown?.frame === this.#pending.frame) this.#sendWish();
+    if (this.#pending && shown?.frame === this.#pending.frame) this.#sendNext();
     // Another tab, an undo or a tracker may have changed the frame.
-    if (!this.#pending && this.#wish === null && state && state.frame !== target) {
+    if (!this.#pending && this.#next === null && state && state.frame !== target) {
       this.#store.set({ target: state.frame });
     }
   }
 
   #reset() {
     this.#pending = null;
-    this.#wish = null;
+    this.#next = null;
     this.pause();
   }
 }

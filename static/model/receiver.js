@@ -125,9 +125,9 @@ export class Receiver {
     this.#pictures = new PictureAssembler((frame, pictures) => this.#show(frame, pictures));
     this.#early.clear();
     this.#recent.clear(); // the footage may have changed while disconnected
-    const former = this.#store.facts.session?.cameras;
+    const previous = this.#store.facts.session?.cameras;
     this.#store.set({ session, lanes: [] });
-    if (JSON.stringify(former) !== JSON.stringify(session.cameras)) this.#store.set({ shown: null, overlay: null });
+    if (JSON.stringify(previous) !== JSON.stringify(session.cameras)) this.#store.set({ shown: null, overlay: null });
   }
 
   /**
@@ -138,13 +138,13 @@ export class Receiver {
    */
   #show(frame, pictures) {
     const { shown } = this.#store.facts;
-    const kept = new Map(shown?.frame === frame ? shown.pictures : []);
+    const merged = new Map(shown?.frame === frame ? shown.pictures : []);
     for (const [key, { bitmap }] of shown?.pictures ?? []) {
-      if (kept.has(key) && !pictures.has(key)) continue;
+      if (merged.has(key) && !pictures.has(key)) continue;
       bitmap.close();
     }
-    for (const [key, picture] of pictures) kept.set(key, picture);
-    this.#store.set({ shown: { frame, pictures: kept } });
+    for (const [key, picture] of pictures) merged.set(key, picture);
+    this.#store.set({ shown: { frame, pictures: merged } });
     this.#recent.keep(frame, pictures);
     const overlay = this.#early.get(frame);
     if (overlay) {

@@ -23,18 +23,18 @@ export class RecentImages {
    * @param {import("./pictures.js").Pictures} pictures
    */
   keep(frame, pictures) {
-    const kept = this.#frames.get(frame) ?? { images: new Map(), bytes: 0 };
+    const entry = this.#frames.get(frame) ?? { images: new Map(), bytes: 0 };
     for (const [key, { bitmap }] of pictures) {
       const [layer, camera] = key.split(" ");
       if (layer !== "image") continue;
       const image = reduced(bitmap);
-      const change = bytesOf(image) - bytesOf(kept.images.get(Number(camera)));
-      kept.images.set(Number(camera), image);
-      kept.bytes += change;
+      const change = bytesOf(image) - bytesOf(entry.images.get(Number(camera)));
+      entry.images.set(Number(camera), image);
+      entry.bytes += change;
       this.#bytes += change;
     }
-    if (kept.images.size === 0) return;
-    this.#touch(frame, kept);
+    if (entry.images.size === 0) return;
+    this.#touch(frame, entry);
     for (const [oldest, { bytes }] of this.#frames) {
       if (this.#bytes <= MAX_BYTES || oldest === frame) break;
       this.#frames.delete(oldest);
@@ -70,19 +70,19 @@ export class RecentImages {
    * @returns {import("./store.js").PlaceholderPictures}
    */
   of(frame) {
-    const kept = this.#frames.get(frame);
-    if (!kept) return new Map();
-    this.#touch(frame, kept);
-    return new Map([...kept.images].map(([camera, bitmap]) => [keyOf("image", camera), { bitmap, limitPx: null }]));
+    const entry = this.#frames.get(frame);
+    if (!entry) return new Map();
+    this.#touch(frame, entry);
+    return new Map([...entry.images].map(([camera, bitmap]) => [keyOf("image", camera), { bitmap, limitPx: null }]));
   }
 
   /**
    * @param {number} frame
-   * @param {{images: Map<number, OffscreenCanvas>, bytes: number}} kept
+   * @param {{images: Map<number, OffscreenCanvas>, bytes: number}} entry
    */
-  #touch(frame, kept) {
+  #touch(frame, entry) {
     this.#frames.delete(frame);
-    this.#frames.set(frame, kept);
+    this.#frames.set(frame, entry);
   }
 }
 

@@ -55,9 +55,9 @@ export function selectedRun(facts) {
 export function mergeSteps(known, { run, first, count }, payload) {
   const columns = new Float32Array(payload);
   const before = known.get(run);
-  const join = (/** @type {number} */ index, /** @type {Float32Array | undefined} */ former) => {
+  const join = (/** @type {number} */ index, /** @type {Float32Array | undefined} */ previous) => {
     const out = new Float32Array(first + count);
-    if (former) out.set(former.subarray(0, first));
+    if (previous) out.set(previous.subarray(0, first));
     out.set(columns.subarray(index * count, (index + 1) * count), first);
     return out;
   };

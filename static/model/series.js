@@ -12,17 +12,17 @@
 /**
  * Merge a message: a new group of curves, or some frames of the current group.
  *
- * @param {Curves | null} former
+ * @param {Curves | null} previous
  * @param {CurvesHeader} header
  * @param {ArrayBuffer} payload frames as uint32, then each curve as float32
  * @param {number} frameCount of the recording
  * @returns {Curves}
  */
-export function mergeCurves(former, { group, person, replace, count, plots }, payload, frameCount) {
+export function mergeCurves(previous, { group, person, replace, count, plots }, payload, frameCount) {
   const labels = plots.flatMap(({ labels, unit }, plot) => labels.map((label) => ({ plot, label, unit })));
   const frames = new Uint32Array(payload, 0, count);
-  const goesOn = !replace && former?.group === group && former.person === person && former.raw.length === labels.length;
-  const raw = goesOn ? former.raw : labels.map(() => new Float32Array(frameCount).fill(NaN));
+  const goesOn = !replace && previous?.group === group && previous.person === person && previous.raw.length === labels.length;
+  const raw = goesOn ? previous.raw : labels.map(() => new Float32Array(frameCount).fill(NaN));
   raw.forEach((values, index) => {
     const news = new Float32Array(payload, 4 * count * (index + 1), count);
     for (let i = 0; i < count; i += 1) values[frames[i]] = news[i];
@@ -43,12 +43,12 @@ export function mergeCurves(former, { group, person, replace, count, plots }, pa
 function unwrapped(degrees) {
   const out = new Float32Array(degrees.length).fill(NaN);
   let turns = 0;
-  let former = NaN;
+  let previous = NaN;
   for (let i = 0; i < degrees.length; i += 1) {
     const value = degrees[i];
     if (value !== value) continue;
-    if (former === former) turns -= Math.round((value - former) / 360);
-    former = value;
+    if (previous === previous) turns -= Math.round((value - previous) / 360);
+    previous = value;
     out[i] = value + 360 * turns;
   }
   return out;
@@ -60,15 +60,15 @@ function unwrapped(degrees) {
  * @param {Float32Array[]} curves
  */
 export function extent(curves) {
-  let least = Infinity;
-  let most = -Infinity;
+  let min = Infinity;
+  let max = -Infinity;
   for (const values of curves) {
     for (let i = 0; i < values.length; i += 1) {
-      if (values[i] < least) least = values[i];
-      if (values[i] > most) most = values[i];
+      if (values[i] < min) min = values[i];
+      if (values[i] > max) max = values[i];
     }
   }
-  return least <= most ? { least, most } : null;
+  return min <= max ? { min, max } : null;
 }
 
 /**
@@ -109,14 +109,14 @@ export function trace(path, values, axis, toY) {
  */
 function summary(values, from, to) {
   if (to - from === 1) return values[from] === values[from] ? [values[from]] : [];
-  let [first, last, least, most] = [NaN, NaN, Infinity, -Infinity];
+  let [first, last, min, max] = [NaN, NaN, Infinity, -Infinity];
   for (let i = from; i < to; i += 1) {
     const value = values[i];
     if (value !== value) continue;
     if (first !== first) first = value;
     last = value;
-    if (value < least) least = value;
-    if (value > most) most = value;
+    if (value < min) min = value;
+    if (value > max) max = value;
   }
-  return first === first ? [first, least, most, last] : [];
+  return first === first ? [first, min, max, last] : [];
 }

@@ -19,8 +19,8 @@ import { partAt } from "./part_hit.js";
 /**
  * @typedef {import("./drawing.js").PlacedHandle} PlacedHandle
  * @typedef {{pane: import("./pane.js").Pane, frame: number, camera: number, pointer: number, person: number, point: string,
- *   part: number | null, mode: import("../model/protocol.js").DragMode, start: {x: number, y: number}, grabbed: {u: number, v: number}, at: {u: number, v: number},
- *   offset: {u: number, v: number}, begun: boolean}} Drag
+ *   part: number | null, mode: import("../model/protocol.js").DragMode, start: {x: number, y: number},
+ *   grabbed: {u: number, v: number}, at: {u: number, v: number}, offset: {u: number, v: number}, begun: boolean}} Drag
  */
 
 export class Gestures {
@@ -103,7 +103,8 @@ export class Gestures {
     let nearest = null;
     let reach = GRAB_RADIUS;
     for (const placed of pane.graspableHandles()) {
-      const distance = Math.hypot(placed.x - at.x, placed.y - at.y) + (placed.handle.person === state?.person ? 0 : OTHER_PERSON_PENALTY_PX);
+      const penalty = placed.handle.person === state?.person ? 0 : OTHER_PERSON_PENALTY_PX;
+      const distance = Math.hypot(placed.x - at.x, placed.y - at.y) + penalty;
       if (distance <= reach) [nearest, reach] = [placed, distance];
     }
     return nearest;

@@ -74,8 +74,8 @@ export class ImageToneMenu {
     const control = slider({
       label,
       title,
-      least: -100,
-      most: 100,
+      min: -100,
+      max: 100,
       step: 2,
       format: (value) => (isGamma ? gammaOf(value).toFixed(2) : signed(value)),
       onInput: (value) =>

@@ -87,8 +87,8 @@ export class LayersMenu {
     const opacity = slider({
       label: `Opacity of ${label.toLowerCase()}`,
       title: `Opacity of ${label.toLowerCase()}`,
-      least: 5,
-      most: 100,
+      min: 5,
+      max: 100,
       step: 5,
       format: (value) => `${value}%`,
       onInput: (value) => this.#layers.setOpacity(id, value / 100),

@@ -10,7 +10,7 @@ export class PlaceholderFrames {
   #store;
   #recent;
   /** @type {number | null} the frame that is loading */
-  #awaited = null;
+  #loading = null;
 
   /**
    * @param {import("../model/store.js").Store} store
@@ -20,31 +20,31 @@ export class PlaceholderFrames {
     this.#store = store;
     this.#recent = recent;
     store.subscribe((changed) => {
-      if (["target", "shown", "playing", "connected"].some((fact) => changed.has(/** @type {any} */ (fact)))) this.#look();
+      if (["target", "shown", "playing", "connected"].some((fact) => changed.has(/** @type {any} */ (fact)))) this.#update();
     });
   }
 
   /** The frame that is loading; null if no placeholder is needed. */
-  get #late() {
+  get #loadingFrame() {
     const { connected, shown, state, target, playing } = this.#store.facts;
     const follows = state?.track.running && state.follow; // then the program is always slightly ahead
     return connected && shown && !playing && !follows && shown.frame !== target ? target : null;
   }
 
-  #look() {
-    const late = this.#late;
-    if (late === this.#awaited) return;
-    this.#awaited = late;
-    if (late === null) this.#store.facts.placeholder && this.#store.set({ placeholder: null });
+  #update() {
+    const loading = this.#loadingFrame;
+    if (loading === this.#loading) return;
+    this.#loading = loading;
+    if (loading === null) this.#store.facts.placeholder && this.#store.set({ placeholder: null });
     // While scrubbing, and for distant frames, show the placeholder immediately.
-    else if (this.#store.facts.placeholder || Math.abs(late - (this.#store.facts.shown?.frame ?? late)) > STEP) this.#stand();
-    else setTimeout(() => this.#stand(), PATIENCE_MS);
+    else if (this.#store.facts.placeholder || Math.abs(loading - (this.#store.facts.shown?.frame ?? loading)) > STEP) this.#showNearest();
+    else setTimeout(() => this.#showNearest(), PATIENCE_MS);
   }
 
   /** Show the nearest cached frame. */
-  #stand() {
+  #showNearest() {
     const { shown, reductions } = this.#store.facts;
-    const target = this.#awaited;
+    const target = this.#loading;
     if (target === null) return;
     const cameras = [...reductions.keys()].filter((camera) => reductions[camera] > 0);
     const nearest = this.#recent.nearest(target, cameras);

@@ -127,7 +127,8 @@ export class Inspector {
     const name = info.joint === point ? info.name : `${displayName(info.joint)} ${info.name}`;
     const row = document.createElement("div");
     row.className = isShort ? "dof is-short" : "dof";
-    row.title = `${displayName(info.joint)} ${info.name}, ${range(info)}. Drag the name sideways to change it (Shift: fine steps). U selects the next, + and - change the selected one.`;
+    const hint = "Drag the name sideways to change it (Shift: fine steps). U selects the next, + and - change the selected one.";
+    row.title = `${displayName(info.joint)} ${info.name}, ${range(info)}. ${hint}`;
     const label = document.createElement("span");
     label.className = "dof-name";
     label.textContent = isShort ? info.name.slice(0, 3) : name;

@@ -231,8 +231,8 @@ export class Pinning {
   #hover(event, pane, camera) {
     const { facts } = this.#store;
     const hit = this.#hit(pane, camera, pane.locate(event));
-    const former = facts.pinHover;
-    if (hit ? !isSame(hit, former) : former) {
+    const previous = facts.pinHover;
+    if (hit ? !isSame(hit, previous) : previous) {
       this.#store.set({ pinHover: hit && { camera, person: hit.person, point: hit.point } });
     }
     pane.surface.classList.toggle("is-over-pin", hit !== null);

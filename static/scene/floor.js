@@ -97,7 +97,7 @@ export class Floor {
     this.#panes.classList.toggle("is-picking", !!floor);
     if (!floor) return;
     const isLast = floor.point === POINTS;
-    const text = `Floor, point ${floor.point} of ${POINTS}: ${said(floor)}`;
+    const text = `Floor, point ${floor.point} of ${POINTS}: ${instruction(floor)}`;
     if (this.#text.textContent !== text) this.#text.textContent = text;
     this.#next.textContent = isLast ? "Apply" : "Next point";
     this.#next.title = isLast ? "Use this plane as the floor (Enter)" : "Continue with the next point (Enter)";
@@ -107,7 +107,7 @@ export class Floor {
 }
 
 /** @param {import("../model/protocol.js").FloorPicking} floor */
-function said(floor) {
+function instruction(floor) {
   if (floor.views === 0) return "click a point on the floor";
   if (!floor.known) return floor.why;
   if (floor.point === POINTS && !floor.ready) return floor.why;

@@ -49,7 +49,8 @@ export class CandidateStrip {
     if (drawn.every((one, index) => one === this.#drawn[index])) return;
     this.#drawn = drawn;
     this.#label.textContent = n ? `Best, ${session?.cameras[camera]?.name ?? ""}` : "";
-    this.#label.title = "The best candidates that differ by 3 cm or more, in the view that fills the grid or else the view where they differ most";
+    this.#label.title =
+      "The best candidates that differ by 3 cm or more, in the view that fills the grid or else the view where they differ most";
     if (!found || n === 0 || !session) return;
     const box = frameOf(found, camera);
     [...this.#list.children].forEach((element, index) => {
@@ -57,7 +58,8 @@ export class CandidateStrip {
       const text = cost === null ? "–" : cost.toFixed(2);
       const output = element.querySelector("output");
       if (output) output.textContent = text;
-      /** @type {HTMLElement} */ (element).title = `Candidate ${index + 1}, ${text} px. Point at it to preview it in all views, click to use it (can be undone)`;
+      const hint = "Point at it to preview it in all views, click to use it (can be undone)";
+      /** @type {HTMLElement} */ (element).title = `Candidate ${index + 1}, ${text} px. ${hint}`;
       element.setAttribute("aria-label", `Use candidate ${index + 1}, ${text} px`);
       const canvas = element.querySelector("canvas");
       if (canvas) this.#draw(canvas, found, index, camera, box);

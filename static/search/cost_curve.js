@@ -112,7 +112,8 @@ export class CostCurve {
       return;
     }
     const all = runs.map(({ number }) => /** @type {Steps} */ (searchSteps.get(number)));
-    const plot = new Plot(clientWidth, clientHeight, { least: 0, most: Math.max(...all.map((s) => s.evaluations[s.count - 1]), 1) }, costs(all), READOUT_HEIGHT);
+    const evaluations = { min: 0, max: Math.max(...all.map((s) => s.evaluations[s.count - 1]), 1) };
+    const plot = new Plot(clientWidth, clientHeight, evaluations, costs(all), READOUT_HEIGHT);
     this.#plot = plot;
     plot.drawFrame(context, style, "");
     plot.within(context, () => {
@@ -159,7 +160,8 @@ export class CostCurve {
     }
     const stage = run.stages[steps.stages[at]];
     const where = stage ? `${stage.name} ×${stage.factor} · ` : "";
-    this.#read.textContent = `${where}${count(steps.evaluations[at])} poses · tested ${steps.tested[at].toFixed(2)} · best ${steps.best[at].toFixed(2)} px`;
+    const costs = `tested ${steps.tested[at].toFixed(2)} · best ${steps.best[at].toFixed(2)} px`;
+    this.#read.textContent = `${where}${count(steps.evaluations[at])} poses · ${costs}`;
   }
 }
 
@@ -178,10 +180,10 @@ export function runColor(number) {
  */
 function costs(all) {
   const tested = all.flatMap((steps) => [...steps.tested]).sort((a, b) => a - b);
-  const least = Math.min(...all.map((steps) => steps.best[steps.count - 1]));
-  const most = Math.max(tested[Math.floor(SHOWN_SHARE * (tested.length - 1))], ...all.map((steps) => steps.best[0]));
-  const margin = Math.max(0.05, 0.06 * (most - least));
-  return { least: Math.max(0, least - margin), most: most + margin };
+  const min = Math.min(...all.map((steps) => steps.best[steps.count - 1]));
+  const max = Math.max(tested[Math.floor(SHOWN_SHARE * (tested.length - 1))], ...all.map((steps) => steps.best[0]));
+  const margin = Math.max(0.05, 0.06 * (max - min));
+  return { min: Math.max(0, min - margin), max: max + margin };
 }
 
 /**

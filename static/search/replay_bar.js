@@ -80,7 +80,8 @@ export class ReplayBar {
       this.#text.title = `${replay.stage ?? "start"}, ${replay.evaluations} poses evaluated${best}`;
     } else {
       this.#text.textContent = run && isReady ? `${run.steps} steps` : "";
-      this.#text.title = run?.thinned ? "Steps that can be replayed. Long searches keep only some of their steps" : "Steps that can be replayed";
+      const thinned = run?.thinned ? ". Long searches keep only some of their steps" : "";
+      this.#text.title = `Steps that can be replayed${thinned}`;
     }
   }
 

@@ -36,8 +36,8 @@ export class RunList {
     const runs = [...(searchRuns?.runs ?? [])].reverse();
     const numbers = runs.map(({ number }) => number);
     if (numbers.join() !== [...this.#rows.keys()].join()) {
-      const former = this.#rows;
-      this.#rows = new Map(numbers.map((number) => [number, former.get(number) ?? this.#makeRow(number)]));
+      const previous = this.#rows;
+      this.#rows = new Map(numbers.map((number) => [number, previous.get(number) ?? this.#makeRow(number)]));
       this.#list.replaceChildren(...[...this.#rows.values()].map(({ element }) => element));
       if (numbers.length === 0) this.#list.textContent = "No runs";
     }

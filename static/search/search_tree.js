@@ -79,7 +79,10 @@ export class SearchTree {
 
   /** @param {import("../model/protocol.js").SearchSetupMessage} setup */
   #head(setup) {
-    const passes = setup.passes.map((factor) => cell("tree-head", `steps ×${factor}`, `Pass with steps ×${factor}: poses evaluated and reduction of the cost`));
+    const passes = setup.passes.map((factor) => {
+      const title = `Pass with steps ×${factor}: poses evaluated and reduction of the cost`;
+      return cell("tree-head", `steps ×${factor}`, title);
+    });
     return [
       cell("tree-head", "Stage", "Groups of degrees of freedom, searched one after the other"),
       cell("tree-head", "DOF", "Number of degrees of freedom searched together"),
@@ -157,12 +160,12 @@ export class SearchTree {
       title: "A stage ends after this many expansions without improvement",
       change: (value) => value !== null && this.#change({ patience: Math.round(value) }),
     });
-    const most = makeNumber({
+    const max = makeNumber({
       label: "Max.",
       title: "Maximum number of expansions per stage",
       change: (value) => value !== null && this.#change({ max_expansions: Math.round(value) }),
     });
-    this.#fields.push({ field: patience, read: (now) => now.patience }, { field: most, read: (now) => now.max_expansions });
+    this.#fields.push({ field: patience, read: (now) => now.patience }, { field: max, read: (now) => now.max_expansions });
     const passes = document.createElement("label");
     passes.className = "search-field";
     passes.title = "Step factors: all stages are searched once per factor. The paper uses 1";
@@ -188,7 +191,7 @@ export class SearchTree {
       box.blur();
     });
     apart.append(box, "separate limbs");
-    line.append(passes, patience.element, most.element, apart);
+    line.append(passes, patience.element, max.element, apart);
     return line;
   }
 
@@ -202,9 +205,15 @@ export class SearchTree {
       if (element.textContent !== text) element.textContent = text;
       element.classList.toggle("is-done", !!stage?.done);
       element.classList.toggle("is-running", !!stage?.running);
-      element.title = stage && text ? `${stage.name}, steps ×${stage.factor}: ${count(stage.evaluations)} poses evaluated, cost reduced by ${stage.gain_px.toFixed(3)} px${stage.running ? "; running" : ""}` : "Not searched";
+      element.title = stage && text ? describe(stage) : "Not searched";
     }
   }
+}
+
+/** @param {import("../model/protocol.js").SearchStage} stage */
+function describe({ name, factor, evaluations, gain_px, running }) {
+  const figures = `${count(evaluations)} poses evaluated, cost reduced by ${gain_px.toFixed(3)} px`;
+  return `${name}, steps ×${factor}: ${figures}${running ? "; running" : ""}`;
 }
 
 /**

@@ -7,7 +7,7 @@ import { drawDiamond, markPositions } from "./timeline_drawing.js";
 /**
  * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
  * @typedef {import("../model/series.js").Curves} Curves
- * @typedef {{top: number, bottom: number, least: number, most: number}} Scale
+ * @typedef {{top: number, bottom: number, min: number, max: number}} Scale
  */
 
 const TICKS_HEIGHT = 16;
@@ -73,21 +73,21 @@ export function colorName(index) {
  * @returns {Scale}
  */
 function scaleOf(unit, curves, top, bottom) {
-  let { least, most } = extent(curves) ?? { least: 0, most: 0 };
-  if (unit === "px") least = 0;
-  const lacking = Math.max(0, MIN_SPAN[unit] - (most - least));
-  if (unit !== "px") least -= lacking / 2;
-  most += unit === "px" ? lacking : lacking / 2;
-  const margin = 0.06 * (most - least);
-  return { top, bottom, least: unit === "px" ? 0 : least - margin, most: most + margin };
+  let { min, max } = extent(curves) ?? { min: 0, max: 0 };
+  if (unit === "px") min = 0;
+  const lacking = Math.max(0, MIN_SPAN[unit] - (max - min));
+  if (unit !== "px") min -= lacking / 2;
+  max += unit === "px" ? lacking : lacking / 2;
+  const margin = 0.06 * (max - min);
+  return { top, bottom, min: unit === "px" ? 0 : min - margin, max: max + margin };
 }
 
 /**
  * @param {Scale} scale
  * @param {number} value
  */
-function toY({ top, bottom, least, most }, value) {
-  return bottom - ((bottom - top) * (value - least)) / (most - least);
+function toY({ top, bottom, min, max }, value) {
+  return bottom - ((bottom - top) * (value - min)) / (max - min);
 }
 
 /**
@@ -101,11 +101,11 @@ function toY({ top, bottom, least, most }, value) {
 function drawFrame(context, axis, scale, style) {
   context.fillStyle = style.getPropertyValue("--plot");
   context.fillRect(axis.left, scale.top, axis.right - axis.left, scale.bottom - scale.top);
-  const step = roundUp(((scale.most - scale.least) * TICK_GAP) / (scale.bottom - scale.top));
+  const step = roundUp(((scale.max - scale.min) * TICK_GAP) / (scale.bottom - scale.top));
   context.font = "10.5px system-ui, sans-serif";
   context.textAlign = "right";
   context.textBaseline = "middle";
-  for (let value = Math.ceil(scale.least / step) * step; value <= scale.most; value += step) {
+  for (let value = Math.ceil(scale.min / step) * step; value <= scale.max; value += step) {
     const y = Math.round(toY(scale, value));
     context.fillStyle = style.getPropertyValue("--line");
     context.fillRect(axis.left, y, axis.right - axis.left, 1);

@@ -87,13 +87,13 @@ export class Drawer {
 
   /** Apply the stored height, as far as the window has room for it. */
   #fit() {
-    const most = Math.max(MIN_PX, innerHeight - PANES_PX);
+    const max = Math.max(MIN_PX, innerHeight - PANES_PX);
     const chosen = Number(localStorage.getItem(STORED_HEIGHT + this.#kind)) || DEFAULT_SHARES[this.#kind] * innerHeight;
-    const height = Math.round(Math.max(MIN_PX, Math.min(most, chosen)));
+    const height = Math.round(Math.max(MIN_PX, Math.min(max, chosen)));
     this.#stage.style.height = `${height}px`;
     this.#grip.setAttribute("aria-valuenow", String(height));
     this.#grip.setAttribute("aria-valuemin", String(MIN_PX));
-    this.#grip.setAttribute("aria-valuemax", String(most));
+    this.#grip.setAttribute("aria-valuemax", String(max));
   }
 
   /** @param {number | null} height null for the default */

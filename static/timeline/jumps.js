@@ -84,10 +84,10 @@ export class Jumps {
   get longestGap() {
     const { timeline } = this.#store.facts;
     let [first, last] = [0, -1];
-    let former = -1;
+    let previous = -1;
     for (const frame of [...keyframesOf(timeline), timeline.frames]) {
-      if (frame - former - 2 > last - first) [first, last] = [former + 1, frame - 1];
-      former = frame;
+      if (frame - previous - 2 > last - first) [first, last] = [previous + 1, frame - 1];
+      previous = frame;
     }
     return last >= first ? { first, last } : null;
   }

@@ -70,10 +70,10 @@ export class RangeBar {
     for (const one of this.#buttons) one.disabled = !connected || isBusy || !!state?.track.running;
     this.#stop.disabled = !connected || !isBusy;
     this.#stop.hidden = !isBusy;
-    const told = work?.message === this.#old ? "" : (work?.message ?? "");
+    const message = work?.message === this.#old ? "" : (work?.message ?? "");
     this.#work.textContent = isBusy
       ? `${work.what} ${count(work.done)} of ${count(work.total)}`
-      : told || `${count(n)} frame${n === 1 ? "" : "s"}`;
+      : message || `${count(n)} frame${n === 1 ? "" : "s"}`;
     const one = session?.people[state?.person ?? 0]?.name ?? "";
     const option = this.#scope.options[1];
     if (option.textContent !== `Only ${one}`) option.textContent = `Only ${one}`;

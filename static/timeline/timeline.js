@@ -231,8 +231,8 @@ export class Timeline {
     return lanes
       .map((lane, person) => {
         const { source = "no pose", keyframe = false, status = "" } = lane.get(frame) ?? {};
-        const told = [source, keyframe && "keyframe", status].filter(Boolean).join(", ");
-        return `\n${session?.people[person]?.name}: ${told}`;
+        const text = [source, keyframe && "keyframe", status].filter(Boolean).join(", ");
+        return `\n${session?.people[person]?.name}: ${text}`;
       })
       .join("");
   }

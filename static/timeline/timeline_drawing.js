@@ -203,10 +203,10 @@ export function drawStatuses(context, axis, cells, style) {
     const index = ALL.indexOf(status);
     const height = STATUS_HEIGHTS[status];
     // Rare bad frames must remain visible, so bars are at least two pixels wide.
-    const least = status === "good" ? 1 : 2;
+    const min = status === "good" ? 1 : 2;
     context.fillStyle = style.getPropertyValue(`--status-${status}`);
     eachRun(axis, (frame) => (statuses[frame] === index ? index : -1), gapOf(axis), (_, x, width) => {
-      context.fillRect(x, STATUS.bottom - height, Math.max(least, width), height);
+      context.fillRect(x, STATUS.bottom - height, Math.max(min, width), height);
     });
   }
 }
@@ -222,9 +222,9 @@ export function drawStatuses(context, axis, cells, style) {
 export function drawCosts(context, axis, cells, style) {
   const ordered = cells.costs.filter((value) => value === value).sort();
   if (ordered.length === 0) return;
-  const most = Math.max(1e-6, ordered[Math.floor(0.98 * (ordered.length - 1))]);
+  const max = Math.max(1e-6, ordered[Math.floor(0.98 * (ordered.length - 1))]);
   const path = new Path2D();
-  trace(path, cells.costs, axis, (value) => COST.bottom - (COST.bottom - COST.top) * Math.min(1, value / most));
+  trace(path, cells.costs, axis, (value) => COST.bottom - (COST.bottom - COST.top) * Math.min(1, value / max));
   context.save();
   context.beginPath();
   context.rect(axis.left, 0, axis.right - axis.left, STATUS.top);
@@ -258,10 +258,10 @@ export function drawOverview(context, whole, cells, style, overview) {
     [(frame) => STATUSES[statuses[frame] - 1] === "doubtful", "--status-doubtful", 1, 1],
     [(frame) => STATUSES[statuses[frame] - 1] === "lost", "--status-lost", 1, 1],
   ];
-  for (const [is, color, share, least] of layers) {
+  for (const [is, color, share, min] of layers) {
     context.fillStyle = style.getPropertyValue(color);
     eachRun(whole, (frame) => (is(frame) ? 0 : -1), 0, (_, x, width) => {
-      context.fillRect(x, overview.bottom - share * height, Math.max(least, width), share * height);
+      context.fillRect(x, overview.bottom - share * height, Math.max(min, width), share * height);
     });
   }
   context.fillStyle = style.getPropertyValue("--text");

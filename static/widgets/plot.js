@@ -9,7 +9,7 @@ const TOP = 6;
 const TICK_X = 80;
 const TICK_Y = 22;
 
-/** @typedef {{least: number, most: number}} Range */
+/** @typedef {{min: number, max: number}} Range */
 
 export class Plot {
   /**
@@ -30,12 +30,12 @@ export class Plot {
 
   /** @param {number} value */
   x(value) {
-    return this.left + ((this.right - this.left) * (value - this.xs.least)) / (this.xs.most - this.xs.least);
+    return this.left + ((this.right - this.left) * (value - this.xs.min)) / (this.xs.max - this.xs.min);
   }
 
   /** @param {number} value */
   y(value) {
-    return this.bottom - ((this.bottom - this.top) * (value - this.ys.least)) / (this.ys.most - this.ys.least);
+    return this.bottom - ((this.bottom - this.top) * (value - this.ys.min)) / (this.ys.max - this.ys.min);
   }
 
   /**
@@ -45,7 +45,7 @@ export class Plot {
    */
   valueAt(x) {
     const share = Math.max(0, Math.min(1, (x - this.left) / (this.right - this.left)));
-    return this.xs.least + share * (this.xs.most - this.xs.least);
+    return this.xs.min + share * (this.xs.max - this.xs.min);
   }
 
   /**
@@ -123,8 +123,8 @@ export class Plot {
  * @param {Range} range
  * @param {number} share minimum distance of two ticks as a fraction of the range
  */
-function ticks({ least, most }, share) {
-  const step = roundUp(Math.max(1e-12, (most - least) * share));
-  const first = Math.ceil(least / step - 1e-9);
-  return Array.from({ length: Math.max(0, Math.floor(most / step + 1e-9) - first + 1) }, (_, i) => (first + i) * step);
+function ticks({ min, max }, share) {
+  const step = roundUp(Math.max(1e-12, (max - min) * share));
+  const first = Math.ceil(min / step - 1e-9);
+  return Array.from({ length: Math.max(0, Math.floor(max / step + 1e-9) - first + 1) }, (_, i) => (first + i) * step);
 }

@@ -50,12 +50,12 @@ export function closePopover() {
 /**
  * Make a slider that shows its value as text.
  *
- * @param {{label: string, title: string, least: number, most: number, step: number,
+ * @param {{label: string, title: string, min: number, max: number, step: number,
  *   format: (value: number) => string, onInput: (value: number) => void}} options
  */
-export function slider({ label, title, least, most, step, format, onInput }) {
+export function slider({ label, title, min, max, step, format, onInput }) {
   const input = document.createElement("input");
-  Object.assign(input, { type: "range", min: String(least), max: String(most), step: String(step), title });
+  Object.assign(input, { type: "range", min: String(min), max: String(max), step: String(step), title });
   input.setAttribute("aria-label", label);
   const value = document.createElement("output");
   const show = (/** @type {number} */ shown) => {

@@ -15,8 +15,8 @@ export function makeSplitter(workspace, bar) {
 
   const show = () => {
     const width = workspace.clientWidth;
-    const most = width - MIN_SCENE_PX;
-    const panes = Math.round(Math.max(Math.min(MIN_PANES_PX, most), Math.min(most, fraction * width)));
+    const max = width - MIN_SCENE_PX;
+    const panes = Math.round(Math.max(Math.min(MIN_PANES_PX, max), Math.min(max, fraction * width)));
     workspace.style.setProperty("--panes-width", `${panes}px`);
     bar.setAttribute("aria-valuenow", String(Math.round((100 * panes) / Math.max(1, width))));
     return panes;
