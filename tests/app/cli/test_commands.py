@@ -4,14 +4,17 @@ import json
 import shutil
 from contextlib import closing
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
 from command_line import SAMPLE, assert_refused, stored
 
+from app.cli.track import _SETTINGS, TrackArguments
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
+from tracker.pipeline.methods import METHODS
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange
@@ -92,6 +95,14 @@ def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
     store.close()
 
 
+def test_every_tracking_method_can_be_named():
+    choices = get_args(get_type_hints(TrackArguments)["method"])
+    assert set(choices) == METHODS.keys() == _SETTINGS.keys()
+    for method in choices:
+        arguments = TrackArguments(SAMPLE, method=method)
+        assert _SETTINGS[method](arguments).method == method
+
+
 @pytest.mark.parametrize("compiled", [False, True])
 def test_tracking_says_that_kernels_may_have_to_be_compiled(run, session, tmp_path, monkeypatch, compiled):
     monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path))
@@ -139,7 +150,7 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     assert {k: found[k].time for k in (1, 2)} == done
     assert {found[k].status for k in range(1, 6)} <= {"good", "doubtful"}
     assert len(found[3].view_costs_px) == 4
-    status, out, _ = run("track", session, "--frames", "0:6", "--json")  # a finished run starts again
+    status, out, _ = run("track", session, "--frames", "0:6", "--json")  # a finished run starts over
     assert (json.loads(out)["frames"], json.loads(out)["resumed_at"]) == (6, None)
 
 
@@ -192,7 +203,7 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
         np.testing.assert_array_equal(f.poses[0], found[k].values)
     np.testing.assert_array_equal(stored(session)[3].values, estimates[3].poses[0] + 0.01)
     monkeypatch.setattr(ChamferTracker, "estimates", tracked)
-    summary = json.loads(run(*words)[1])  # a finished run starts again, as one entry
+    summary = json.loads(run(*words)[1])  # a finished run starts over, as one entry
     assert (summary["frames"], summary["resumed_at"]) == (5, None)
     with closing(AnnotationStore(session / "annotations.sqlite")) as store:
         assert [store.undo() for _ in range(3)] == ["track frames 0:5"] * 3
@@ -240,13 +251,13 @@ def test_several_people(run, tmp_path):
 
 
 def test_simulate(run, tmp_path):
-    status, out, err = run(
-        "simulate", tmp_path / "sim", "--frames", "2", "--cameras", "2", "--body", "model", "--masks"
-    )
+    options = ("--frames", "2", "--cameras", "2", "--size", "160", "120", "--body", "model", "--masks")
+    status, out, err = run("simulate", tmp_path / "sim", *options)
     assert (status, out) == (0, f"made {tmp_path / 'sim'}\n")
     assert err.splitlines()[-1].startswith("rendering: 4 of 4, ")  # an image of each camera for each frame
     made = load_session(tmp_path / "sim")
     assert (made.n_frames, [c.camera.name for c in made.cameras]) == (2, ["cam1", "cam2"])
+    assert {c.camera.size for c in made.cameras} == {(160, 120)}
     for name in ("truth.trc", "truth.csv", "truth_model.toml", "masks/cam2/000001.png", "background/cam1.png"):
         assert (tmp_path / "sim" / name).is_file(), name
     assert run("info", tmp_path / "sim")[0] == 0
