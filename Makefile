@@ -1,47 +1,73 @@
-# Everything happens in .venv. Files .venv/.* mark what is done, so that a second run is quick.
-# Needs Python 3.11 or newer with pip, and make; nothing else, and no rights.
+# Everything happens in .venv. The files .venv/.* mark finished steps, so that a second run is quick.
+# Needs Python 3.11 or newer with pip, and make; no other program and no rights.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 PYTHON_FILES := app tracker tests
+PARALLEL := $(MAKE) --jobs 4 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
+# The library's rooms that need neither kernels nor sessions.
+QUICK := $(wildcard tests/test_*.py) $(addprefix tests/,tracker/compute tracker/geometry tracker/body tracker/motion \
+	tracker/formats tracker/session tracker/store tracker/evaluation tracker/images tracker/contours tracker/fitting \
+	app/runtime app/state app/drawing)
 
-.PHONY: install run test test-library test-page kernels bench check lint format clean
+.PHONY: install run test test-all test-quick test-library test-page test-live test-slow kernels bench check lint types \
+	page-types format clean
 
 install: $(VENV)/.installed
 
 run: install
 	$(BIN)/quadrille
 
-# The library's tests take what those of the page leave: these wait a lot, but what they wait for must not come late.
-# Two browsers wait in half the time; what the tests of one file share, a server and its page, stays with one of them.
-test:
-	$(MAKE) --jobs 2 check kernels
-	$(MAKE) --jobs 2 $(if $(filter output-sync,$(.FEATURES)),--output-sync) test-library test-page
+# What must hold on every change: at most five minutes on two cores. The steps run beside one another. Tests of the page
+# wait a lot: those of the library, at a lower priority, take what they leave of the processor.
+test: $(VENV)/.tested $(VENV)/.typescript
+	$(PARALLEL) check test-page test-library test-live
 
-test-library: $(VENV)/.tested
-	nice -n 19 $(BIN)/python -m pytest --ignore tests/browser --numprocesses auto
+# And what is long and rarely broken.
+test-all: test
+	$(MAKE) test-slow
 
+# The inner loop: under a minute.
+test-quick: $(VENV)/.tested
+	$(PYTEST) -m "not slow" $(QUICK)
+
+test-library: $(VENV)/.tested kernels
+	nice -n 19 $(PYTEST) -m "not slow" --ignore tests/browser
+
+# The page against an endpoint that is a stand-in for the program: needs no kernels.
 test-page: $(VENV)/.tested
-	$(BIN)/python -m pytest tests/browser --numprocesses 2 --dist loadfile
+	$(PYTEST) -m "not slow" tests/browser --ignore tests/browser/live
 
-# Once, not in each process of the tests at the same time. Modules are found here while pip puts what is installed anew.
+# The page against the program.
+test-live: $(VENV)/.tested kernels
+	$(PYTEST) -m "not slow" tests/browser/live
+
+test-slow: $(VENV)/.tested kernels
+	$(PYTEST) -m slow
+
+# Once, not in each process of the tests at the same time.
 kernels: $(VENV)/.installed
 	$(BIN)/python -m app.bench.compile_kernels
 
-# How fast it is here, beside what must hold and the ratios that are kept.
+# How fast it is here, beside what must hold and the ratios of the last release.
 bench: $(VENV)/.tested
 	$(BIN)/quadrille bench
 
 # What needs no running program: style and types, of Python and of the page.
-check: lint $(VENV)/.typescript
-	$(BIN)/mypy
-	$(BIN)/node node_modules/typescript/bin/tsc
+check: lint types page-types
 
 lint: $(VENV)/.tested
 	$(BIN)/ruff check $(PYTHON_FILES)
 	$(BIN)/ruff format --check $(PYTHON_FILES)
+
+types: $(VENV)/.tested
+	$(BIN)/mypy
+
+page-types: $(VENV)/.typescript
+	$(BIN)/node node_modules/typescript/bin/tsc
 
 format: $(VENV)/.tested
 	$(BIN)/ruff check --fix $(PYTHON_FILES)
@@ -66,5 +92,5 @@ $(VENV)/.tested: $(VENV)/.installed tests/support/chromium.py
 
 # The path is for npm's own scripts, which look for node there.
 $(VENV)/.typescript: package.json .npmrc $(VENV)/.tested
-	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm install --silent
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm install --loglevel=error
 	touch $@

@@ -1,8 +1,8 @@
-"""The chamfer cost as one would write it with numpy and OpenCV: what the compiled kernels are measured against.
+"""The chamfer cost written with numpy and OpenCV, with which the compiled kernels are compared.
 
-It shares with them only the shapes. Each part's outline is the convex hull of its projected mesh; parts are painted
-from far to near into an image of labels, and what of an outline still shows there is visible. The way back from the
-edges is a distance transform of the painted contours.
+The two share only the shapes. Each part's contour is the convex hull of its projected mesh. Parts are painted from far
+to near into a label image; contour points that still show there are visible. The distances from the edges to the
+contours come from a distance transform of the painted contours.
 """
 
 from collections.abc import Sequence
@@ -20,11 +20,11 @@ _RINGS, _SECTORS = 12, 16
 _SHIFT = 4
 """OpenCV draws at sixteenths of a pixel."""
 _MARGIN_PX = 24
-"""What is painted around the body, px: edges farther off are outliers anyway."""
+"""Margin painted around the body, px; edges farther away are outliers anyway."""
 
 
 class PaintedCost:
-    """Scores poses of one person against fixed evidence, by painting."""
+    """Scores poses of one person against fixed evidence by painting."""
 
     def __init__(
         self, views: Sequence[ViewEvidence], model: BodyModel, edge_points_px: Sequence[NDArray[np.float32]]
@@ -41,7 +41,7 @@ class PaintedCost:
         self._surface = np.stack([g + c for g, c in zip(grids, model.centers_part, strict=True)])
 
     def __call__(self, values: Array) -> float:
-        """Undirected chamfer distance, mean over the views, px."""
+        """Return the undirected chamfer distance, mean over the views, px."""
         Ts = self._model.kinematics(values).Ts_world_part
         world = np.einsum("pij,pnj->pni", Ts[:, :3, :3], self._surface) + Ts[:, None, :3, 3]
         return float(np.mean([self._score(v, s, world) for v, s in zip(self._views, self._scene, strict=True)]))
@@ -67,7 +67,7 @@ class PaintedCost:
         return 0.5 * (_forward(view, points[seen] + corner) + _backward(view, scene - corner, labels.shape, lines))
 
     def _outermost(self, labels: NDArray[np.uint8], points: Array, parts: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Whether an outline's point still shows: its own label, and no adjoining part's, is painted around it."""
+        """Return whether each contour point is visible: its own label, and no other part's, is painted around it."""
         u, v = np.round(points).astype(int).T
         around = np.stack([labels[v + dv, u + du] for du, dv in ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))])
         shows = np.any(around == parts, axis=0)
@@ -79,7 +79,7 @@ class PaintedCost:
 
 
 def _evenly(hull: NDArray[np.float32]) -> Array:
-    """Points on a closed polygon, SAMPLE_PX apart, (n, 2)."""
+    """Sample a closed polygon at intervals of SAMPLE_PX, (n, 2)."""
     ring = np.concatenate([hull, hull[:1]])
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(ring, axis=0).T))])
     at = np.arange(0.0, along[-1], SAMPLE_PX)

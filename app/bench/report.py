@@ -1,7 +1,7 @@
-"""`quadrille bench`: how fast the tracker is, beside what it is compared with, and whether it has become slower.
+"""The report of `quadrille bench`: the tracker's speed beside its requirements, and whether it has become slower.
 
-Times depend on the machine. What binds is their ratio to a yardstick that is timed in the same run; the ratios are
-compared with those of a baseline that is kept with the program.
+Times depend on the machine. Requirements therefore bound their ratio to a yardstick that is timed in the same run. The
+ratios are compared with those of a baseline that is part of the program.
 """
 
 import json
@@ -23,11 +23,11 @@ from app.bench.sample_frames import FRAME, read_crowd, read_frame
 from app.session.samples import sample_copy
 from tracker.errors import TrackerError
 from tracker.files import write_text_atomic
-from tracker.simulate import simulate
+from tracker.simulate import Simulation, simulate
 
 BASELINE = Path(__file__).with_name("baseline.json")
 N_ROWS = 19
-"""Number of rows that `measure` gives where `cma` is installed."""
+"""Number of rows that `measure` yields if `cma` is installed."""
 _PACKAGES = ("numpy", "opencv-python-headless", "numba", "scipy", "av", "cma")
 
 
@@ -37,13 +37,13 @@ def measure() -> Iterator[Row]:
     frame = read_frame(sample_copy("elbow_rotation"))
     cones = frame.with_model("gavrila22_cones")
     with TemporaryDirectory() as folder, _one_thread():
-        simulate(Path(folder) / "six", scene="exercise", n_cameras=6, n_frames=2)
+        simulate(Path(folder) / "six", Simulation("exercise", n_cameras=6, n_frames=2))
         six = read_frame(Path(folder) / "six").with_model("gavrila22_cones")
         yield from bench_rows.candidates(frame, cones, yardstick)
         yield from bench_rows.searches(frame, cones, yardstick)
         yield from bench_rows.iterations(cones, six, yardstick)
         yield from bench_rows.evolution(cones, yardstick)
-        simulate(Path(folder) / "crowd", scene="crowd_of_three", n_frames=1)
+        simulate(Path(folder) / "crowd", Simulation("crowd_of_three", n_frames=1))
         yield from bench_rows.crowds(read_crowd(Path(folder) / "crowd", 0), yardstick)
     yield bench_rows.pipeline(frame, yardstick)
     yield bench_rows.pipeline_of_two(read_crowd(sample_copy("tango"), FRAME), yardstick)
@@ -63,7 +63,7 @@ def read_baseline(path: Path = BASELINE) -> dict[str, Any]:
     """Read a baseline: `tolerance`, and `ratios` of rows by name.
 
     Raises:
-        TrackerError: it is not one.
+        TrackerError: the file is not a baseline.
     """
     try:
         found = json.loads(path.read_text("utf-8"))
@@ -75,22 +75,22 @@ def read_baseline(path: Path = BASELINE) -> dict[str, Any]:
 
 
 def save_baseline(rows: list[Row], path: Path, tolerance: float) -> None:
-    """Keep the ratios of rows as a baseline."""
+    """Save the ratios of rows as a baseline."""
     ratios = {r.name: round(r.ratio, 5) for r in rows}
     write_text_atomic(path, json.dumps({"tolerance": tolerance, "ratios": ratios}, indent=2) + "\n")
 
 
 def report(rows: list[Row], baseline: Mapping[str, Any]) -> dict[str, Any]:
-    """Put the rows beside what must hold and the baseline.
+    """Compare rows with their requirements and the baseline.
 
     Returns:
         `versions`, `tolerance`, `rows` and the names of those that became `slower` than the tolerance allows.
     """
     ratios, tolerance = baseline["ratios"], baseline["tolerance"]
-    told = []
+    compared = []
     for r in rows:
         before = ratios.get(r.name)
-        told.append(
+        compared.append(
             {
                 "name": r.name,
                 "what": r.what,
@@ -108,13 +108,13 @@ def report(rows: list[Row], baseline: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "versions": versions(),
         "tolerance": tolerance,
-        "rows": told,
-        "slower": [t["name"] for t in told if t["slower"]],
+        "rows": compared,
+        "slower": [t["name"] for t in compared if t["slower"]],
     }
 
 
 def versions() -> dict[str, str]:
-    """What the figures depend on besides the machine's load."""
+    """Return the versions of the software that the times depend on."""
     found = {"python": platform.python_version(), "machine": platform.machine()}
     for package in _PACKAGES:
         try:
@@ -125,12 +125,12 @@ def versions() -> dict[str, str]:
 
 
 def show(found: Mapping[str, Any], console: Console) -> None:
-    """Print a report as a table. Ratios are told as people compare them: the yardstick by the time, or the reverse."""
+    """Print a report as a table. Ratios are given as at least 1: the time in yardsticks, or the reverse."""
     table = Table("work", "median", "yardstick", "must", "aim", "baseline", "")
     for r in found["rows"]:
         verdict = "slower" if r["slower"] else "" if r["holds"] is None else "holds" if r["holds"] else "fails"
-        told = [_ratio(r[k]) for k in ("ratio", "must", "aim", "baseline")]
-        table.add_row(r["what"], _time(r["median_us"]), *told, f"{verdict} {r['note']}".strip())
+        ratios = [_ratio(r[k]) for k in ("ratio", "must", "aim", "baseline")]
+        table.add_row(r["what"], _time(r["median_us"]), *ratios, f"{verdict} {r['note']}".strip())
     console.print(table)
     console.print(", ".join(f"{k} {v}" for k, v in found["versions"].items()), highlight=False)
     if found["slower"]:

@@ -1,4 +1,4 @@
-"""What `quadrille bench` measures: one small function for each row, timed between runs of the yardstick."""
+"""The measurements of `quadrille bench`: one function for each row, timed between runs of the yardstick."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -45,9 +45,9 @@ class Row(NamedTuple):
     yardstick_us: float
     """Median of the yardstick between the runs, microseconds."""
     must: float | None = None
-    """Largest time that must hold, in yardsticks; None for what is only compared with."""
+    """Largest allowed time, in yardsticks; None for rows that are only for comparison."""
     aim: float | None = None
-    """Time that is aimed for, in yardsticks."""
+    """Desired time, in yardsticks."""
     note: str = ""
 
     @property
@@ -57,14 +57,14 @@ class Row(NamedTuple):
 
 
 class Timed(NamedTuple):
-    """Medians of some work and of the yardstick, microseconds."""
+    """Median times of some work and of the yardstick, microseconds."""
 
     work_us: float
     yardstick_us: float
 
 
 class Yardstick:
-    """The work that all times are compared with: a distance transform (L2, 5x5) of a 640x480 image on one thread."""
+    """The unit of all times: a distance transform (L2, 5x5) of a 640x480 image on one thread."""
 
     def __init__(self) -> None:
         """Scatter edges over the image."""
@@ -76,19 +76,19 @@ class Yardstick:
         cv2.distanceTransform(self._image, cv2.DIST_L2, cv2.DIST_MASK_5)
 
     def beside(self, work: Callable[[], object], runs: int, times: int = 1) -> Timed:
-        """Time some work and the yardstick in turns, so that both meet the same load, after a first run for nothing.
+        """Time some work and the yardstick alternately, so that both meet the same load, after one untimed run.
 
         Args:
-            work: what is timed.
-            runs: how often.
-            times: how many pieces of work one run does.
+            work: the work to time.
+            runs: number of runs.
+            times: number of pieces of work in one run.
         """
         spent = np.array([(_seconds(work), _seconds(self)) for _ in range(runs + 1)][1:])
         work_s, yardstick_s = np.median(spent, axis=0)
         return Timed(1e6 * work_s / times, 1e6 * yardstick_s)
 
     def beside_difference(self, long: Callable[[], object], short: Callable[[], object], runs: int) -> Timed:
-        """Time how much longer some work takes than some other, all in turns; otherwise as `beside`."""
+        """Time the difference between two works, alternately with the yardstick; otherwise as `beside`."""
         more_s = list[float]()
         timed = self.beside(lambda: more_s.append(_seconds(long) - _seconds(short)), runs)
         return timed._replace(work_us=1e6 * float(np.median(more_s[1:])))
@@ -117,7 +117,7 @@ def candidates(frame: BenchFrame, cones: BenchFrame, yardstick: Yardstick) -> It
 
 
 def crowds(crowd: BenchCrowd, yardstick: Yardstick) -> Iterator[Row]:
-    """One candidate pose of one person who is alone, one of two and one of three: each costs what it adds."""
+    """One candidate pose of one person: alone, with one other, with two others. Costs should add up."""
     alone, poses = 0.0, crowd.candidates(_CANDIDATES)
     for n, name, must in ((1, "one person", None), (2, "two people", 2.3), (3, "three people", 3.5)):
         cost = crowd.cost(n)
@@ -164,7 +164,7 @@ def _refined(frame: BenchFrame, start: Array, predicted: Array) -> Fit:
 
 
 def _apart(frame: BenchFrame, start: Array, fit: Fit) -> str:
-    """How far the body's points are from where the true joints put them, at the start and fitted."""
+    """Format the distances of the body's points from the true joints, at the start and after the fit."""
     true = frame.model.points_world(frame.values)
     off = [np.linalg.norm(frame.model.points_world(v) - true, axis=1).mean() for v in (start, fit.pose)]
     return f"{1000 * off[0]:.0f} mm off, then {1000 * off[1]:.0f}"
@@ -177,7 +177,7 @@ def iterations(cones: BenchFrame, six: BenchFrame, yardstick: Yardstick) -> Iter
         match = ContourResiduals(of.views, [PosedBody(of.model, start)])
         steps = np.random.default_rng(3).normal(scale=0.005, size=(50, of.model.n_dofs))
         poses = [of.model.retract(start, step) for step in steps]
-        # What a descent takes besides its iterations drops out of the difference between long ones and short ones.
+        # The difference between long and short descents leaves out what a descent costs besides its iterations.
         few, many = (partial(_descended, of.model, match, poses, n) for n in (2, 6))
         n, timed = many() - few(), yardstick.beside_difference(many, few, 30)
         timed = timed._replace(work_us=timed.work_us / n)
@@ -194,12 +194,12 @@ def iterations(cones: BenchFrame, six: BenchFrame, yardstick: Yardstick) -> Iter
 
 
 def _descended(model: BodyModel, match: ContourResiduals, poses: Sequence[Array], most: int) -> int:
-    """Descend from some poses, (n_values,) each, for so many iterations at most; how many there were."""
+    """Descend from some poses, (n_values,) each, and return the number of iterations, at most `most`."""
     return sum(solve_compiled(model, pose, [match], max_iterations=most, tolerance=0.0).iterations for pose in poses)
 
 
 def _stepped(model: BodyModel, match: ContourResiduals, poses: Sequence[Array]) -> None:
-    """Linearize at some poses, (n_values,) each, and find the step from there."""
+    """Linearize at some poses, (n_values,) each, and compute the step from there."""
     for values in poses:
         normal = match.linearize(model, values, model.kinematics(values))
         damped_step(normal.hessian, normal.gradient, 1e-3 * np.diag(normal.hessian) + 1e-9)
@@ -218,7 +218,7 @@ def _edge_distances(cost: ChamferCost, frame: BenchFrame, values: Array) -> list
 
 
 def evolution(cones: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
-    """CMA-ES on the hard frame by the same evaluator and with as many poses as the search; nothing without `cma`."""
+    """CMA-ES on the hard frame with the same evaluator and as many poses as the search; empty without `cma`."""
     try:
         import cma
     except ImportError:  # a development extra
@@ -245,7 +245,7 @@ def evolution(cones: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
 
 
 def pipeline(frame: BenchFrame, yardstick: Yardstick) -> Row:
-    """From video to overlay: decode, undistort, edges, predict, refine, judge, trace what is drawn; per frame."""
+    """From video to overlay: decode, undistort, edges, predict, refine, assess, trace contours; per frame."""
     what = "video to overlay, 4 views, per frame"
     return _pipeline("pipeline", what, frame.session, [frame.model], [frame.joints], (45, 90), yardstick)
 
@@ -265,7 +265,7 @@ def _pipeline(
     per_second: tuple[float, float],
     yardstick: Yardstick,
 ) -> Row:
-    """Track a session from the fitted poses; `per_second` are the frames that must and that should be done."""
+    """Track a session from the fitted poses; `per_second` are the required and the desired frames per second."""
     wanted = [k for k in _PIPELINE_FRAMES if k < session.n_frames]
     first = [pose_at(j, m, wanted[0]) for j, m in zip(joints, models, strict=True)]
     n, spent = len(wanted), list[float]()
@@ -274,7 +274,7 @@ def _pipeline(
         with Recording(session.cameras) as recording:
             observer = Observer(session.cameras, recording)
             tracked = ChamferTracker(_SETTINGS).estimates(TrackingRun(observer, Subjects.of(models), first, wanted))
-            next(tracked)  # opening the videos is not part of going on
+            next(tracked)  # opening the videos does not count
             start = time.perf_counter()
             for found in islice(tracked, n - 1):
                 bodies = [PosedBody(m, p) for m, p in zip(models, found.poses, strict=True)]

@@ -1,4 +1,4 @@
-"""What the benchmarks work on: frames of the bundled sample, and of a simulated scene with six cameras."""
+"""The inputs of the benchmarks: frames of the bundled sample, and of a simulated scene with six cameras."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +23,7 @@ _SEED = 11
 
 @dataclass(frozen=True, eq=False)
 class BenchFrame:
-    """One frame of a session, and the body where it stands in it."""
+    """One frame of a session with its body in the true pose."""
 
     session: Session
     joints: MarkerTable
@@ -35,21 +35,21 @@ class BenchFrame:
     """Pose fitted to the true joints, (n_values,)."""
 
     def with_model(self, name: str) -> "BenchFrame":
-        """The same frame with another body of the same height."""
+        """Return the same frame with another body of the same height."""
         model = load_model(name, self.model.height_m)
         return BenchFrame(self.session, self.joints, self.views, model, pose_at(self.joints, model, FRAME))
 
     def cost(self, predicted: Array | None = None, threads: int = 2) -> ChamferCost:
-        """The cost around a prediction, the fitted pose by default."""
+        """Return the cost around a prediction, the fitted pose by default."""
         body = PosedBody(self.model, self.values if predicted is None else predicted)
         return ChamferCost(self.views, [body], threads=threads)
 
     def candidates(self, n: int) -> Array:
-        """Poses spread around the fitted one by 10 degrees and 5 cm in every degree of freedom, (n, n_values)."""
+        """Spread poses by 10 degrees and 5 cm in every degree of freedom around the fitted one, (n, n_values)."""
         return _spread(self.model, self.values, n)
 
     def hard_prediction(self) -> Array:
-        """A prediction that is 10 cm off in place and 15 degrees off in one angle of the trunk and of every limb."""
+        """Return a prediction off by 10 cm in position and 15 degrees in one angle of the trunk and of each limb."""
         step = np.zeros(self.model.n_dofs)
         off = {"torso.x": 0.08, "torso.y": -0.06, "torso.twist": 15, "left_shoulder.abduction": 15,
                "right_shoulder.elevation": 15, "left_elbow.extension": 15, "left_hip.elevation": 15,
@@ -60,7 +60,7 @@ class BenchFrame:
         return self.model.clip(self.model.retract(self.values, step))
 
     def near_prediction(self) -> Array:
-        """A prediction as that of a tracked frame: 1 cm and 3 degrees off in every degree of freedom."""
+        """Return a prediction as on a tracked frame: off by 1 cm and 3 degrees in every degree of freedom."""
         off = np.where(self.model.dof_is_length, 0.01, np.radians(3))
         signs = np.random.default_rng(_SEED).choice((-1.0, 1.0), self.model.n_dofs)
         return self.model.clip(self.model.retract(self.values, off * signs))
@@ -68,7 +68,7 @@ class BenchFrame:
 
 @dataclass(frozen=True, eq=False)
 class BenchCrowd:
-    """One frame of a session of several people, and the bodies where they stand in it."""
+    """One frame of a session of several people with the bodies in their true poses."""
 
     session: Session
     joints: tuple[MarkerTable, ...]
@@ -80,17 +80,17 @@ class BenchCrowd:
     """Poses fitted to the true joints, (n_values,) each."""
 
     def cost(self, n: int) -> ChamferCost:
-        """The cost of the first few people around their fitted poses, on one thread."""
+        """Return the cost of the first few people around their fitted poses, on one thread."""
         bodies = [PosedBody(m, v) for m, v in zip(self.models[:n], self.values[:n], strict=True)]
         return ChamferCost(self.views, bodies, threads=1)
 
     def candidates(self, n: int) -> Array:
-        """Poses of the first person, as those of `BenchFrame`, (n, n_values)."""
+        """Return poses of the first person, like those of `BenchFrame`, (n, n_values)."""
         return _spread(self.models[0], self.values[0], n)
 
 
 def _spread(model: BodyModel, values: Array, n: int) -> Array:
-    """Poses spread by 10 degrees and 5 cm in every degree of freedom, (n, n_values)."""
+    """Return poses spread by 10 degrees and 5 cm in every degree of freedom, (n, n_values)."""
     spread = np.where(model.dof_is_length, 0.05, np.radians(10))
     steps = spread * np.random.default_rng(_SEED).normal(size=(n, model.n_dofs))
     return np.stack([model.clip(model.retract(values, step)) for step in steps])
@@ -120,6 +120,6 @@ def read_frame(folder: Path) -> BenchFrame:
 
 
 def pose_at(joints: MarkerTable, model: BodyModel, frame: int, near: Array | None = None) -> Array:
-    """The pose fitted to the true joints of a frame, (n_values,)."""
+    """Return the pose fitted to the true joints of a frame, (n_values,)."""
     frame = min(frame, len(joints.points) - 1)
     return fit_to_points(model, dict(zip(joints.names, joints.points[frame], strict=True)), near).pose

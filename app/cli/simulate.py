@@ -17,6 +17,7 @@ def command(
     seed: int = 0,
     masks: bool = False,
     body: Literal["skinned", "model"] = "skinned",
+    size: tuple[int, int] = (640, 480),
 ) -> None:
     """Make a session of a simulated recording with known truth.
 
@@ -28,13 +29,12 @@ def command(
         seed: seed of everything random.
         masks: write true masks too.
         body: skinned, a smooth body unlike the model; model, the very shapes that are fitted.
+        size: width and height of the images, px, both even.
     """
-    from tracker.simulate import simulate
+    from tracker.simulate import Simulation, simulate
 
     reporter = Reporter()
     with reporter.over(frames * cameras, "rendering") as tick:  # one tick per image
-        simulate(
-            out, scene=scene, n_cameras=cameras, n_frames=frames, seed=seed, body=body, masks=masks,
-            progress=lambda *_: tick(),
-        )  # fmt: skip
+        simulation = Simulation(scene, cameras, frames, seed, size, body=body, masks=masks)
+        simulate(out, simulation, progress=lambda *_: tick())
     print(f"made {out}")

@@ -78,7 +78,7 @@ def state(session: Session, state: State) -> wire.StateMessage:
         source=shown.source,
         status=_status(shown.status),
         remark=shown.remark,
-        part_costs_px=shown.parts_px,
+        part_costs_px=shown.part_costs_px,
         dofs=tuple(dof_labels.shown(session.people[state.person].model, shown.values)),
         locked=tuple(sorted(state.locked[state.person])),
         other_sizes=state.revisions[state.person] != state.present[state.person],

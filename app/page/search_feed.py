@@ -147,7 +147,9 @@ def landscape(session: Session, found: CostLandscape) -> bytes:
         current_px=finite_or_none(found.current_px),
         count=len(found.values),
     )
-    return encode_binary(header, np.vstack([found.values, found.totals_px, found.views_px.T]).astype("<f4").tobytes())
+    return encode_binary(
+        header, np.vstack([found.values, found.totals_px, found.view_costs_px.T]).astype("<f4").tobytes()
+    )
 
 
 def _run(run: SearchRun, differs: dict[str, str], state: State) -> wire.SearchRun:

@@ -18,7 +18,7 @@ class ShownPose:
     """The tracker's assessment: `good`, `doubtful`, `lost`, or empty."""
     remark: str = ""
     """Note of the tracker about the frame, as text for the user."""
-    parts_px: tuple[float | None, ...] = ()
+    part_costs_px: tuple[float | None, ...] = ()
     """Cost of each part, px; None for an unseen part, empty where unknown."""
     sources: tuple[str, ...] = ()
     """Source of each value of a pose that is not stored yet, (n_values,); empty if `source` applies to all."""

@@ -84,5 +84,5 @@ class CostLandscape:
     """Sampled values, (N,), ascending, rad or metres."""
     totals_px: Array
     """Costs, (N,), px."""
-    views_px: Array
+    view_costs_px: Array
     """Costs in each view, (N, V), px; NaN for views without edges."""

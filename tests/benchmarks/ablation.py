@@ -1,4 +1,4 @@
-"""What each piece of the tracker is good for: docs/accuracy.md, made anew by `python tests/benchmarks/ablation.py`.
+"""Measure what each piece of the tracker contributes (docs/accuracy.md): `python tests/benchmarks/ablation.py`.
 
 Every variant tracks the same recordings from the pose fitted to the true joints of frame 0: simulated scenes that this
 script makes itself (smooth-skinned people whose bones are not the model's, clutter, noise) and, with `--data DIR`, the
@@ -28,7 +28,7 @@ from tracker.motion.prediction import PredictSettings
 from tracker.search.best_first import SearchSettings
 from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
-from tracker.simulate import simulate
+from tracker.simulate import Simulation, simulate
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.subjects import Subjects
@@ -74,7 +74,7 @@ def simulated(folder: Path, n_frames: int) -> list[Clip]:
     """Make the scenes."""
     clips = []
     for scene, seed in SCENES:
-        session = simulate(folder / scene, scene, n_frames=n_frames, seed=seed)
+        session = simulate(folder / scene, Simulation(scene, n_frames=n_frames, seed=seed))
         true = read_simulated(session.folder)
         clips.append(Clip(scene, session.cameras, true.models[0], true.references[0], range(n_frames), session.fps))
     return clips

@@ -27,7 +27,7 @@ from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array
-from tracker.simulate import simulate
+from tracker.simulate import Simulation, simulate
 from tracker.simulate.motion.scenes import cast_of
 from tracker.tracking import confidence
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -168,7 +168,7 @@ def main() -> None:
             if not path.exists():
                 # Two people are two persons' frames, and take longer.
                 n_frames = words.frames // 2 if spec.of_several else words.frames
-                simulate(path, spec.name, spec.cameras, n_frames, spec.seed, spec.size)
+                simulate(path, Simulation(spec.name, spec.cameras, n_frames, spec.seed, spec.size))
             tracked[spec] = limbs = Limbs()
             limbs.add(path, TrackSettings())
             if spec in FIT:

@@ -1,6 +1,6 @@
 """What mutual occlusion, joint refinement and the penalty on interpenetration are good for, by how near two people are.
 
-A section of docs/accuracy.md, made anew by `python tests/benchmarks/closeness.py`. Every variant tracks the same
+A section of docs/accuracy.md, made by `python tests/benchmarks/closeness.py`. Every variant tracks the same
 simulated couples (smooth-skinned people whose bones are not the model's, in a furnished room, with noise) from the
 poses fitted to the true joints of frame 0. Accuracy is the mean error of the 12 limb joints of both; a frame of a
 person is lost when one of them is off by more than 150 mm.
@@ -24,7 +24,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 from tracker.session.session import Session
-from tracker.simulate import simulate
+from tracker.simulate import Simulation, simulate
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.subjects import Subjects
@@ -146,7 +146,7 @@ def main() -> None:
         scenes = [*(f"couple_{d}" for d in DISTANCES), "tango"]
         for scene in scenes:
             if not (folder / scene).exists():
-                simulate(folder / scene, scene, n_frames=words.frames, seed=SEED)
+                simulate(folder / scene, Simulation(scene, n_frames=words.frames, seed=SEED))
         couples = [read_couple(folder / scene, words.frames) for scene in scenes]
         rows = measured(VARIANTS, couples, measure, lambda cell: "{:.1f} mm, {:.1f} lost, {:.1f} swapped".format(*cell))
         put_section(words.out, section(couples, rows))

@@ -29,7 +29,7 @@ from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import Session, load_session, save_session
-from tracker.simulate.record import simulate
+from tracker.simulate.record import Simulation, simulate
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
 
@@ -194,11 +194,11 @@ TUTORIAL = ("empty", "posing", "pins", "search-replay", "landscape", "curves", "
 
 
 def make_sessions(folder: Path, wanted: set[str]) -> dict[str, Path]:
-    """The sessions that pictures are taken of, each anew."""
+    """Make the sessions that pictures are taken of."""
     made = {name: folder / name for name in wanted}
     for name, at in made.items():
         if name == "eight":
-            simulate(at, "exercise", n_cameras=8, n_frames=4, size=(320, 240))
+            simulate(at, Simulation("exercise", n_cameras=8, n_frames=4, size=(320, 240)))
         else:
             shutil.copytree(SAMPLES / ("tango" if name == "tango" else "elbow_rotation"), at)
         session = load_session(at)

@@ -13,7 +13,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.pose_csv import read_pose_table
 from tracker.motion.prediction import predict
 from tracker.session.session import Session
-from tracker.simulate.record import simulate
+from tracker.simulate.record import Simulation, simulate
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.confidence import Status
 
@@ -46,7 +46,7 @@ class Shown:
 def filmed(tmp_path_factory):
     """Six frames of a figure of the tracker's own parts that moves all its limbs, in four small views."""
     folder = tmp_path_factory.mktemp("filmed") / "small"
-    session = simulate(folder, "exercise", 4, N, 3, (320, 240), body="model")
+    session = simulate(folder, Simulation("exercise", 4, N, 3, (320, 240), body="model"))
     with Recording(session.cameras) as recording:
         frames = [list(recording.read(k)) for k in range(N)]
     return Filmed(session, frames, read_pose_table(folder / "truth.csv").values_for(session.people[0].model))
@@ -93,14 +93,14 @@ def test_the_recording_as_it_is(filmed):
     found, off = follow(filmed)
     assert off.max() < 20
     assert "lost" not in {f.statuses[0] for f in found}
-    assert not any(np.isnan(f.views_px).any() for f in found)
+    assert not any(np.isnan(f.view_costs_px).any() for f in found)
 
 
 @pytest.mark.parametrize("change", [black, damaged, gray])
 def test_a_frame_of_one_view_fails(filmed, change):
     found, off = follow(filmed, edited(filmed, [BAD], [1], change))
     assert off.max() < NEAR_MM
-    blind = np.array([np.isnan(f.views_px) for f in found])
+    blind = np.array([np.isnan(f.view_costs_px) for f in found])
     assert blind[BAD, 1]
     assert blind.sum() == 1
 
@@ -118,7 +118,7 @@ def test_a_file_that_cannot_be_decoded(filmed, tmp_path):
     with Recording(sources) as recording:
         found, off = follow(filmed, cameras=sources, recording=recording)
     assert off.max() < NEAR_MM
-    assert np.isnan(found[BAD].views_px).tolist() == [False, True, False, False]
+    assert np.isnan(found[BAD].view_costs_px).tolist() == [False, True, False, False]
 
 
 @pytest.mark.parametrize("change", [black, damaged, gray])
@@ -137,13 +137,13 @@ def test_a_frame_of_all_views_fails(filmed, change):
 def test_a_view_never_shows_anything(filmed, change):
     found, off = follow(filmed, edited(filmed, range(N), [2], change))
     assert off.max() < NEAR_MM
-    assert all(np.isnan(f.views_px).tolist() == [False, False, True, False] for f in found)
+    assert all(np.isnan(f.view_costs_px).tolist() == [False, False, True, False] for f in found)
 
 
 def test_one_view_alone_is_left(filmed):
     found, off = follow(filmed, edited(filmed, range(N), [0, 2, 3], damaged))
     assert off.max() < 300  # how far away it is, a single view hardly tells
-    assert all(np.isfinite(f.views_px).tolist() == [False, True, False, False] for f in found)
+    assert all(np.isfinite(f.view_costs_px).tolist() == [False, True, False, False] for f in found)
 
 
 def through_window(filmed, view, region, tmp_path):

@@ -61,6 +61,7 @@ def test_its_footage_and_truth_are_of_all_frames(session):
         assert len(read_trc(session.folder / f"{truth_of(session, person)}.trc").points) == session.n_frames
 
 
+@pytest.mark.slow
 def test_it_is_what_the_recipe_makes_now(session):
     for source, camera in zip(session.cameras, make_cameras(4, (640, 480), 0), strict=True):
         assert np.allclose(source.camera.T_world_camera, camera.T_world_camera, atol=1e-9)

@@ -1,4 +1,4 @@
-"""Several people at a time: nobody is mixed up with anybody, and nobody is refined in vain."""
+"""Several people at a time: no identity swaps, and no refinement without effect."""
 
 from dataclasses import replace
 
@@ -92,5 +92,5 @@ def test_nothing_depends_on_who_is_done_first(gavrila, monkeypatch):
     usual = poses()
     assert len(searched) == 2
     one_by_one = lambda work, items: [work(x) for x in items[::-1]][::-1]  # noqa: E731
-    monkeypatch.setattr("tracker.tracking.chamfer.frame_estimator.side_by_side", one_by_one)
+    monkeypatch.setattr("tracker.tracking.chamfer.frame_estimator.map_parallel", one_by_one)
     np.testing.assert_array_equal(poses(), usual)

@@ -53,12 +53,12 @@ class FakeTracker:
             status = "doubtful" if frame == 4 else "lost" if frame % 7 == 0 else "good"
             remark = "left arm relocated" if frame == 4 else ""
             self.seen.append(frame)
-            views_px = np.array([1.0, np.nan, 2.0, 3.0])
-            parts_px = np.array([0.5] * (N_PARTS - 1) + [np.nan])
+            view_costs_px = np.array([1.0, np.nan, 2.0, 3.0])
+            part_costs_px = np.array([0.5] * (N_PARTS - 1) + [np.nan])
             n = len(models)
             self.last[frame] = PoseEstimate(
-                frame, tuple(poses), 1.0 + 0.1 * frame, views_px, 9, (status,) * n, (remark,) * n, (parts_px,) * n,
-                tuple(np.eye(m.n_dofs) for m in models), (None,) * n, ((),) * n, "chamfer",
+                frame, tuple(poses), 1.0 + 0.1 * frame, view_costs_px, 9, (status,) * n, (remark,) * n,
+                (part_costs_px,) * n, tuple(np.eye(m.n_dofs) for m in models), (None,) * n, ((),) * n, "chamfer",
             )  # fmt: skip
             yield self.last[frame]
 

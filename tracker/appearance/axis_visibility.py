@@ -8,7 +8,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.compute.numba_options import BORROW
+from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.geometry.arrays import Array
 
 ALONG = 7
@@ -27,7 +27,7 @@ def unit_balls(shapes: Array) -> Array:
     return out
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def ray_transform(eye: Array, T: Array, shape: Array, ray: Array) -> None:
     """Fill what lines of sight ask of a part, (13,): what turns directions into the coordinates in which the part is
     the unit ball, the eye in these, and the square of its distance from the ball."""
@@ -43,7 +43,7 @@ def ray_transform(eye: Array, T: Array, shape: Array, ray: Array) -> None:
     ray[12] = C
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def occludes(ray: Array, x: float, y: float, z: float) -> bool:
     """Whether a part lies before a point, which is at (x, y, z) from the eye: the middle of the chord that the line of
     sight shares with it is nearer than the point."""
@@ -55,13 +55,13 @@ def occludes(ray: Array, x: float, y: float, z: float) -> bool:
     return B < 0.0 and -B < A and B * B - A * ray[12] > 0.0
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def axis_sample(shape: Array, sample: int) -> float:
     """Place of a sample along the axis of a part, from its centre, metres."""
     return shape[5] * 0.8 * (2.0 * sample / (ALONG - 1) - 1.0)
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def project_axis(P: Array, eye: Array, T: Array, shape: Array, axis: Array) -> None:
     """Fill where the axis of a part is from the eye and in the image, (4, 3): its centre from the eye, metres; its
     centre, the change for a metre along the axis and for a metre across axis and sight in homogeneous pixels."""
@@ -77,7 +77,7 @@ def project_axis(P: Array, eye: Array, T: Array, shape: Array, axis: Array) -> N
         axis[3, i] = (P[i, 0] * sx + P[i, 1] * sy + P[i, 2] * sz) / norm
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def is_occluded(
     T: Array, axis: Array, along_m: float, own: int, rays: Array, among: NDArray[np.int64], n_among: int
 ) -> bool:
@@ -100,7 +100,7 @@ def is_occluded(
     return False
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def pixel_on_axis(axis: Array, along_m: float) -> tuple[float, float, float, float]:
     """Where a place along the axis of a part is in an image, px, and how that changes to the side, px per metre; see
     `project_axis`. So near the axis the image is as good as linear."""

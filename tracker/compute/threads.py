@@ -7,46 +7,47 @@ from functools import lru_cache
 from typing import TypeVar
 
 S = TypeVar("S")
-
-
 T = TypeVar("T")
-
-
 U = TypeVar("U")
 
-
 N_HELPERS = os.cpu_count() or 1
-"""Threads that work side by side."""
+"""Number of threads of each pool."""
 
 
 @lru_cache(maxsize=1)
-def helpers() -> ThreadPoolExecutor:
-    """Threads that work besides the caller's; kernels let go of the interpreter's lock."""
+def kernel_pool() -> ThreadPoolExecutor:
+    """Return the pool for kernels, which release the interpreter lock."""
     return ThreadPoolExecutor(N_HELPERS, thread_name_prefix="kernels")
 
 
-def dealt_out(work: Callable[[S, U], T], rooms: Sequence[S], items: Sequence[U]) -> list[T]:
-    """What some work makes of each of several things, in order, in as many threads as there are rooms to work in."""
-
-    def share(room: S, own: Sequence[U]) -> list[T]:
-        return [work(room, x) for x in own]
-
-    n = len(rooms)
-    shares = list(helpers().map(share, rooms, [items[i::n] for i in range(n)]))
-    return [shares[i % n][i // n] for i in range(len(items))]
-
-
 @lru_cache(maxsize=1)
-def _besides() -> ThreadPoolExecutor:
-    """Threads for what itself waits for `helpers`, which must not wait for one another."""
-    return ThreadPoolExecutor(N_HELPERS, thread_name_prefix="beside")
+def _task_pool() -> ThreadPoolExecutor:
+    """Return a second pool, for tasks that wait on `kernel_pool`; sharing one pool could deadlock."""
+    return ThreadPoolExecutor(N_HELPERS, thread_name_prefix="tasks")
 
 
-def side_by_side(work: Callable[[S], T], items: Sequence[S]) -> list[T]:
-    """What some work makes of each of several things, the first here and the others in threads beside this one.
+def map_chunked(work: Callable[[S, U], T], workspaces: Sequence[S], items: Sequence[U]) -> list[T]:
+    """Apply work to each of several items in parallel, with a thread for each workspace; return the results in order.
 
-    The work may ask `helpers`, but not for this again.
+    Args:
+        work: called with a workspace and an item. No two calls use a workspace at the same time.
+        workspaces: scratch of each thread.
+        items: are dealt out in turn.
     """
-    others = [_besides().submit(work, x) for x in items[1:]]
+
+    def chunk(workspace: S, own: Sequence[U]) -> list[T]:
+        return [work(workspace, x) for x in own]
+
+    n = len(workspaces)
+    chunks = list(kernel_pool().map(chunk, workspaces, [items[i::n] for i in range(n)]))
+    return [chunks[i % n][i // n] for i in range(len(items))]
+
+
+def map_parallel(work: Callable[[S], T], items: Sequence[S]) -> list[T]:
+    """Apply work to each of several items in parallel, the first in this thread; return the results in order.
+
+    The work may use `kernel_pool`, but must not call this function.
+    """
+    others = [_task_pool().submit(work, x) for x in items[1:]]
     first = [work(x) for x in items[:1]]
     return first + [x.result() for x in others]

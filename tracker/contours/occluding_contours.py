@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.model import PosedBody
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.generator import MAX_POINTS, grid_outline, revolved_outline
 from tracker.contours.surfaces import Surfaces, surfaces_of
 from tracker.contours.visibility import JOINT_MARGIN_M, LANES, mark_occluded
@@ -140,7 +140,7 @@ def piece_buffer(surfaces: Surfaces, room: int) -> Pieces:
 # a dozen arrays take as long to hand over as the work does.
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def place_parts(Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
     """Fill the motions between the parts' unit coordinates and the world, which are the same in all views."""
     to_world, to_unit = out.Ts_world_unit, out.Ts_unit_world
@@ -161,7 +161,7 @@ def place_parts(Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
                 to_unit[part, i, 3] -= to_unit[part, i, k] * to_world[part, k, 3]
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def place_eye(eye: Array, out: Pieces) -> None:
     """Fill where the eye is in the unit coordinates of parts that are placed, and how far it is from them."""
     to_world, to_unit = out.Ts_world_unit, out.Ts_unit_world
@@ -172,7 +172,7 @@ def place_eye(eye: Array, out: Pieces) -> None:
             to_unit[part, i, 4] = to_unit[part, i, 0] * x + to_unit[part, i, 1] * y + to_unit[part, i, 2] * z
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def _project(
     part: int, P: Array, n: int, Ts_world_unit: Array, outline: FloatArray, image: FloatArray, boxes: Array
 ) -> int:
@@ -210,7 +210,7 @@ def _project(
     return n_kept
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _image_row(i: int, part: int, P: Array, W: Array) -> tuple[np.float32, np.float32, np.float32, np.float32]:
     """Row i of the projection from the unit coordinates of a part."""
     p, q, r = P[i, 0], P[i, 1], P[i, 2]
@@ -222,7 +222,7 @@ def _image_row(i: int, part: int, P: Array, W: Array) -> tuple[np.float32, np.fl
     )
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def _cut(
     n_edges: int, edge: int, piece_px: float, n: int, outline: FloatArray, image: FloatArray, ends: FloatArray,
     middles: FloatArray, edges: NDArray[np.int32],
@@ -262,7 +262,7 @@ def _cut(
     return n
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def mark_all_occluded(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
     """Mark what parts hide of one another: those whose boxes in the image meet, and that are not all behind.
 
@@ -308,13 +308,13 @@ def mark_all_occluded(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
             mark_occluded(b, solids, Q, margin, middles, firsts[a], firsts[a + 1], shared, occluded)
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def focal_px(P: Array) -> float:
     """Focal length of a projection matrix, (3, 4), px."""
     return np.sqrt(P[0, 0] ** 2 + P[0, 1] ** 2 + P[0, 2] ** 2)
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def trace_part(
     part: int, P: Array, focal: float, surfaces: Surfaces, piece_px: float, n: int, edge: int, out: Pieces
 ) -> tuple[int, int]:  # fmt: skip
@@ -341,7 +341,7 @@ def trace_part(
     return n, edge
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def trace_pieces(P: Array, eye: Array, surfaces: Surfaces, piece_px: float, out: Pieces) -> int:
     """Fill the pieces of parts that are placed in one view; returns their number. See `trace_view`."""
     n_parts, focal = surfaces.radii.shape[0], focal_px(P)

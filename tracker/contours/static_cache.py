@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import BORROW, FAST
+from tracker.compute.numba_options import FAST_MATH, NO_REFCOUNT
 from tracker.contours.generator import MAX_POINTS
 from tracker.contours.occluding_contours import Pieces, focal_px, mark_all_occluded, place_eye, trace_part
 from tracker.contours.surfaces import Surfaces
@@ -59,7 +59,7 @@ def static_contours_buffer(n_views: int, room: int, n_points: int, moves: NDArra
     )  # fmt: skip
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def is_static_unchanged(Ts: Array, moves: NDArray[np.bool_], static: Array) -> bool:
     """Whether all parts but those that move are where they were static, poses (P, 4, 4), to the last digit."""
     for part in range(Ts.shape[0]):
@@ -71,7 +71,7 @@ def is_static_unchanged(Ts: Array, moves: NDArray[np.bool_], static: Array) -> b
     return True
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def copy_poses(Ts: Array, static: Array) -> None:
     """Note where all parts are, poses (P, 4, 4), when what is_static is static."""
     for part in range(Ts.shape[0]):
@@ -80,7 +80,7 @@ def copy_poses(Ts: Array, static: Array) -> None:
                 static[part, i, k] = Ts[part, i, k]
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def trace_static(
     P: Array, eye: Array, surfaces: Surfaces, piece_px: float, static: StaticContours, out: Pieces
 ) -> None:
@@ -99,7 +99,7 @@ def trace_static(
     mark_all_occluded(n_parts, surfaces, out)
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def store_pieces(view: int, traced: Pieces, static: StaticContours) -> None:
     """Keep the pieces of a view after those of the views before it."""
     n_parts = traced.firsts.shape[0] - 1
@@ -118,7 +118,7 @@ def store_pieces(view: int, traced: Pieces, static: StaticContours) -> None:
     static.firsts[view, n_parts] = at + traced.firsts[n_parts]
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def trace_moving_parts(
     view: int, P: Array, eye: Array, surfaces: Surfaces, piece_px: float, static: StaticContours, out: Pieces
 ) -> int:
@@ -150,7 +150,7 @@ def trace_moving_parts(
     return n
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def mark_covered_segments(view: int, traced: Pieces, static: StaticContours) -> bool:
     """Mark the static segments of a view of which something that moves hides a piece; whether there are any."""
     static.covered[: static.firsts[view, -1] - static.firsts[view, 0]] = False

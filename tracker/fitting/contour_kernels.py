@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import (
     StaticContours,
@@ -103,7 +103,7 @@ class Sums(NamedTuple):
     """Points of each view's silhouette that are explained, (V,)."""
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def nearest_oriented_segment(
     u: FloatArray, v: FloatArray, nu: FloatArray, nv: FloatArray, rows: IntArray, segments: FloatArray, n: int,
     wanted: NDArray[np.bool_], turn: float, reach: float, best: FloatArray, nearest: NDArray[np.int32],
@@ -136,7 +136,7 @@ def nearest_oriented_segment(
                 best[i] = squared if closer else best[i]
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _pack_visible(n_parts: int, scratch: Scratch) -> int:
     """Pack the visible pieces, and join them to segments; returns the number of those."""
     traced, pieces, segments, of_segment = scratch.traced, scratch.pieces, scratch.segments, scratch.of_segment
@@ -170,7 +170,7 @@ def _pack_visible(n_parts: int, scratch: Scratch) -> int:
     return int(n)
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _model_to_image(
     view: int, first: int, last: int, pixel: int, views: ViewArrays, scale: float, with_jacobian: bool,
     static: StaticContours, scratch: Scratch, sums: Sums,
@@ -209,7 +209,7 @@ def _model_to_image(
     return 0.5 * float(weight) * cost
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _match_segments(
     view: int, n: int, views: ViewArrays, turn: float, scratch: Scratch, best: FloatArray, nearest: NDArray[np.int32]
 ) -> None:  # fmt: skip
@@ -223,7 +223,7 @@ def _match_segments(
     )  # fmt: skip
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _match_points(
     view: int, n_segments: int, views: ViewArrays, turn: float, static: StaticContours, scratch: Scratch
 ) -> None:
@@ -242,7 +242,7 @@ def _match_points(
     _match_segments(view, n_segments, views, turn, scratch, best, nearest)
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _rematch_covered(view: int, n_segments: int, views: ViewArrays, static: StaticContours, scratch: Scratch) -> None:
     """Let the points whose nearest segment something that moves covers be held against whatever is in reach of them."""
     start, stop, reach = views.firsts[view], views.firsts[view + 1], np.float32(views.thetas[view])
@@ -262,7 +262,7 @@ def _rematch_covered(view: int, n_segments: int, views: ViewArrays, static: Stat
             scratch.wanted[k] = True
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _image_to_model(
     view: int, n_segments: int, views: ViewArrays, scale: float, turn: float, with_jacobian: bool,
     static: StaticContours, scratch: Scratch, sums: Sums,
@@ -326,7 +326,7 @@ def _image_to_model(
     return 0.5 * float(weight) * cost
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _store_static(
     view: int, surfaces: occluding_contours.Surfaces, views: ViewArrays, turn: float, static: StaticContours,
     scratch: Scratch,
@@ -374,7 +374,7 @@ WITH_JACOBIAN, COST_ONLY = np.bool_(True), np.bool_(False)
 """Values of `with_jacobian`. Literals in a kernel would have `accumulate_normal_equations` compiled once for each."""
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def accumulate_normal_equations(term: ContourTerm, with_jacobian: bool) -> float:
     """Fill the sums for one pose of the parts from first to last, the other parts fixed; returns the cost.
 

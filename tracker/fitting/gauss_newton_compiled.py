@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
 from tracker.body.model import BodyModel
-from tracker.compute.numba_options import BORROW
+from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.fitting import gauss_newton
 from tracker.fitting.contour_kernels import WITH_JACOBIAN, ContourTerm, accumulate_normal_equations
 from tracker.fitting.contour_residuals import ContourResiduals
@@ -183,7 +183,7 @@ def _linearize(blocks: _Blocks, values: Array, out: _Linear) -> float:
     return cost
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _list_moving(
     values: Array, gradient: Array, may_move: NDArray[np.bool_], limits: Array, moving: IntArray
 ) -> int:  # fmt: skip
@@ -197,7 +197,7 @@ def _list_moving(
     return n
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _damped_step(gradient: Array, hessian: Array, moving: IntArray, damping: float, L: Array, step: Array) -> float:
     """Fill the step of what moves, indices (m,), (m,), by Cholesky's factor L (room); the decrease that it promises."""
     m, trace = moving.shape[0], 0.0
@@ -219,7 +219,7 @@ def _damped_step(gradient: Array, hessian: Array, moving: IntArray, damping: flo
     return promised
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _factor(hessian: Array, moving: IntArray, damping: float, floor: float, L: Array) -> bool:
     """Fill Cholesky's factor of the damped Hessian of what moves, the lower triangle of (m, m); False where it is not
     definite to the last digit."""
@@ -239,7 +239,7 @@ def _factor(hessian: Array, moving: IntArray, damping: float, floor: float, L: A
     return True
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _substitute(L: Array, gradient: Array, moving: IntArray, step: Array) -> None:
     """Fill the step, (m,), that a factor, (m, m), takes against the gradient of what moves."""
     m = moving.shape[0]
@@ -255,7 +255,7 @@ def _substitute(L: Array, gradient: Array, moving: IntArray, step: Array) -> Non
         step[i] = total / L[i, i]
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _move(values: Array, step: Array, moving: IntArray, limits: Array, out: Array) -> float:
     """Fill a pose, (n_dofs,), after a step (m,) of what moves, within the limits; the largest change."""
     farthest = 0.0

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import BORROW
+from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import SCENE_SPACING_PX, ViewEvidence
 from tracker.geometry.arrays import FloatArray, IntArray
@@ -51,7 +51,7 @@ def points_to_match(
     return points[: _pack(points[:n], near)]
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _merge(points: FloatArray, n_edges: int, cells: IntArray) -> int:
     """Add the points of the silhouette, which come after those of the edges, to the edges that they lie on.
 

@@ -196,11 +196,13 @@ def search(
     predicted = [np.array(p, dtype=np.float64) for p in poses]
     best = list(predicted)
     first = cost(best)
-    best_px, views_px, evaluations = first.total_px, first.views_px, 1
+    best_px, view_costs_px, evaluations = first.total_px, first.view_costs_px, 1
     for stage in stages(cost.models, settings, people, free):
-        for step in _search_stage(cost, stage, settings, predicted[stage.person], best, best_px, views_px, evaluations):
+        for step in _search_stage(
+            cost, stage, settings, predicted[stage.person], best, best_px, view_costs_px, evaluations
+        ):
             yield step
-            best, best_px, views_px = list(step.best), step.best_px, step.best_views_px
+            best, best_px, view_costs_px = list(step.best), step.best_px, step.best_views_px
             evaluations = step.evaluations
 
 
@@ -211,7 +213,7 @@ def _search_stage(
     predicted: Array,
     best: Sequence[Array],
     best_px: float,
-    views_px: Array,
+    view_costs_px: Array,
     evaluations: int,
 ) -> Iterator[SearchStep]:
     """Best-first search of one stage around the best pose so far, within the bounds around the prediction."""
@@ -255,9 +257,9 @@ def _search_stage(
             candidate, candidate_px = candidates[cheapest], float(totals[cheapest])
             if candidate_px < best_px:
                 best = [*best[:person], candidate, *best[person + 1 :]]
-                best_px, views_px, idle = candidate_px, views[cheapest], 0
+                best_px, view_costs_px, idle = candidate_px, views[cheapest], 0
         done = not queue or idle >= settings.patience or expansions >= settings.max_expansions
         shown = tuple(candidate if i == person else p for i, p in enumerate(best))
-        yield SearchStep(stage, shown, candidate_px, tuple(best), best_px, views_px, evaluations, done)
+        yield SearchStep(stage, shown, candidate_px, tuple(best), best_px, view_costs_px, evaluations, done)
         if done:
             return

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from tracker.body.kinematics import Tree, forward_kinematics
 from tracker.body.model import BodyModel, PosedBody, parts_of
-from tracker.compute.numba_options import FAST
-from tracker.compute.threads import helpers
+from tracker.compute.numba_options import FAST_MATH
+from tracker.compute.threads import kernel_pool
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray
@@ -49,7 +49,7 @@ class Cost(NamedTuple):
 
     total_px: float
     """Mean over the views that have any edges, px of the footage."""
-    views_px: Array
+    view_costs_px: Array
     """Cost of each view, (V,), px of the footage; NaN for a view without edges."""
     forward_px: Array
     """Model to image, (V,), px of the footage."""
@@ -172,8 +172,8 @@ class ChamferCost:
 
     def _cost(self, directed: Array) -> Cost:
         directed_px = directed / self._scales[:, None]
-        views_px = self._blank_unseen(directed_px.mean(axis=-1))
-        return Cost(float(self._mean(views_px)), views_px, directed_px[:, 0], directed_px[:, 1])
+        view_costs_px = self._blank_unseen(directed_px.mean(axis=-1))
+        return Cost(float(self._mean(view_costs_px)), view_costs_px, directed_px[:, 0], directed_px[:, 1])
 
     def of_person(self, person: int, candidates: Array, poses: Sequence[Array]) -> tuple[Array, Array]:
         """Costs of many candidate poses of one person, the others held at `poses`.
@@ -186,8 +186,8 @@ class ChamferCost:
         Returns:
             The total costs, (C,), and those of each view, (C, V), px of the footage; NaN for views without edges.
         """
-        views_px = self._blank_unseen(self._directed(person, candidates, poses).mean(axis=-1) / self._scales)
-        return self._mean(views_px), views_px
+        view_costs_px = self._blank_unseen(self._directed(person, candidates, poses).mean(axis=-1) / self._scales)
+        return self._mean(view_costs_px), view_costs_px
 
     @property
     def edge_points_px(self) -> tuple[FloatArray, ...]:
@@ -245,7 +245,7 @@ class ChamferCost:
         if self._threads > 1 and len(candidates) >= _WORTH_SHARING:
             shares = np.linspace(0, len(candidates), self._threads + 1).astype(int)
             slices = [slice(a, b) for a, b in pairwise(shares)]
-            others = [helpers().submit(score, s) for s in slices[1:]]
+            others = [kernel_pool().submit(score, s) for s in slices[1:]]
             score(slices[0])
             for other in others:
                 other.result()
@@ -268,15 +268,15 @@ class ChamferCost:
             )  # fmt: skip
         return scratch
 
-    def _blank_unseen(self, views_px: Array) -> Array:
-        views_px[..., ~self._seen] = np.nan
-        return views_px
+    def _blank_unseen(self, view_costs_px: Array) -> Array:
+        view_costs_px[..., ~self._seen] = np.nan
+        return view_costs_px
 
-    def _mean(self, views_px: Array) -> Array:
+    def _mean(self, view_costs_px: Array) -> Array:
         """Mean over the views with edges, (..., V) to (...); where there is none, that of the outlier distances."""
         if not self._seen.any():
-            return np.full(views_px.shape[:-1], np.mean(self._arrays.thetas / self._scales))
-        return views_px[..., self._seen].mean(axis=-1)
+            return np.full(view_costs_px.shape[:-1], np.mean(self._arrays.thetas / self._scales))
+        return view_costs_px[..., self._seen].mean(axis=-1)
 
 
 @lru_cache(maxsize=1)  # a hand makes dozens of costs a second from the same views
@@ -297,7 +297,7 @@ def _near(view: ViewEvidence, pieces_px: FloatArray, occluded: NDArray[np.bool_]
     return within_reach(everything, pieces_px, occluded, theta)
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool) -> float:
     """Mean of n distances with weights w, outliers treated as `ChamferCost` says; theta where there are none."""
     total, weight = 0.0, 0.0
@@ -325,7 +325,7 @@ def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool
     return total / weight if weight >= 0.5 * everything else theta
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _distance(image: FloatArray, width: int, height: int, u: np.float32, v: np.float32) -> np.float32:
     """Distance at a pixel; outside the image, that of the nearest border pixel and the way to it."""
     inside = bilinear(image, width, height, u, v)[0]
@@ -335,7 +335,7 @@ def _distance(image: FloatArray, width: int, height: int, u: np.float32, v: np.f
     return inside + np.sqrt(off_u * off_u + off_v * off_v)
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, visible: FloatArray) -> float:
     """Mean distance of n visible pieces, see `_Scratch`, cut off at theta; theta where none is visible.
 
@@ -351,7 +351,7 @@ def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, v
     return theta - spared / weight if weight > 0.0 else theta
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: float, scratch: _Scratch) -> float:
     """The same by the paper's robust mean."""
     visible, lengths, d = scratch.visible, scratch.lengths, scratch.distances
@@ -361,7 +361,7 @@ def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: fl
     return _robust_mean(d, lengths, n, theta, True)
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _take_visible(
     n: int, pieces: occluding_contours.Pieces, visible: FloatArray, segments: Segments
 ) -> tuple[int, int]:
@@ -406,7 +406,7 @@ def _trace_views(
     return at
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _take_traced(view: int, contours: _Contours, pieces: occluding_contours.Pieces) -> int:
     """Copy the pieces of a view that are traced already; their number."""
     first, last = contours.firsts[view], contours.firsts[view + 1]
@@ -418,7 +418,7 @@ def _take_traced(view: int, contours: _Contours, pieces: occluding_contours.Piec
     return n
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _score(
     Ts: Array,
     surfaces: occluding_contours.Surfaces,

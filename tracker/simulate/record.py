@@ -4,6 +4,7 @@ import secrets
 import shutil
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
 from typing import Literal, get_args
@@ -38,49 +39,55 @@ Progress = Callable[[int, int], None]
 
 PRESET = "gavrila22"
 BACKGROUND_FRAMES = 3
-"""Frames filmed of the empty room, of which the last is kept: the codec has settled by then."""
+"""Frames filmed of the empty room. The last one is stored, because the codec has settled by then."""
 
 
-def simulate(
-    out: str | Path,
-    scene: str = "elbow_rotation",
-    n_cameras: int = 4,
-    n_frames: int = 50,
-    seed: int = 0,
-    size: tuple[int, int] = (640, 480),
-    fps: float = 25.0,
-    *,
-    body: BodyKind = "skinned",
-    masks: bool = False,
-    progress: Progress | None = None,
-) -> Session:
+@dataclass(frozen=True)
+class Simulation:
+    """The parameters of a simulated recording. Equal parameters give equal footage."""
+
+    scene: str = "elbow_rotation"
+    """One of `scenes.SCENES`."""
+    n_cameras: int = 4
+    """Number of cameras; 4 are FRONT, RIGHT, BACK and LEFT in the corners, others are spread around the room."""
+    n_frames: int = 50
+    """Number of frames."""
+    seed: int = 0
+    """Seed of the room, the differences of the cameras, the noise, and the motion of scenes that vary."""
+    size: tuple[int, int] = (640, 480)
+    """Image width and height, px, both even."""
+    fps: float = 25.0
+    """Frame rate, 1/s."""
+    body: BodyKind = "skinned"
+    """`skinned`: a smooth-skinned person with other bones than the preset's; `model`: the preset's own parts."""
+    masks: bool = False
+    """Whether to write true masks too, `masks/CAM/%06d.png`: 0 background, k person k."""
+
+
+_DEFAULT = Simulation()
+
+
+def simulate(out: str | Path, simulation: Simulation = _DEFAULT, progress: Progress | None = None) -> Session:
     """Make a session folder of a simulated recording; it appears complete or not at all.
 
-    Besides the session it holds `truth.trc` (joint centres, metres), `truth.csv` (poses of the true skeleton) and
-    `truth_model.toml` (that skeleton); with several people one of each per person, `truth_NAME.trc`, `truth_NAME.csv`
-    and `truth_NAME_model.toml`. The session's people get the plain preset at the true body height. The same arguments
-    give the same footage.
+    Besides the session it has `truth.trc` (joint centres, metres), `truth.csv` (poses of the true skeleton) and
+    `truth_model.toml` (that skeleton). With several people there is one of each per person: `truth_NAME.trc`,
+    `truth_NAME.csv` and `truth_NAME_model.toml`. The session's people have the preset at the true body height.
 
     Args:
         out: the folder; must not exist, or be empty.
-        scene: one of `scenes.SCENES`.
-        n_cameras: 4 are FRONT, RIGHT, BACK and LEFT in the corners; others are spread around.
-        n_frames: number of frames.
-        seed: of the room, the small differences of the cameras, the noise, and the motion where the scene has it vary.
-        size: image width and height, px, both even.
-        fps: frame rate, 1/s.
-        body: film a smooth-skinned person whose bones are not the preset's, or the preset's own parts.
-        masks: also write true masks, `masks/CAM/%06d.png`: 0 background, k person k.
+        simulation: parameters of the recording.
         progress: called with the number of images made and their total.
 
     Raises:
-        TrackerError: an argument is impossible.
+        TrackerError: a parameter is impossible.
         SessionError: the folder is in use or cannot be written.
     """
+    n_frames, fps, seed, body = simulation.n_frames, simulation.fps, simulation.seed, simulation.body
     out = Path(out).absolute()
     _check(out, n_frames, fps, body)
-    cast = cast_of(scene, seed)
-    cameras = make_cameras(n_cameras, size, seed)
+    cast = cast_of(simulation.scene, seed)
+    cameras = make_cameras(simulation.n_cameras, simulation.size, seed)
     presets = [load_model(PRESET, role.height_m) for role in cast]
     models = [
         altered_model(m, r.build.bone_factors) if body == "skinned" else m for r, m in zip(cast, presets, strict=True)
@@ -89,7 +96,7 @@ def simulate(
     temporary = out.with_name(f".{out.name}.{secrets.token_hex(4)}.tmp")
     try:
         temporary.mkdir(parents=True)
-        sources = [_source(temporary, c, masks) for c in cameras]
+        sources = [_source(temporary, c, simulation.masks) for c in cameras]
         figures = [_figure(role, model, body) for role, model in zip(cast, models, strict=True)]
         _shoot(sources, figures, poses, fps, seed, progress)
         _write_truth(temporary, cast, models, poses, fps)
@@ -159,7 +166,7 @@ def _shoot(
 
 
 def _shoot_background(source: CameraSource, backdrop: Backdrop, fps: float, rng: np.random.Generator) -> None:
-    """Write the empty room as the same camera and codec record it, with noise of its own."""
+    """Write the empty room as the same camera and codec record it, with independent noise."""
     assert source.background is not None
     source.background.parent.mkdir(exist_ok=True)
     clip = source.background.with_suffix(".mp4")
@@ -186,9 +193,9 @@ def _write_truth(
 ) -> None:
     for role, model, values in zip(cast, models, poses, strict=True):
         suffix = "" if len(cast) == 1 else f"_{role.name}"
-        # The root is a place within the trunk that no marker set knows.
-        kept = [i for i, name in enumerate(model.point_names) if name != model.joints[0].name]
-        points = np.array([model.points_world(v)[kept] for v in values])
-        write_trc(folder / f"truth{suffix}.trc", [model.point_names[i] for i in kept], points, fps)
+        # The root lies within the trunk; no marker set has it.
+        marked = [i for i, name in enumerate(model.point_names) if name != model.joints[0].name]
+        points = np.array([model.points_world(v)[marked] for v in values])
+        write_trc(folder / f"truth{suffix}.trc", [model.point_names[i] for i in marked], points, fps)
         write_pose_table(folder / f"truth{suffix}.csv", model, values)
         write_text_atomic(folder / f"truth{suffix}_model.toml", format_model(model))

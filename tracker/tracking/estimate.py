@@ -6,7 +6,7 @@ from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import PoseQuality, Status
 
 
-class Alternative(NamedTuple):
+class AlternativePose(NamedTuple):
     """A pose of a person that fits the evidence about as well as the estimate."""
 
     values: Array
@@ -37,7 +37,7 @@ class PoseEstimate(NamedTuple):
     """Covariance of each pose, (n_dofs, n_dofs) each, rad and metres; zero for a keyframe."""
     qualities: tuple[PoseQuality | None, ...]
     """Features from which the statuses follow; None for a keyframe."""
-    alternatives: tuple[tuple[Alternative, ...], ...]
+    alternatives: tuple[tuple[AlternativePose, ...], ...]
     """Poses that are about as good, best first. A person who has any is at most doubtful."""
     method: str
     """Name of the tracking method, such as `chamfer`."""

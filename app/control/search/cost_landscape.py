@@ -139,8 +139,8 @@ def landscape(
     low, high = (low if np.isfinite(low) else current - reach), (high if np.isfinite(high) else current + reach)
     values = np.linspace(min(low, current), max(high, current), SAMPLES)
     cost = pose_cost(views, models, poses, settings)
-    totals_px, views_px = cost.of_person(person, along(model, poses[person], dof, values), poses)
-    return CostLandscape(person, dof, current, cost(poses).total_px, values, totals_px, views_px)
+    totals_px, view_costs_px = cost.of_person(person, along(model, poses[person], dof, values), poses)
+    return CostLandscape(person, dof, current, cost(poses).total_px, values, totals_px, view_costs_px)
 
 
 def current_value(model: BodyModel, pose: Array, dof: int) -> float:

@@ -156,7 +156,7 @@ class SessionState:
         cost = pose_cost(views, models or self.models, poses, self.state.settings)(poses)
         return {
             "cost_px": finite_or_none(cost.total_px),
-            "view_costs_px": tuple(finite_or_none(c) for c in cost.views_px),
+            "view_costs_px": tuple(finite_or_none(c) for c in cost.view_costs_px),
         }
 
     def show_pose(self, person: int, values: Array) -> None:

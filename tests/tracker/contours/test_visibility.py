@@ -41,10 +41,20 @@ def blocked(model, points, eye, margin=0.0):
     return out
 
 
-def walked(shape, points, eye, first=0.0):
-    """How deep the line of sight of each point gets: the least of the implicit function's root along it, (n,)."""
-    s = np.linspace(first, 1, 4001)[:, None, None]
-    return (shape.inside_outside(points + s * (eye - points)) ** (1 / shape.degree)).min(axis=0)
+def walked(shape, points, eye, first=0.0, n=201):
+    """How deep the line of sight of each point gets: the least of the implicit function's root along it, (n,).
+
+    In steps, then in eighty times finer ones around the deepest: along a line the function has one minimum.
+    """
+    s, step = np.linspace(first, 1, n, retstep=True)
+    deepest = s[depths_along(shape, points, eye, s[:, None]).argmin(axis=0)]
+    near = np.clip(deepest + step * np.linspace(-1, 1, 161)[:, None], first, 1)
+    return depths_along(shape, points, eye, near).min(axis=0)
+
+
+def depths_along(shape, points, eye, s):
+    """The implicit function's root at parts of the way from points to the eye, (k, 1) or (k, n) to (k, n)."""
+    return shape.inside_outside(points + s[..., None] * (eye - points)) ** (1 / shape.degree)
 
 
 @pytest.mark.parametrize("name", PARTS)

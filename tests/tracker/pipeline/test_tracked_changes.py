@@ -6,7 +6,7 @@ from tracker.pipeline.methods import METHODS, make_tracker
 from tracker.pipeline.tracked_changes import StoredPerson, recorded_method, settings_record, tracked_changes
 from tracker.store.annotation_store import AnnotationStore
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimate import Alternative, PoseEstimate
+from tracker.tracking.estimate import AlternativePose, PoseEstimate
 
 
 def estimate(other):
@@ -20,7 +20,7 @@ def estimate(other):
 def test_alternatives_are_stored_with_the_pose(tmp_path):
     store = AnnotationStore(tmp_path / "annotations.sqlite")
     people = [StoredPerson(name, store.add_model_revision(name, "a = 1")) for name in ("man", "woman")]
-    other = Alternative(np.array([7.0, 8.0]), 1.25)
+    other = AlternativePose(np.array([7.0, 8.0]), 1.25)
     changes = tracked_changes([estimate(other)], people, [0, 1], {}, TrackSettings())
     store.commit("track", changes, by_program=True)
     assert store.alternatives("man", 4) == ()
@@ -31,7 +31,7 @@ def test_alternatives_are_stored_with_the_pose(tmp_path):
 
 
 def test_keyframes_and_people_who_are_not_tracked_are_not_written():
-    found, people = estimate(Alternative(np.zeros(2), 1.0)), [StoredPerson("man", 1), StoredPerson("woman", 2)]
+    found, people = estimate(AlternativePose(np.zeros(2), 1.0)), [StoredPerson("man", 1), StoredPerson("woman", 2)]
     for tracked, keyframes, expected in (
         ([0, 1], {4: {1: np.ones(2)}}, ["man"]),
         ([0, 1], {3: {1: np.ones(2)}}, ["man", "woman"]),

@@ -55,8 +55,8 @@ def test_directed_and_undirected_by_hand():
     cost = cost_of(ring(2, 4, 6), bands([1], [3]), "truncated")
     assert cost.forward_px[0] == pytest.approx(3, abs=1e-5)
     assert cost.backward_px[0] == pytest.approx((2 + 4 + 6) / 3, abs=BY_HAND)
-    assert cost.views_px[0] == (cost.forward_px[0] + cost.backward_px[0]) / 2
-    assert cost.total_px == cost.views_px[0]
+    assert cost.view_costs_px[0] == (cost.forward_px[0] + cost.backward_px[0]) / 2
+    assert cost.total_px == cost.view_costs_px[0]
 
 
 @pytest.mark.parametrize(
@@ -128,12 +128,12 @@ def test_view_without_edges_has_no_say(gavrila):
     all_three = ChamferCost(views, [PosedBody(gavrila, values)])([moved])
     two = ChamferCost([views[0], blind, views[2]], [PosedBody(gavrila, values)])
     cost = two([moved])
-    assert np.isnan(cost.views_px).tolist() == [False, True, False]
-    assert cost.views_px[[0, 2]].tolist() == all_three.views_px[[0, 2]].tolist()
-    assert cost.total_px == pytest.approx(all_three.views_px[[0, 2]].mean())
+    assert np.isnan(cost.view_costs_px).tolist() == [False, True, False]
+    assert cost.view_costs_px[[0, 2]].tolist() == all_three.view_costs_px[[0, 2]].tolist()
+    assert cost.total_px == pytest.approx(all_three.view_costs_px[[0, 2]].mean())
     total, by_view = two.of_person(0, moved[None], [moved])
     assert total[0] == pytest.approx(cost.total_px, rel=ROUNDING)
-    np.testing.assert_allclose(by_view[0], cost.views_px, rtol=ROUNDING)
+    np.testing.assert_allclose(by_view[0], cost.view_costs_px, rtol=ROUNDING)
     none = ChamferCost([blind], [PosedBody(gavrila, values)], THETA)
     assert none([moved]).total_px == THETA
     assert none.of_person(0, moved[None], [moved])[0].tolist() == [THETA]
@@ -150,10 +150,10 @@ def test_many_candidates_cost_the_same_as_one_by_one(gavrila, outliers):
         candidates = np.stack([shaken(model, poses[person], rng, 0.2, 0.05) for _ in range(10)])
         totals, by_view = cost.of_person(person, candidates, poses)
         assert len(set(totals)) == 10
-        for candidate, total, views_px in zip(candidates, totals, by_view, strict=True):
+        for candidate, total, view_costs_px in zip(candidates, totals, by_view, strict=True):
             alone = cost([candidate if i == person else p for i, p in enumerate(poses)])
             assert alone.total_px == pytest.approx(total, rel=ROUNDING)
-            np.testing.assert_allclose(alone.views_px, views_px, rtol=ROUNDING)
+            np.testing.assert_allclose(alone.view_costs_px, view_costs_px, rtol=ROUNDING)
 
 
 def test_costs_are_in_pixels_of_the_footage(gavrila):
@@ -197,13 +197,13 @@ def test_wholly_off_costs_theta(real_frame, outliers):
     own = own_evidence([PosedBody(model, values)], [v.camera for v in views])
     cost = ChamferCost(own, [PosedBody(model, values)], 12.0, outliers)
     far = moved_by(model, values, (0.0, 0.0, 100.0))  # above every image
-    assert cost([far]).views_px.tolist() == [12.0] * 4
+    assert cost([far]).view_costs_px.tolist() == [12.0] * 4
     # Predicted there, nothing of the scene is near: a direction without points costs theta too.
     predicted = ChamferCost(own, [PosedBody(model, far)], 12.0, outliers)
-    assert predicted([far]).views_px.tolist() == [12.0] * 4
+    assert predicted([far]).view_costs_px.tolist() == [12.0] * 4
     # Behind one camera it is gone from that view.
     behind = cost([moved_by(model, values, 2 * (views[2].camera.center_world - values[:3]))])
-    assert behind.views_px[2] == 12.0
+    assert behind.view_costs_px[2] == 12.0
     # Into a part of the images where there is nothing: the model's contour is seen whole, and explains nothing.
     left_of_all = [ViewEvidence(v.camera, 1.0, v.points_px - (300, 0), np.full_like(v.distance, 30.0)) for v in own]
     assert (

@@ -7,7 +7,7 @@ from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.formats.trc import read_trc
 from tracker.session.session import load_session
-from tracker.simulate.record import simulate
+from tracker.simulate.record import Simulation, simulate
 
 SIZE = (160, 120)
 ARGUMENTS = {"n_cameras": 2, "n_frames": 30, "size": SIZE}
@@ -17,7 +17,7 @@ LIMB_JOINTS = {f"{s}_{j}" for s in ("left", "right") for j in ("shoulder", "elbo
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("simulated") / "small"
-    simulate(out, **ARGUMENTS, masks=True)
+    simulate(out, Simulation(**ARGUMENTS, masks=True))
     return out
 
 
@@ -78,8 +78,8 @@ def test_the_footage_shows_the_person_against_the_background(folder):
 
 def test_the_same_arguments_give_the_same_bytes_and_another_seed_others(folder, tmp_path):
     again, other = tmp_path / "small", tmp_path / "other"
-    simulate(again, **ARGUMENTS, masks=True)
-    simulate(other, **(ARGUMENTS | {"n_frames": 1, "seed": 1}))
+    simulate(again, Simulation(**ARGUMENTS, masks=True))
+    simulate(other, Simulation(**(ARGUMENTS | {"n_frames": 1, "seed": 1})))
     for path in sorted(p for p in folder.rglob("*") if p.is_file()):
         assert path.read_bytes() == (again / path.relative_to(folder)).read_bytes(), path
     first, second = (read_image(f / "background" / "cam1.png", "") for f in (folder, other))
@@ -87,7 +87,7 @@ def test_the_same_arguments_give_the_same_bytes_and_another_seed_others(folder, 
 
 
 def test_the_fitted_body_can_be_filmed_itself(tmp_path):
-    simulate(tmp_path / "s", **(ARGUMENTS | {"n_frames": 2}), body="model")
+    simulate(tmp_path / "s", Simulation(**(ARGUMENTS | {"n_frames": 2}), body="model"))
     true, preset = load_model(tmp_path / "s" / "truth_model.toml"), load_model("gavrila22", 1.78)
     assert true.joints == preset.joints
     assert true.parts == preset.parts
@@ -95,12 +95,12 @@ def test_the_fitted_body_can_be_filmed_itself(tmp_path):
 
 def test_progress_counts_images(tmp_path):
     calls = []
-    simulate(tmp_path / "s", **(ARGUMENTS | {"n_frames": 2}), progress=lambda *call: calls.append(call))
+    simulate(tmp_path / "s", Simulation(**(ARGUMENTS | {"n_frames": 2})), progress=lambda *call: calls.append(call))
     assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
 def test_two_people_have_truth_each_and_masks_by_person(tmp_path):
-    session = simulate(tmp_path / "s", **(ARGUMENTS | {"n_frames": 1}), scene="tango", masks=True)
+    session = simulate(tmp_path / "s", Simulation(**(ARGUMENTS | {"n_frames": 1}), scene="tango", masks=True))
     assert [p.name for p in session.people] == ["man", "woman"]
     assert len({p.color for p in session.people}) == 2
     for k, person in enumerate(session.people):
@@ -123,14 +123,14 @@ def test_an_interrupted_run_leaves_nothing(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        simulate(tmp_path / "s", **ARGUMENTS, progress=interrupt)
+        simulate(tmp_path / "s", Simulation(**ARGUMENTS), progress=interrupt)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_folder_in_use_is_not_touched(tmp_path):
     (tmp_path / "note.txt").write_text("mine")
     with pytest.raises(SessionError, match="not an empty folder"):
-        simulate(tmp_path, **ARGUMENTS)
+        simulate(tmp_path, Simulation(**ARGUMENTS))
     assert [p.name for p in tmp_path.iterdir()] == ["note.txt"]
 
 
@@ -145,5 +145,5 @@ def test_a_folder_in_use_is_not_touched(tmp_path):
 )
 def test_impossible_arguments_are_refused_before_anything_is_written(tmp_path, argument, message):
     with pytest.raises(TrackerError, match=message):
-        simulate(tmp_path / "s", **(ARGUMENTS | argument))
+        simulate(tmp_path / "s", Simulation(**(ARGUMENTS | argument)))
     assert list(tmp_path.iterdir()) == []

@@ -82,7 +82,7 @@ def test_the_shares_of_three_are_those_of_the_simple_version(person):
 
 
 def test_distances_are_measured_once_for_all(monkeypatch):
-    """Of two people in one pose each, whoever asks first."""
+    """Of two people in one pose each, in either order of calls."""
     bodies, told = [at(BALL, 0, -0.25, 0), at(BALL, 0, 0.25, 0)], []
     monkeypatch.setattr("tracker.tracking.evidence_assignment._assign", lambda *a: told.append(a) or _assign(*a))
     shares = EvidenceAssignment(EvidencePool([seen(bodies)]), bodies)

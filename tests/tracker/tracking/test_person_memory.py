@@ -22,7 +22,7 @@ def seen(memory, unexplained=0.0, astray=()):
 
 
 def searched_at(memory, found, n_frames):
-    """The frames in which the first limb that is due is searched, in vain each time."""
+    """The frames in which the first limb to search is searched, and never found."""
     out = []
     for frame in range(n_frames):
         for limb in memory.limbs_to_search(found)[:1]:

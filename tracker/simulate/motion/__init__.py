@@ -1,1 +1,1 @@
-"""How simulated people move: postures, choreography, couples."""
+"""Motion of simulated people: postures, choreography, solo moves, couples, scenes."""

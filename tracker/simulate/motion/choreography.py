@@ -1,4 +1,4 @@
-"""Motion of all limbs, put together from keys: tracks of angles, a path, and the steps that follow it."""
+"""Compose the motion of all limbs from keys: tracks of angles, a path on the floor, and steps that follow it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,32 +15,32 @@ ARM_DOFS = ("shoulder.abduction", "shoulder.elevation", "shoulder.twist", "elbow
 SIDES = ("left", "right")
 
 _SWING = (0.06, 0.94)
-"""When in its step a foot leaves the floor and lands."""
+"""Phases of a step at which the foot leaves the floor and lands."""
 _SMALLEST_STEP = (0.03, np.radians(6.0))
-"""A foot that would move by less, metres and rad, stays."""
+"""A foot that would move by less, metres and rad, stays on the floor."""
 _SOFTNESS_M = 0.010
-"""How gradually a trunk begins to sink when a leg is nearly straight."""
+"""Softness of the transition to a sinking trunk when a leg becomes straight."""
 
 
 def glide(t: float, start: float, end: float) -> float:
-    """Rise from 0 to 1 between two times as a walker does: soon under way, and never much faster than needed."""
+    """Rise from 0 to 1 between two times like a walker: accelerate quickly, then move evenly."""
     s = min(max((t - start) / (end - start), 0.0), 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Values over time: from key to key, at rest at each of them."""
+    """Values over time: interpolated between keys, at rest at each key."""
 
     times: Array
     """Ascending, (K,), seconds."""
     values: Array
     """(K, D)."""
     ease: Callable[[float, float, float], float] = ramp
-    """How the time between two keys is spent, from 0 to 1, as `ramp` does."""
+    """Easing between two keys, from 0 to 1, like `ramp`."""
 
     def at(self, t: float) -> Array:
-        """Values at a time, (D,); before the first and after the last key those of the key."""
+        """Return the values at a time, (D,); constant before the first and after the last key."""
         i = int(np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 1))
         if i + 1 == len(self.times):
             return self.values[i]
@@ -53,25 +53,24 @@ class Choreography:
     """One person's motion in the frame of the actor's place: x ahead, y left, z up."""
 
     arms: Mapping[str, Track]
-    """Angles of the `left` and `right` arm, in the order of `ARM_DOFS`, rad; none of an arm that reaches somewhere."""
+    """Angles of the `left` and `right` arm, in the order of `ARM_DOFS`, rad; empty for an arm with a target."""
     path: Track
-    """Where the trunk is on the floor, metres, and where it faces, turned left from ahead, rad; (K, 3)."""
+    """Position of the trunk on the floor, metres, and heading, turned left from ahead, rad; (K, 3)."""
     crouch: Track
-    """How far the trunk is below upright standing, fraction of body height, and how far it bends forward, rad;
-    (K, 2)."""
+    """Height of the trunk below upright standing, fraction of body height, and forward bend, rad; (K, 2)."""
     lifts: Track
-    """How far the `left` and the `right` foot are lifted, fraction of body height, (K, 2). Where the path rests."""
+    """Lift of the `left` and the `right` foot, fraction of body height, (K, 2); used while the path rests."""
     sway_hz: float = 0.6
-    """How often the trunk sways, 1/s."""
+    """Frequency of the sway of the trunk, 1/s."""
     step_s: float = 0.42
     """Time from the landing of one foot to that of the other, seconds."""
     step_height_m: float = 0.07
-    """How high a stepping foot is lifted, metres."""
+    """Lift of a stepping foot, metres."""
     ahead_m: float = 0.0
-    """How far the trunk is ahead of the feet, metres, as of a body that leans on somebody."""
+    """Distance of the trunk ahead of the feet, metres, for a person who leans on somebody."""
 
     def act(self, model: BodyModel, t: float) -> Posture:
-        """Posture at a time in seconds."""
+        """Return the posture at a time in seconds."""
         x, y, yaw = self.path.at(t)
         depth, bend = self.crouch.at(t)
         lifts = self.lifts.at(t)
@@ -84,7 +83,7 @@ class Choreography:
             ahead = _turned(foot_yaw)[:2, 0] * 0.4 * lifts[i] * model.height_m
             z = stance(model)[side][2] + height + lifts[i] * model.height_m
             feet[side], toes[side] = (float(foot_x + ahead[0]), float(foot_y + ahead[1]), float(z)), float(foot_yaw)
-        # The weight goes over the standing foot; bending forward, the hips go back.
+        # The weight shifts over the standing foot; bending forward moves the hips back.
         aside = 0.16 * (lifts[1] - lifts[0]) * model.height_m
         moved = _turned(yaw)[:2, :2] @ (self.ahead_m - 0.13 * np.sin(bend) * model.height_m, aside)
         wanted = standing_height(model) - (0.006 + depth) * model.height_m
@@ -98,7 +97,7 @@ class Choreography:
         return Posture((float(trunk[0]), float(trunk[1]), float(trunk[2])), lean, feet, angles, toes)
 
     def _foot(self, model: BodyModel, side: str, t: float) -> tuple[float, float, float, float]:
-        """Where a foot is on the floor, metres, where it heads, rad, and how high it is lifted by its step, metres."""
+        """Return the position of a foot on the floor, metres, its heading, rad, and its lift in a step, metres."""
         before = here = self._footfalls[side][0]
         height = 0.0
         for start, landing in zip(self._step_starts[side], self._footfalls[side][1:], strict=True):
@@ -119,12 +118,12 @@ class Choreography:
 
     @cached_property
     def _footfalls(self) -> dict[str, Array]:
-        """Place of the body, as `path` has it, that each foot stands for before its first step and after each."""
+        """Return the path's values for which each foot stands before its first step and after each step."""
         out: dict[str, Array] = {}
         for side in SIDES:
             stands = [self.path.at(0.0)]
             for start in self._step_starts[side]:
-                # A foot lands where it suits the middle of the time that it will stand.
+                # A foot lands where it suits the middle of its next stance.
                 wanted = self.path.at(start + 1.5 * self.step_s)
                 small = (
                     np.linalg.norm(wanted[:2] - stands[-1][:2]) < _SMALLEST_STEP[0]
@@ -140,7 +139,7 @@ def _turned(yaw: float) -> Array:
 
 
 def _within_reach(model: BodyModel, trunk: Array, lean: Array, feet: Mapping[str, tuple[float, float, float]]) -> float:
-    """Height of the trunk, metres, at which both feet can be reached, gradually where a leg becomes straight."""
+    """Return the height of the trunk, metres, at which both feet are within reach; smooth as a leg becomes straight."""
     points = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
     heights = [float(trunk[2])]
     for side in SIDES:

@@ -1,4 +1,4 @@
-"""Two people face to face: how they turn about each other, and where their hands are."""
+"""Two people face to face: their turn about each other, and the positions of their hands."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -12,25 +12,25 @@ from tracker.simulate.motion.choreography import SIDES, Choreography, Track
 from tracker.simulate.motion.postures import Posture, Reach
 
 TANGO_TURN_S = 2.4
-"""Time of a whole turn: 60 frames at 25 frames a second."""
+"""Duration of a whole turn: 60 frames at 25 frames a second."""
 TANGO_APART_M = 0.31
-"""Between the middles of the trunks: flesh to flesh a hand's breadth."""
+"""Distance between the middles of the trunks, which leaves a hand's breadth between the bodies."""
 COUPLE_APART_M: Mapping[str, float] = MappingProxyType(
     {"apart": 1.5, "near": 0.7, "touching": 0.45, "overlapping": 0.25}
 )
-"""Between the middles of the trunks; the hands touch at 0.7 m already, at 0.25 m the trunks are pressed together."""
+"""Distances between the middles of the trunks. The hands touch at 0.7 m; the trunks are pressed together at 0.25 m."""
 
 _ASIDE_M = 0.05
-"""How far each stands to the own left, so that the feet of people close together have room beside the other's."""
+"""Sideways shift of each person to the own left, so that the feet of close people have room beside each other."""
 _STANCE_M = 0.49
-"""The feet of people who lean on each other are no nearer, metres."""
+"""Smallest distance of the feet of people who lean on each other, metres."""
 _LEAN_RAD = np.radians(4.0)
 _CLASP_M, _PALM_M = 0.088, 0.15
-"""From the wrist to where two hands meet, clasped as fists are and palm to palm."""
+"""Distance from the wrist to the contact of two hands, clasped and palm to palm."""
 _PERFORMANCE_S = 60.0
 _PATH_KEY_S = 0.04
 _BEFORE_S = 2.0
-"""How long the steps have gone on when the footage begins, so that the feet are where turning takes them."""
+"""Duration of the steps before the footage begins, so that the feet already follow the turn."""
 
 Turn = Callable[[float], float]
 Reaches = Mapping[str, Reach]
@@ -41,14 +41,14 @@ class Partner:
     """One of two people who turn about the point between them."""
 
     steps: Choreography
-    """What trunk and legs do; its time is `_BEFORE_S` ahead."""
+    """Motion of trunk and legs; its time is `_BEFORE_S` ahead."""
     turn: Turn
-    """How far the couple has turned at a time, left about the vertical, rad."""
+    """Turn of the couple at a time, left about the vertical, rad."""
     reaches: Callable[[float], Reaches]
-    """Where the arms reach at a time, in the couple's frame: the man stands at negative x and faces along it."""
+    """Targets of the arms at a time, in the couple's frame: the man stands at negative x and faces along x."""
 
     def act(self, model: BodyModel, t: float) -> Posture:
-        """Posture at a time in seconds."""
+        """Return the posture at a time in seconds."""
         R_place_couple = rigid.so3_exp(np.array([0.0, 0.0, self.turn(t)]))
         reaches = {
             side: Reach(tuple(R_place_couple @ wrist), tuple(R_place_couple @ elbow_to))
@@ -72,12 +72,12 @@ def tango(man_m: float, woman_m: float) -> tuple[Partner, Partner]:
     def turn(t: float) -> float:
         return 2 * np.pi * t / TANGO_TURN_S
 
-    def held(t: float) -> tuple[float, float]:
-        """How far aside and how high the joined hands are."""
+    def joined_hands(t: float) -> tuple[float, float]:
+        """Return the sideways position and the height of the joined hands."""
         return 0.505 + _wave(t, 0.03, 2.1), 0.812 * woman_m + _wave(t, 0.05, 1.5)
 
     def his(t: float) -> Reaches:
-        aside, height = held(t)
+        aside, height = joined_hands(t)
         back = (half + 0.075, -0.215, 0.748 * woman_m + _wave(t, 0.012, 1.7))
         return {
             "right": Reach(back, (-0.45, -1.0, -0.45)),
@@ -85,7 +85,7 @@ def tango(man_m: float, woman_m: float) -> tuple[Partner, Partner]:
         }
 
     def hers(t: float) -> Reaches:
-        aside, height = held(t)
+        aside, height = joined_hands(t)
         return {
             "left": Reach((0.080 - half, -0.185, 0.842 * man_m), (0.15, -1.0, -0.1)),
             "right": Reach((_CLASP_M, aside, height), (0.3, 0.2, -1.0)),
@@ -110,7 +110,7 @@ def couple(apart_m: float, seed: int) -> tuple[Partner, Partner]:
         return 2 * np.pi * t / turn_s
 
     def waving(t: float, toward: float) -> Reaches:
-        """Reaches of the one who faces along x (`toward` 1) or against it (-1)."""
+        """Return the reaches of the person who faces along x (`toward` 1) or against it (-1)."""
         reaches = {}
         for i, at_left in enumerate((1.0, -1.0)):
             aside, up = np.sin(2 * np.pi * t / periods_s[i] + phases[i])
@@ -129,7 +129,7 @@ def _partners(
     his: Callable[[float], Reaches],
     hers: Callable[[float], Reaches],
 ) -> tuple[Partner, Partner]:
-    """Put two people's trunks at a distance; closer than their feet have room they lean on each other."""
+    """Place two people's trunks at a distance; closer than their feet have room for, they lean on each other."""
     lean_m = max(0.0, 0.5 * (_STANCE_M - apart_m))
     out = 0.5 * apart_m + lean_m
     aside = _ASIDE_M if apart_m < 2 * _STANCE_M else 0.0
@@ -141,7 +141,7 @@ def _partners(
 def _circling(
     turn: Turn, place: tuple[float, float, float], depth: float, lean_m: float, step_s: float
 ) -> Choreography:
-    """Keep a place in the couple's frame, x, y of the feet and where the person faces, while the couple turns."""
+    """Keep a position and heading in the couple's frame, x, y of the feet and yaw, while the couple turns."""
     times = np.arange(0.0, _PERFORMANCE_S, _PATH_KEY_S)
     x, y, yaw = place
     angles = np.array([turn(t - _BEFORE_S) for t in times])
@@ -155,13 +155,13 @@ def _circling(
         sway_hz=0.0,
         step_s=step_s,
         step_height_m=0.035,
-        # A trunk that bends goes back at the hips.
+        # Bending the trunk moves the hips back.
         ahead_m=lean_m + (0.016 if lean_m else 0.0),
     )
 
 
 def _evenly(t: float, start: float, end: float) -> float:
-    """Rise from 0 to 1 between two times at one speed."""
+    """Rise linearly from 0 to 1 between two times."""
     return (t - start) / (end - start)
 
 

@@ -1,4 +1,4 @@
-"""From postures to poses: trunk, feet and hands are placed, the limbs follow."""
+"""Solve postures for poses: trunk, feet and hands are given, the limbs are computed."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -15,12 +15,12 @@ from tracker.simulate.people.builds import MAN, Build
 from tracker.simulate.people.outfit import Outfit
 
 HEADING_RAD = np.radians(32.0)
-"""Where the person faces: towards FRONT, but not straight at it, where a forward motion would hardly show."""
+"""Heading of the person: towards FRONT, but not exactly, because a forward motion would hardly show."""
 TOES_OUT_RAD = np.radians(9.0)
 ELBOW_WEIGHT = 0.03
-"""How much a metre that an elbow is off its place counts against one that the wrist is off."""
+"""Weight of an elbow's position error against that of the wrist."""
 WITHIN_REACH_M = 0.01
-"""How near a wrist has to come to where it should be, metres: within flesh, joint limits may forbid more."""
+"""Largest error of a wrist, metres: within flesh, joint limits may prevent an exact solution."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Role:
     height_m: float
     """Body height, metres."""
     act: Callable[[BodyModel, float], "Posture"]
-    """Posture of a body of these sizes at a time in seconds."""
+    """Returns the posture of a body of these dimensions at a time in seconds."""
     build: Build = MAN
     """Bones and flesh."""
     outfit: Outfit = field(default_factory=Outfit)
@@ -39,17 +39,17 @@ class Role:
 
 
 class Reach(NamedTuple):
-    """Where an arm reaches to, in the frame of the actor's place."""
+    """The target of an arm, in the frame of the actor's place."""
 
     wrist_m: tuple[float, float, float]
-    """The wrist, metres."""
+    """Position of the wrist, metres."""
     elbow_to: tuple[float, float, float]
     """Direction from the line between shoulder and wrist in which the elbow points."""
 
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """A pose as an actor thinks of it; the hips and knees follow from where trunk and feet are."""
+    """A pose in an actor's terms; hips and knees follow from trunk and feet."""
 
     trunk_m: tuple[float, float, float]
     """Torso centre, metres, in the frame of the actor's place: x ahead, y left, z from the floor."""
@@ -58,15 +58,15 @@ class Posture:
     feet_m: Mapping[str, tuple[float, float, float]]
     """`left` and `right` ankle in the frame of the actor's place, metres."""
     angles: Mapping[str, float]
-    """Degrees of freedom of the arms that do not reach anywhere, rad."""
+    """Degrees of freedom of the arms without a target, rad."""
     toes_rad: Mapping[str, float] = field(default_factory=lambda: {"left": 0.0, "right": 0.0})
-    """Where the `left` and `right` foot head, turned left from ahead in the frame of the actor's place."""
+    """Heading of the `left` and `right` foot, turned left from ahead in the frame of the actor's place."""
     reaches: Mapping[str, Reach] = field(default_factory=dict)
-    """Where the `left` and the `right` arm reach to, where they do."""
+    """Targets of the `left` and the `right` arm, if any."""
 
 
 def solve_posture(role: Role, model: BodyModel, n_frames: int, fps: float) -> Array:
-    """Poses of a role played by a body, (n_frames, n_values)."""
+    """Solve the postures of a role for the poses of a body, (n_frames, n_values)."""
     R_world_place = rigid.so3_exp(np.array([0.0, 0.0, HEADING_RAD]))
     at_twist = model.value_names.index("torso.twist")
     poses: list[Array] = []
@@ -77,7 +77,7 @@ def solve_posture(role: Role, model: BodyModel, n_frames: int, fps: float) -> Ar
         for name, angle in (_torso_angles(R_world_place @ posture.lean) | dict(posture.angles)).items():
             values[model.value_names.index(name)] = angle
         if poses:
-            # A body that turns on and on has angles that go on and on.
+            # Unwrap the turn of the trunk: the angles of a body that keeps turning keep growing.
             values[at_twist] += 2 * np.pi * np.round((poses[-1][at_twist] - values[at_twist]) / (2 * np.pi))
         for side, ankle in posture.feet_m.items():
             _plant(model, values, side, R_world_place @ ankle, HEADING_RAD + posture.toes_rad[side])
@@ -95,7 +95,7 @@ def ramp(t: float, start: float, end: float) -> float:
 
 
 def _upright(model: BodyModel) -> Array:
-    """Pose to start the first frame's limbs from: knees and elbows bent, so that they know which way to go."""
+    """Return the start of the first frame's solution: knees and elbows bent, which determines their direction."""
     values = model.neutral()
     for i, name in enumerate(model.value_names):
         values[i] += 0.4 * name.endswith("_knee.extension") + 0.2 * name.endswith(("_hip.elevation", "_hip.flexion"))
@@ -104,19 +104,19 @@ def _upright(model: BodyModel) -> Array:
 
 
 def standing_height(model: BodyModel) -> float:
-    """Height of the torso centre over the floor with straight legs, metres."""
+    """Return the height of the torso centre over the floor with straight legs, metres."""
     points = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
     return float(ANKLE_HEIGHT * model.height_m - points["left_ankle"][2])
 
 
 def stance(model: BodyModel) -> dict[str, tuple[float, float, float]]:
-    """Ankles of a relaxed stance, metres."""
+    """Return the ankles of a relaxed stance, metres."""
     y, z = 0.068 * model.height_m, ANKLE_HEIGHT * model.height_m
     return {"left": (-0.02, y, z), "right": (0.0, -y, z)}
 
 
 def _torso_angles(R_world_torso: Array) -> dict[str, float]:
-    """Angles whose rotation `Rx(abduction) Ry(elevation) Rz(twist)` is the given one."""
+    """Return the angles whose rotation `Rx(abduction) Ry(elevation) Rz(twist)` is the given one."""
     return {
         "torso.abduction": float(np.arctan2(-R_world_torso[1, 2], R_world_torso[2, 2])),
         "torso.elevation": float(np.arcsin(R_world_torso[0, 2])),
@@ -125,7 +125,7 @@ def _torso_angles(R_world_torso: Array) -> dict[str, float]:
 
 
 def _plant(model: BodyModel, values: Array, side: str, ankle_world: Array, heading: float) -> None:
-    """Solve one leg's four angles, in place: the ankle where it should be, the toes pointing a little out."""
+    """Solve one leg's four angles in place for the position of the ankle, with the toes a little out."""
     dofs = np.array([i for i, n in enumerate(model.dof_names) if n.startswith((f"{side}_hip.", f"{side}_knee."))])
     at = model.dof_value[dofs]
     ankle, calf = model.point_names.index(f"{side}_ankle"), model.part_index[f"{side}_calf"]
@@ -143,7 +143,7 @@ def _plant(model: BodyModel, values: Array, side: str, ankle_world: Array, headi
 
 
 def _reach(model: BodyModel, values: Array, side: str, wrist_world: Array, elbow_to_world: Array) -> None:
-    """Solve one arm's four angles, in place: the wrist where it should be, the elbow on its side of the way there."""
+    """Solve one arm's four angles in place for the position of the wrist and the direction of the elbow."""
     dofs = np.array([i for i, n in enumerate(model.dof_names) if n.startswith((f"{side}_shoulder.", f"{side}_elbow."))])
     at = model.dof_value[dofs]
     shoulder, elbow, wrist = (model.point_names.index(f"{side}_{name}") for name in ("shoulder", "elbow", "wrist"))
@@ -154,7 +154,7 @@ def _reach(model: BodyModel, values: Array, side: str, wrist_world: Array, elbow
     assert abs(upper - fore) < length < upper + fore, f"the {side} hand cannot reach {length:.2f} m"
     ahead = way / length
     aside = elbow_to_world - (elbow_to_world @ ahead) * ahead
-    # The two circles about shoulder and wrist on which the elbow may lie meet here.
+    # The two circles about shoulder and wrist on which the elbow may lie intersect here.
     along = (upper**2 - fore**2 + length**2) / (2 * length)
     bend = points[shoulder] + along * ahead + np.sqrt(upper**2 - along**2) * aside / np.linalg.norm(aside)
 
@@ -170,7 +170,7 @@ def _reach(model: BodyModel, values: Array, side: str, wrist_world: Array, elbow
 
 
 def _solve(model: BodyModel, values: Array, dofs: IntArray, errors: Callable[[Array], Array]) -> float:
-    """Bring errors of some degrees of freedom down from where they are, in place; the cost that is left."""
+    """Minimize errors over some degrees of freedom from the current pose, in place; return the remaining cost."""
     at = model.dof_value[dofs]
     low, high = model.limits[dofs].T
     start = np.clip(values[at], low + 1e-3, high - 1e-3)

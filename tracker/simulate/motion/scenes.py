@@ -1,4 +1,4 @@
-"""What the simulated people do."""
+"""The scenes that can be simulated, and the roles in them."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -19,7 +19,7 @@ from tracker.simulate.people.outfit import BLACK_AND_WHITE, GREEN, RED, Outfit
 def elbow_rotation(model: BodyModel, t: float) -> Posture:
     """Raise both arms sideways to 90 degrees, rotate both elbows forward, and back again (GD96 Fig. 8).
 
-    The trunk leans back against the arms and turns a little, the knees give.
+    The trunk leans back against the arms and turns a little; the knees bend slightly.
     """
     t = t % 4.4
     up = ramp(t, 0.05, 0.95) - ramp(t, 3.25, 4.25)
@@ -55,7 +55,7 @@ def walk_in_place(model: BodyModel, t: float) -> Posture:
         angles[f"{side}_elbow.extension"] = np.radians(14.0 + start * (38.0 + 24.0 * sign * np.sin(phase)))
     lean = rigid.so3_exp(np.radians([1.5 * swing, 3.0 * start, 6.0 * swing]))
     bob = 0.014 * start * np.cos(2 * phase)
-    # The weight goes over the standing foot, away from the lifted one.
+    # The weight shifts over the standing foot, away from the lifted one.
     trunk = (0.0, -0.028 * swing, standing_height(model) - 0.022 + bob)
     return Posture(trunk, lean, feet, angles)
 
@@ -70,7 +70,7 @@ def _couple(apart_m: float, seed: int) -> tuple[Role, ...]:
 
 
 def _crowd(n: int, seed: int) -> tuple[Role, ...]:
-    """People at the corners of a triangle or a square, each `CROWD_APART_M` from the next and facing its middle."""
+    """Place people at the corners of a triangle or a square, `CROWD_APART_M` apart and facing its middle."""
     radius = CROWD_APART_M / (2 * np.sin(np.pi / n))
     looks = ((1.82, MAN, BLACK_AND_WHITE), (1.64, WOMAN, RED), (1.74, MAN, Outfit()), (1.70, WOMAN, GREEN))
     roles = []
@@ -81,12 +81,12 @@ def _crowd(n: int, seed: int) -> tuple[Role, ...]:
     return tuple(roles)
 
 
-Casting = Callable[[int], tuple[Role, ...]]
+MakeRoles = Callable[[int], tuple[Role, ...]]
 
 MAN_M, WOMAN_M = 1.80, 1.66
 CROWD_APART_M = 1.0
 
-SCENES: Mapping[str, Casting] = MappingProxyType(
+SCENES: Mapping[str, MakeRoles] = MappingProxyType(
     {
         "elbow_rotation": lambda seed: (Role("person", 1.78, elbow_rotation),),
         "walk_in_place": lambda seed: (Role("person", 1.78, walk_in_place),),
@@ -100,11 +100,11 @@ SCENES: Mapping[str, Casting] = MappingProxyType(
         "crowd_of_four": partial(_crowd, 4),
     }
 )
-"""Who does what, by the name of the scene, for a seed; the first two and the tango are the same for every seed."""
+"""Makes the roles of each scene for a seed; the first two and the tango are the same for every seed."""
 
 
 def cast_of(scene: str, seed: int = 0) -> tuple[Role, ...]:
-    """Roles of a scene.
+    """Return the roles of a scene.
 
     Raises:
         TrackerError: there is no such scene.

@@ -1,4 +1,4 @@
-"""What choreographies are made of, and how a seed puts them together: every seed gives another performance."""
+"""Choreographies of one person, composed from moves by a seed."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -32,11 +32,11 @@ ARM_KEYS: Mapping[str, tuple[float, float, float, float]] = MappingProxyType(
 _TUCKED = ("hip", "belly", "chest", "shoulder")
 """Postures close to the trunk."""
 _BEYOND_TRUNK = (*_TUCKED, "back", "swing behind")
-"""Between these and one close to the trunk an arm opens, else it would pass through the body."""
+"""Between one of these and a posture close to the trunk an arm opens, or it would pass through the body."""
 _SPREAD_DEG = (4.0, 4.0, 4.0, 5.0)
 _BOUNDS_DEG = ((-20.0, -55.0, -95.0, 2.0), (172.0, 150.0, 60.0, 145.0))
 _HIP_TURN_RAD = np.radians(58.0)
-"""How far the trunk turns over a standing foot."""
+"""Largest turn of the trunk over a standing foot."""
 _PERFORMANCE_S = 60.0
 
 Move = tuple[str, float, float]
@@ -58,7 +58,7 @@ def exercise(seed: int) -> Choreography:
     order = list(range(len(_EXERCISES)))
     orders = [order if seed == 0 and not i else rng.permutation(len(_EXERCISES)) for i in range(8)]
     left = [move for order in orders for i in order for move in _EXERCISES[i]]
-    # Boxing and crossing look alike in both arms, but are never quite at the same time.
+    # The moves of both arms are alike in boxing and crossing, but offset in time.
     right = left if seed % 2 == 0 else left[3:] + left[:3]
     trunk = _Trunk(rng)
     while trunk.time_s < _PERFORMANCE_S:
@@ -71,7 +71,7 @@ def exercise(seed: int) -> Choreography:
 
 
 def dance(seed: int) -> Choreography:
-    """Quick arms, the body turning half round and back, small steps."""
+    """Move the arms quickly, turn the body half round and back, with small steps."""
     rng = np.random.default_rng([seed, 12])
     keys = ("up", "side", "front", "chest", "back", "head", "guard", "open", "belly")
     scores = {
@@ -87,7 +87,7 @@ def dance(seed: int) -> Choreography:
 
 
 def reach_and_cross(seed: int) -> Choreography:
-    """Arms that cross the trunk at real speed and come to rest against it, then reach out again."""
+    """Cross the arms before the trunk at real speed, rest them against it, then reach out again."""
     rng = np.random.default_rng([seed, 13])
     scores: dict[str, list[Move]] = {side: [] for side in SIDES}
     for score in scores.values():
@@ -106,7 +106,7 @@ def reach_and_cross(seed: int) -> Choreography:
 def leaving(seed: int) -> Choreography:
     """Walk into a corner of the room, out of the image of some cameras, and back."""
     rng = np.random.default_rng([seed, 14])
-    corner = float(np.radians((13.0, -77.0, 103.0, -167.0)[seed % 4]))  # from where the actor faces
+    corner = float(np.radians((13.0, -77.0, 103.0, -167.0)[seed % 4]))  # from the actor's heading
     swing: list[Move] = [("swing ahead", 0.42, 0.0), ("swing behind", 0.42, 0.0)] * 70
     trunk = _Trunk(rng, step_s=0.32)
     trunk.face(corner)
@@ -123,7 +123,7 @@ def mingling(seed: int, home: tuple[float, float, float]) -> Choreography:
 
     Args:
         seed: of the motion.
-        home: x, y in the frame of the actor's place, metres, and where the person faces, rad.
+        home: x, y in the frame of the actor's place, metres, and the heading, rad.
     """
     rng = np.random.default_rng([seed, 15])
     keys = ("rest", "open", "guard", "head", "hip", "belly", "chest", "shoulder", "swing ahead")
@@ -141,7 +141,7 @@ def mingling(seed: int, home: tuple[float, float, float]) -> Choreography:
 
 
 class _Trunk:
-    """Writes down what the trunk and the legs do, one thing after the other."""
+    """Records the motion of trunk and legs, one action after the other."""
 
     def __init__(
         self, rng: np.random.Generator, step_s: float = 0.36, home: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -160,17 +160,17 @@ class _Trunk:
         self.time_s += duration_s
 
     def turn(self, degrees: float) -> None:
-        """Turn on the spot with steps, there and back by turns."""
+        """Turn on the spot with steps, alternately there and back."""
         self._turned = 1 - self._turned
         self.face(self._place[2] + (1 - 2 * self._turned) * np.radians(degrees))
 
     def face(self, yaw_rad: float) -> None:
-        """Turn on the spot with steps, as fast as the hips allow; yaw is turned left from ahead."""
+        """Turn on the spot with steps to a yaw, turned left from ahead, as fast as the hips allow."""
         x, y, yaw = self._place
         self._go((x, y, yaw_rad), max(0.3, 1.5 * abs(yaw_rad - yaw) * self._step_s / _HIP_TURN_RAD))
 
     def step(self, length_m: float, duration_s: float) -> None:
-        """Step to somewhere near home."""
+        """Step to a place near home."""
         angle = self._rng.uniform(0.0, 2 * np.pi)
         x, y = self._home[:2] + length_m * np.array([np.cos(angle), np.sin(angle)])
         self._go((x, y, self._place[2]), duration_s)
@@ -181,18 +181,18 @@ class _Trunk:
         self._go((x + length_m * np.cos(yaw), y + length_m * np.sin(yaw), yaw), duration_s)
 
     def crouch(self, depth: float, bend_deg: float, duration_s: float) -> None:
-        """Bend the knees, fraction of body height, and the trunk, and come up again."""
+        """Bend the knees, fraction of body height, and the trunk, and straighten them again."""
         self._there_and_back("crouch", np.array([depth, np.radians(bend_deg)]), duration_s)
 
     def lift(self, height: float) -> None:
-        """Lift a knee, the foot by a fraction of body height; left and right by turns."""
+        """Lift a knee, the foot by a fraction of body height; alternately left and right."""
         # The feet come to rest last.
         self.time_s = max(self.time_s, self._keys["path"][-1][0] + 1.5 * self._step_s)
         self._lifted = 1 - self._lifted
         self._there_and_back("lifts", height * np.eye(2)[self._lifted], 0.95)
 
     def with_arms(self, arms: Mapping[str, Track]) -> Choreography:
-        """Put it all together."""
+        """Combine the recorded motion with that of the arms."""
         path, crouch, lifts = (
             Track(np.array([t for t, _ in keys]), np.array([v for _, v in keys]), glide if name == "path" else ramp)
             for name, keys in self._keys.items()
@@ -216,7 +216,7 @@ class _Trunk:
 
 
 def _arm(rng: np.random.Generator, score: Sequence[Move]) -> Track:
-    """Keys of one arm; a seed changes angles and pace a little everywhere."""
+    """Return the keys of one arm; a seed varies angles and pace a little."""
     times, angles_deg, before = [0.0, 0.1], [np.array(ARM_KEYS["rest"])] * 2, "rest"
     for key, move_s, stay_s in score:
         if key != before and {key, before} <= set(_BEYOND_TRUNK) and {key, before} & set(_TUCKED):

@@ -1,1 +1,1 @@
-"""Simulated people: skeletons, builds, skin, clothes."""
+"""Simulated people: skeletons, builds, skin, clothes, and figures of plain model parts."""

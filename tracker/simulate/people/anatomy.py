@@ -1,6 +1,6 @@
-"""The flesh of a simulated person: rounded lobes around an anatomical skeleton, to be blended into one surface.
+"""The flesh of a simulated person: rounded lobes around an anatomical skeleton, blended into one surface.
 
-Nothing here knows the primitives that are fitted: muscles, hands, feet, nose and hair are lobes of their own.
+The lobes are independent of the primitives that are fitted: muscles, hands, feet, nose and hair are separate lobes.
 """
 
 from typing import NamedTuple
@@ -32,18 +32,18 @@ class Lobe(NamedTuple):
     radii: tuple[float, float]
     """Radii of the balls, fraction of body height."""
     squash: Factors = (1.0, 1.0, 1.0)
-    """Factor by which the lobe is scaled along the bone's x, y, z (about the bone's origin, hence no offset there)."""
+    """Scale of the lobe along the bone's x, y, z about the bone's origin."""
 
 
 def bone_names(model: BodyModel) -> tuple[str, ...]:
-    """Names of what carries flesh: the model's parts, then the feet, which the model has no joints for."""
+    """Return the names of the bones that carry flesh: the model's parts, then the feet (no joints in the model)."""
     return tuple(p.name for p in model.parts) + FEET
 
 
 def bone_poses(model: BodyModel, values: Array) -> Array:
     """Place the bones in a pose.
 
-    A foot sits at the ankle and keeps flat on the floor, heading where its calf heads, as far as an ankle bends.
+    A foot sits at the ankle and stays flat on the floor, with the heading of its calf, as far as an ankle bends.
 
     Returns:
         `Ts_world_bone`, (n_bones, 4, 4), metres, in the order of `bone_names`.

@@ -1,4 +1,4 @@
-"""How simulated people are built: bones and flesh, as they differ from one person to the next."""
+"""The builds of simulated people: bones and flesh, which differ from person to person."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,9 +16,9 @@ class Build:
     bone_factors: Mapping[str, Factors] = field(default_factory=lambda: BONE_FACTORS)
     """See `skeleton.BONE_FACTORS`."""
     girths: Mapping[str, float] = field(default_factory=dict)
-    """Factor on the thickness of the flesh on each bone, left and right alike, where it is not 1."""
+    """Factor on the thickness of the flesh on each bone, left and right alike; 1 for bones left out."""
     further: tuple[Lobe, ...] = ()
-    """Flesh and hair that not everybody has."""
+    """Additional flesh and hair."""
 
     def flesh(self, model: BodyModel) -> list[Lobe]:
         """List the lobes of a body of this build whose limbs have the model's lengths."""
@@ -32,7 +32,7 @@ class Build:
 MAN = Build()
 
 WOMAN = Build(
-    # Where the man's bones are longer than the preset's hers are shorter, and the other way round.
+    # Bones of the man longer than the preset's are shorter here, and the other way round.
     bone_factors=MappingProxyType(
         {
             "neck": (1.0, 1.0, 0.95),

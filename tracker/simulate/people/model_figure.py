@@ -1,4 +1,4 @@
-"""The fitted body itself as something to film: its part shapes, for recordings without shape mismatch."""
+"""Film the fitted body model itself, by its part shapes, for recordings without shape mismatch."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -33,12 +33,12 @@ class ModelFigure:
         return self._meshes[1]
 
     def posed(self, values: Array) -> Array:
-        """Vertices in a pose, (N, 3), metres, world."""
+        """Return the vertices in a pose, (N, 3), metres, world."""
         Ts = self.model.kinematics(values).Ts_world_part
         return np.concatenate([rigid.apply(T, v) for T, v in zip(Ts, self._meshes[0], strict=True)])
 
     def colors(self, faces: IntArray, corner_weights: Array) -> Array:
-        """Colours of the parts, (n, 3), 0 to 1, of points on triangles `(n,)`."""
+        """Return the colours of the parts, (n, 3), 0 to 1, at points on triangles `(n,)`."""
         part_colors = [[int(p.color[i : i + 2], 16) / 255 for i in (1, 3, 5)] for p in self.model.parts]
         part_of_vertex = np.repeat(np.arange(len(self._meshes[0])), [len(v) for v in self._meshes[0]])
         return np.array(part_colors)[part_of_vertex[self.faces[faces, 0]]]

@@ -1,4 +1,4 @@
-"""What a simulated person wears: colours as a function of the place on the body."""
+"""The clothes of a simulated person: colours as a function of the position on the body."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ class Outfit:
     left_sleeve: Color = (0.87, 0.80, 0.60)
     right_sleeve: Color = (0.80, 0.33, 0.22)
     trousers: Color = (0.40, 0.37, 0.33)
-    """Close to the floor and the racks, as real clothes are: subtraction finds no clean silhouette."""
+    """Similar to the floor and the racks, as real clothes are, so that subtraction finds no clean silhouette."""
     shoes: Color = (0.16, 0.13, 0.12)
     skin: Color = (0.80, 0.60, 0.48)
     hair: Color = (0.20, 0.13, 0.08)
@@ -43,7 +43,7 @@ class Outfit:
         leg = np.char.endswith(bones, "_thigh") | np.char.endswith(bones, "_calf")
         arm = np.char.endswith(bones, "_arm") | np.char.endswith(bones, "_forearm")
         hand = np.char.endswith(bones, "_forearm") & (z < -0.138)
-        # The seam runs in a plane from the shoulder to the armpit, whichever bone the cloth follows there.
+        # The seam runs in a plane from the shoulder to the armpit, independent of the bone that the cloth follows.
         beyond_seam = (np.abs(points_torso[:, 1]) > 0.095) & (points_torso[:, 2] > 0.075)
         sleeve = (arm & ~hand & (np.abs(points_torso[:, 1]) > 0.095)) | (in_torso & beyond_seam)
         collar = in_torso & (z > 0.176) & (np.hypot(x + 0.004, y) < 0.040)

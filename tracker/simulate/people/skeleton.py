@@ -1,4 +1,4 @@
-"""The true skeleton of a simulated person: a preset's joints at other proportions."""
+"""The true skeleton of a simulated person: a preset's joints in other proportions."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,8 +10,8 @@ from tracker.body.parts import Joint, Landmark, Part
 Factors = tuple[float, float, float]
 """Factors along x, y, z."""
 
-# Every bone is 5% or more off the preset's, some longer and some shorter, in such a way that the body keeps its
-# height: a tracker that assumes the preset is wrong in the way it would be wrong about a real person.
+# Every bone differs from the preset's by 5% or more, some longer and some shorter, so that the body keeps its height. A
+# tracker that assumes the preset has a model error like that of a real person.
 BONE_FACTORS: Mapping[str, Factors] = MappingProxyType(
     {
         "neck": (1.0, 1.0, 1.055),
@@ -60,7 +60,7 @@ def _moved_landmark(landmark: Landmark, factors: Mapping[str, Factors]) -> Landm
 
 
 def _stretched_part(part: Part, factors: Mapping[str, Factors]) -> Part:
-    """Stretch a limb's shape with its bone; the trunk and the head keep theirs."""
+    """Stretch a limb's shape with its bone; the shapes of trunk and head stay."""
     end = _END_OF_PART.get(part.name.removeprefix("left_").removeprefix("right_"))
     if end is None:
         return part

@@ -1,4 +1,4 @@
-"""The smooth-skinned person: a surface blended from lobes, bent by its bones, dressed and painted."""
+"""A smooth-skinned person: a surface blended from lobes, deformed by its bones, dressed and painted."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,13 +16,13 @@ from tracker.simulate.people.outfit import Outfit
 from tracker.simulate.people.surface_nets import surface_nets
 
 SPACING_M = 0.010
-"""Grid of the implicit surface: about a pixel at four metres."""
+"""Spacing of the implicit surface's grid: about a pixel at four metres."""
 BLEND_M = 0.011
-"""Width over which lobes flow into each other."""
+"""Width over which lobes blend."""
 WEIGHT_STEPS = 40
-"""Diffusion steps of the skinning weights: a joint bends over some 5 cm of skin."""
+"""Diffusion steps of the skinning weights: a joint deforms some 5 cm of skin."""
 REST_DEGREES = {"shoulder.abduction": 55.0, "elbow.extension": 15.0, "hip.abduction": 9.0, "knee.extension": 5.0}
-"""Pose in which the surface is made: limbs apart, so that they do not flow together, joints half bent."""
+"""Pose in which the surface is made: limbs apart, so that they do not blend, and joints half bent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Skin:
     faces: IntArray
     """Triangles, counter-clockwise seen from outside, (M, 3)."""
     weights: Array
-    """How far each vertex follows each bone, (N, n_bones), rows sum to 1."""
+    """Weight of each bone for each vertex, (N, n_bones); rows sum to 1."""
 
     @cached_property
     def bone_poses_rest(self) -> Array:
@@ -56,11 +56,11 @@ class Skin:
         return [*self.model.parents, *calves]
 
     def posed(self, values: Array) -> Array:
-        """Vertices in a pose, (N, 3), metres, world, by dual-quaternion skinning (L. Kavan et al. 2007)."""
+        """Return the vertices in a pose, (N, 3), metres, world, by dual-quaternion skinning (L. Kavan et al. 2007)."""
         Ts = bone_poses(self.model, values) @ rigid.inverse(self.bone_poses_rest)
         real = rigid.quaternion_from_matrix(Ts[:, :3, :3])
         for bone, parent in enumerate(self._bone_parents):
-            # q and -q are the same rotation, but not in a blend: take the one nearer to the parent's.
+            # q and -q are the same rotation, but not in a blend: use the one nearer to the parent's.
             if parent >= 0 and real[bone] @ real[parent] < 0:
                 real[bone] = -real[bone]
         dual = 0.5 * rigid.quaternion_multiply(np.pad(Ts[:, :3, 3], ((0, 0), (1, 0))), real)
@@ -73,7 +73,7 @@ class Skin:
         return p + 2.0 * np.cross(v, np.cross(v, p) + w * p) + t
 
     def colors(self, faces: IntArray, corner_weights: Array) -> Array:
-        """Colours, (n, 3), of points on triangles `(n,)` at barycentric weights `(n, 3)`, each from 0 to 1."""
+        """Return colours, (n, 3), 0 to 1, at points on triangles `(n,)` with barycentric weights `(n, 3)`."""
         points_rest = np.einsum("nk,nkc->nc", corner_weights, self.vertices_rest[self.faces[faces]])
         Ts_bone_rest = rigid.inverse(self.bone_poses_rest)
         height = self.model.height_m
@@ -86,7 +86,7 @@ class Skin:
 
 
 def make_skin(model: BodyModel, outfit: Outfit, build: Build = MAN) -> Skin:
-    """Grow the skin of a body: blend its lobes, mesh the surface, tie it to the bones."""
+    """Make the skin of a body: blend its lobes, mesh the surface, compute skinning weights."""
     flesh = build.flesh(model)
     Ts_rest = bone_poses(model, rest_values(model))
     names = bone_names(model)
@@ -100,7 +100,7 @@ def make_skin(model: BodyModel, outfit: Outfit, build: Build = MAN) -> Skin:
 
 
 def rest_values(model: BodyModel) -> Array:
-    """Pose in which the skin is made."""
+    """Return the pose in which the skin is made."""
     values = model.neutral()
     for i, name in enumerate(model.value_names):
         values[i] += np.radians(REST_DEGREES.get(name.removeprefix("left_").removeprefix("right_"), 0.0))
@@ -108,7 +108,7 @@ def rest_values(model: BodyModel) -> Array:
 
 
 def _lobe_distances(lobe: Lobe, T_world_bone: Array, height: float, points_world: Array) -> Array:
-    """Signed distances, about true near the surface, of points (..., 3) from a lobe, metres."""
+    """Return signed distances of points (..., 3) from a lobe, accurate near the surface, metres."""
     squash = np.array(lobe.squash)
     points = rigid.apply(rigid.inverse(T_world_bone), points_world) / (height * squash)
     start, end = np.array(lobe.start) / squash, np.array(lobe.end) / squash
@@ -120,7 +120,7 @@ def _lobe_distances(lobe: Lobe, T_world_bone: Array, height: float, points_world
 
 
 def _blended_field(flesh: list[Lobe], Ts_lobe: list[Array], height: float) -> tuple[NDArray[np.float32], Array]:
-    """Smooth union `-k log sum exp(-d / k)` of the lobes on a grid, and the grid's origin."""
+    """Return the smooth union `-k log sum exp(-d / k)` of the lobes on a grid, and the grid's origin."""
     boxes = []
     for lobe, T in zip(flesh, Ts_lobe, strict=True):
         ends = rigid.apply(T, np.array([lobe.start, lobe.end]) * height)
@@ -140,7 +140,7 @@ def _blended_field(flesh: list[Lobe], Ts_lobe: list[Array], height: float) -> tu
 
 
 def _diffused(weights: Array, faces: IntArray) -> Array:
-    """Spread weights along the surface, so that they flow from bone to bone but not from limb to limb."""
+    """Diffuse weights along the surface: from bone to bone, but not from limb to limb."""
     n = len(weights)
     a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     adjacency = sparse.csr_array((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), shape=(n, n))

@@ -36,7 +36,7 @@ def surface_nets(field: NDArray[np.float32], origin: Array, spacing: float) -> t
 
 
 def _mean_crossings(field: NDArray[np.float32], cells: IntArray) -> Array:
-    """Mean of the points where the surface crosses the edges of cells, in cell coordinates, (N, 3)."""
+    """Return the mean of the points where the surface crosses the edges of cells, in cell coordinates, (N, 3)."""
     at_corner = np.stack([field[tuple((cells + c).T)] for c in _CORNERS], axis=1).astype(np.float64)  # (N, 8)
     total, n = np.zeros((len(cells), 3)), np.zeros((len(cells), 1))
     for a, b in _EDGES:
@@ -49,13 +49,13 @@ def _mean_crossings(field: NDArray[np.float32], cells: IntArray) -> Array:
 
 
 def _faces_across(inside: NDArray[np.bool_], number: IntArray, axis: int) -> IntArray:
-    """Triangles around the crossed grid edges along one axis."""
+    """Return the triangles around the crossed grid edges along one axis."""
     here, there = np.moveaxis(inside, axis, 0)[:-1], np.moveaxis(inside, axis, 0)[1:]
     around = np.moveaxis(number, axis, 0)
     edges = np.argwhere(here != there)
     i, j, k = edges.T
     quads = np.stack([around[i, j - 1, k - 1], around[i, j, k - 1], around[i, j, k], around[i, j - 1, k]], axis=-1)
-    # Moving an axis to the front keeps the handedness for x and z, and turns it for y.
+    # Moving an axis to the front keeps the handedness for x and z, and reverses it for y.
     flip = ~here[i, j, k] ^ (axis == 1)
     quads[flip] = quads[flip][:, ::-1]
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])

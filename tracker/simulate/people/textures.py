@@ -9,12 +9,12 @@ _LATTICE = np.random.default_rng(7).random((32, 32, 32)).astype(np.float32)
 
 
 def value_noise(points: Array, size: float | Array, octaves: int = 2) -> Array:
-    """Smooth random function of space, about -1 to 1.
+    """Evaluate a smooth random function of space, about -1 to 1.
 
     Args:
-        points: where, (N, 3).
+        points: (N, 3).
         size: extent of its features in the unit of the points, one number or (3,).
-        octaves: how many halvings of the size are added, each at half the strength.
+        octaves: number of octaves; each has half the size and half the strength of the one before.
 
     Returns:
         (N,).

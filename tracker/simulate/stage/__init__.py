@@ -1,1 +1,1 @@
-"""Where simulated people are filmed: rooms, furniture, cameras, rendering."""
+"""The stage of a simulated recording: room, furniture, cameras, rendering, video."""

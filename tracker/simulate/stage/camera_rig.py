@@ -13,7 +13,7 @@ CORNER_DEGREES = (45.0, -45.0, -135.0, 135.0)
 FIELD_OF_VIEW_DEGREES = 67.0
 CORNER_HEIGHT_M = 2.2
 WALL_HEIGHT_M = 2.5
-"""Along the walls cameras look over the racks."""
+"""Cameras along the walls look over the racks."""
 WALL_GAP_M = 0.2
 TARGET_WORLD = (0.0, 0.0, 1.0)
 
@@ -29,7 +29,7 @@ def make_cameras(n_cameras: int, size: tuple[int, int], seed: int) -> tuple[Came
         seed: of the small differences.
 
     Raises:
-        TrackerError: no camera, or an image too small to see anything in.
+        TrackerError: no camera, or an image too small to show a person.
     """
     if n_cameras < 1:
         raise TrackerError(f"expected at least one camera to simulate, found {n_cameras}")
@@ -57,7 +57,7 @@ def _mounted(name: str, direction: float, height_m: float, size: tuple[int, int]
 
 
 def _looking(center: Array, target: Array, roll: float) -> Array:
-    """`T_world_camera` of a camera that looks at a target, turned by a small roll about its axis, rad."""
+    """Return `T_world_camera` of a camera that looks at a target, turned by a small roll about its axis, rad."""
     z = (target - center) / np.linalg.norm(target - center)
     level = np.cross(z, (0.0, 0.0, 1.0))
     level /= np.linalg.norm(level)

@@ -19,7 +19,7 @@ FLICKER = 0.006
 
 
 class Moment(NamedTuple):
-    """All figures at one time, as one mesh, and the shadow they throw."""
+    """All figures at one time, as one mesh, with their shadow."""
 
     vertices_world: Array
     """(N, 3), metres."""
@@ -29,7 +29,7 @@ class Moment(NamedTuple):
     """(M, 3)."""
     figures: tuple[Figure, ...]
     first_faces: IntArray
-    """Index of the first triangle of each figure, and after them M; (n_figures + 1,)."""
+    """Index of the first triangle of each figure, and finally M; (n_figures + 1,)."""
     shadow: NDArray[np.float32]
     """See `room.floor_shadow`."""
 
@@ -58,7 +58,7 @@ def film(backdrop: Backdrop, moment: Moment) -> tuple[NDArray[np.float32], Image
         the figure k that covers most of a pixel, if figures cover half of it.
     """
     hits = cast(backdrop.sample_camera, moment.vertices_world, moment.faces, backdrop.inverse_depths)
-    # Light varies little within a pixel: it is looked up once per sample all the same, for the edges of the floor.
+    # Light varies little within a pixel, but it is evaluated for each sample, because of the edges of the floor.
     colors = backdrop.colors * backdrop.light(moment.shadow)[..., None]
     on_figure = hits.faces >= 0
     seen, weights = hits.faces[on_figure], hits.weights[on_figure].astype(np.float64)
@@ -77,7 +77,7 @@ def film(backdrop: Backdrop, moment: Moment) -> tuple[NDArray[np.float32], Image
 
 
 def exposed(image: NDArray[np.float32], rng: np.random.Generator) -> Image:
-    """Read an image, (H, W, 3), 0 to 1, out of a noisy sensor."""
+    """Simulate the sensor: noise, flicker and quantization of an image, (H, W, 3), 0 to 1."""
     levels = 255.0 * image * np.float32(1.0 + FLICKER * rng.standard_normal())
     deviation = np.sqrt(READ_NOISE**2 + SHOT_NOISE * levels, dtype=np.float32)
     noisy = levels + deviation * rng.standard_normal(levels.shape, dtype=np.float32)
@@ -85,7 +85,7 @@ def exposed(image: NDArray[np.float32], rng: np.random.Generator) -> Image:
 
 
 def _majority(labels: Image, n_figures: int) -> Image:
-    """Mask of pixels from labels of samples: the figure that most samples see, where half of them see any."""
+    """Return the mask of pixels from labels of samples: the figure with most samples, if half of them show any."""
     assert n_figures < 256
     counts = np.stack([pixel_means((labels == i + 1).astype(np.float32)) for i in range(n_figures)])
     mask = np.argmax(counts, axis=0) + 1

@@ -1,4 +1,4 @@
-"""What stands in the simulated room: textured boxes, most of them along the walls."""
+"""The furniture of the simulated room: textured boxes, most of them along the walls."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -23,14 +23,14 @@ _DARK: Vector = (0.15, 0.15, 0.17)
 
 @dataclass(frozen=True)
 class Box:
-    """A textured box, turned about the vertical."""
+    """A textured box, rotated about the vertical."""
 
     center: Vector
     """Metres, world."""
     half: Vector
     """Half-widths along the box's own axes, metres."""
     yaw: float
-    """Turn about z, rad."""
+    """Rotation about z, rad."""
     pattern: Pattern
     colors: tuple[Vector, Vector]
     """The pattern's two colours, 0 to 1."""
@@ -38,7 +38,7 @@ class Box:
     """Size of the pattern's features, metres."""
 
     def appearance(self, points_world: Array) -> tuple[Array, Array]:
-        """Colours (n, 3), 0 to 1, and outward normals (n, 3) at points of the surface, (n, 3)."""
+        """Return colours (n, 3), 0 to 1, and outward normals (n, 3) at points of the surface, (n, 3)."""
         R_world_box = rigid.so3_exp(np.array([0.0, 0.0, self.yaw]))
         points = (points_world - self.center) @ R_world_box
         across = np.argmax(np.abs(points) - self.half, axis=1)
@@ -62,7 +62,7 @@ def furnished(seed: int) -> tuple[Box, ...]:
     rng = np.random.default_rng([seed, 1])
     a = HALF_WIDTH_M
     out = _shell()
-    # The corners stay free: cameras hang there.
+    # The corners stay free for the cameras.
     out += _rack(rng, (-a + 0.22, -0.35), 1.9, 0.0)
     out += _rack(rng, (0.5, -a + 0.22), 2.2, np.pi / 2)
     out += _rack(rng, (a - 0.22, -0.6), 1.5, np.pi)
@@ -74,7 +74,7 @@ def furnished(seed: int) -> tuple[Box, ...]:
 
 
 def _share(pattern: Pattern, u: Array, v: Array) -> Array:
-    """How far each point of a face takes the second colour, 0 to 1; u and v count features."""
+    """Return the share of the second colour at each point of a face, 0 to 1; u and v count features."""
     noise = value_noise(np.stack([u, v, np.zeros_like(u)], axis=-1), 1.0)
     if pattern == "planks":
         joint = (np.abs(v - np.round(v)) < 0.03) | ((u / 6.0 + 0.37 * np.floor(v)) % 1.0 < 0.01)
@@ -113,7 +113,7 @@ def _shell() -> list[Box]:
 
 
 def _placed(base: tuple[float, float], yaw: float, x: float, y: float, z: float) -> Vector:
-    """World position of a point given in a piece's own frame: x out of the wall, y along it."""
+    """Return the world position of a point given in a piece's own frame: x out of the wall, y along it."""
     c, s = np.cos(yaw), np.sin(yaw)
     return (float(base[0] + c * x - s * y), float(base[1] + s * x + c * y), z)
 

@@ -18,21 +18,21 @@ DIRECT = 0.55
 
 
 class Figure(Protocol):
-    """What can be rendered: a mesh that follows a pose and knows its colours."""
+    """A mesh that follows a pose and has colours, and can be rendered."""
 
     @property
     def faces(self) -> IntArray:
         """Triangles, counter-clockwise seen from outside, (M, 3)."""
 
     def posed(self, values: Array) -> Array:
-        """Vertices in a pose, (N, 3), metres, world."""
+        """Return the vertices in a pose, (N, 3), metres, world."""
 
     def colors(self, faces: IntArray, corner_weights: Array) -> Array:
-        """Colours, (n, 3), 0 to 1, of points on triangles `(n,)` at barycentric weights `(n, 3)`."""
+        """Return colours, (n, 3), 0 to 1, at points on triangles `(n,)` with barycentric weights `(n, 3)`."""
 
 
 class Hits(NamedTuple):
-    """What each sample of an image sees."""
+    """The surface point seen by each sample of an image."""
 
     faces: NDArray[np.int32]
     """Index of the nearest triangle, -1 for none, (H, W)."""
@@ -45,7 +45,7 @@ class Hits(NamedTuple):
 def cast(
     camera: Camera, vertices_world: Array, faces: IntArray, inverse_depths: NDArray[np.float32] | None = None
 ) -> Hits:
-    """Find the nearest triangle behind each pixel centre of a camera.
+    """Find the nearest triangle at each pixel centre of a camera.
 
     Triangles should be small where the lens distorts: their corners are distorted, their edges stay straight.
 
@@ -53,7 +53,7 @@ def cast(
         camera: the camera, as large as the image of samples.
         vertices_world: (N, 3), metres.
         faces: (M, 3).
-        inverse_depths: what else is in the way, as in `Hits`; by default nothing.
+        inverse_depths: other surfaces, as in `Hits`; by default none.
     """
     shape = (camera.height, camera.width)
     found = np.zeros(shape, dtype=np.float32) if inverse_depths is None else inverse_depths.copy()
@@ -65,7 +65,7 @@ def cast(
 
 
 def covered(points_px: Array, faces: IntArray, size: tuple[int, int]) -> NDArray[np.bool_]:
-    """Pixels, (H, W), whose centres lie within the triangles of plane points (N, 2)."""
+    """Return the pixels, (H, W), whose centres lie within the triangles of plane points (N, 2)."""
     shape = (size[1], size[0])
     hits = Hits(
         np.full(shape, -1, dtype=np.int32), np.zeros(shape, dtype=np.float32), np.zeros((*shape, 3), dtype=np.float32)
@@ -75,7 +75,7 @@ def covered(points_px: Array, faces: IntArray, size: tuple[int, int]) -> NDArray
 
 
 def vertex_normals(vertices: Array, faces: IntArray) -> Array:
-    """Outward unit normals of a mesh's vertices, weighted by the area of the triangles around, (N, 3)."""
+    """Return outward unit normals of a mesh's vertices, weighted by the area of the triangles around, (N, 3)."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     across = np.cross(b - a, c - a)
     columns = [np.bincount(faces.ravel(), np.repeat(across[:, i], 3), len(vertices)) for i in range(3)]
@@ -88,7 +88,7 @@ def lit(colors: Array, normals: Array, points_world: Array, light_world: Array) 
     to_light = light_world - points_world
     to_light /= np.linalg.norm(to_light, axis=1, keepdims=True)
     facing = np.sum(normals * to_light, axis=1)
-    # Wrapped a little past the terminator, as under a lamp of some size.
+    # The light extends a little past the terminator, as under a lamp of some size.
     direct = np.clip((facing + 0.2) / 1.2, 0.0, None)
     up = 0.5 + 0.5 * normals[:, 2]
     return colors * (AMBIENT_GROUND + (AMBIENT_SKY - AMBIENT_GROUND) * up + DIRECT * direct)[:, None]
@@ -103,7 +103,7 @@ def pixel_means(samples: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @njit(nogil=True, cache=True)
 def _rasterize(points, inverse_z, triangles, faces, inverse_depths, weights):  # type: ignore[no-untyped-def]
-    """Draw triangles into the arrays of a `Hits`; those with a corner behind the camera are left out."""
+    """Draw triangles into the arrays of a `Hits`; triangles with a corner behind the camera are left out."""
     height, width = faces.shape
     for f in range(triangles.shape[0]):
         a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
@@ -123,7 +123,7 @@ def _rasterize(points, inverse_z, triangles, faces, inverse_depths, weights):  #
                 wc = 1.0 - wa - wb
                 if wa < 0.0 or wb < 0.0 or wc < 0.0:
                     continue
-                # 1/z is linear in the image, and so is what is divided by z.
+                # 1/z is linear in the image, and so are quantities divided by z.
                 iz = wa * za + wb * zb + wc * zc
                 if iz > inverse_depths[y, x]:
                     inverse_depths[y, x] = iz

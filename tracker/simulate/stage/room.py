@@ -1,4 +1,4 @@
-"""The room of a simulated recording: what stands in it, its light, and what each camera sees of it when empty."""
+"""The room of a simulated recording: furniture, light, and the empty room as each camera sees it."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,10 +17,10 @@ LAMP_WORLD = np.array([0.7, -0.5, 2.75])
 """Centre of the ceiling lamp, metres."""
 LAMP_HALF_WIDTH_M = 0.45
 LAMP_POINTS = 3
-"""Points along each side of the lamp for which shadows are cast."""
+"""Number of points along each side of the lamp from which shadows are cast."""
 SHADOW_CELL_M = 0.015
 SHADOW_STRENGTH = 0.62
-"""Part of a fully shaded floor's light that is lost."""
+"""Share of the light that a fully shaded floor loses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Backdrop:
     inverse_depths: NDArray[np.float32]
     """1 / depth along the optical axis of each sample, 1/m."""
     floor_cells: NDArray[np.float32]
-    """Cell (x, y) of the floor's shadow map that each sample sees, -1e4 where it sees no floor; (2, ...)."""
+    """Cell (x, y) of the floor's shadow map that each sample sees, -1e4 if it sees no floor; (2, ...)."""
 
     @property
     def sample_camera(self) -> Camera:
@@ -47,19 +47,19 @@ class Backdrop:
         return pixel_means(self.colors)
 
     def light(self, shadow: NDArray[np.float32]) -> NDArray[np.float32]:
-        """How much light a shadow map (see `floor_shadow`) leaves each sample, 0 to 1."""
+        """Return the share of light that a shadow map (see `floor_shadow`) leaves each sample, 0 to 1."""
         shade = cv2.remap(shadow, self.floor_cells[0], self.floor_cells[1], cv2.INTER_LINEAR)
         return np.asarray(1.0 - SHADOW_STRENGTH * shade, dtype=np.float32)
 
 
 def lamp_points() -> Array:
-    """Points of the lamp that shadows are cast from, (n, 3), metres."""
+    """Return the points of the lamp from which shadows are cast, (n, 3), metres."""
     steps = np.linspace(-LAMP_HALF_WIDTH_M, LAMP_HALF_WIDTH_M, LAMP_POINTS)
     return np.array([LAMP_WORLD + np.array([x, y, 0.0]) for x in steps for y in steps])
 
 
 def floor_shadow(vertices_world: Array, faces: IntArray) -> NDArray[np.float32]:
-    """Shadow of a mesh: the part of the lamp, 0 to 1, that each floor cell does not see; (n, n), row y, column x."""
+    """Return the share of the lamp, 0 to 1, that a mesh hides from each floor cell; (n, n), row y, column x."""
     n = round(2 * HALF_WIDTH_M / SHADOW_CELL_M)
     total = np.zeros((n, n), dtype=np.float32)
     for lamp in lamp_points():
@@ -70,7 +70,7 @@ def floor_shadow(vertices_world: Array, faces: IntArray) -> NDArray[np.float32]:
 
 
 def see_room(camera: Camera, seed: int) -> Backdrop:
-    """RegionFeatures at the empty room, furnished by a random seed."""
+    """Render the empty room, furnished by a random seed."""
     boxes = furnished(seed)
     samples = camera.scaled(SAMPLES)
     u, v = np.meshgrid(np.arange(samples.width), np.arange(samples.height))
@@ -84,7 +84,7 @@ def see_room(camera: Camera, seed: int) -> Backdrop:
         at = np.flatnonzero(seen == i)
         colors[at], normals[at] = boxes[i].appearance(points[at])
     shades = np.mean([_shaded(points + 1e-3 * normals, p, *solids) for p in lamp_points()], axis=0)
-    # The lamp's part of the light is lost in the shade, and what comes from all sides is not.
+    # Shade removes the lamp's share of the light, not the ambient light.
     colors = lit(colors, normals, points, LAMP_WORLD) * (1.0 - DIRECT * shades)[:, None]
     on_floor = (points[:, 2] < 1e-4)[:, None]
     cells = np.where(on_floor, _floor_cells(points[:, :2]), -1e4)
@@ -99,12 +99,12 @@ def see_room(camera: Camera, seed: int) -> Backdrop:
 
 
 def _floor_cells(points_floor: Array) -> Array:
-    """Cells of the shadow map, cell centres at integers, of points on the floor (..., 2)."""
+    """Return the cells of the shadow map, cell centres at integers, of points on the floor (..., 2)."""
     return (points_floor + HALF_WIDTH_M) / SHADOW_CELL_M - 0.5
 
 
 def _shaded(points: Array, lamp: Array, *boxes: Array) -> NDArray[np.bool_]:
-    """Whether something stands between points (n, 3) and a point of the lamp, (n,)."""
+    """Return whether something stands between points (n, 3) and a point of the lamp, (n,)."""
     to_lamp = lamp - points
     distances = np.linalg.norm(to_lamp, axis=1)
     seen, _ = _first_hits(points, to_lamp / distances[:, None], distances - 1e-3, True, *boxes)
@@ -113,7 +113,7 @@ def _shaded(points: Array, lamp: Array, *boxes: Array) -> NDArray[np.bool_]:
 
 @njit(nogil=True, cache=True)
 def _first_hits(origins, directions, reaches, any_hit, centers, halves, yaws):  # type: ignore[no-untyped-def]
-    """Index of the first box (or of any) on each ray within its reach, -1 for none, and the distance to it."""
+    """Return the index of the first box (or of any) on each ray within its reach, -1 for none, and its distance."""
     n = directions.shape[0]
     boxes, distances = np.full(n, -1, dtype=np.int64), reaches.copy()
     cosines, sines = np.cos(yaws), np.sin(yaws)
@@ -123,7 +123,7 @@ def _first_hits(origins, directions, reaches, any_hit, centers, halves, yaws):  
         for b in range(centers.shape[0]):
             ox, oy, oz = origins[r, 0] - centers[b, 0], origins[r, 1] - centers[b, 1], origins[r, 2] - centers[b, 2]
             along = ox * dx + oy * dy + oz * dz
-            # Most boxes are small and far from the ray: their bounding ball tells.
+            # Most boxes are small and far from the ray: test their bounding spheres first.
             if ox * ox + oy * oy + oz * oz - along * along > radii2[b]:
                 continue
             c, s = cosines[b], sines[b]

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from tracker.body.model import PosedBody
-from tracker.compute.threads import side_by_side
+from tracker.compute.threads import map_parallel
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray
@@ -15,7 +15,7 @@ from tracker.tracking.chamfer.assessment import PersonEstimate
 from tracker.tracking.chamfer.frame_estimator import FrameEstimator
 from tracker.tracking.chamfer.settings import TrackSettings, chamfer_cost
 from tracker.tracking.confidence import Status
-from tracker.tracking.estimate import Alternative, PoseEstimate
+from tracker.tracking.estimate import AlternativePose, PoseEstimate
 from tracker.tracking.person_memory import PersonMemory
 from tracker.tracking.tracker import TrackingRun
 from tracker.tracking.view_regions import confirmed_regions, regions, regions_ahead, visible_pieces_px
@@ -96,10 +96,11 @@ def make_estimate(
     """
     cost = cost_of.at_prediction()
     alternatives = tuple(
-        tuple(Alternative(poses[p], cost_of(poses).total_px) for poses in e.alternatives) for p, e in enumerate(people)
+        tuple(AlternativePose(poses[p], cost_of(poses).total_px) for poses in e.alternatives)
+        for p, e in enumerate(people)
     )
     return PoseEstimate(
-        frame, tuple(b.values for b in bodies), cost.total_px, cost.views_px, sum(e.evaluations for e in people),
+        frame, tuple(b.values for b in bodies), cost.total_px, cost.view_costs_px, sum(e.evaluations for e in people),
         tuple(e.status for e in people), tuple(e.note for e in people), tuple(e.part_costs_px for e in people),
         tuple(e.covariance for e in people), tuple(e.quality for e in people), alternatives, settings.method,
     )  # fmt: skip
@@ -114,7 +115,7 @@ def _remember(
     def remember(p: int) -> None:
         memories[p].update(estimator.bodies[p].values, estimator.colors(p), statuses[p], keyframe=p in keyframes)
 
-    side_by_side(remember, range(len(memories)))
+    map_parallel(remember, range(len(memories)))
 
 
 def _update_static_edges(

@@ -14,7 +14,7 @@ import numpy as np
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import Limb, limb_display_name
 from tracker.body.model import PosedBody
-from tracker.compute.threads import side_by_side
+from tracker.compute.threads import map_parallel
 from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MIN_DECREASE
@@ -91,7 +91,7 @@ class FrameEstimator:
         self._recover(fits)
         if any(f.untrusted_limbs is not None for f in fits.values()):
             self._refine_together(fits)
-        finalized = side_by_side(lambda p: self._finalize(p, fits[p]), [*fits])
+        finalized = map_parallel(lambda p: self._finalize(p, fits[p]), [*fits])
         estimates = dict(zip(fits, finalized, strict=True))
         for (p, q), poses in identity_swaps(self._problem, self.bodies, fits).items():
             for one, other in ((p, q), (q, p)):
@@ -136,7 +136,7 @@ class FrameEstimator:
         on the order.
         """
         problem, alone = self._problem, len(self.bodies) == 1
-        assessments = side_by_side(lambda p: assess(problem, p, self.bodies, fits[p]), [*fits])
+        assessments = map_parallel(lambda p: assess(problem, p, self.bodies, fits[p]), [*fits])
         fits.update({p: fits[p]._replace(assessment=a) for p, a in zip(list(fits), assessments, strict=True)})
         has_edges = any(len(v.points_px) for v in problem.views)
         if self._settings.recover is None or not has_edges:
@@ -151,7 +151,7 @@ class FrameEstimator:
             return
         people = [*limbs_of]
         own = dict(zip(people, problem.own_evidence(people, self.bodies, everywhere=True), strict=True))
-        recovered = side_by_side(lambda p: self._recover_person(p, fits[p], limbs_of[p], own[p]), people)
+        recovered = map_parallel(lambda p: self._recover_person(p, fits[p], limbs_of[p], own[p]), people)
         for person, found in zip(people, recovered, strict=True):
             fits[person] = self._move(person, found)
 

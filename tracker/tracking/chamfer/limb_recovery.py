@@ -19,7 +19,7 @@ from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.kinematics import chain_poses
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
-from tracker.compute.threads import N_HELPERS, dealt_out, helpers
+from tracker.compute.threads import N_HELPERS, kernel_pool, map_chunked
 from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals
 from tracker.fitting.gauss_newton import Fit, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solve_compiled
@@ -75,7 +75,7 @@ class PoseScorer:
 
     def each(self, work: Callable[["PoseScorer", Array], T], poses: Sequence[Array] | Array) -> list[T]:
         """Apply work to each of several poses, (n_values,) each, in parallel; each thread has a scorer of its own."""
-        return dealt_out(work, [replace(self, residuals=c) for c in self.clones], list(poses))
+        return map_chunked(work, [replace(self, residuals=c) for c in self.clones], list(poses))
 
     def cost(self, fit: Fit) -> float:
         """Return the cost of a refined pose with its colours."""
@@ -89,7 +89,7 @@ class PoseScorer:
             own = candidates[i::n]
             costs[i::n] = residuals.costs(own) + self._color_costs(own)
 
-        list(helpers().map(score, range(n), self.clones))
+        list(kernel_pool().map(score, range(n), self.clones))
         return costs
 
     def _color_costs(self, poses: Array) -> Array:
@@ -304,7 +304,7 @@ def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSet
 
 def _map_split(work: Callable[..., T], *arrays: Array) -> list[T]:
     """Apply work to shares of arrays of the same length, one for each helper thread; return the results in order."""
-    return list(helpers().map(work, *(np.array_split(a, N_HELPERS) for a in arrays)))
+    return list(kernel_pool().map(work, *(np.array_split(a, N_HELPERS) for a in arrays)))
 
 
 def _perturbed(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.model import BodyModel
-from tracker.compute.threads import N_HELPERS, dealt_out
+from tracker.compute.threads import N_HELPERS, map_chunked
 from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals
 from tracker.fitting.gauss_newton import ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solve_compiled
@@ -76,7 +76,7 @@ class FrameCost:
             fit = solve_compiled(model, pose, blocks, self._active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
             return fit.pose
 
-        return np.array(dealt_out(refine, self._clones, poses))
+        return np.array(map_chunked(refine, self._clones, poses))
 
     def _prior_cost(self, pose: Array) -> float:
         """Return the cost of the prior terms at a pose, but for that of the prediction."""

@@ -28,7 +28,7 @@ def test_it_is_what_the_cost_says_one_by_one(opened, name):
         pose[dof] = found.values[i]
         one = cost((pose,))
         assert found.totals_px[i] == pytest.approx(one.total_px, rel=1e-9)
-        np.testing.assert_allclose(found.views_px[i], one.views_px, rtol=1e-9)
+        np.testing.assert_allclose(found.view_costs_px[i], one.view_costs_px, rtol=1e-9)
     assert found.current_px == pytest.approx(state.cost_px)
 
 

@@ -19,7 +19,7 @@ def at(controller, frame):
 
 
 def end_the_step_soon(tracker):
-    """Whoever stops a run waits for the step at hand."""
+    """To stop a run waits for the current step."""
     threading.Timer(0.2, tracker.let_go, (1,)).start()
 
 
@@ -37,7 +37,7 @@ def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, sess
     shown = placed.state.people[0]
     assert placed.state.frame == 4
     assert (shown.source, shown.status, shown.remark) == ("tracked", "doubtful", "left arm relocated")
-    assert shown.parts_px == (0.5,) * 9 + (None,)
+    assert shown.part_costs_px == (0.5,) * 9 + (None,)
     assert (placed.state.cost_px, placed.state.view_costs_px) == (pytest.approx(1.4), (1.0, None, 2.0, 3.0))
     assert x_of(placed) == pytest.approx(start + 2 * STEP_M)
     tracker.let_go(5)
@@ -51,7 +51,11 @@ def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, sess
         (6, "tracked", "good"), (7, "tracked", "lost"), (8, "tracked", "good"), (9, "tracked", "good"),
     ]  # fmt: skip
     record = store.pose("person", 4)
-    assert (record.view_costs_px, record.part_costs_px, record.remark) == (shown_costs(), shown.parts_px, shown.remark)
+    assert (record.view_costs_px, record.part_costs_px, record.remark) == (
+        shown_costs(),
+        shown.part_costs_px,
+        shown.remark,
+    )
     assert record.settings["method"]
     store.close()
     assert placed.stored_poses.timeline()[4] == {

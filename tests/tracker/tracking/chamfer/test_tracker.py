@@ -98,7 +98,7 @@ def test_frames_are_read_one_at_a_time(balls):
     observer = Shown(views)
     running = track(observer, [model, model], values[0], range(5), COARSE)
     next(running)
-    assert observer.asked == [0]  # whoever stops here has cost no more
+    assert observer.asked == [0]  # a run that stops here has read no more
     running.close()
     assert list(track(observer, [model, model], values[0], [], COARSE)) == []
 
