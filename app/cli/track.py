@@ -89,7 +89,7 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
     resumes it.
 
     Args:
-        at: the session and whom to track.
+        at: the session and the people to track.
         frames: in the order of tracking.
         settings: of the tracker, which name its method.
         progress: shows how far it is.
