@@ -87,10 +87,10 @@ def report(rows: list[Row], baseline: Mapping[str, Any]) -> dict[str, Any]:
         `versions`, `tolerance`, `rows` and the names of those that became `slower` than the tolerance allows.
     """
     ratios, tolerance = baseline["ratios"], baseline["tolerance"]
-    told = []
+    compared = []
     for r in rows:
         before = ratios.get(r.name)
-        told.append(
+        compared.append(
             {
                 "name": r.name,
                 "what": r.what,
@@ -108,8 +108,8 @@ def report(rows: list[Row], baseline: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "versions": versions(),
         "tolerance": tolerance,
-        "rows": told,
-        "slower": [t["name"] for t in told if t["slower"]],
+        "rows": compared,
+        "slower": [t["name"] for t in compared if t["slower"]],
     }
 
 
@@ -129,8 +129,8 @@ def show(found: Mapping[str, Any], console: Console) -> None:
     table = Table("work", "median", "yardstick", "must", "aim", "baseline", "")
     for r in found["rows"]:
         verdict = "slower" if r["slower"] else "" if r["holds"] is None else "holds" if r["holds"] else "fails"
-        told = [_ratio(r[k]) for k in ("ratio", "must", "aim", "baseline")]
-        table.add_row(r["what"], _time(r["median_us"]), *told, f"{verdict} {r['note']}".strip())
+        ratios = [_ratio(r[k]) for k in ("ratio", "must", "aim", "baseline")]
+        table.add_row(r["what"], _time(r["median_us"]), *ratios, f"{verdict} {r['note']}".strip())
     console.print(table)
     console.print(", ".join(f"{k} {v}" for k, v in found["versions"].items()), highlight=False)
     if found["slower"]:

@@ -1,7 +1,7 @@
 """`quadrille track`: track people and store the poses; the same command resumes an interrupted run."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -55,7 +55,8 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     at = load_target(arguments.session, arguments.person, several=True)
     frames: Sequence[int] = parse_frames(arguments.frames, at.session)
     frames = frames[::-1] if arguments.backward else frames
-    found = track(at, frames, _chamfer_settings(arguments), Reporter(silent=arguments.json))
+    settings = _SETTINGS[arguments.method](arguments)
+    found = track(at, frames, settings, Reporter(silent=arguments.json))
     print(format_json(found) if arguments.json else _format(found))
     if found["stopped_at"] is not None:
         sys.exit(130)
@@ -77,6 +78,10 @@ def _chamfer_settings(arguments: TrackArguments) -> "TrackSettings":
     )
 
 
+_SETTINGS: Mapping[str, "Callable[[TrackArguments], TrackerSettings]"] = {"chamfer": _chamfer_settings}
+"""Makes the settings of each method (`METHODS`) from the arguments."""
+
+
 def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progress: Reporter) -> dict[str, Any]:
     """Track people and store their poses as one entry of the history.
 
@@ -84,7 +89,7 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
     resumes it.
 
     Args:
-        at: the session and whom to track.
+        at: the session and the people to track.
         frames: in the order of tracking.
         settings: of the tracker, which name its method.
         progress: shows how far it is.

@@ -177,9 +177,12 @@ def _with_draft(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
 
 def _alternatives(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
     """Return the bodies with everybody who has alternatives in the best of these; empty if nobody has any."""
-    if not any(shown.others for shown in state.people):
+    if not any(shown.alternatives for shown in state.people):
         return []
-    return [PosedBody(b.model, s.others[0]) if s.others else b for b, s in zip(bodies, state.people, strict=True)]
+    return [
+        PosedBody(b.model, s.alternatives[0]) if s.alternatives else b
+        for b, s in zip(bodies, state.people, strict=True)
+    ]
 
 
 def _ghosts(chosen: Collection[int], people: Sequence[PosedBody], camera: Camera, index: int, color: str) -> list[Path]:

@@ -24,7 +24,7 @@ class ShownPose:
     """Source of each value of a pose that is not stored yet, (n_values,); empty if `source` applies to all."""
     revision: int | None = None
     """Model revision of a stored pose; None for a pose that is not stored as shown."""
-    others: tuple[Array, ...] = ()
+    alternatives: tuple[Array, ...] = ()
     """Alternatives that the tracker found, (n_values,) each, best first; empty for a keyframe."""
 
 

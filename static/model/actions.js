@@ -1,4 +1,4 @@
-/** What a user can want, whichever button or key says it. */
+/** Actions of the user that send messages, shared by buttons and keys. */
 
 import { scopePerson, hasTrack } from "./selectors.js";
 
@@ -28,23 +28,23 @@ export class Actions {
     this.#send({ type: "search", action, person: scopePerson(this.#store.facts) });
   }
 
-  /** Search again from where the run that is looked at began, by the settings of now. */
+  /** Repeat the selected run from its start pose with the current settings. */
   searchAgain() {
     const { facts } = this.#store;
     this.#send({ type: "search", action: "again", run: facts.searchRun, person: scopePerson(facts) });
   }
 
-  /** Show the true pose again, where a search is replayed; whether there was something to leave. */
+  /** End the replay of a search. Returns whether one was shown. */
   leaveReplay() {
     if (!this.#store.facts.state?.replay) return false;
-    // Else its next step would lead back into the replay before the program has answered.
+    // Otherwise the next step of the replay could be sent before the program has answered.
     this.#store.set({ replaying: false });
     this.#send({ type: "replay", run: null, step: 0 });
     return true;
   }
 
   /**
-   * Track from the shown frame to the end of the recording, or of the marked range where that lies ahead.
+   * Track from the current frame to the end of the recording, or of the marked range if that lies ahead.
    *
    * @param {"forward" | "backward"} way
    */
@@ -56,7 +56,7 @@ export class Actions {
     this.#send({ type: "track", action: way, until: isAhead ? end : null });
   }
 
-  /** Pause a tracking run that is at work, go on with one that is paused. */
+  /** Pause the tracking run, or continue it if it is paused. */
   togglePause() {
     const { state } = this.#store.facts;
     if (hasTrack(state)) this.#send({ type: "track", action: state?.track.running ? "pause" : "resume" });
@@ -67,10 +67,10 @@ export class Actions {
   }
 
   /**
-   * Work on the marked range.
+   * Process the marked range.
    *
    * @param {import("./protocol.js").RangeAction} action
-   * @param {number | null} person null for everybody
+   * @param {number | null} person null for all people
    */
   onRange(action, person) {
     const { range } = this.#store.facts;
@@ -82,7 +82,7 @@ export class Actions {
   }
 
   /**
-   * Mark the shown pose of the person worked on, or take the mark back.
+   * Toggle a mark of the active person's pose on the current frame.
    *
    * @param {"keyframe" | "reviewed"} toggle
    */
@@ -90,7 +90,7 @@ export class Actions {
     if (this.#store.facts.connected) this.#send({ type: "mark", toggle });
   }
 
-  /** Take the marks of the shown pose of the person worked on away. */
+  /** Remove the marks of the active person's pose on the current frame. */
   unmark() {
     const { connected, state, target, timeline } = this.#store.facts;
     if (!connected || !state || !timeline.has(target)) return;
@@ -118,7 +118,7 @@ export class Actions {
   }
 
   /**
-   * Work on the next person, or the one before.
+   * Select the next or the previous person.
    *
    * @param {1 | -1} way
    */
@@ -129,7 +129,7 @@ export class Actions {
   }
 
   /**
-   * Show a person in all views, or nowhere.
+   * Show or hide a person in all views.
    *
    * @param {number} person
    * @param {boolean} shown
@@ -138,19 +138,19 @@ export class Actions {
     this.#send({ type: "people", action: "show", person, shown });
   }
 
-  /** Show or hide the person worked on. */
+  /** Show or hide the active person. */
   toggleShown() {
     const { state } = this.#store.facts;
     if (state && state.people.length > 1) this.showPerson(state.person, !state.people[state.person].shown);
   }
 
-  /** Dim everybody but the person worked on, or no more. */
+  /** Dim all people except the active one (toggle). */
   toggleSolo() {
     const { state } = this.#store.facts;
     if (state && state.people.length > 1) this.#send({ type: "people", action: "solo", on: !state.solo });
   }
 
-  /** Let searches and fits move everybody, or the person worked on alone. */
+  /** Switch searches and fits between all people and the active person. */
   toggleScope() {
     const { scope, session } = this.#store.facts;
     if ((session?.people.length ?? 0) > 1) this.#store.set({ scope: scope === "all" ? "one" : "all" });

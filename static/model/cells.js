@@ -1,11 +1,11 @@
-/** The cells of the timeline, a column each: a long recording has a hundred thousand, and all are drawn twice a second. */
+/** Cells of the timeline in columns. A long recording has 100,000 cells, which are drawn twice a second. */
 
 /**
  * @typedef {import("./protocol.js").Cell} Cell
  * @typedef {import("./protocol.js").Status} Status
  */
 
-/** The sources of a pose, in the order of the legend; their colours are in styles/tokens.css. */
+/** Sources of a pose in the order of the legend. styles/tokens.css has their colours. */
 export const SOURCES = [
   "manual",
   "pinned",
@@ -18,15 +18,15 @@ export const SOURCES = [
 ];
 /** Statuses of a pose, the worst last. */
 export const STATUSES = /** @type {const} */ (["", "good", "doubtful", "lost"]);
-/** In place of a source: the frame has no pose. */
+/** Instead of a source: the frame has no pose. */
 export const NO_POSE = 255;
 export const KEYFRAME = 1;
 export const REVIEWED = 2;
-/** Other poses are about as good, and nobody has vouched for this one. */
+/** An alternative fits about as well, and nobody has confirmed this pose. */
 export const AMBIGUOUS = 4;
 
 export class Cells {
-  /** How many frames have a pose. */
+  /** Number of frames that have a pose. */
   size = 0;
   /** @type {Map<number, string>} */
   #remarks = new Map();
@@ -37,13 +37,13 @@ export class Cells {
     this.sources = new Uint8Array(frames).fill(NO_POSE);
     /** Index into `STATUSES`. */
     this.statuses = new Uint8Array(frames);
-    /** `KEYFRAME` plus `REVIEWED` plus `AMBIGUOUS`. */
+    /** Bits `KEYFRAME`, `REVIEWED` and `AMBIGUOUS`. */
     this.marks = new Uint8Array(frames);
-    /** Pixels; NaN where unknown. */
+    /** Cost in pixels; NaN if unknown. */
     this.costs = new Float32Array(frames).fill(NaN);
   }
 
-  /** How many frames the recording has. */
+  /** Number of frames of the recording. */
   get frames() {
     return this.sources.length;
   }
@@ -73,7 +73,7 @@ export class Cells {
 
   /**
    * @param {number} frame
-   * @param {Cell | null} cell null: the frame has no pose any more
+   * @param {Cell | null} cell null if the frame has no pose any more
    */
   set(frame, cell) {
     if (frame >= this.frames) return;
@@ -88,7 +88,7 @@ export class Cells {
   }
 
   /**
-   * Take over many cells that came as columns.
+   * Copy cells that arrive in columns.
    *
    * @param {import("./protocol.js").CellsHeader} header
    * @param {ArrayBuffer} payload
@@ -106,7 +106,7 @@ export class Cells {
     }
   }
 
-  /** Frames that have a pose, with their cells. */
+  /** Frames that have a pose, and their cells. */
   *[Symbol.iterator]() {
     for (let frame = 0; frame < this.frames; frame += 1) {
       const cell = this.get(frame);

@@ -1,4 +1,4 @@
-/** The pane socket: keeps itself open, and hands messages on. */
+/** Pane socket: reconnects automatically, and passes messages to a listener. */
 
 import { decodeBinary } from "./protocol.js";
 
@@ -7,7 +7,7 @@ const MAX_DELAY_MS = 5000;
 
 /**
  * @typedef {object} Listener
- * @property {(open: boolean) => void} onOpen called when the connection opens and when it is lost
+ * @property {(open: boolean) => void} onOpen called when the connection opens or is lost
  * @property {(message: import("./protocol.js").TextMessage) => void} onText
  * @property {(header: import("./protocol.js").BinaryHeader, payload: ArrayBuffer) => void} onBinary
  */
@@ -30,12 +30,12 @@ export class Connection {
     this.#listener = listener;
     this.#greeting = greeting;
     this.#connect();
-    // A laptop that wakes up or finds its network again need not wait for the next attempt.
+    // Reconnect immediately when the network is back.
     addEventListener("online", () => this.#connect());
   }
 
   /**
-   * Send a message, or drop it where there is no connection: the program sends its state anew on the next one.
+   * Send a message, or drop it without a connection: the program sends its whole state on each new connection.
    *
    * @param {import("./protocol.js").ClientMessage} message
    */

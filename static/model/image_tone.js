@@ -1,4 +1,4 @@
-/** Brightness, contrast and gamma of each camera's image: in this browser only, kept session by session. */
+/** Brightness, contrast and gamma of each camera's image, stored in this browser per session. */
 
 /**
  * @typedef {{brightness: number, contrast: number, gamma: number}} ImageTone
@@ -17,7 +17,7 @@ export function isPlain(tone) {
 }
 
 /**
- * The value that each of the 256 gray levels is shown with: gamma first, then contrast about the middle, then brightness.
+ * Map each of the 256 gray levels to its displayed value: gamma first, then contrast about the middle, then brightness.
  *
  * @param {ImageTone} tone
  */
@@ -37,7 +37,7 @@ export class ImageTones {
   constructor(store) {
     this.#store = store;
     store.subscribe((changed) => {
-      if (changed.has("session")) this.#recall();
+      if (changed.has("session")) this.#restore();
     });
   }
 
@@ -48,23 +48,23 @@ export class ImageTones {
   set(camera, tone) {
     const imageTones = [...this.#store.facts.imageTones];
     imageTones[camera] = tone;
-    this.#keep(imageTones);
+    this.#save(imageTones);
   }
 
   /** @param {ImageTone} tone for all cameras */
   setAll(tone) {
-    this.#keep((this.#store.facts.session?.cameras ?? []).map(() => tone));
+    this.#save((this.#store.facts.session?.cameras ?? []).map(() => tone));
   }
 
   /** @param {(ImageTone | undefined)[]} imageTones by camera */
-  #keep(imageTones) {
+  #save(imageTones) {
     this.#store.set({ imageTones });
     const names = (this.#store.facts.session?.cameras ?? []).map(({ name }) => name);
     const changed = names.map((name, camera) => [name, imageTones[camera]]).filter(([, tone]) => tone && tone !== PLAIN);
     localStorage.setItem(STORED + this.#session, JSON.stringify(Object.fromEntries(changed)));
   }
 
-  #recall() {
+  #restore() {
     const { session } = this.#store.facts;
     if (!session) return;
     this.#session = session.name;
@@ -73,19 +73,19 @@ export class ImageTones {
     try {
       stored = JSON.parse(localStorage.getItem(STORED + session.name) ?? "{}") ?? {};
     } catch {
-      // What is not understood is as good as nothing.
+      // Settings that cannot be read are ignored.
     }
-    this.#store.set({ imageTones: session.cameras.map(({ name }) => known(stored[name])) });
+    this.#store.set({ imageTones: session.cameras.map(({ name }) => restored(stored[name])) });
   }
 }
 
 /** @param {Partial<ImageTone> | undefined} stored */
-function known(stored) {
+function restored(stored) {
   const tone = { ...PLAIN };
   for (const field of /** @type {(keyof ImageTone)[]} */ (Object.keys(BOUNDS))) {
     const value = stored?.[field];
-    const [least, most] = BOUNDS[field];
-    if (typeof value === "number" && value >= least && value <= most) tone[field] = value;
+    const [min, max] = BOUNDS[field];
+    if (typeof value === "number" && value >= min && value <= max) tone[field] = value;
   }
   return tone;
 }

@@ -1,9 +1,9 @@
-/** How long a hand waits: from a pointer's move to the panes that show it. */
+/** Measure the time from a pointer move to the panes that show it. */
 
 const KEPT = 512;
 
 export class Latency {
-  /** Milliseconds, the latest last.
+  /** Milliseconds, newest last.
    * @type {number[]} */
   latencies = [];
   /** @type {Map<number, number>} */
@@ -11,18 +11,18 @@ export class Latency {
 
   /**
    * @param {number} seq number of the drag message
-   * @param {number} moved when the pointer moved
+   * @param {number} moved time of the pointer move
    */
   sent(seq, moved) {
     this.#pending.set(seq, moved);
   }
 
-  /** Forget what an answer is still awaited for: the connection was lost. */
+  /** Discard pending measurements after the connection is lost. */
   forget() {
     this.#pending.clear();
   }
 
-  /** @param {number} seq the last drag message that all panes show */
+  /** @param {number} seq number of the last drag message that all panes show */
   painted(seq) {
     const now = performance.now();
     for (const [number, moved] of this.#pending) {

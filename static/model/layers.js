@@ -1,6 +1,5 @@
 /**
- * The layers of the panes: which are shown, how strongly, and what remembers it. The choice belongs to whoever looks, so each
- * browser keeps its own, session by session.
+ * Layers of the panes: visibility, opacity and defaults. Each browser stores its own choice per session.
  */
 
 /**
@@ -13,11 +12,11 @@
  * @property {string} group
  * @property {string} label
  * @property {string} title
- * @property {boolean} shown at first
- * @property {number} opacity at first
+ * @property {boolean} shown by default
+ * @property {number} opacity by default
  */
 
-/** @type {LayerInfo[]} in the order in which they are painted, one over the other */
+/** @type {LayerInfo[]} in painting order, bottom first */
 export const LAYERS = [
   { id: "image", group: "Picture", label: "Image", title: "Undistorted camera image", shown: true, opacity: 1 },
   {
@@ -89,10 +88,10 @@ export const LAYERS = [
   },
 ];
 
-/** Layers that come as pictures, in the order in which they are painted. */
+/** Layers that are images, in painting order. */
 export const PICTURE_LAYERS = /** @type {const} */ (["image", "distance", "silhouette", "parts"]);
 
-/** Layers by key: Shift 1 toggles the first, and so on. The menu lists them in this order, group by group. */
+/** Layers by key: Shift+1 toggles the first, and so on. The order matches the menu. */
 export const BY_KEY = /** @type {Layer[]} */ ([
   "image", "distance", "silhouette", "accepted", "rejected", "contours", "hidden", "parts", "skeleton",
 ]); // prettier-ignore
@@ -100,7 +99,7 @@ export const BY_KEY = /** @type {Layer[]} */ ([
 const STORED = "quadrille.layers.";
 
 /**
- * @param {number} people of the session: of several one wants to see who hides whom
+ * @param {number} people number of people of the session; with several, occluded contours are shown by default
  * @returns {LayerChoice}
  */
 export function defaultLayers(people = 1) {
@@ -118,63 +117,63 @@ export class Layers {
   constructor(store) {
     this.#store = store;
     store.subscribe((changed) => {
-      if (changed.has("session")) this.#recall();
+      if (changed.has("session")) this.#restore();
     });
   }
 
   /**
-   * Show or hide layers; those of one call are one thing to the user.
+   * Show or hide layers.
    *
    * @param {Layer[]} ids
-   * @param {boolean} [isShown] by default all are shown, or hidden where they all are shown already
+   * @param {boolean} [isShown] default: show all, or hide all if all are shown
    */
   toggle(ids, isShown) {
     const { layers } = this.#store.facts;
     const show = isShown ?? !ids.every((id) => layers.shown[id]);
     const shown = { ...layers.shown };
     for (const id of ids) shown[id] = show;
-    this.#keep({ ...layers, shown });
+    this.#save({ ...layers, shown });
   }
 
   /**
    * @param {Layer} id
-   * @param {number} opacity from 0 to 1
+   * @param {number} opacity 0 to 1
    */
   setOpacity(id, opacity) {
     const { layers } = this.#store.facts;
-    this.#keep({ ...layers, opacity: { ...layers.opacity, [id]: opacity } });
+    this.#save({ ...layers, opacity: { ...layers.opacity, [id]: opacity } });
   }
 
   /** @param {ContourColors} colors */
   setColors(colors) {
-    this.#keep({ ...this.#store.facts.layers, colors });
+    this.#save({ ...this.#store.facts.layers, colors });
   }
 
   reset() {
-    this.#keep(defaultLayers(this.#store.facts.session?.people.length));
+    this.#save(defaultLayers(this.#store.facts.session?.people.length));
   }
 
   /** @param {LayerChoice} layers */
-  #keep(layers) {
+  #save(layers) {
     this.#store.set({ layers });
     localStorage.setItem(STORED + this.#session, JSON.stringify(layers));
   }
 
-  #recall() {
+  #restore() {
     const { name = "", people = [] } = this.#store.facts.session ?? {};
     if (name === this.#session) return;
     this.#session = name;
-    this.#store.set({ layers: known(localStorage.getItem(STORED + name), people.length) });
+    this.#store.set({ layers: restored(localStorage.getItem(STORED + name), people.length) });
   }
 }
 
 /**
- * What was stored, as far as it is understood: another version may have had other layers.
+ * Parse stored settings and ignore unknown ones, which another version may have written.
  *
  * @param {string | null} stored
- * @param {number} people of the session
+ * @param {number} people number of people of the session
  */
-function known(stored, people) {
+function restored(stored, people) {
   const layers = defaultLayers(people);
   /** @type {Partial<LayerChoice>} */
   let found;

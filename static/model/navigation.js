@@ -1,6 +1,6 @@
 /**
- * Which frame is asked for. One request is under way at a time and the newest wish waits behind it: however fast a hand
- * scrubs or a clip plays, the program is never more than one frame behind.
+ * Request frames from the program. Only one request is pending at a time, and only the newest further request is kept.
+ * Scrubbing and playback are therefore never more than one frame ahead of the program.
  */
 
 const TIMEOUT_MS = 2000;
@@ -11,7 +11,7 @@ export class Navigation {
   /** @type {{frame: number} | null} */
   #pending = null;
   /** @type {number | null} */
-  #wish = null;
+  #next = null;
 
   /**
    * @param {import("./store.js").Store} store
@@ -31,7 +31,7 @@ export class Navigation {
   }
 
   /**
-   * Go to a frame; one outside the recording means its nearest end.
+   * Go to a frame, clamped to the recording.
    *
    * @param {number} frame
    */
@@ -40,7 +40,7 @@ export class Navigation {
     this.request(Math.max(0, Math.min(this.#last, Math.round(frame))));
   }
 
-  /** @param {number} count frames forward, or backward where negative */
+  /** @param {number} count negative to go back */
   step(count) {
     this.pause();
     this.goTo(this.#store.facts.target + count);
@@ -58,52 +58,52 @@ export class Navigation {
     if (this.#store.facts.playing) this.#store.set({ playing: false });
   }
 
-  /** Whether a frame is on its way. */
+  /** Whether a request is pending. */
   get isWaiting() {
     return this.#pending !== null;
   }
 
   /**
-   * Ask for a frame of the recording.
+   * Request a frame of the recording.
    *
    * @param {number} frame
    */
   request(frame) {
     this.#store.set({ target: frame });
-    this.#wish = frame;
-    if (!this.#pending) this.#sendWish();
+    this.#next = frame;
+    if (!this.#pending) this.#sendNext();
   }
 
-  #sendWish() {
+  #sendNext() {
     this.#pending = null;
-    if (this.#wish === null) return;
-    const frame = this.#wish;
-    this.#wish = null;
+    if (this.#next === null) return;
+    const frame = this.#next;
+    this.#next = null;
     const { shown, state } = this.#store.facts;
     if (shown?.frame === frame && state?.frame === frame) return;
     const request = { frame };
     this.#pending = request;
     this.#send({ type: "seek", frame });
-    // Another tab may have led the program elsewhere before it got there: then those images never come.
+    // Another tab may have requested a different frame. Then these images never arrive.
     setTimeout(() => {
       if (this.#pending !== request) return;
-      this.#sendWish();
+      this.#sendNext();
       this.#arrived();
     }, TIMEOUT_MS);
   }
 
   #arrived() {
     const { shown, state, target } = this.#store.facts;
-    if (this.#pending && shown?.frame === this.#pending.frame) this.#sendWish();
-    // Another tab, an undo or a tracker may have gone elsewhere.
-    if (!this.#pending && this.#wish === null && state && state.frame !== target) {
+    if (this.#pending && shown?.frame === this.#pending.frame) this.#sendNext();
+    // Another tab, an undo or a tracker may have changed the frame.
+    if (!this.#pending && this.#next === null && state && state.frame !== target) {
       this.#store.set({ target: state.frame });
     }
   }
 
   #reset() {
     this.#pending = null;
-    this.#wish = null;
+    this.#next = null;
     this.pause();
   }
 }

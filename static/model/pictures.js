@@ -1,4 +1,4 @@
-/** Puts the pictures of a set together, so that the panes change at once. Decoding is the browser's, beside the page's thread. */
+/** Assemble the pictures of a set, so that all panes change at once. The browser decodes them asynchronously. */
 
 /**
  * @typedef {import("./protocol.js").ImageHeader} ImageHeader
@@ -17,22 +17,22 @@ export function keyOf(layer, camera) {
 
 export class PictureAssembler {
   #onShow;
-  /** @type {Arrived[]} of one set */
+  /** @type {Arrived[]} of the incomplete set */
   #arriving = [];
-  /** @type {{frame: number, pictures: Map<string, Arrived>} | null} complete sets of the newest frame that wait for the decoder */
+  /** @type {{frame: number, pictures: Map<string, Arrived>} | null} complete sets of the newest frame that wait for decoding */
   #waiting = null;
   #decoding = false;
   #closed = false;
 
   /**
-   * @param {(frame: number, pictures: Pictures) => void} onShow takes over the bitmaps
+   * @param {(frame: number, pictures: Pictures) => void} onShow takes ownership of the bitmaps
    */
   constructor(onShow) {
     this.#onShow = onShow;
   }
 
   /**
-   * Take one picture. A set that was not complete when another begins is dropped.
+   * Add a picture. An incomplete set is dropped when another set begins.
    *
    * @param {ImageHeader} header
    * @param {ArrayBuffer} payload
@@ -47,7 +47,7 @@ export class PictureAssembler {
     void this.#decode();
   }
 
-  /** Forget everything on its way. */
+  /** Discard everything that is pending. */
   close() {
     this.#closed = true;
   }

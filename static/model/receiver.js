@@ -1,4 +1,4 @@
-/** Puts the program's messages into the store. */
+/** Put the program's messages into the store. */
 
 import { Cells } from "./cells.js";
 import { PICTURE_LAYERS } from "./layers.js";
@@ -14,13 +14,13 @@ export class Receiver {
   #recent;
   /** @type {PictureAssembler | null} */
   #pictures = null;
-  /** @type {Map<number, import("./protocol.js").Overlay>} vectors that came before the images of their frame */
+  /** @type {Map<number, import("./protocol.js").Overlay>} overlays that arrived before the images of their frame */
   #early = new Map();
 
   /**
    * @param {import("./store.js").Store} store
    * @param {(notice: import("./protocol.js").NoticeMessage) => void} notify
-   * @param {import("./recent_images.js").RecentImages} recent keeps the images of the frames that came last
+   * @param {import("./recent_images.js").RecentImages} recent caches the images of recent frames
    */
   constructor(store, notify, recent) {
     this.#store = store;
@@ -101,7 +101,7 @@ export class Receiver {
   }
 
   /**
-   * Vectors never lie over the image of another frame: they wait for theirs, where any layer has one.
+   * Show an overlay, or keep it until the images of its frame arrive.
    *
    * @param {import("./protocol.js").Overlay} overlay
    */
@@ -115,7 +115,7 @@ export class Receiver {
     }
     this.#early.delete(overlay.frame);
     this.#early.set(overlay.frame, overlay);
-    // A tracker may be some frames ahead of the decoder. What is older belongs to frames that were skipped.
+    // A tracker can be some frames ahead of decoding. Older overlays belong to skipped frames.
     for (const frame of this.#early.keys()) if (this.#early.size > MAX_EARLY) this.#early.delete(frame);
   }
 
@@ -124,27 +124,27 @@ export class Receiver {
     this.#pictures?.close();
     this.#pictures = new PictureAssembler((frame, pictures) => this.#show(frame, pictures));
     this.#early.clear();
-    this.#recent.clear(); // the footage may have changed while the program was away
-    const former = this.#store.facts.session?.cameras;
+    this.#recent.clear(); // the footage may have changed while disconnected
+    const previous = this.#store.facts.session?.cameras;
     this.#store.set({ session, lanes: [] });
-    if (JSON.stringify(former) !== JSON.stringify(session.cameras)) this.#store.set({ shown: null, overlay: null });
+    if (JSON.stringify(previous) !== JSON.stringify(session.cameras)) this.#store.set({ shown: null, overlay: null });
   }
 
   /**
-   * Pictures of another frame take the place of all; those of the same frame that of their like.
+   * Show new pictures. They replace all pictures of another frame, or those of the same layer of the same frame.
    *
    * @param {number} frame
    * @param {import("./pictures.js").Pictures} pictures
    */
   #show(frame, pictures) {
     const { shown } = this.#store.facts;
-    const kept = new Map(shown?.frame === frame ? shown.pictures : []);
+    const merged = new Map(shown?.frame === frame ? shown.pictures : []);
     for (const [key, { bitmap }] of shown?.pictures ?? []) {
-      if (kept.has(key) && !pictures.has(key)) continue;
+      if (merged.has(key) && !pictures.has(key)) continue;
       bitmap.close();
     }
-    for (const [key, picture] of pictures) kept.set(key, picture);
-    this.#store.set({ shown: { frame, pictures: kept } });
+    for (const [key, picture] of pictures) merged.set(key, picture);
+    this.#store.set({ shown: { frame, pictures: merged } });
     this.#recent.keep(frame, pictures);
     const overlay = this.#early.get(frame);
     if (overlay) {
@@ -153,7 +153,7 @@ export class Receiver {
     }
   }
 
-  /** The program sends a layer anew when it is shown again: until then what is kept may have become wrong. */
+  /** Discard pictures of hidden layers, which may become outdated. The program sends a layer when it is shown again. */
   #forgetHidden() {
     const { shown, layers, session } = this.#store.facts;
     for (const layer of PICTURE_LAYERS) {
@@ -172,10 +172,10 @@ export class Receiver {
   }
 
   /**
-   * The cells to change in place: a long recording has a hundred thousand, and a tracker changes some twice a second.
+   * Return the cells to change in place, since a tracker changes a few of 100,000 cells twice a second.
    *
-   * @param {{replace: boolean, person: number | null}} message whether to begin with none; of whom among several, null
-   *   for all together
+   * @param {{replace: boolean, person: number | null}} message `replace` to start empty; `person` null for
+   *   the cells of all people
    */
   #cells({ replace, person }) {
     const { facts } = this.#store;

@@ -1,40 +1,40 @@
 /**
- * The images of the frames that came last, reduced and ready to be drawn, bounded in bytes: to decode them anew would take as long as
- * whoever waits for a frame can be kept waiting.
+ * Cache of reduced images of recent frames, bounded in bytes. They are shown until a requested frame arrives, so they must
+ * not need decoding.
  */
 
 import { keyOf } from "./pictures.js";
 
-/** Of four panes in a window of 1280x720 some hundred frames. */
+/** About a hundred frames of four panes in a window of 1280x720. */
 const MAX_BYTES = 64 * 2 ** 20;
 const BYTES_PER_PIXEL = 4;
-/** Of the size that they are shown at, along either side: enough to find one's way. */
+/** Size relative to the displayed image, per side. */
 const SHARE = 0.6;
 
 export class RecentImages {
-  /** @type {Map<number, {images: Map<number, OffscreenCanvas>, bytes: number}>} images by camera, by frame, the latest last */
+  /** @type {Map<number, {images: Map<number, OffscreenCanvas>, bytes: number}>} images by camera, by frame, newest last */
   #frames = new Map();
   #bytes = 0;
 
   /**
-   * Keep the images among the pictures of a frame.
+   * Cache the images among the pictures of a frame.
    *
    * @param {number} frame
    * @param {import("./pictures.js").Pictures} pictures
    */
   keep(frame, pictures) {
-    const kept = this.#frames.get(frame) ?? { images: new Map(), bytes: 0 };
+    const entry = this.#frames.get(frame) ?? { images: new Map(), bytes: 0 };
     for (const [key, { bitmap }] of pictures) {
       const [layer, camera] = key.split(" ");
       if (layer !== "image") continue;
       const image = reduced(bitmap);
-      const change = bytesOf(image) - bytesOf(kept.images.get(Number(camera)));
-      kept.images.set(Number(camera), image);
-      kept.bytes += change;
+      const change = bytesOf(image) - bytesOf(entry.images.get(Number(camera)));
+      entry.images.set(Number(camera), image);
+      entry.bytes += change;
       this.#bytes += change;
     }
-    if (kept.images.size === 0) return;
-    this.#touch(frame, kept);
+    if (entry.images.size === 0) return;
+    this.#touch(frame, entry);
     for (const [oldest, { bytes }] of this.#frames) {
       if (this.#bytes <= MAX_BYTES || oldest === frame) break;
       this.#frames.delete(oldest);
@@ -48,7 +48,7 @@ export class RecentImages {
   }
 
   /**
-   * The frame nearest to another of which the images of some cameras are kept, and the one itself where they are.
+   * The nearest frame that has cached images of some cameras.
    *
    * @param {number} frame
    * @param {number[]} cameras
@@ -64,25 +64,25 @@ export class RecentImages {
   }
 
   /**
-   * The images of a frame, which are kept longer than all others from now on.
+   * Images of a frame. They become the newest of the cache.
    *
    * @param {number} frame
    * @returns {import("./store.js").PlaceholderPictures}
    */
   of(frame) {
-    const kept = this.#frames.get(frame);
-    if (!kept) return new Map();
-    this.#touch(frame, kept);
-    return new Map([...kept.images].map(([camera, bitmap]) => [keyOf("image", camera), { bitmap, limitPx: null }]));
+    const entry = this.#frames.get(frame);
+    if (!entry) return new Map();
+    this.#touch(frame, entry);
+    return new Map([...entry.images].map(([camera, bitmap]) => [keyOf("image", camera), { bitmap, limitPx: null }]));
   }
 
   /**
    * @param {number} frame
-   * @param {{images: Map<number, OffscreenCanvas>, bytes: number}} kept
+   * @param {{images: Map<number, OffscreenCanvas>, bytes: number}} entry
    */
-  #touch(frame, kept) {
+  #touch(frame, entry) {
     this.#frames.delete(frame);
-    this.#frames.set(frame, kept);
+    this.#frames.set(frame, entry);
   }
 }
 
@@ -92,7 +92,7 @@ function bytesOf(image) {
 }
 
 /**
- * A canvas, since Chromium takes seconds for whatever comes after some two hundred bitmaps where no graphics card draws them.
+ * Reduce an image. A canvas, because Chromium becomes slow with more than 200 bitmaps in software rendering.
  *
  * @param {ImageBitmap} bitmap
  */

@@ -1,8 +1,8 @@
-/** What the program tells of searches, made into facts of the store. */
+/** Convert messages about searches to facts of the store. */
 
 /**
  * @typedef {{count: number, evaluations: Float32Array, tested: Float32Array, best: Float32Array,
- *   stages: Float32Array}} Steps figures of the recorded steps of a run: poses scored so far, costs in px, index of the stage
+ *   stages: Float32Array}} Steps columns of the recorded steps of a run: poses evaluated so far, costs in px, index of the stage
  * @typedef {{costs: (number | null)[], clearest_view: number, people: number[], cameras: number,
  *   points: Float32Array}} Candidates costs in px; points are those of each candidate, in each view, u and v
  * @typedef {import("./protocol.js").LandscapeHeader & {values: Float32Array, total: Float32Array,
@@ -18,7 +18,7 @@ export function takeRuns(facts, message) {
   const newest = message.runs.at(-1)?.number ?? 0;
   const known = facts.searchRuns?.runs.at(-1)?.number ?? 0;
   const isKept = message.runs.some(({ number }) => number === facts.searchRun);
-  // A run that begins is what one wants to see.
+  // Select a new run.
   const searchRun = newest > known || !isKept ? null : facts.searchRun;
   const searchSteps = keptOf(facts.searchSteps, message);
   const searchCandidates = keptOf(facts.searchCandidates, message);
@@ -26,7 +26,7 @@ export function takeRuns(facts, message) {
 }
 
 /**
- * What is known of runs that are still listed: a page that is open for days must not grow.
+ * Keep the data of listed runs only, so that memory stays bounded.
  *
  * @template T
  * @param {Map<number, T>} known by run
@@ -38,7 +38,7 @@ function keptOf(known, { runs }) {
 }
 
 /**
- * The run that the user looks at.
+ * The run that the user has selected, by default the newest.
  *
  * @param {import("./store.js").Facts} facts
  */
@@ -55,9 +55,9 @@ export function selectedRun(facts) {
 export function mergeSteps(known, { run, first, count }, payload) {
   const columns = new Float32Array(payload);
   const before = known.get(run);
-  const join = (/** @type {number} */ index, /** @type {Float32Array | undefined} */ former) => {
+  const join = (/** @type {number} */ index, /** @type {Float32Array | undefined} */ previous) => {
     const out = new Float32Array(first + count);
-    if (former) out.set(former.subarray(0, first));
+    if (previous) out.set(previous.subarray(0, first));
     out.set(columns.subarray(index * count, (index + 1) * count), first);
     return out;
   };

@@ -1,7 +1,7 @@
 /** Questions about the state that several rooms ask. */
 
 /**
- * Whom searches and fits move; null for everybody.
+ * The only person that searches and fits move; null for all people.
  *
  * @param {import("./store.js").Facts} facts
  */
@@ -10,7 +10,7 @@ export function scopePerson({ scope, state }) {
 }
 
 /**
- * Whether a person is dimmed, and out of reach of a hand: another is worked on alone.
+ * Whether a person is dimmed and cannot be dragged, because another person is solo.
  *
  * @param {import("./protocol.js").StateMessage | null} state
  * @param {number} person
@@ -20,7 +20,7 @@ export function isDimmed(state, person) {
 }
 
 /**
- * Whether there is a search to stop: one that runs, or one that waits between two steps.
+ * Whether a search is running, or paused between two steps.
  *
  * @param {import("./protocol.js").StateMessage | null} state
  */
@@ -29,7 +29,7 @@ export function hasSearch(state) {
 }
 
 /**
- * Whether there is a tracking run: one at work, or one that is paused.
+ * Whether a tracking run is running or paused.
  *
  * @param {import("./protocol.js").StateMessage | null} state
  */

@@ -1,4 +1,4 @@
-/** Curves as data: one number per frame, NaN where there is none. */
+/** Data of curves: one number per frame, NaN where there is none. */
 
 /** @typedef {import("./protocol.js").CurveGroup | "search" | "landscape"} Tab */
 
@@ -6,23 +6,23 @@
  * @typedef {import("./protocol.js").CurvesHeader} CurvesHeader
  * @typedef {{plot: number, label: string, values: Float32Array}} Series
  * @typedef {{group: import("./protocol.js").CurveGroup, person: number, plots: import("./protocol.js").Plot[],
- *   series: Series[], raw: Float32Array[]}} Curves `values` are what is drawn, `raw` what came: angles within a turn
+ *   series: Series[], raw: Float32Array[]}} Curves `values` are drawn; `raw` has angles within one turn, as received
  */
 
 /**
- * Take over a message: a new group of curves, or some frames of the known one.
+ * Merge a message: a new group of curves, or some frames of the current group.
  *
- * @param {Curves | null} former
+ * @param {Curves | null} previous
  * @param {CurvesHeader} header
- * @param {ArrayBuffer} payload frames as uint32, then one curve after the other as float32
+ * @param {ArrayBuffer} payload frames as uint32, then each curve as float32
  * @param {number} frameCount of the recording
  * @returns {Curves}
  */
-export function mergeCurves(former, { group, person, replace, count, plots }, payload, frameCount) {
+export function mergeCurves(previous, { group, person, replace, count, plots }, payload, frameCount) {
   const labels = plots.flatMap(({ labels, unit }, plot) => labels.map((label) => ({ plot, label, unit })));
   const frames = new Uint32Array(payload, 0, count);
-  const goesOn = !replace && former?.group === group && former.person === person && former.raw.length === labels.length;
-  const raw = goesOn ? former.raw : labels.map(() => new Float32Array(frameCount).fill(NaN));
+  const goesOn = !replace && previous?.group === group && previous.person === person && previous.raw.length === labels.length;
+  const raw = goesOn ? previous.raw : labels.map(() => new Float32Array(frameCount).fill(NaN));
   raw.forEach((values, index) => {
     const news = new Float32Array(payload, 4 * count * (index + 1), count);
     for (let i = 0; i < count; i += 1) values[frames[i]] = news[i];
@@ -36,45 +36,44 @@ export function mergeCurves(former, { group, person, replace, count, plots }, pa
 }
 
 /**
- * Angles without jumps of whole turns.
+ * Unwrap angles in degrees.
  *
  * @param {Float32Array} degrees
  */
-export function unwrapped(degrees) {
+function unwrapped(degrees) {
   const out = new Float32Array(degrees.length).fill(NaN);
   let turns = 0;
-  let former = NaN;
+  let previous = NaN;
   for (let i = 0; i < degrees.length; i += 1) {
     const value = degrees[i];
     if (value !== value) continue;
-    if (former === former) turns -= Math.round((value - former) / 360);
-    former = value;
+    if (previous === previous) turns -= Math.round((value - previous) / 360);
+    previous = value;
     out[i] = value + 360 * turns;
   }
   return out;
 }
 
 /**
- * Least and greatest of some curves; null where they hold no number.
+ * Minimum and maximum of some curves; null if they have no number.
  *
  * @param {Float32Array[]} curves
  */
 export function extent(curves) {
-  let least = Infinity;
-  let most = -Infinity;
+  let min = Infinity;
+  let max = -Infinity;
   for (const values of curves) {
     for (let i = 0; i < values.length; i += 1) {
-      if (values[i] < least) least = values[i];
-      if (values[i] > most) most = values[i];
+      if (values[i] < min) min = values[i];
+      if (values[i] > max) max = values[i];
     }
   }
-  return least <= most ? { least, most } : null;
+  return min <= max ? { min, max } : null;
 }
 
 /**
- * Trace a curve: frame by frame, or where several frames share a pixel from its first to its least, greatest and last value
- * there, so that no spike is lost and a long recording is drawn as soon as a short one. Gaps stay open; a frame that stands
- * alone shows as a dot.
+ * Trace a curve. Where several frames share a pixel, trace their first, minimum, maximum and last value. Spikes remain
+ * visible, and the time is bounded by the width of the plot. Missing values leave gaps, and an isolated frame is a dot.
  *
  * @param {Path2D} path
  * @param {Float32Array} values
@@ -84,7 +83,7 @@ export function extent(curves) {
 export function trace(path, values, axis, toY) {
   const stride = Math.max(1, Math.floor(1 / axis.pitch));
   let isOpen = false;
-  // One more on either side, so that the line runs out of the picture.
+  // One stride more on each side, so that lines extend beyond the edge.
   const begin = Math.max(0, Math.floor(axis.first / stride) - 1) * stride;
   const end = Math.min(values.length, axis.last + 2 * stride + 1);
   for (let first = begin; first < end; first += stride) {
@@ -102,7 +101,7 @@ export function trace(path, values, axis, toY) {
 }
 
 /**
- * First, least, greatest and last number of a stretch; nothing where it has none.
+ * First, minimum, maximum and last number of an interval; empty if it has none.
  *
  * @param {Float32Array} values
  * @param {number} from
@@ -110,14 +109,14 @@ export function trace(path, values, axis, toY) {
  */
 function summary(values, from, to) {
   if (to - from === 1) return values[from] === values[from] ? [values[from]] : [];
-  let [first, last, least, most] = [NaN, NaN, Infinity, -Infinity];
+  let [first, last, min, max] = [NaN, NaN, Infinity, -Infinity];
   for (let i = from; i < to; i += 1) {
     const value = values[i];
     if (value !== value) continue;
     if (first !== first) first = value;
     last = value;
-    if (value < least) least = value;
-    if (value > most) most = value;
+    if (value < min) min = value;
+    if (value > max) max = value;
   }
-  return first === first ? [first, least, most, last] : [];
+  return first === first ? [first, min, max, last] : [];
 }

@@ -1,6 +1,5 @@
 /**
- * What the page knows, in one place. Views read it; they are told once per animation frame what changed, however many
- * messages came in between.
+ * Store of all facts that the page knows. Views read it, and are notified once per animation frame of what has changed.
  */
 
 import { Cells } from "./cells.js";
@@ -10,51 +9,51 @@ import { defaultLayers } from "./layers.js";
  * @typedef {{camera: number, person: number, point: string}} Joint
  * @typedef {{frame: number, pictures: import("./pictures.js").Pictures}} Shown
  *
- * @typedef {Map<string, {bitmap: OffscreenCanvas, limitPx: null}>} PlaceholderPictures as `Pictures`, which may have all layers
+ * @typedef {Map<string, {bitmap: OffscreenCanvas, limitPx: null}>} PlaceholderPictures like `Pictures`, of images only
  * @typedef {{frame: number, target: number, pictures: PlaceholderPictures | null}} Placeholder pictures: those of `frame`,
- *   without vectors; null where `frame` is the one shown anyway
+ *   without overlay; null if `frame` is the frame shown
  *
  * @typedef {object} Facts
  * @property {boolean} connected
  * @property {import("./protocol.js").SessionMessage | null} session
  * @property {import("./protocol.js").StateMessage | null} state
- * @property {import("./cells.js").Cells} timeline the known cells by frame
- * @property {import("./cells.js").Cells[]} lanes the same of each person, where there are several
- * @property {number[]} disagreeing frames whose pose does not go together with those around it, ascending
- * @property {import("../widgets/frame_axis.js").Span | null} visible the part of the recording that timeline and curves show; null: all
- * @property {import("./series.js").Curves | null} curves the group of curves that came last
- * @property {import("./series.js").Tab | null} drawer what the drawer shows; null while it is closed
+ * @property {import("./cells.js").Cells} timeline cells of all people together
+ * @property {import("./cells.js").Cells[]} lanes cells of each person, if there are several
+ * @property {number[]} disagreeing frames whose pose is inconsistent with its neighbours, ascending
+ * @property {import("../widgets/frame_axis.js").Span | null} visible the visible part of timeline and curves; null for all
+ * @property {import("./series.js").Curves | null} curves the current group of curves
+ * @property {import("./series.js").Tab | null} drawer the open tab; null while the drawer is closed
  * @property {import("./protocol.js").SearchSetupMessage | null} searchSetup
  * @property {import("./protocol.js").SearchRunsMessage | null} searchRuns
  * @property {Map<number, import("./search_runs.js").Steps>} searchSteps recorded steps by run
  * @property {Map<number, import("./search_runs.js").Candidates>} searchCandidates best poses by run
- * @property {number | null} searchRun the run that the user looks at; null for the newest
- * @property {boolean} replaying whether a search is being replayed step by step
+ * @property {number | null} searchRun the selected run; null for the newest
+ * @property {boolean} replaying whether a replay is playing
  * @property {import("./search_runs.js").Landscape | null} landscape
- * @property {import("./protocol.js").HistoryMessage | null} history what the list of the history shows
- * @property {{first: number, last: number} | null} range the frames that the user has marked
- * @property {Shown | null} shown the pictures on the screen
- * @property {Placeholder | null} placeholder what is shown until the pictures of the frame asked for are there
- * @property {import("./protocol.js").Overlay | null} overlay the vectors on the screen
+ * @property {import("./protocol.js").HistoryMessage | null} history the listed part of the history
+ * @property {{first: number, last: number} | null} range the marked frames, both included
+ * @property {Shown | null} shown the pictures that are displayed
+ * @property {Placeholder | null} placeholder what is shown until the requested frame arrives
+ * @property {import("./protocol.js").Overlay | null} overlay the overlay that is displayed
  * @property {Joint | null} hover the joint under the pointer
- * @property {{camera: number, person: number, part: number} | null} hoverPart the part under the pointer, where no joint is
- * @property {boolean} dragging whether a hand holds a joint
- * @property {number | null} active the camera whose pane was last pointed at; steps of keys are parallel to its image
- * @property {number | null} dof the degree of freedom that keys turn, of those that the selected joint means
- * @property {boolean} pinning whether each click sets a pin of the selected joint
- * @property {boolean} livePins whether the body follows while a pin is dragged
+ * @property {{camera: number, person: number, part: number} | null} hoverPart the part under the pointer, if no joint is
+ * @property {boolean} dragging whether a joint or pin is being dragged
+ * @property {number | null} active the camera whose pane the pointer was in last; arrow keys move parallel to its image
+ * @property {number | null} dof the degree of freedom that keys change, one of the selected joint
+ * @property {boolean} pinning whether each click pins the selected joint
+ * @property {boolean} livePins whether the body follows a dragged pin
  * @property {Joint | null} pinHover the pin under the pointer
- * @property {import("./protocol.js").PinMark | null} heldPin the pin in the hand, or just let go
- * @property {"all" | "one"} scope whom searches and fits move: everybody, or the person worked on alone
- * @property {number} target the frame the user asked for last
+ * @property {import("./protocol.js").PinMark | null} heldPin the pin that is dragged or was just released
+ * @property {"all" | "one"} scope people that searches and fits move: all, or the active person only
+ * @property {number} target the frame that was requested last
  * @property {boolean} playing
- * @property {number} rate at which a clip plays, 1 for real time
- * @property {boolean} loops whether playing begins anew at the end, of the marked range where there is one
- * @property {boolean} everyFrame whether playing waits for every frame instead of skipping those that come late
+ * @property {number} rate playback speed, 1 for real time
+ * @property {boolean} loops whether playback loops, within the marked range if there is one
+ * @property {boolean} everyFrame whether playback waits for every frame instead of skipping late ones
  * @property {number | null} filled the camera whose pane fills the grid
- * @property {import("./layers.js").LayerChoice} layers what is drawn in the panes
- * @property {(import("./image_tone.js").ImageTone | undefined)[]} imageTones brightness, contrast and gamma of each camera's image
- * @property {number[]} reductions how many pixels of each camera's image the page can do with one for; 0: it is not seen
+ * @property {import("./layers.js").LayerChoice} layers visible layers and their opacity
+ * @property {(import("./image_tone.js").ImageTone | undefined)[]} imageTones tone of each camera's image
+ * @property {number[]} reductions pixels of each camera's image per displayed pixel, per side; 0 if not visible
  */
 
 const MAX_ROUNDS = 3;
@@ -110,7 +109,7 @@ export class Store {
   #isScheduled = false;
 
   /**
-   * Change facts; views hear of it on the next animation frame.
+   * Change facts. Views are notified on the next animation frame.
    *
    * @param {Partial<Facts>} facts
    */
@@ -130,7 +129,7 @@ export class Store {
 
   /**
    * @param {keyof Facts} fact
-   * @param {() => void} act done once, when the fact is there
+   * @param {() => void} act called once, when the fact is known
    */
   onceKnown(fact, act) {
     let isDone = false;
@@ -142,7 +141,7 @@ export class Store {
   }
 
   #flush() {
-    // What views change meanwhile is shown at once too, not an animation frame later.
+    // Changes made by views are shown in the same animation frame.
     for (let round = 0; round < MAX_ROUNDS && this.#changed.size > 0; round += 1) {
       const changed = this.#changed;
       this.#changed = new Set();
@@ -153,8 +152,8 @@ export class Store {
   }
 
   /**
-   * Whether the vectors on the screen belong to the images under them and to the program's frame: only then does a hand
-   * that grabs a joint mean what it sees. While a tracker is followed the program is always a little ahead.
+   * Whether overlay, images and the program's frame agree, so that joints can be dragged. While a tracker is followed, the
+   * program is always slightly ahead.
    */
   get isSettled() {
     const { state, shown, placeholder, overlay, connected } = this.facts;

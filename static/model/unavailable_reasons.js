@@ -1,4 +1,4 @@
-/** Why a command is not possible now: sentences for the user, null where it is possible. */
+/** Reasons why commands are unavailable: sentences for the user, null if a command is available. */
 
 import { hasSearch, hasTrack } from "./selectors.js";
 

@@ -1,4 +1,4 @@
-/** Tells the program what this page shows: its layers, and how fine a picture each pane can use. */
+/** Tell the program which layers and image sizes this page shows. */
 
 export class ViewRequest {
   #store;
@@ -13,7 +13,7 @@ export class ViewRequest {
     this.#store = store;
     this.#send = send;
     store.subscribe((changed) => {
-      // The session comes first on every connection, and the program of a new one knows nothing of this page.
+      // The session is the first message of each connection; a new program does not know this page.
       if (changed.has("session")) this.#sent = "";
       if (changed.has("session") || changed.has("layers") || changed.has("reductions")) this.#ask();
     });

@@ -1,16 +1,16 @@
-/** Which joints of a view a hand can tell apart. All distances are CSS pixels. */
+/** Leave out joints that are too close together to be picked by pointer. All distances are CSS pixels. */
 
 /** @typedef {import("./drawing.js").PlacedHandle} PlacedHandle */
 
-/** How far from a joint it can be taken. */
+/** Picking radius of a joint. */
 export const GRAB_RADIUS = 12;
 
 /**
- * Leave out the minor joints on which a hand might take a neighbour instead, or be taken for it: zoomed in, they are there.
+ * Leave out minor joints that overlap others. They are shown when the view is zoomed in.
  *
  * @param {PlacedHandle[]} placed
  * @param {import("../model/protocol.js").PersonInfo[]} people
- * @param {import("../model/store.js").Joint | null} held the joint that a hand holds; it stays
+ * @param {import("../model/store.js").Joint | null} held the joint that is being dragged; it is always kept
  */
 export function decluttered(placed, people, held) {
   const isMinor = (/** @type {PlacedHandle} */ { handle }) =>
@@ -24,6 +24,6 @@ export function decluttered(placed, people, held) {
     const isApart = (/** @type {PlacedHandle} */ { x, y }) => Math.hypot(x - one.x, y - one.y) >= 2 * GRAB_RADIUS;
     if (isHeld || (major.every(isApart) && kept.every(isApart))) kept.push(one);
   }
-  // The joints that matter are drawn over the others.
+  // Major joints are drawn on top.
   return [...kept, ...major];
 }

@@ -1,8 +1,7 @@
 /**
- * What a drag is doing, and what else it could, said at the foot of its pane.
+ * Hint at the bottom of a pane: what a drag does, and which keys change it.
  *
- * It stays there: what follows the pointer lies over what is being placed, and costs a picture of the page of its own
- * with each move.
+ * The hint does not follow the pointer, where it would cover the joint and cost a repaint with each move.
  */
 
 /** @type {Record<import("../model/protocol.js").DragMode, string>} */
@@ -14,7 +13,7 @@ const HINTS = {
 
 export class DragHint {
   #element = document.createElement("div");
-  /** @type {import("../model/protocol.js").DragMode | null} what it says now */
+  /** @type {import("../model/protocol.js").DragMode | null} the mode of the text that is shown */
   #mode = null;
 
   constructor() {
@@ -46,7 +45,7 @@ export class DragHint {
 }
 
 /**
- * What the keys held down make of a drag.
+ * Drag mode of the modifier keys.
  *
  * @param {MouseEvent | KeyboardEvent} event
  * @returns {import("../model/protocol.js").DragMode}

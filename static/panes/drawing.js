@@ -1,4 +1,4 @@
-/** Draws one pane: the image layer, and the vectors over it. All sizes on the screen are CSS pixels. */
+/** Draw a pane: pictures, and vectors over them. All sizes on the screen are CSS pixels. */
 
 /**
  * @typedef {import("../model/protocol.js").Overlay} Overlay
@@ -8,21 +8,21 @@
  */
 
 const HALO = "rgba(0, 0, 0, 0.45)";
-// Joints have their person's colour, as its contours have: bones between them must not look like contours.
+// White, because joints and contours have the colour of their person.
 const BONE = "#fff";
 const PIXELS_VISIBLE_FROM = 4;
 const BEHIND_IMAGES = "#000";
 const JOINT_RADIUS = 3.5;
 const TORSO_HALF_SIDE = 5.5;
-export const TORSO = "torso";
-/** How strongly people are drawn who are dimmed. */
-export const DIMMED = 0.3;
+const TORSO = "torso";
+/** Opacity of dimmed people. */
+const DIMMED = 0.3;
 
 /**
- * How each kind of line is drawn, and the layer that it belongs to; null: always.
+ * Line style and layer of each kind of path. A layer of null is always drawn.
  *
  * @typedef {{width: number, dash: number[], layer: import("../model/protocol.js").Layer | null, hasHalo: boolean,
- *   ofPerson?: boolean}} LineStyle ofPerson: whether they go faint with their person
+ *   ofPerson?: boolean}} LineStyle ofPerson: whether they are dimmed with their person
  * @type {Record<import("../model/protocol.js").Path["kind"], LineStyle>}
  */
 const LINE_STYLES = {
@@ -32,20 +32,20 @@ const LINE_STYLES = {
   ghost: { width: 1.5, dash: [5, 4], layer: null, hasHalo: true, ofPerson: true },
   part_edge: { width: 1, dash: [], layer: "part_edges", hasHalo: true },
   epipolar: { width: 1.25, dash: [6, 4], layer: "epipolar", hasHalo: true },
-  // Thousands of short lines, which their halos would merge into one.
+  // Halos would merge thousands of short lines into one area.
   accepted: { width: 1.5, dash: [], layer: "accepted", hasHalo: false },
   floor: { width: 1.25, dash: [], layer: null, hasHalo: true },
   rejected: { width: 1, dash: [], layer: "rejected", hasHalo: false },
 };
 
 /**
- * Give a canvas the size of its pane in device pixels, and return its context scaled to CSS pixels and cleared.
+ * Resize a canvas to its pane in device pixels. Return its cleared context, scaled to CSS pixels.
  *
  * @param {HTMLCanvasElement} canvas
  * @param {number} width
  * @param {number} height
- * @param {boolean} onProcessor keep the canvas off the graphics card: many short lines, all new each time, are drawn sooner
- *   by the processor, and much sooner where there is no graphics card
+ * @param {boolean} onProcessor whether to draw on the processor, which is faster for many short lines that change each
+ *   time, especially without a graphics card
  */
 export function prepare(canvas, width, height, onProcessor) {
   const ratio = devicePixelRatio;
@@ -61,7 +61,7 @@ export function prepare(canvas, width, height, onProcessor) {
 }
 
 /**
- * Darken the place of the image: layers that let something through must look the same in the dark and the light theme.
+ * Draw a dark background, so that translucent layers look the same in both colour schemes.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {PaneView} view
@@ -73,7 +73,7 @@ export function drawBackground(context, view) {
 }
 
 /**
- * Draw a picture, of whatever size, in the place of the whole image.
+ * Draw a picture of any size over the area of the whole image.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {PaneView} view
@@ -82,7 +82,7 @@ export function drawBackground(context, view) {
  */
 export function drawPicture(context, view, picture, opacity) {
   const { x, y, width, height } = view.place;
-  // Far in, pixels are what one wants to see.
+  // Zoomed in far, show single pixels.
   context.imageSmoothingEnabled = width / picture.width < PIXELS_VISIBLE_FROM;
   context.imageSmoothingQuality = "medium";
   context.globalAlpha = opacity;
@@ -96,7 +96,7 @@ export function drawPicture(context, view, picture, opacity) {
  * @param {Overlay} overlay
  * @param {number} camera
  * @param {import("../model/layers.js").LayerChoice} layers
- * @param {(person: number) => boolean} isDimmed whether a person's lines are to be faint
+ * @param {(person: number) => boolean} isDimmed whether a person is dimmed
  */
 export function drawPaths(context, view, overlay, camera, layers, isDimmed) {
   for (const path of overlay.paths) {
@@ -124,7 +124,7 @@ function tracePath(view, segments, first, count) {
   const scale = view.scale;
   const line = new Path2D();
   for (let i = 4 * first, end = 4 * (first + count); i < end; i += 4) {
-    // Segments that go on where the last one ended are one line: its corners join, and it is drawn in half the time.
+    // Consecutive segments form one line: its corners join, and drawing takes half the time.
     const goesOn = i > 4 * first && segments[i] === segments[i - 2] && segments[i + 1] === segments[i - 1];
     if (!goesOn) line.moveTo(x + scale * segments[i], y + scale * segments[i + 1]);
     line.lineTo(x + scale * segments[i + 2], y + scale * segments[i + 3]);
@@ -133,7 +133,7 @@ function tracePath(view, segments, first, count) {
 }
 
 /**
- * Stroke with a dark halo, so that any colour shows on any image.
+ * Stroke with a dark halo, so that the line is visible on any image.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {Path2D} line
@@ -154,7 +154,7 @@ function stroke(context, line, color, width, hasHalo = true) {
 }
 
 /**
- * Mark the part that a press would take.
+ * Highlight the part under the pointer.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {PaneView} view
@@ -208,7 +208,7 @@ export function drawHandle(context, { handle, x, y }, color, emphasis) {
   } else {
     outline.arc(x, y, JOINT_RADIUS + grown, 0, 2 * Math.PI);
   }
-  // Hidden joints are hollow: a ring of the colour. Visible ones are discs with a white ring.
+  // Hidden joints are rings in the person's colour, visible joints discs with a white ring.
   context.strokeStyle = HALO;
   context.lineWidth = 3.5;
   context.stroke(outline);
@@ -222,7 +222,7 @@ export function drawHandle(context, { handle, x, y }, color, emphasis) {
 }
 
 /**
- * Write a joint's name beside it, on the side where the pane has room.
+ * Draw the name of a joint beside it, on the side with more room.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {PlacedHandle} placed

@@ -1,14 +1,14 @@
 /**
- * The pointer in a pane. On a joint it drags the joint, anywhere else (or with the middle button) it moves the view.
+ * Pointer gestures in a pane. A drag on a joint moves the joint; elsewhere, or with the middle button, it moves the view.
  *
- * A drag keeps the distance between pointer and joint, begins after a few pixels (a click only selects), and sends about one
- * message per animation frame: as soon as the pointer moves, not when the browser gets to the next frame.
+ * A drag keeps the offset between pointer and joint, and begins after a few pixels, since a click only selects. Messages are
+ * sent when the pointer moves, about one per animation frame, without waiting for the next frame.
  */
 
 const DRAG_THRESHOLD = 3;
-/** A mouse may tell its moves a thousand times a second; no more often than this they are told on. */
+/** Minimum interval of messages. Some mice report moves a thousand times a second. */
 const MIN_INTERVAL_MS = 12;
-/** By so much a joint of the person worked on is nearer than it looks: hands that touch are told apart by whose they are. */
+/** Penalty on the distance to joints of other people, so that the active person's joints win where people touch. */
 const OTHER_PERSON_PENALTY_PX = 4;
 
 import { isDimmed } from "../model/selectors.js";
@@ -19,8 +19,8 @@ import { partAt } from "./part_hit.js";
 /**
  * @typedef {import("./drawing.js").PlacedHandle} PlacedHandle
  * @typedef {{pane: import("./pane.js").Pane, frame: number, camera: number, pointer: number, person: number, point: string,
- *   part: number | null, mode: import("../model/protocol.js").DragMode, start: {x: number, y: number}, grabbed: {u: number, v: number}, at: {u: number, v: number},
- *   offset: {u: number, v: number}, begun: boolean}} Drag
+ *   part: number | null, mode: import("../model/protocol.js").DragMode, start: {x: number, y: number},
+ *   grabbed: {u: number, v: number}, at: {u: number, v: number}, offset: {u: number, v: number}, begun: boolean}} Drag
  */
 
 export class Gestures {
@@ -31,7 +31,7 @@ export class Gestures {
   #drag = null;
   /**
    * @type {{pane: import("./pane.js").Pane, pointer: number, x: number, y: number, start: {x: number, y: number},
-   *   person: number | null} | null} person: a dimmed one whom a mere click means
+   *   person: number | null} | null} person: the dimmed person to select if the gesture is a click
    */
   #pan = null;
   #hint = new DragHint();
@@ -55,7 +55,7 @@ export class Gestures {
   }
 
   /**
-   * Watch the pointer in a pane.
+   * Handle the pointer in a pane.
    *
    * @param {import("./pane.js").Pane} pane
    * @param {number} camera
@@ -64,7 +64,7 @@ export class Gestures {
     const surface = pane.surface;
     surface.addEventListener("pointerdown", (event) => this.#down(event, pane, camera));
     surface.addEventListener("pointermove", (event) => this.#move(event, pane, camera));
-    // Where the browser tells them; elsewhere the moves of each frame come as one.
+    // Not all browsers have raw updates. The others merge the moves of an animation frame.
     surface.addEventListener("pointerrawupdate", (event) => {
       if (this.#drag?.pointer === /** @type {PointerEvent} */ (event).pointerId && this.#drag.begun) {
         this.#dragTo(this.#drag, /** @type {PointerEvent} */ (event), MIN_INTERVAL_MS);
@@ -78,11 +78,11 @@ export class Gestures {
     surface.addEventListener("pointerleave", () => {
       if (!this.#drag && (this.#store.facts.hover || this.#store.facts.hoverPart)) this.#store.set({ hover: null, hoverPart: null });
     });
-    // The middle button would scroll, and paste on some systems.
+    // Prevent scrolling, and pasting on some systems.
     surface.addEventListener("mousedown", (event) => event.button === 1 && event.preventDefault());
   }
 
-  /** Let go of whatever is held and take a begun drag back; says whether there was anything. */
+  /** Cancel the current gesture and revert its drag. Returns whether there was one. */
   cancel() {
     const held = this.#drag !== null || this.#pan !== null;
     if (this.#drag?.begun) this.#message("cancel", this.#drag.grabbed);
@@ -91,7 +91,7 @@ export class Gestures {
   }
 
   /**
-   * The joint nearest to a pointer, within reach.
+   * The joint nearest to the pointer, within the picking radius.
    *
    * @param {import("./pane.js").Pane} pane
    * @param {{x: number, y: number}} at
@@ -103,14 +103,15 @@ export class Gestures {
     let nearest = null;
     let reach = GRAB_RADIUS;
     for (const placed of pane.graspableHandles()) {
-      const distance = Math.hypot(placed.x - at.x, placed.y - at.y) + (placed.handle.person === state?.person ? 0 : OTHER_PERSON_PENALTY_PX);
+      const penalty = placed.handle.person === state?.person ? 0 : OTHER_PERSON_PENALTY_PX;
+      const distance = Math.hypot(placed.x - at.x, placed.y - at.y) + penalty;
       if (distance <= reach) [nearest, reach] = [placed, distance];
     }
     return nearest;
   }
 
   /**
-   * The part under a pointer, with what a drag needs to know of it: the place that is taken is the pointer's own.
+   * The part under the pointer, with the data that a drag needs. The grabbed point is the pointer's position.
    *
    * @param {import("./pane.js").Pane} pane
    * @param {number} camera
@@ -122,13 +123,13 @@ export class Gestures {
     const place = pane.view.toImage(at.x, at.y);
     const found = partAt(overlay, camera, place, (person) => !isDimmed(state, person));
     if (!found) return null;
-    // Joint i moves part i, and is what a part that is touched selects.
+    // Joint i moves part i; touching the part selects the joint.
     const point = this.#store.facts.session?.people[found.person]?.points[found.part] ?? "";
     return { camera, person: found.person, part: found.part, point, ...place };
   }
 
   /**
-   * The person who is dimmed and lies under the pointer of the main button: no hand can take him, but a click can mean him.
+   * The dimmed person under the pointer. A click selects that person, but a drag does not move the body.
    *
    * @param {import("./pane.js").Pane} pane
    * @param {number} camera
@@ -199,11 +200,11 @@ export class Gestures {
   }
 
   /**
-   * Take what is held to where a pointer is.
+   * Move the grabbed point to the pointer.
    *
    * @param {Drag} drag
    * @param {PointerEvent} event
-   * @param {number} intervalMs since the last message, or else this one waits for the next move
+   * @param {number} intervalMs minimum time since the last message; an earlier move is skipped
    */
   #dragTo(drag, event, intervalMs = 0) {
     const at = drag.pane.locate(event);
@@ -256,7 +257,7 @@ export class Gestures {
   /**
    * @param {"start" | "move" | "end" | "cancel"} phase
    * @param {{u: number, v: number}} at
-   * @returns the message's number
+   * @returns  the number of the message
    */
   #message(phase, { u, v }) {
     const { frame, camera, person, point, part, mode } = /** @type {Drag} */ (this.#drag);

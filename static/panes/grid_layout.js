@@ -1,15 +1,15 @@
-/** Where the panes of a grid lie. All sizes are CSS pixels. */
+/** Layout of the grid of panes. All sizes are CSS pixels. */
 
-/** Between neighbours. */
+/** Gap between neighbours. */
 const GAP = 2;
 
 /** @typedef {{x: number, y: number, width: number, height: number}} Box */
 
 /**
- * Lay images out in rows, all at one height, so that they are as large as the space allows. Panes of a row are as wide in
- * proportion as their images; a row that is not full stands in the middle.
+ * Lay out images in rows of equal height, as large as the space allows. Widths are proportional to aspect ratios. An
+ * incomplete row is centred.
  *
- * @param {number[]} aspects width by height of each image
+ * @param {number[]} aspects width / height of each image
  * @param {number} width
  * @param {number} height
  * @returns {Box[]}
@@ -36,7 +36,7 @@ export function layOut(aspects, width, height) {
 }
 
 /**
- * Fill rows in order, none longer than it must be for their number. Equal images then stand in columns.
+ * Fill rows in order, each with the fewest images that the number of rows allows. Equal images then align in columns.
  *
  * @param {number[]} aspects
  * @param {number} count

@@ -1,11 +1,11 @@
-/** The small panel at a pane for brightness, contrast and gamma of its image. */
+/** Popover for brightness, contrast and gamma of a camera's image. */
 
 import { byId } from "../widgets/elements.js";
 import { PLAIN, isPlain } from "../model/image_tone.js";
 import { slider, togglePopover } from "../widgets/popovers.js";
 
 const signed = (/** @type {number} */ value) => (value > 0 ? `+${value}` : String(value));
-/** The slider of gamma runs evenly over its logarithm: as far down as up. */
+/** The gamma slider is logarithmic and symmetric about 1. */
 const GAMMA_STEPS = 100;
 const MAX_GAMMA = 5;
 
@@ -41,13 +41,13 @@ export class ImageToneMenu {
   }
 
   /**
-   * Open the panel for a camera at a button, or close it where it is open for that camera.
+   * Open the popover for a camera at a button, or close it if it is open for that camera.
    *
    * @param {number} camera
    * @param {HTMLElement} button
    */
   toggle(camera, button) {
-    // The press on the button of an open panel has closed it by now: the click must not open it again.
+    // The press on the button has already closed the popover: this click must not open it again.
     const isClosing = camera === this.#camera && performance.now() - this.#closedAt < 250;
     if (isClosing) return;
     if (this.#panel.matches(":popover-open") && camera !== this.#camera) this.#panel.hidePopover();
@@ -74,8 +74,8 @@ export class ImageToneMenu {
     const control = slider({
       label,
       title,
-      least: -100,
-      most: 100,
+      min: -100,
+      max: 100,
       step: 2,
       format: (value) => (isGamma ? gammaOf(value).toFixed(2) : signed(value)),
       onInput: (value) =>
@@ -107,7 +107,7 @@ export class ImageToneMenu {
   }
 }
 
-/** @param {number} step from -100 to 100 */
+/** @param {number} step -100 to 100 */
 function gammaOf(step) {
   return MAX_GAMMA ** (step / GAMMA_STEPS);
 }

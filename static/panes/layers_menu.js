@@ -1,4 +1,4 @@
-/** The menu of the layers, and the few that are one click away. */
+/** Popover of all layers, and switches of the most important ones in the top bar. */
 
 import { button, byId } from "../widgets/elements.js";
 import { BY_KEY, LAYERS } from "../model/layers.js";
@@ -67,7 +67,7 @@ export class LayersMenu {
     const heading = document.createElement("h3");
     heading.textContent = group;
     this.#panel.append(heading);
-    // As they lie over one another: the uppermost comes first.
+    // In painting order, topmost first.
     for (const info of LAYERS.filter((layer) => layer.group === group).reverse()) {
       this.#panel.append(...this.#row(info));
       if (info.id === "contours") this.#panel.append(this.#colors());
@@ -87,8 +87,8 @@ export class LayersMenu {
     const opacity = slider({
       label: `Opacity of ${label.toLowerCase()}`,
       title: `Opacity of ${label.toLowerCase()}`,
-      least: 5,
-      most: 100,
+      min: 5,
+      max: 100,
       step: 5,
       format: (value) => `${value}%`,
       onInput: (value) => this.#layers.setOpacity(id, value / 100),

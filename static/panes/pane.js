@@ -1,4 +1,4 @@
-/** One camera's pane: two canvases, what stands in its corners, zoom and pan. */
+/** Pane of one camera: two canvases, labels in the corners, zoom and pan. */
 
 import * as drawing from "./drawing.js";
 import { drawPins } from "./pin_drawing.js";
@@ -12,15 +12,15 @@ import { keyOf } from "../model/pictures.js";
 import { TonedImage } from "./toned_image.js";
 import { drawsInSoftware } from "../widgets/webgl.js";
 
-// Without a graphics card one opaque canvas is laid on the screen sooner than a transparent one over another.
+// Software rendering composites one opaque canvas faster than two.
 const IN_SOFTWARE = drawsInSoftware();
 const WHEEL_ZOOM = 0.0015;
 const PINCH_ZOOM = 0.01;
 const LINE_PX = 16;
-/** Below this width words give way to signs. */
+/** Below this width, labels are shortened. */
 const NARROW_PX = 250;
-/** A picture may have this share of the pixels that its pane shows along either side, up to that: a splitter that is drawn
- * does not ask for new ones all the way. */
+/** Accepted range of picture pixels per displayed pixel, per side. Within it, resizing the pane does not request new
+ * pictures. */
 const [ENOUGH, MORE_THAN_ENOUGH] = [0.95, 1.25];
 
 export class Pane {
@@ -62,7 +62,7 @@ export class Pane {
     this.element.addEventListener("wheel", (event) => this.#zoom(event), { passive: false });
   }
 
-  /** The element that takes the pointer. */
+  /** The element that receives pointer events. */
   get surface() {
     return this.#overlay;
   }
@@ -72,8 +72,8 @@ export class Pane {
   }
 
   /**
-   * How many pixels of the image, along either side, this pane can do with one for; 0 where it is not seen. A picture as large as
-   * its pane is made, sent, decoded and drawn in a fraction of the time that the whole image takes.
+   * Image pixels per displayed pixel, per side, that this pane needs; 0 if it is not visible. Reduced pictures are sent and
+   * drawn much faster than full images.
    */
   get reduction() {
     if (this.#size.width === 0 || this.#size.height === 0) return 0;
@@ -84,7 +84,7 @@ export class Pane {
     return this.#reduction;
   }
 
-  /** Show the whole image. */
+  /** Reset zoom and pan. */
   reset() {
     this.view.reset();
     this.#redraw();
@@ -100,7 +100,7 @@ export class Pane {
   }
 
   /**
-   * Screen position, in CSS pixels of the pane, of a pointer event.
+   * Position of a pointer event in the pane, CSS pixels.
    *
    * @param {MouseEvent} event
    */
@@ -109,14 +109,14 @@ export class Pane {
     return { x: event.clientX - box.left, y: event.clientY - box.top };
   }
 
-  /** The joints that a hand can take in this view, and where they lie in the pane; of people who are dimmed none. */
+  /** Joints of this view that can be dragged, with their positions in the pane. Dimmed people have none. */
   graspableHandles() {
     const { session, hover, dragging, state } = this.#store.facts;
     const placed = this.#placedHandles().filter(({ handle }) => !isDimmed(state, handle.person));
     return decluttered(placed, session?.people ?? [], dragging ? hover : null);
   }
 
-  /** All joints of this view, and where they lie in the pane. */
+  /** All joints of this view, with their positions in the pane. */
   #placedHandles() {
     const handles = this.#store.facts.overlay?.handles ?? [];
     return handles
@@ -125,7 +125,7 @@ export class Pane {
   }
 
   /**
-   * Take over the place that the layout gave; canvases that show nothing keep no memory.
+   * Move the pane to its place in the grid. Hidden panes free their canvases.
    *
    * @param {import("./grid_layout.js").Box | null} box
    */
@@ -140,7 +140,7 @@ export class Pane {
     else this.#image.width = this.#image.height = this.#overlay.width = this.#overlay.height = 0;
   }
 
-  /** Draw once on the next animation frame, however often the view moves before it. */
+  /** Draw on the next animation frame, once for all moves of the view until then. */
   #redraw() {
     if (this.#redrawScheduled) return;
     this.#redrawScheduled = true;
@@ -152,9 +152,9 @@ export class Pane {
   }
 
   /**
-   * Draw now; called within an animation frame.
+   * Draw now, within an animation frame.
    *
-   * @param {boolean} withPictures whether the pictures under the vectors changed too
+   * @param {boolean} withPictures whether the pictures below the vectors changed too
    */
   draw(withPictures) {
     const { width, height } = this.#size;
@@ -249,7 +249,7 @@ export class Pane {
     event.preventDefault();
     const { x, y } = this.locate(event);
     const delta = event.deltaY * (event.deltaMode === WheelEvent.DOM_DELTA_LINE ? LINE_PX : 1);
-    // Browsers report a pinch as a wheel with the control key held.
+    // Browsers report a pinch as a wheel event with the Ctrl key.
     this.view.zoomAt(x, y, Math.exp(-delta * (event.ctrlKey ? PINCH_ZOOM : WHEEL_ZOOM)));
     this.#store.set({ hover: null });
     this.#redraw();

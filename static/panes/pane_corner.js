@@ -1,4 +1,4 @@
-/** What stands in the corners of a pane: the camera, the selected joint's visibility, the cost; scale, tools. */
+/** Labels in the corners of a pane: camera, visibility of the selected joint, cost, scale and tools. */
 
 import { px } from "../widgets/text.js";
 
@@ -8,7 +8,7 @@ const SCALE_FROM_PX = 230;
  * @typedef {"visible" | "hidden" | "outside"} Visibility
  */
 
-/** As the joints are drawn: full where one sees them, hollow where something hides them. */
+/** Filled for visible joints, hollow for hidden ones, as the joints are drawn. */
 const MARKS = { visible: "●", hidden: "○", outside: "⊘" };
 const MEANINGS = {
   visible: "is visible in this view",
@@ -85,21 +85,21 @@ export class PaneCorner {
     this.#cost.textContent = px(cost);
   }
 
-  /** @param {import("../model/store.js").Placeholder | null} placeholder which frame is shown in place of which */
+  /** @param {import("../model/store.js").Placeholder | null} placeholder the frame that is shown and the frame that is loading */
   showPlaceholder(placeholder) {
     this.#placeholder.hidden = placeholder === null || placeholder.frame === placeholder.target;
     if (!placeholder) return;
-    const word = document.createElement("span"); // there is no room for it in a narrow pane
+    const word = document.createElement("span"); // hidden in a narrow pane
     word.textContent = "frame ";
     this.#placeholder.replaceChildren(word, `${placeholder.frame}, while ${placeholder.target} loads`);
   }
 
-  /** @param {boolean} isReset whether the whole image is shown already */
+  /** @param {boolean} isReset whether the whole image is shown */
   showZoom(isReset) {
     this.#fit.hidden = isReset;
   }
 
-  /** @param {boolean} isChanged whether the image is shown otherwise than it is */
+  /** @param {boolean} isChanged whether the tone was changed */
   showTone(isChanged) {
     this.#tone.classList.toggle("is-changed", isChanged);
   }
@@ -118,7 +118,7 @@ export class PaneCorner {
   }
 
   /**
-   * @param {number | null} limitPx what the darkest colour of the distance image means; null: it is not shown
+   * @param {number | null} limitPx distance of the darkest colour of the distance image; null if it is hidden
    * @param {number} paneWidth
    */
   showScale(limitPx, paneWidth) {

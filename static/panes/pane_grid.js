@@ -1,13 +1,13 @@
-/** The panes of all cameras: laid out as large as they fit, or one of them filling the grid. */
+/** Grid of the panes of all cameras, or one pane that fills it. */
 
 import { layOut } from "./grid_layout.js";
 import { Pane } from "./pane.js";
 
-/** Two digits within this time are one number. */
+/** Two digits within this time form one number. */
 const SECOND_DIGIT_MS = 700;
-/** What is drawn otherwise under the pointer. @type {(keyof import("../model/store.js").Facts)[]} */
+/** Facts that change the highlights. @type {(keyof import("../model/store.js").Facts)[]} */
 const HOVERED = ["hover", "hoverPart", "pinHover", "heldPin"];
-/** What changes the pictures under the vectors. @type {(keyof import("../model/store.js").Facts)[]} */
+/** Facts that change the pictures. @type {(keyof import("../model/store.js").Facts)[]} */
 const PICTURED = ["shown", "placeholder", "layers", "imageTones"];
 
 /** @typedef {{watch: (pane: Pane, camera: number) => void}} PointerTarget handles the pointer in a pane */
@@ -29,7 +29,7 @@ export class PaneGrid {
    * @param {HTMLElement} element
    * @param {import("../model/store.js").Store} store
    * @param {import("../model/latency.js").Latency} latency
-   * @param {(camera: number, button: HTMLElement) => void} openToneMenu opens brightness and contrast of a camera
+   * @param {(camera: number, button: HTMLElement) => void} openToneMenu opens the tone popover of a camera
    */
   constructor(element, store, latency, openToneMenu) {
     this.#openToneMenu = openToneMenu;
@@ -38,12 +38,12 @@ export class PaneGrid {
     this.#latency = latency;
     store.subscribe((changed) => this.#update(changed));
     new ResizeObserver(() => this.#layOut()).observe(element);
-    // Moving the window to another screen changes the size of a device pixel, not that of the element.
+    // Moving the window to another screen changes the device pixel ratio, but not the size of the element.
     addEventListener("resize", () => this.#layOut());
   }
 
   /**
-   * Let a target handle the pointer in all panes, before the targets that were added earlier.
+   * Let a target handle the pointer in all panes, before targets that were added earlier.
    *
    * @param {PointerTarget} target
    */
@@ -52,7 +52,7 @@ export class PaneGrid {
   }
 
   /**
-   * Let one pane fill the grid, or lead back where it does already.
+   * Let one pane fill the grid, or show all panes again.
    *
    * @param {number} camera
    */
@@ -62,11 +62,11 @@ export class PaneGrid {
   }
 
   /**
-   * Fill the grid with the camera of a number, counted from 1. Where there are more than nine, a second digit soon after the
-   * first makes the number of both.
+   * Fill the grid with the camera of a number, counted from 1. With more than nine cameras, two digits in quick succession
+   * form one number.
    *
    * @param {number} digit
-   * @returns whether there is such a camera, or one is meant that a second digit may yet make
+   * @returns  whether the digit was used
    */
   typeCamera(digit) {
     const now = performance.now();
@@ -81,7 +81,7 @@ export class PaneGrid {
   }
 
   /**
-   * Fill the grid with the next camera, or the one before.
+   * Fill the grid with the next or the previous camera.
    *
    * @param {1 | -1} step
    */
@@ -92,21 +92,21 @@ export class PaneGrid {
     if (count > 0) this.#store.set({ filled: next, active: next });
   }
 
-  /** Open brightness and contrast of the pane under the pointer, else of the one worked in. */
+  /** Open the tone popover of the pane under the pointer, or else of the active pane. */
   openToneMenu() {
     const under = this.panes.findIndex((pane) => pane.element.matches(":hover"));
     const camera = under >= 0 ? under : (this.#store.facts.filled ?? this.#store.facts.active ?? 0);
     if (camera < this.panes.length) this.#openToneMenu(camera, this.panes[camera].toneButton);
   }
 
-  /** Show whole images: in the pane under the pointer, or else in all. */
+  /** Reset the view of the pane under the pointer, or else of all panes. */
   resetViews() {
     const under = this.panes.filter((pane) => pane.element.matches(":hover"));
     for (const pane of under.length ? under : this.panes) pane.reset();
   }
 
   /**
-   * Where an undistorted pixel lies in the window.
+   * Window position of an undistorted pixel.
    *
    * @param {number} camera
    * @param {number} u
@@ -126,7 +126,7 @@ export class PaneGrid {
     if (changed.has("target")) this.#ask(this.panes.map((pane) => pane.reduction));
     if (changed.has("active") || changed.has("session")) this.#markActive();
     const withPictures = PICTURED.some((fact) => changed.has(fact));
-    // A new state comes with every move of a drag; only its choice of what to draw concerns the vectors.
+    // Each move of a drag changes the state, but only these fields of it change the vectors.
     const { person, point, solo } = this.#store.facts.state ?? {};
     const choice = JSON.stringify([person, point, solo]);
     const hovered = HOVERED.some((fact) => changed.has(fact));
@@ -148,7 +148,7 @@ export class PaneGrid {
 
   #build() {
     const cameras = this.#store.facts.session?.cameras ?? [];
-    // The session comes again with each connection: zoom and filled pane outlast it where the cameras are the same.
+    // The session is sent again on each connection. With the same cameras, zoom and filled pane remain.
     const described = JSON.stringify(cameras);
     if (described === this.#cameras) return;
     this.#cameras = described;
@@ -182,7 +182,7 @@ export class PaneGrid {
     this.#ask(this.panes.map((pane) => pane.reduction));
   }
 
-  /** Ask for finer pictures where one has zoomed in; coarser ones would save nothing before the next frame. */
+  /** Request finer pictures after zooming in. Coarser pictures can wait for the next frame. */
   #refine() {
     const { reductions } = this.#store.facts;
     this.#ask(this.panes.map((pane, camera) => Math.min(pane.reduction, reductions[camera] ?? pane.reduction)));

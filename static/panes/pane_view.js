@@ -1,15 +1,15 @@
 /**
- * Where an image lies in its pane: zoom and centre, kept in image terms so that resizing the pane shows the same spot.
+ * Zoom and centre of an image in its pane. The centre is an image position, so that it stays when the pane is resized.
  *
- * Image positions are undistorted pixels with pixel centres at integers, so that the image spans -0.5 to width - 0.5;
- * screen positions are CSS pixels from the pane's upper left corner.
+ * Image positions are undistorted pixels with pixel centres at integers, so an image spans -0.5 to width - 0.5. Screen
+ * positions are CSS pixels from the upper left corner of the pane.
  */
 
 const MIN_ZOOM = 0.25;
 const MAX_ZOOM = 40;
 
 export class PaneView {
-  /** 1 shows the whole image as large as the pane allows. */
+  /** 1 if the whole image fits the pane. */
   zoom = 1;
   #image;
   #pane = { width: 1, height: 1 };
@@ -42,7 +42,7 @@ export class PaneView {
     };
   }
 
-  /** Where the whole image lies on the screen, in CSS pixels. */
+  /** Box of the whole image on the screen, CSS pixels. */
   get place() {
     const { x, y } = this.toScreen(-0.5, -0.5);
     return { x, y, width: this.#image.width * this.scale, height: this.#image.height * this.scale };
@@ -80,7 +80,7 @@ export class PaneView {
   }
 
   /**
-   * Zoom so that what lies under a screen position stays there.
+   * Zoom about a screen position, which keeps its image position.
    *
    * @param {number} x
    * @param {number} y
@@ -107,7 +107,7 @@ export class PaneView {
   }
 
   /**
-   * The pane's middle stays on the image, so that an image is never lost from sight.
+   * Move the centre, which stays inside the image.
    *
    * @param {number} du
    * @param {number} dv

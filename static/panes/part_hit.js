@@ -1,12 +1,12 @@
-/** Which part of a body lies under the pointer. */
+/** Find the body part under the pointer. */
 
 /**
- * The nearest of the parts whose outline holds an image position; null where none does.
+ * The nearest part whose outline contains an image position; null if there is none.
  *
  * @param {import("../model/protocol.js").Overlay} overlay
  * @param {number} camera
  * @param {{u: number, v: number}} at
- * @param {(person: number) => boolean} isMeant whose parts count
+ * @param {(person: number) => boolean} isMeant whether a person's parts are included
  */
 export function partAt(overlay, camera, { u, v }, isMeant) {
   /** @type {import("../model/protocol.js").Outline | null} */
@@ -19,7 +19,7 @@ export function partAt(overlay, camera, { u, v }, isMeant) {
 }
 
 /**
- * A convex outline holds what lies on the same side of all its segments.
+ * Whether a convex outline contains a position: it is on the same side of all segments.
  *
  * @param {Float32Array} segments
  * @param {import("../model/protocol.js").Outline} outline

@@ -1,4 +1,4 @@
-/** Draws the pins of one view, how far the model is off them, and where they meet. All sizes are CSS pixels. */
+/** Draw the pins of a view, their distance to the model, and their triangulated point. All sizes are CSS pixels. */
 
 /**
  * @typedef {import("../model/protocol.js").PinMark} PinMark
@@ -6,23 +6,23 @@
  */
 
 const HALO = "rgba(0, 0, 0, 0.55)";
-/** The joint worked on: its pins, their lines and the place where they meet. */
+/** Colour of the pins of the selected joint, their lines and their triangulated point. */
 const CHOSEN = "#ffd54a";
 const OFF = "#ff8a7a";
-/** How strongly the pins of people are drawn who are not worked on. */
+/** Opacity of the pins of other people. */
 const OTHERS = 0.4;
 const STEM = 15;
 const HEAD_RADIUS = 5;
-/** How far from the middle of its head a pin can be taken. */
+/** Picking radius of a pin's head. */
 export const HEAD_REACH = 9;
-/** How far from its point, where no joint lies that a hand could mean. */
+/** Picking radius of a pin's point, where no joint is nearer. */
 export const POINT_REACH = 6;
 const MEETING_RADIUS = 5;
 const MIN_ERROR_PX = 2;
 
 /**
- * The pins of a view and where they lie in its pane: as the program drew them last, but for the one in the hand. A pin
- * stands on the place it means, so that its head can be taken where a joint lies under it; at the upper border it hangs.
+ * The pins of a view with their positions in the pane. The dragged pin is at the pointer. The head is above the point, so
+ * that it can be picked where a joint covers the point; at the upper border it is below.
  *
  * @param {import("../model/store.js").Facts} facts
  * @param {import("./pane_view.js").PaneView} view
@@ -57,7 +57,7 @@ export function drawPins(context, view, facts, camera, paneWidth) {
   const { state, session, pinHover, overlay } = facts;
   if (!state || !session) return;
   const isChosen = (/** @type {PlacedPin} */ { pin }) => pin.person === state.person && pin.point === state.point;
-  // Those of the joint worked on are drawn last, over the others, and those of other people first.
+  // Pins of other people are drawn first, pins of the selected joint last.
   const rank = (/** @type {PlacedPin} */ one) => Number(one.pin.person === state.person) + Number(isChosen(one));
   const placed = placedPins(facts, view, camera).sort((a, b) => rank(a) - rank(b));
   const strengthOf = (/** @type {PlacedPin} */ { pin }) => (pin.person === state.person ? 1 : OTHERS);
@@ -87,7 +87,7 @@ function describe({ point, u, v, model_u, model_v }) {
 }
 
 /**
- * The line from a pin to where the model has the joint.
+ * Draw the line from a pin to the joint of the model.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {import("./pane_view.js").PaneView} view
@@ -128,7 +128,7 @@ function drawPin(context, { x, y, headX, headY }, color, isGrown) {
 }
 
 /**
- * Where in this view the point lies in which the pins of the joint worked on meet, and how far this view's pin is from it.
+ * Draw the triangulated point of the selected joint's pins, and its distance to the pin of this view.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {import("./pane_view.js").PaneView} view
@@ -151,7 +151,7 @@ function drawMeeting(context, view, overlay, camera, paneWidth) {
 }
 
 /**
- * Stroke with a dark halo, so that any colour shows on any image.
+ * Stroke with a dark halo, so that the line is visible on any image.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {Path2D} line
@@ -169,11 +169,11 @@ function strokeWithHalo(context, line, color, width) {
 }
 
 /**
- * Lines of text beside a place, on the side where the pane has room; the first counts, the others explain.
+ * Draw lines of text beside a position, on the side with more room. The first line is brighter.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {number} x
- * @param {number} y of the first line's middle
+ * @param {number} y centre of the first line
  * @param {string[]} lines
  * @param {number} paneWidth
  */

@@ -1,16 +1,16 @@
 /**
- * While a frame is on its way the nearest one at hand stands in for it: its images only, marked in each pane, and nothing that
- * a hand could take. Frames that come at once, as in playing, need none.
+ * Show the nearest cached frame while the requested frame is loading. Only its images are shown, marked in each pane, and
+ * nothing can be dragged. Frames that load quickly, as in playback, need no placeholder.
  */
 
-/** So far a frame may be away and so long take before another stands in: it may be decoded already. */
+/** Frames farther away than this get a placeholder immediately, nearer ones after a delay. */
 const [STEP, PATIENCE_MS] = [2, 25];
 
 export class PlaceholderFrames {
   #store;
   #recent;
-  /** @type {number | null} the frame that is waited for */
-  #awaited = null;
+  /** @type {number | null} the frame that is loading */
+  #loading = null;
 
   /**
    * @param {import("../model/store.js").Store} store
@@ -20,31 +20,31 @@ export class PlaceholderFrames {
     this.#store = store;
     this.#recent = recent;
     store.subscribe((changed) => {
-      if (["target", "shown", "playing", "connected"].some((fact) => changed.has(/** @type {any} */ (fact)))) this.#look();
+      if (["target", "shown", "playing", "connected"].some((fact) => changed.has(/** @type {any} */ (fact)))) this.#update();
     });
   }
 
-  /** The frame to wait for, or null where nothing has to stand in. */
-  get #late() {
+  /** The frame that is loading; null if no placeholder is needed. */
+  get #loadingFrame() {
     const { connected, shown, state, target, playing } = this.#store.facts;
-    const follows = state?.track.running && state.follow; // then the program is always a little ahead
+    const follows = state?.track.running && state.follow; // then the program is always slightly ahead
     return connected && shown && !playing && !follows && shown.frame !== target ? target : null;
   }
 
-  #look() {
-    const late = this.#late;
-    if (late === this.#awaited) return;
-    this.#awaited = late;
-    if (late === null) this.#store.facts.placeholder && this.#store.set({ placeholder: null });
-    // A hand that scrubs on sees the next one at once, and so does who goes far: the true one takes its time.
-    else if (this.#store.facts.placeholder || Math.abs(late - (this.#store.facts.shown?.frame ?? late)) > STEP) this.#stand();
-    else setTimeout(() => this.#stand(), PATIENCE_MS);
+  #update() {
+    const loading = this.#loadingFrame;
+    if (loading === this.#loading) return;
+    this.#loading = loading;
+    if (loading === null) this.#store.facts.placeholder && this.#store.set({ placeholder: null });
+    // While scrubbing, and for distant frames, show the placeholder immediately.
+    else if (this.#store.facts.placeholder || Math.abs(loading - (this.#store.facts.shown?.frame ?? loading)) > STEP) this.#showNearest();
+    else setTimeout(() => this.#showNearest(), PATIENCE_MS);
   }
 
-  /** Let the nearest frame stand in. */
-  #stand() {
+  /** Show the nearest cached frame. */
+  #showNearest() {
     const { shown, reductions } = this.#store.facts;
-    const target = this.#awaited;
+    const target = this.#loading;
     if (target === null) return;
     const cameras = [...reductions.keys()].filter((camera) => reductions[camera] > 0);
     const nearest = this.#recent.nearest(target, cameras);

@@ -1,4 +1,4 @@
-/** An image with another tone curve: made once for each picture and tone, and kept until either changes. */
+/** Apply a tone curve to an image, once for each picture and tone. */
 
 import { isPlain, toneCurve } from "../model/image_tone.js";
 
@@ -13,7 +13,7 @@ export class TonedImage {
   /**
    * @param {ImageBitmap | OffscreenCanvas} bitmap
    * @param {import("../model/image_tone.js").ImageTone | undefined} tone
-   * @returns {CanvasImageSource & {width: number, height: number}} the bitmap itself where the tone is plain
+   * @returns {CanvasImageSource & {width: number, height: number}} the bitmap itself if the tone is plain
    */
   of(bitmap, tone) {
     if (!tone || isPlain(tone)) {

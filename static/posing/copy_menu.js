@@ -1,4 +1,4 @@
-/** The menu of poses that can be copied: of the others on this frame, of the frames beside it, of the nearest keyframes. */
+/** Menu of poses to copy: of other people, of the neighbouring frames and of the nearest keyframes. */
 
 import { byId } from "../widgets/elements.js";
 

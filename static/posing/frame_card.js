@@ -1,10 +1,10 @@
-/** What the tracker says of the shown frame: a line in the corner of the panes that opens to the cost of each part. */
+/** Card with the status of the current frame, which opens to the cost of each body part. */
 
 import { button, byId } from "../widgets/elements.js";
 import { px } from "../widgets/text.js";
 
 const STORED_OPEN = "quadrille.parts-open";
-/** A bar as long as this cost fills its row: what costs more looks no worse. */
+/** Cost of a full bar; higher costs look the same. */
 const FULL_PX = 6;
 
 export class FrameCard {
@@ -49,7 +49,7 @@ export class FrameCard {
 }
 
 /**
- * The order of parts in two columns: those of the trunk, then each part of the left beside that of the right. Null is a gap.
+ * Order parts in two columns: the trunk first, then each left part beside the right one. Null is a gap.
  *
  * @param {string[]} names
  */
@@ -63,14 +63,14 @@ function leftBesideRight(names) {
   return [...trunk, ...(trunk.length % 2 ? [null] : []), ...pairs.flat()];
 }
 
-/** An empty place in a row; a value too, so that every second value ends a row. */
+/** An empty cell. It is an output element, because every second output ends a row. */
 function gap() {
   return [document.createElement("output")];
 }
 
 /**
  * @param {string} name
- * @param {number | null} cost px; null for a part that no view sees
+ * @param {number | null} cost px; null for a part that is visible in no view
  */
 function row(name, cost) {
   const label = document.createElement("span");

@@ -1,4 +1,4 @@
-/** The bar under the views: the selected joint, its degrees of freedom as numbers, locks, steps, whole-pose edits. */
+/** Inspector below the views: selected joint, degrees of freedom as numbers, locks, step sizes and edits of the whole pose. */
 
 import { CopyMenu } from "./copy_menu.js";
 import { button, byId } from "../widgets/elements.js";
@@ -9,9 +9,9 @@ import { displayName } from "../widgets/text.js";
 const LOCK = '<path d="M4 7.5h8v5.5H4zM5.5 7.5V5.2a2.5 2.5 0 0 1 5 0v2.3" />';
 const UNLOCKED = '<path d="M4 7.5h8v5.5H4zM5.5 7.5V4.2a2.5 2.5 0 0 1 4.7-1.2" />';
 const UNITS = { deg: "°", cm: "cm" };
-/** How far a number goes for a CSS pixel that its name is drawn sideways. */
+/** Change of a value per CSS pixel when its name is dragged sideways. */
 const PER_PIXEL = { deg: 0.5, cm: 0.2 };
-/** More degrees of freedom than these are named in short. */
+/** Above this number of degrees of freedom, short names are used. */
 const MAX_FULL_NAMES = 3;
 
 /** @typedef {{dof: number, row: HTMLElement, entry: import("../widgets/number_field.js").NumberField, lock: HTMLButtonElement}} Field */
@@ -50,7 +50,7 @@ export class Inspector {
     new CopyMenu(store, posing);
     this.#addStep("step-cm", "cm", "Step of the arrow keys in centimetres (Shift: ×10, Ctrl: ×0.1)");
     this.#addStep("step-deg", "deg", "Step of + and - in degrees");
-    // A row of many fields goes sideways under the wheel.
+    // The wheel scrolls a long row of fields sideways.
     this.#list.addEventListener("wheel", (event) => {
       this.#list.scrollLeft += event.deltaY + event.deltaX;
     });
@@ -61,7 +61,7 @@ export class Inspector {
     this.#enable(element);
   }
 
-  /** Put the cursor where the selected degree of freedom is typed in. */
+  /** Focus the number field of the selected degree of freedom. */
   type() {
     const selected = this.#fields.find(({ dof }) => dof === this.#store.facts.dof);
     selected?.row.scrollIntoView({ block: "nearest", inline: "nearest" });
@@ -74,7 +74,7 @@ export class Inspector {
   }
 
   /**
-   * @param {string} id of the place
+   * @param {string} id of the element to replace
    * @param {"cm" | "deg"} unit
    * @param {string} name
    */
@@ -127,7 +127,8 @@ export class Inspector {
     const name = info.joint === point ? info.name : `${displayName(info.joint)} ${info.name}`;
     const row = document.createElement("div");
     row.className = isShort ? "dof is-short" : "dof";
-    row.title = `${displayName(info.joint)} ${info.name}, ${range(info)}. Drag the name sideways to change it (Shift: fine steps). U selects the next, + and - change the selected one.`;
+    const hint = "Drag the name sideways to change it (Shift: fine steps). U selects the next, + and - change the selected one.";
+    row.title = `${displayName(info.joint)} ${info.name}, ${range(info)}. ${hint}`;
     const label = document.createElement("span");
     label.className = "dof-name";
     label.textContent = isShort ? info.name.slice(0, 3) : name;

@@ -1,4 +1,4 @@
-/** The pins of the selected joint in figures, and what can be done with pins. */
+/** Pins of the selected joint: their number, error and actions. */
 
 import { button, byId } from "../widgets/elements.js";
 
@@ -54,7 +54,7 @@ export class PinBar {
 
   /**
    * @param {string} joint
-   * @param {number} ofPerson pins of the person on this frame
+   * @param {number} ofPerson number of pins of the active person on this frame
    */
   #figure(joint, ofPerson) {
     const { overlay } = this.#store.facts;

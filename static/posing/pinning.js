@@ -1,6 +1,6 @@
 /**
- * Pins under the pointer: set where it clicks, dragged by their heads, removed. It watches a pane before the gestures that
- * drag joints and views do, and keeps from them what is meant for a pin.
+ * Pointer gestures on pins: a click sets a pin, a drag of its head moves it, a right click removes it. Pins get pointer
+ * events before joints and views, and stop those that they handle.
  */
 
 import { scopePerson } from "../model/selectors.js";
@@ -8,7 +8,7 @@ import { GRAB_RADIUS } from "../panes/declutter.js";
 import { HEAD_REACH, POINT_REACH, isSame, placedPins } from "../panes/pin_drawing.js";
 
 const DRAG_THRESHOLD = 3;
-/** How long a pin that was let go waits to be drawn by the program. */
+/** Maximum time that a released pin waits for the program's overlay. */
 const RESPONSE_MS = 600;
 
 /**
@@ -41,7 +41,7 @@ export class Pinning {
     });
   }
 
-  /** Let each click set a pin of the selected joint, or end that. */
+  /** Toggle the mode in which each click pins the selected joint. */
   toggle() {
     const { pinning, state } = this.#store.facts;
     if (!pinning && !state?.point) this.#say("Select a joint first: click it in a view, then press X.");
@@ -52,7 +52,7 @@ export class Pinning {
     this.#store.set({ livePins: !this.#store.facts.livePins });
   }
 
-  /** Put back a pin in the hand, else end the mode in which clicks set pins; says whether there was anything. */
+  /** Revert the drag of a pin, or else end pin mode. Returns whether there was anything to cancel. */
   cancel() {
     if (this.#held) {
       if (this.#held.begun) this.#message("cancel", this.#held.pin);
@@ -64,7 +64,7 @@ export class Pinning {
     return wasOn;
   }
 
-  /** Remove the pin under the pointer, or else those of the selected joint. */
+  /** Remove the pin under the pointer, or else the pins of the selected joint. */
   remove() {
     const { pinHover, state, overlay } = this.#store.facts;
     if (pinHover) this.#unpin(pinHover.person, pinHover.point, pinHover.camera);
@@ -73,7 +73,7 @@ export class Pinning {
     } else this.#say("No pin to remove. Point at a pin, or select a joint that has pins.");
   }
 
-  /** Remove all pins of the person worked on, on this frame. */
+  /** Remove all pins of the active person on this frame. */
   clear() {
     const { state, overlay } = this.#store.facts;
     if (!state) return;
@@ -81,14 +81,14 @@ export class Pinning {
     else this.#say("This person has no pins on this frame.");
   }
 
-  /** Fit everybody who has been placed, or the person worked on alone, to pins and edges. */
+  /** Fit all placed people, or only the active person, to pins and edges. */
   fit() {
     const { facts } = this.#store;
     if (facts.state) this.#send({ type: "fit", frame: facts.state.frame, person: scopePerson(facts) });
   }
 
   /**
-   * Watch the pointer in a pane.
+   * Handle the pointer in a pane.
    *
    * @param {Pane} pane
    * @param {number} camera
@@ -102,13 +102,13 @@ export class Pinning {
     surface.addEventListener("pointerleave", () => this.#store.facts.pinHover && this.#store.set({ pinHover: null }));
     surface.addEventListener("contextmenu", (event) => event.preventDefault());
     surface.addEventListener("dblclick", (event) => {
-      // Two pins in a row are not a wish for a larger pane.
+      // A double-click that sets two pins must not fill the grid.
       if (this.#store.facts.pinning || this.#store.facts.pinHover || event.ctrlKey) event.stopImmediatePropagation();
     });
   }
 
   /**
-   * The pin that a pointer means: by its head, or by its point where no joint is nearer.
+   * The pin under the pointer: by its head, or by its point if no joint is nearer.
    *
    * @param {Pane} pane
    * @param {number} camera
@@ -127,7 +127,7 @@ export class Pinning {
   }
 
   /**
-   * The joint under a pointer.
+   * The joint under the pointer.
    *
    * @param {Pane} pane
    * @param {{x: number, y: number}} at
@@ -164,7 +164,7 @@ export class Pinning {
       this.#say("Select a joint first: click it in a view, then Ctrl+click to pin it.");
       return;
     }
-    // Where joints crowd, a click means the selected one, whatever pin of another stands there.
+    // Among crowded joints, a click refers to the selected joint, even if another joint's pin is nearer.
     const isOwn = hit && (!isSetting || (hit.person === joint?.person && hit.point === joint.point));
     const pointer = pane.view.toImage(at.x, at.y);
     const model = { model_u: null, model_v: null };
@@ -199,7 +199,7 @@ export class Pinning {
     if (event.pointerId !== held.pointer) return;
     const at = held.pane.locate(event);
     const isFar = Math.hypot(at.x - held.start.x, at.y - held.start.y) >= DRAG_THRESHOLD;
-    // A click is never quite still: a pin that was just set stays where the button went down.
+    // Small movements during a click do not move the pin.
     if (!isFar && held.start.x !== Infinity) return;
     held.start = { x: Infinity, y: Infinity };
     if (!held.begun) this.#begin(held);
@@ -231,8 +231,8 @@ export class Pinning {
   #hover(event, pane, camera) {
     const { facts } = this.#store;
     const hit = this.#hit(pane, camera, pane.locate(event));
-    const former = facts.pinHover;
-    if (hit ? !isSame(hit, former) : former) {
+    const previous = facts.pinHover;
+    if (hit ? !isSame(hit, previous) : previous) {
       this.#store.set({ pinHover: hit && { camera, person: hit.person, point: hit.point } });
     }
     pane.surface.classList.toggle("is-over-pin", hit !== null);
@@ -243,7 +243,7 @@ export class Pinning {
   }
 
   /**
-   * The nearest place within the image.
+   * Clamp a position to the image.
    *
    * @param {number} camera
    * @param {number} u
@@ -273,7 +273,7 @@ export class Pinning {
     if (state) this.#send({ type: "unpin", frame: state.frame, person, point, camera });
   }
 
-  /** @param {boolean} isKept whether the pin stays where it was let go until the program has drawn it there */
+  /** @param {boolean} isKept whether to show the pin at its last position until the program's overlay arrives */
   #release(isKept) {
     const held = this.#held;
     if (!held) return;

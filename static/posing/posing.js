@@ -1,6 +1,6 @@
-/** Posing without a drag: which joint and degree of freedom, steps of it, mirror, copies, resets and locks. */
+/** Edit poses without a drag: selection, steps, mirror, copies, resets and locks. */
 
-/** Steps of a key that is held down are sent together, this often at most. */
+/** Minimum interval of messages while a key is held down. */
 const SEND_MS = 50;
 const REQUEST_MS = 1500;
 const STEPS_KEY = "quadrille.steps";
@@ -15,10 +15,10 @@ export class Posing {
   #store;
   #send;
   #steps = restoredSteps();
-  /** @type {Map<string, import("../model/protocol.js").PoseEdit>} steps that wait to be sent, by what they move */
+  /** @type {Map<string, import("../model/protocol.js").PoseEdit>} steps that wait to be sent, by target */
   #waiting = new Map();
   #sentAt = -Infinity;
-  /** @type {{point: string, at: number} | null} the joint asked for last, until the program has taken it */
+  /** @type {{point: string, at: number} | null} the joint requested last, until the program has confirmed it */
   #requested = null;
 
   /**
@@ -34,7 +34,7 @@ export class Posing {
     });
   }
 
-  /** How far one step goes. */
+  /** Step sizes of the keys. */
   get steps() {
     return this.#steps;
   }
@@ -45,38 +45,38 @@ export class Posing {
     localStorage.setItem(STEPS_KEY, JSON.stringify(this.#steps));
   }
 
-  /** The person worked on; null before the session is known. */
+  /** The active person; null before the session is known. */
   get person() {
     const { session, state } = this.#store.facts;
     return (state && session?.people[state.person]) ?? null;
   }
 
-  /** The selected joint; null for none. */
+  /** The selected joint; null if there is none. */
   get selected() {
-    // Keys come faster than the program's answers. An answer that never comes must not hold for long.
+    // Keys are faster than the program's answers. A request without an answer expires.
     const requested = this.#requested && performance.now() < this.#requested.at + REQUEST_MS ? this.#requested.point : null;
     return requested ?? this.#store.facts.state?.point ?? null;
   }
 
-  /** The joint worked on: the selected one, else the root. */
+  /** The joint to edit: the selected joint, or else the root. */
   get point() {
     return this.selected ?? this.person?.points[0] ?? null;
   }
 
-  /** Indices of the degrees of freedom that the joint means. */
+  /** Indices of the joint's degrees of freedom. */
   get dofs() {
     const { person, point } = this;
     return (person && point && person.point_dofs[point]) || [];
   }
 
-  /** The limb of the joint: its name, and its degrees of freedom. */
+  /** Name and degrees of freedom of the joint's limb. */
   get limb() {
     const { person, point } = this;
     return (person && point && person.point_limbs[point]) || { name: "", dofs: [] };
   }
 
   /**
-   * Select the next joint in the order of the body, or the one before.
+   * Select the next or the previous joint.
    *
    * @param {1 | -1} way
    */
@@ -109,7 +109,7 @@ export class Posing {
   }
 
   /**
-   * Move the joint parallel to the image of the active view, by a factor of the step.
+   * Move the joint parallel to the image plane of the active view, by a multiple of the step.
    *
    * @param {Way} way
    * @param {number} factor
@@ -124,7 +124,7 @@ export class Posing {
   }
 
   /**
-   * Turn (or move) the selected degree of freedom by a factor of the step.
+   * Change the selected degree of freedom by a multiple of the step.
    *
    * @param {number} factor
    */
@@ -144,7 +144,7 @@ export class Posing {
   }
 
   /**
-   * Set it again and again, as a slider does: of what waits to be sent the newest counts.
+   * Set a value repeatedly, as a slider does. Only the newest waiting value is sent.
    *
    * @param {number} dof
    * @param {number} value in degrees or centimetres
@@ -157,7 +157,7 @@ export class Posing {
     this.#edit({ ...this.#head(), action: "mirror" });
   }
 
-  /** Take the other of two poses that are about as good; said again, go back. */
+  /** Switch to the alternative pose, or back. */
   takeAlternative() {
     this.#edit({ ...this.#head(), action: "alternative" });
   }
@@ -172,7 +172,7 @@ export class Posing {
   }
 
   /**
-   * Bend as another person does on this frame; place and turn stay.
+   * Copy the joint angles of another person on this frame; position and orientation stay.
    *
    * @param {number} from
    */
@@ -180,7 +180,7 @@ export class Posing {
     if (from !== this.#head().person) this.#edit({ ...this.#head(), action: "copy_person", from });
   }
 
-  /** The same of the next person in the list. */
+  /** Copy the joint angles of the next person in the list. */
   copyNextPerson() {
     const count = this.#store.facts.session?.people.length ?? 1;
     this.copyPerson((this.#head().person + 1) % count);
@@ -194,7 +194,7 @@ export class Posing {
   }
 
   /**
-   * Lock degrees of freedom, or unlock them where all of them are locked already.
+   * Lock degrees of freedom, or unlock them if all are locked.
    *
    * @param {number[]} dofs
    */
@@ -203,7 +203,7 @@ export class Posing {
   }
 
   /**
-   * Whether all of some degrees of freedom are locked.
+   * Whether all of these degrees of freedom are locked.
    *
    * @param {number[]} dofs
    */
@@ -212,7 +212,7 @@ export class Posing {
     return dofs.length > 0 && dofs.every((dof) => locked.includes(dof));
   }
 
-  /** What every edit says: whom it is about, and the frame that the user sees. */
+  /** Fields of every edit: the active person and the frame that is shown. */
   #head() {
     const { shown, state } = this.#store.facts;
     return { type: /** @type {const} */ ("pose"), frame: shown?.frame ?? state?.frame ?? 0, person: state?.person ?? 0 };
@@ -226,7 +226,7 @@ export class Posing {
   }
 
   /**
-   * Add a step to those that wait: a key held down asks for more steps than are worth drawing.
+   * Merge a step with waiting steps of the same target, since a held key repeats faster than poses can be drawn.
    *
    * @param {string} what
    * @param {import("../model/protocol.js").PoseEdit & {action: "nudge" | "turn" | "set"}} step

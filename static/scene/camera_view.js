@@ -1,4 +1,4 @@
-/** Looking through a camera in the 3-D view: which camera is meant, and the mark on its pane. */
+/** Look through a camera in the 3-D view, and mark its pane. */
 
 export class CameraView {
   #store;
@@ -19,7 +19,7 @@ export class CameraView {
     });
   }
 
-  /** Look through the camera of the pane that fills the grid, else of the one pointed at last; or no longer. */
+  /** Look through the camera that fills the grid, or else through the active one (toggle). */
   toggle() {
     const { state, filled, active, connected } = this.#store.facts;
     if (!state || !connected) return;

@@ -1,4 +1,4 @@
-/** The 3-D view in the page's scheme: viser is dark only where its address says so. */
+/** Load the 3-D view in the page's colour scheme, which is part of viser's address. */
 
 /** @param {HTMLIFrameElement} scene */
 export function followColorScheme(scene) {
@@ -6,7 +6,7 @@ export function followColorScheme(scene) {
   const address = () => (dark.matches ? "viser/?darkMode" : "viser/");
   scene.src = address();
   dark.addEventListener("change", () => {
-    // Replaced, not visited: the browser's Back leads out of the page as before.
+    // Replace the address, so that no entry is added to the browser's history.
     const target = new URL(address(), document.baseURI).href;
     if (scene.contentWindow) scene.contentWindow.location.replace(target);
     else scene.src = target;

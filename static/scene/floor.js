@@ -1,4 +1,4 @@
-/** Setting the floor: the bar that leads through it, and clicks in the panes that mark a point of the floor. */
+/** Set the floor: a bar with instructions, and clicks in the panes that mark points on the floor. */
 
 import { button, byId } from "../widgets/elements.js";
 import { px } from "../widgets/text.js";
@@ -35,22 +35,22 @@ export class Floor {
     button("floor-cancel", () => this.cancel());
     panes.addEventListener("pointerdown", (event) => this.#down(event), { capture: true });
     panes.addEventListener("pointerup", (event) => this.#up(event), { capture: true });
-    // Two clicks in one view are two marks, not a wish for a larger pane.
+    // A double-click sets two marks and must not fill the grid.
     panes.addEventListener("dblclick", (event) => this.isOn && event.stopPropagation(), { capture: true });
     store.subscribe((changed) => changed.has("state") && this.#show());
   }
 
-  /** Whether points of the floor are being clicked. */
+  /** Whether the floor is being set. */
   get isOn() {
     return !!this.#store.facts.state?.floor;
   }
 
-  /** Begin to set the floor, or leave it. */
+  /** Start setting the floor, or cancel it. */
   toggle() {
     this.#send({ type: "floor", action: this.isOn ? "cancel" : "begin" });
   }
 
-  /** Go on to the next point; with the last one known, take the plane over. */
+  /** Continue with the next point, or apply the plane after the last one. */
   goOn() {
     const { floor } = this.#store.facts.state ?? {};
     if (floor) this.#send({ type: "floor", action: floor.point === POINTS ? "apply" : "next" });
@@ -60,12 +60,12 @@ export class Floor {
     if (this.isOn) this.#send({ type: "floor", action: "take_back" });
   }
 
-  /** Go back to the floor before the last change. */
+  /** Restore the floor before the last change. */
   revert() {
     this.#send({ type: "floor", action: "revert" });
   }
 
-  /** Leave the floor as it is; says whether it was being set. */
+  /** Cancel setting the floor. Returns whether it was being set. */
   cancel() {
     if (!this.isOn) return false;
     this.#send({ type: "floor", action: "cancel" });
@@ -97,7 +97,7 @@ export class Floor {
     this.#panes.classList.toggle("is-picking", !!floor);
     if (!floor) return;
     const isLast = floor.point === POINTS;
-    const text = `Floor, point ${floor.point} of ${POINTS}: ${said(floor)}`;
+    const text = `Floor, point ${floor.point} of ${POINTS}: ${instruction(floor)}`;
     if (this.#text.textContent !== text) this.#text.textContent = text;
     this.#next.textContent = isLast ? "Apply" : "Next point";
     this.#next.title = isLast ? "Use this plane as the floor (Enter)" : "Continue with the next point (Enter)";
@@ -107,7 +107,7 @@ export class Floor {
 }
 
 /** @param {import("../model/protocol.js").FloorPicking} floor */
-function said(floor) {
+function instruction(floor) {
   if (floor.views === 0) return "click a point on the floor";
   if (!floor.known) return floor.why;
   if (floor.point === POINTS && !floor.ready) return floor.why;

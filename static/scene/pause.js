@@ -1,13 +1,13 @@
 /**
- * Lets the 3-D view's animation frames wait where no graphics card draws them: one takes both cores for longer than a pane has time,
- * and viser draws one each second even where nothing changes.
+ * Delay animation frames of the 3-D view in software rendering. A frame keeps both cores busy for longer than the panes can
+ * wait, and viser renders one each second even if nothing changes.
  */
 
-/** So seldom it is drawn while frames go by or something is at work: a twentieth of the time may go there. */
+/** Interval of frames while the panes change or a run is active: about 5% of the time. */
 const THROTTLE_MS = 5000;
-/** Frames still go by until one has been shown for so long. */
+/** Time after the last frame change during which the panes still count as changing. */
 const SETTLED_MS = 250;
-/** So long nothing waits: once it is loaded it fades in, and in another size it is empty until it is drawn. */
+/** No delay for this long after loading, when the view fades in, and after resizing, when it is empty. */
 const [LOADED_MS, RESIZED_MS] = [8000, 500];
 
 export class ScenePause {
@@ -39,24 +39,24 @@ export class ScenePause {
     this.#freeUntil = Math.max(this.#freeUntil, performance.now() + forMs);
   }
 
-  /** Whether an animation frame has to wait. */
+  /** Whether an animation frame must wait. */
   get #waits() {
     const { state, dragging, shown, target } = this.#store.facts;
     const now = performance.now();
     if (now < this.#freeUntil) return false;
     if (dragging) return true;
-    // Whoever points at it works with it; the view through a camera belongs to its image.
+    // No delay while the user works with it, or while it shows a camera's view together with the image.
     if (this.#scene.matches(":hover") || (state?.snapped ?? null) !== null) return false;
     const isPassing = shown?.frame !== target || now < this.#sought + SETTLED_MS;
     const isAtWork = state?.job.running || state?.track.running;
     return (isPassing || isAtWork) && now < this.#drawn + THROTTLE_MS;
   }
 
-  /** @param {Window} view whose animation frames wait from now on, until it is loaded anew */
+  /** @param {Window} view whose animation frames are delayed until it is reloaded */
   #holdBack(view) {
     const request = view.requestAnimationFrame.bind(view);
     const cancel = view.cancelAnimationFrame.bind(view);
-    /** @type {Map<number, number>} the requests that wait, and the browser's number for each */
+    /** @type {Map<number, number>} delayed requests, with the browser's current number for each */
     const waiting = new Map();
     view.requestAnimationFrame = (callback) => {
       const attempt = () =>

@@ -1,4 +1,4 @@
-/** The best poses that a search came by, as stick figures over the view that tells them apart best. */
+/** Best candidates of a search as stick figures, in the view where they differ most. */
 
 import { prepare } from "../panes/drawing.js";
 import { byId } from "../widgets/elements.js";
@@ -7,7 +7,7 @@ import { selectedRun } from "../model/search_runs.js";
 
 const WIDTH = 76;
 const HEIGHT = 58;
-/** Share of the figures' height that is left around them. */
+/** Margin as a fraction of the figures' size. */
 const MARGIN = 0.08;
 
 export class CandidateStrip {
@@ -16,7 +16,7 @@ export class CandidateStrip {
   #element = byId("candidates", HTMLElement);
   #list = document.createElement("div");
   #label = document.createElement("span");
-  /** @type {unknown[]} what is drawn: a search at work tells of every step, but seldom of other candidates */
+  /** @type {unknown[]} the arguments of the last drawing; candidates change less often than steps */
   #drawn = [];
 
   /**
@@ -49,7 +49,8 @@ export class CandidateStrip {
     if (drawn.every((one, index) => one === this.#drawn[index])) return;
     this.#drawn = drawn;
     this.#label.textContent = n ? `Best, ${session?.cameras[camera]?.name ?? ""}` : "";
-    this.#label.title = "The best candidates that differ by 3 cm or more, in the view that fills the grid or else the view where they differ most";
+    this.#label.title =
+      "The best candidates that differ by 3 cm or more, in the view that fills the grid or else the view where they differ most";
     if (!found || n === 0 || !session) return;
     const box = frameOf(found, camera);
     [...this.#list.children].forEach((element, index) => {
@@ -57,7 +58,8 @@ export class CandidateStrip {
       const text = cost === null ? "–" : cost.toFixed(2);
       const output = element.querySelector("output");
       if (output) output.textContent = text;
-      /** @type {HTMLElement} */ (element).title = `Candidate ${index + 1}, ${text} px. Point at it to preview it in all views, click to use it (can be undone)`;
+      const hint = "Point at it to preview it in all views, click to use it (can be undone)";
+      /** @type {HTMLElement} */ (element).title = `Candidate ${index + 1}, ${text} px. ${hint}`;
       element.setAttribute("aria-label", `Use candidate ${index + 1}, ${text} px`);
       const canvas = element.querySelector("canvas");
       if (canvas) this.#draw(canvas, found, index, camera, box);
@@ -135,7 +137,7 @@ export class CandidateStrip {
 }
 
 /**
- * Where all candidates lie in a view, with a margin.
+ * Box of all candidates in a view, with a margin.
  *
  * @param {import("../model/search_runs.js").Candidates} found
  * @param {number} camera

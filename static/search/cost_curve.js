@@ -1,5 +1,5 @@
 /**
- * Least and tested cost against the poses scored, with the stages marked; other runs beside it. A click goes to that step.
+ * Plot of best and tested costs by number of poses evaluated, with stages and other runs. A click replays that step.
  */
 
 import { colorName } from "../timeline/curve_drawing.js";
@@ -11,7 +11,7 @@ import { count } from "../widgets/text.js";
 
 /** @typedef {import("../model/search_runs.js").Steps} Steps */
 
-/** Costs above this share of all that were tested are cut off: a few bad ones would flatten the rest. */
+/** Quantile of the tested costs at the top of the plot, so that a few high ones do not flatten the rest. */
 const SHOWN_SHARE = 0.95;
 const NAME_GAP = 70;
 const READOUT_HEIGHT = 18;
@@ -112,7 +112,8 @@ export class CostCurve {
       return;
     }
     const all = runs.map(({ number }) => /** @type {Steps} */ (searchSteps.get(number)));
-    const plot = new Plot(clientWidth, clientHeight, { least: 0, most: Math.max(...all.map((s) => s.evaluations[s.count - 1]), 1) }, costs(all), READOUT_HEIGHT);
+    const evaluations = { min: 0, max: Math.max(...all.map((s) => s.evaluations[s.count - 1]), 1) };
+    const plot = new Plot(clientWidth, clientHeight, evaluations, costs(all), READOUT_HEIGHT);
     this.#plot = plot;
     plot.drawFrame(context, style, "");
     plot.within(context, () => {
@@ -134,7 +135,7 @@ export class CostCurve {
   }
 
   /**
-   * The step replayed, the step under the pointer, and what it says.
+   * Draw the replayed step and the step under the pointer, and show its figures.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {Plot} plot
@@ -159,12 +160,13 @@ export class CostCurve {
     }
     const stage = run.stages[steps.stages[at]];
     const where = stage ? `${stage.name} ×${stage.factor} · ` : "";
-    this.#read.textContent = `${where}${count(steps.evaluations[at])} poses · tested ${steps.tested[at].toFixed(2)} · best ${steps.best[at].toFixed(2)} px`;
+    const costs = `tested ${steps.tested[at].toFixed(2)} · best ${steps.best[at].toFixed(2)} px`;
+    this.#read.textContent = `${where}${count(steps.evaluations[at])} poses · ${costs}`;
   }
 }
 
 /**
- * Name of the style's colour of a run.
+ * CSS variable with the colour of a run.
  *
  * @param {number} number
  */
@@ -178,10 +180,10 @@ export function runColor(number) {
  */
 function costs(all) {
   const tested = all.flatMap((steps) => [...steps.tested]).sort((a, b) => a - b);
-  const least = Math.min(...all.map((steps) => steps.best[steps.count - 1]));
-  const most = Math.max(tested[Math.floor(SHOWN_SHARE * (tested.length - 1))], ...all.map((steps) => steps.best[0]));
-  const margin = Math.max(0.05, 0.06 * (most - least));
-  return { least: Math.max(0, least - margin), most: most + margin };
+  const min = Math.min(...all.map((steps) => steps.best[steps.count - 1]));
+  const max = Math.max(tested[Math.floor(SHOWN_SHARE * (tested.length - 1))], ...all.map((steps) => steps.best[0]));
+  const margin = Math.max(0.05, 0.06 * (max - min));
+  return { min: Math.max(0, min - margin), max: max + margin };
 }
 
 /**
@@ -198,7 +200,7 @@ function drawTested(context, plot, steps, style) {
 }
 
 /**
- * Where stages begin, with their names as far as there is room.
+ * Draw the starts of stages, with their names where there is room.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {Plot} plot

@@ -1,4 +1,4 @@
-/** The landscape tab of the drawer: the cost over the range of one degree of freedom. Hovering reads it, a click sets the value. */
+/** Plot of the cost over the range of one degree of freedom. Hovering reads values, a click sets the value. */
 
 import { colorName } from "../timeline/curve_drawing.js";
 import { prepare } from "../panes/drawing.js";
@@ -18,11 +18,11 @@ export class CostLandscape {
   #canvas = document.createElement("canvas");
   #choice = document.createElement("select");
   #legend = document.createElement("div");
-  #toLeast;
+  #toMinimum;
   #hovered = /** @type {number | null} */ (null);
   #plot = /** @type {Plot | null} */ (null);
   #isOpen = false;
-  /** What the list of degrees of freedom was built for. */
+  /** The names that the list of degrees of freedom was built for. */
   #listed = "";
 
   /**
@@ -38,12 +38,12 @@ export class CostLandscape {
       send({ type: "landscape", dof: this.#choice.value });
       this.#choice.blur();
     });
-    this.#toLeast = makeButton("To minimum", "Set this degree of freedom to the minimum of the cost", () => {
+    this.#toMinimum = makeButton("To minimum", "Set this degree of freedom to the minimum of the cost", () => {
       const found = store.facts.landscape;
       if (found) this.#setTo(found.values[indexOfMin(found.total)]);
     });
     this.#legend.className = "landscape-legend";
-    this.#controls.append(this.#choice, this.#toLeast, this.#legend);
+    this.#controls.append(this.#choice, this.#toMinimum, this.#legend);
     this.#element.append(this.#canvas);
     store.subscribe((changed) => {
       if (changed.has("drawer")) this.#open();
@@ -94,7 +94,7 @@ export class CostLandscape {
 
   #show() {
     const { landscape: found, session } = this.#store.facts;
-    this.#toLeast.disabled = this.#choice.disabled = !found;
+    this.#toMinimum.disabled = this.#choice.disabled = !found;
     if (found && found.names.join() !== this.#listed) {
       this.#listed = found.names.join();
       const groups = new Map(found.names.map((name) => [name.split(".")[0], document.createElement("optgroup")]));
@@ -120,10 +120,12 @@ export class CostLandscape {
     const style = getComputedStyle(this.#element);
     const curves = [found.total, ...found.views];
     const known = curves.flatMap((curve) => [...curve].filter(Number.isFinite));
-    const [least, most] = [Math.min(...known, found.current_px ?? Infinity), Math.max(...known)];
-    const margin = Math.max(0.05, 0.06 * (most - least));
+    const [min, max] = [Math.min(...known, found.current_px ?? Infinity), Math.max(...known)];
+    const margin = Math.max(0.05, 0.06 * (max - min));
     const xs = found.values.map((value) => value * factor);
-    const plot = new Plot(clientWidth, clientHeight, { least: xs[0], most: xs[xs.length - 1] }, { least: Math.max(0, least - margin), most: most + margin });
+    const range = { min: xs[0], max: xs[xs.length - 1] };
+    const costs = { min: Math.max(0, min - margin), max: max + margin };
+    const plot = new Plot(clientWidth, clientHeight, range, costs);
     this.#plot = plot;
     plot.drawFrame(context, style, sign);
     plot.within(context, () => {
@@ -141,7 +143,7 @@ export class CostLandscape {
   }
 
   /**
-   * The current value, the least cost, and the value under the pointer.
+   * Draw the current value, the minimum and the value under the pointer.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {Plot} plot
@@ -159,8 +161,8 @@ export class CostLandscape {
     const isRight = now > (plot.left + plot.right) / 2;
     context.textAlign = isRight ? "right" : "left";
     context.fillText("now", now + (isRight ? -4 : 4), plot.top + 2);
-    const least = indexOfMin(found.total);
-    const [x, y] = [plot.x(found.values[least] * factor), plot.y(found.total[least])];
+    const min = indexOfMin(found.total);
+    const [x, y] = [plot.x(found.values[min] * factor), plot.y(found.total[min])];
     context.beginPath();
     context.arc(x, y, 4.5, 0, 2 * Math.PI);
     context.lineWidth = 2;
@@ -179,19 +181,21 @@ export class CostLandscape {
    * @param {string} sign
    */
   #readOut(found, hovered, factor, sign) {
-    const least = indexOfMin(found.total);
+    const min = indexOfMin(found.total);
     const at = hovered ?? nearest(found.values, found.current);
     const value = hovered === null ? found.current : found.values[at];
     const outputs = this.#legend.querySelectorAll("output");
-    const texts = [`${(value * factor).toFixed(1)}${sign}`, ...[found.total, ...found.views].map((c) => (Number.isFinite(c[at]) ? c[at].toFixed(2) : "–"))];
+    const costs = [found.total, ...found.views].map((curve) => (Number.isFinite(curve[at]) ? curve[at].toFixed(2) : "–"));
+    const texts = [`${(value * factor).toFixed(1)}${sign}`, ...costs];
     outputs.forEach((output, index) => (output.textContent = texts[index] ?? ""));
-    this.#toLeast.title = `Set it to ${(found.values[least] * factor).toFixed(1)}${sign}, the minimum of the mean cost (${found.total[least].toFixed(2)} px). Can be undone`;
+    const best = `${(found.values[min] * factor).toFixed(1)}${sign}`;
+    this.#toMinimum.title = `Set it to ${best}, the minimum of the mean cost (${found.total[min].toFixed(2)} px). Can be undone`;
     this.#element.title = hovered === null ? "" : "Click to set the value";
   }
 }
 
 /**
- * @param {string} label empty for the value itself
+ * @param {string} label empty for the value of the degree of freedom
  * @param {number} color
  */
 function legendEntry(label, color) {

@@ -1,4 +1,4 @@
-/** Replays the run that is looked at, back and forth. The stored pose stays what it is. */
+/** Replay of the selected run, forward and backward. The stored pose does not change. */
 
 import { byId, iconButton } from "../widgets/elements.js";
 import { makeButton } from "./search_widgets.js";
@@ -17,7 +17,7 @@ export class ReplayBar {
   #play;
   /** @type {ReturnType<typeof setInterval> | null} */
   #timer = null;
-  /** The step asked for last: the program's answer may be on its way. */
+  /** The step requested last. The program's answer may still be pending. */
   #requested = -1;
 
   /**
@@ -54,7 +54,7 @@ export class ReplayBar {
     store.subscribe((changed) => changed.has("state") && this.#showBadge());
   }
 
-  /** Whoever sees the panes must know that they do not show the true pose, whether the drawer is open or not. */
+  /** Show in the panes that a replay is displayed, also while the drawer is closed. */
   #showBadge() {
     const replay = this.#store.facts.state?.replay;
     this.#badge.hidden = !replay;
@@ -80,7 +80,8 @@ export class ReplayBar {
       this.#text.title = `${replay.stage ?? "start"}, ${replay.evaluations} poses evaluated${best}`;
     } else {
       this.#text.textContent = run && isReady ? `${run.steps} steps` : "";
-      this.#text.title = run?.thinned ? "Steps that can be replayed. Long searches keep only some of their steps" : "Steps that can be replayed";
+      const thinned = run?.thinned ? ". Long searches keep only some of their steps" : "";
+      this.#text.title = `Steps that can be replayed${thinned}`;
     }
   }
 

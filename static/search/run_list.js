@@ -1,4 +1,4 @@
-/** The runs of the shown frame: what each was told that differs, what it found and cost; to compare, take, or run again. */
+/** Search runs of the current frame: results, differing settings, and buttons to compare and apply. */
 
 import { runColor } from "./cost_curve.js";
 import { byId } from "../widgets/elements.js";
@@ -36,8 +36,8 @@ export class RunList {
     const runs = [...(searchRuns?.runs ?? [])].reverse();
     const numbers = runs.map(({ number }) => number);
     if (numbers.join() !== [...this.#rows.keys()].join()) {
-      const former = this.#rows;
-      this.#rows = new Map(numbers.map((number) => [number, former.get(number) ?? this.#makeRow(number)]));
+      const previous = this.#rows;
+      this.#rows = new Map(numbers.map((number) => [number, previous.get(number) ?? this.#makeRow(number)]));
       this.#list.replaceChildren(...[...this.#rows.values()].map(({ element }) => element));
       if (numbers.length === 0) this.#list.textContent = "No runs";
     }

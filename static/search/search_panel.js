@@ -1,4 +1,4 @@
-/** The search tab of the drawer: its controls, and what lies below them, each in a module of its own. */
+/** Search tab of the drawer: its controls, and the views below them. */
 
 import { hasSearch, hasTrack } from "../model/selectors.js";
 import { CandidateStrip } from "./candidate_strip.js";
@@ -11,9 +11,9 @@ import { makeButton, makeNumber } from "./search_widgets.js";
 import { selectedRun } from "../model/search_runs.js";
 import { count, px } from "../widgets/text.js";
 
-/** Expansions per second that can be watched; 0 stands for as many as there can be. */
+/** Speeds in expansions per second; 0 for no limit. */
 const SPEEDS = [1, 2, 5, 10, 30, 0];
-/** Why the cost at the top is another once the search is over. */
+/** Why the cost changes when a search ends. */
 const MEASURED = "The cost uses the edges near the start pose; the final cost in the top bar may differ";
 
 export class SearchPanel {

@@ -1,6 +1,6 @@
 /**
- * The decomposition of the search as a tree (GD96 Fig. 2), the passes beside it: what each stage searches, within which bounds
- * and by which steps, what it cost and gained, and which one is at work.
+ * Tree of the search stages (GD96 Fig. 2) with a column per pass: degrees of freedom, bounds, steps, cost and gain of each
+ * stage, and the running stage.
  */
 
 import { byId } from "../widgets/elements.js";
@@ -24,9 +24,9 @@ export class SearchTree {
   #store;
   #change;
   #element = byId("search-tree", HTMLElement);
-  /** What the tree was built for. */
+  /** The shape that the tree was built for. */
   #built = "";
-  /** @type {Map<string, HTMLElement>} cells by person, group and pass */
+  /** @type {Map<string, HTMLElement>} cells by person, stage and pass */
   #cells = new Map();
   /** @type {{field: ReturnType<typeof makeNumber>, read: (setup: import("../model/protocol.js").SearchSetupMessage) => number | null}[]} */
   #fields = [];
@@ -79,7 +79,10 @@ export class SearchTree {
 
   /** @param {import("../model/protocol.js").SearchSetupMessage} setup */
   #head(setup) {
-    const passes = setup.passes.map((factor) => cell("tree-head", `steps ×${factor}`, `Pass with steps ×${factor}: poses evaluated and reduction of the cost`));
+    const passes = setup.passes.map((factor) => {
+      const title = `Pass with steps ×${factor}: poses evaluated and reduction of the cost`;
+      return cell("tree-head", `steps ×${factor}`, title);
+    });
     return [
       cell("tree-head", "Stage", "Groups of degrees of freedom, searched one after the other"),
       cell("tree-head", "DOF", "Number of degrees of freedom searched together"),
@@ -89,7 +92,7 @@ export class SearchTree {
   }
 
   /**
-   * The root of a person's tree; of the first it holds the bounds and steps that all follow.
+   * Root row of a person. The root of the first person has the default bounds and steps.
    *
    * @param {import("../model/protocol.js").SearchSetupMessage} setup
    * @param {string} name
@@ -145,7 +148,7 @@ export class SearchTree {
   }
 
   /**
-   * What is told to all stages.
+   * Settings of all stages.
    *
    * @param {import("../model/protocol.js").SearchSetupMessage} setup
    */
@@ -157,12 +160,12 @@ export class SearchTree {
       title: "A stage ends after this many expansions without improvement",
       change: (value) => value !== null && this.#change({ patience: Math.round(value) }),
     });
-    const most = makeNumber({
+    const max = makeNumber({
       label: "Max.",
       title: "Maximum number of expansions per stage",
       change: (value) => value !== null && this.#change({ max_expansions: Math.round(value) }),
     });
-    this.#fields.push({ field: patience, read: (now) => now.patience }, { field: most, read: (now) => now.max_expansions });
+    this.#fields.push({ field: patience, read: (now) => now.patience }, { field: max, read: (now) => now.max_expansions });
     const passes = document.createElement("label");
     passes.className = "search-field";
     passes.title = "Step factors: all stages are searched once per factor. The paper uses 1";
@@ -188,7 +191,7 @@ export class SearchTree {
       box.blur();
     });
     apart.append(box, "separate limbs");
-    line.append(passes, patience.element, most.element, apart);
+    line.append(passes, patience.element, max.element, apart);
     return line;
   }
 
@@ -202,9 +205,15 @@ export class SearchTree {
       if (element.textContent !== text) element.textContent = text;
       element.classList.toggle("is-done", !!stage?.done);
       element.classList.toggle("is-running", !!stage?.running);
-      element.title = stage && text ? `${stage.name}, steps ×${stage.factor}: ${count(stage.evaluations)} poses evaluated, cost reduced by ${stage.gain_px.toFixed(3)} px${stage.running ? "; running" : ""}` : "Not searched";
+      element.title = stage && text ? describe(stage) : "Not searched";
     }
   }
+}
+
+/** @param {import("../model/protocol.js").SearchStage} stage */
+function describe({ name, factor, evaluations, gain_px, running }) {
+  const figures = `${count(evaluations)} poses evaluated, cost reduced by ${gain_px.toFixed(3)} px`;
+  return `${name}, steps ×${factor}: ${figures}${running ? "; running" : ""}`;
 }
 
 /**

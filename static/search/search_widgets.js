@@ -1,7 +1,7 @@
-/** Small controls that the search tab makes many of. */
+/** Small controls of the search tab. */
 
 /**
- * A button that gives the focus back after a click by pointer, so that keys go on to mean what they mean.
+ * Make a button that loses focus after a click by pointer, so that keys keep their meaning.
  *
  * @param {string} text
  * @param {string} title
@@ -20,8 +20,8 @@ export function makeButton(text, title, run) {
 }
 
 /**
- * A field for a number that may be empty. What is typed counts when it is entered; what the program says is shown unless
- * the field is being typed in.
+ * Make a field for an optional number. Input is sent when it is entered; values of the program are shown unless the user
+ * is typing.
  *
  * @param {{label: string, title: string, placeholder?: string, change: (value: number | null) => void}} options
  */
@@ -37,7 +37,7 @@ export function makeNumber({ label, title, placeholder = "", change }) {
   let shown = "";
   const send = () => {
     if (input.value !== shown) change(input.value === "" ? null : Number(input.value));
-    // The program's answer is what counts: it may have refused.
+    // Show the program's value, since it may have refused the input.
     input.value = shown;
   };
   input.addEventListener("change", send);

@@ -1,4 +1,4 @@
-/** Says in a live region what has changed, for those who do not see the page. */
+/** Announce changes in a live region for screen readers. */
 
 import { displayName } from "../widgets/text.js";
 
@@ -8,7 +8,7 @@ export class Announcer {
   #store;
   #region;
   /** @type {import("../model/protocol.js").StateMessage | null} what was last announced */
-  #told = null;
+  #announced = null;
   #timer = 0;
 
   /**
@@ -20,18 +20,18 @@ export class Announcer {
     this.#store = store;
     store.subscribe((changed) => {
       if (!changed.has("state")) return;
-      this.#told ??= store.facts.state;
+      this.#announced ??= store.facts.state;
       clearTimeout(this.#timer);
-      // While frames run past or a hand moves there would be no end of words.
-      this.#timer = setTimeout(() => this.#say(), SETTLED_MS);
+      // Wait until a sequence of changes has ended.
+      this.#timer = setTimeout(() => this.#announce(), SETTLED_MS);
     });
   }
 
-  #say() {
+  #announce() {
     const { state, session, playing, dragging } = this.#store.facts;
     if (!state || playing || dragging || state.track.running) return;
-    const before = this.#told ?? state;
-    this.#told = state;
+    const before = this.#announced ?? state;
+    this.#announced = state;
     const words = [];
     if (state.person !== before.person) words.push(session?.people[state.person]?.name ?? "");
     if (state.point !== before.point && state.point) words.push(`${displayName(state.point)} selected`);

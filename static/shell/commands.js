@@ -1,16 +1,16 @@
-/** Everything that can be done on the page, as a list for the palette: keys, buttons, layers, and places to jump to. */
+/** Commands of the palette: keys, buttons, layers, cameras, people, joints and frames. */
 
 import { LAYERS } from "../model/layers.js";
 import { displayName } from "../widgets/text.js";
 
 /**
  * @typedef {object} Command
- * @property {string} id stays the same from one session to the next
+ * @property {string} id the same in all sessions
  * @property {string} area
  * @property {string} label
  * @property {string[]} keys
- * @property {string} words further words that find it
- * @property {() => string | null} why why it is not possible now; null where it is
+ * @property {string} words additional search terms
+ * @property {() => string | null} why why it is unavailable; null if it is available
  * @property {() => void} run
  *
  * @typedef {object} CommandContext
@@ -20,14 +20,14 @@ import { displayName } from "../widgets/text.js";
  * @property {import("../posing/posing.js").Posing} posing
  * @property {import("../model/layers.js").Layers} layers
  * @property {import("../model/actions.js").Actions} actions
- * @property {() => string | null} away why nothing is possible while the program is away
+ * @property {() => string | null} away why all commands are unavailable while disconnected
  */
 
 const BUTTONS =
   ".top-bar button, .top-bar input, #inspector button, .transport button, .transport input, #range-bar button, .drawer-bar label";
 
 /**
- * The commands of the keys; those that want to know which of many keys was pressed have commands of their own.
+ * Commands of keys. Bindings of several keys are left out, because other commands replace them.
  *
  * @param {import("../widgets/key_matching.js").Binding[]} table
  * @returns {Command[]}
@@ -47,7 +47,7 @@ export function keyCommands(table) {
 }
 
 /**
- * Buttons and switches that no key of the table presses. Their titles name the key where there is one.
+ * Buttons and switches without a binding. A key in the title of a button refers to its binding.
  *
  * @param {import("../widgets/key_matching.js").Binding[]} table
  * @returns {Command[]}
@@ -78,7 +78,7 @@ export function buttonCommands(table) {
 }
 
 /**
- * Layers, cameras, people, joints; and the frame, where the query is a number.
+ * Layers, cameras, people and joints, and the frame if the query is a number.
  *
  * @param {CommandContext} context
  * @param {string} query

@@ -1,4 +1,4 @@
-/** What to do first, on one card: shown until it is dismissed for good, found again in the palette. */
+/** Card with the first steps, shown until the user closes it. The palette can show it again. */
 
 import { button, byId } from "../widgets/elements.js";
 
@@ -23,7 +23,7 @@ export class FirstSteps {
     });
   }
 
-  /** Show the card again, and where it can be closed. */
+  /** Show the card and focus its button. */
   show() {
     this.#card.hidden = false;
     byId("close-first-steps", HTMLButtonElement).focus();

@@ -1,4 +1,4 @@
-/** The history as a list: what was done, by whom, when; a click goes there. */
+/** Popover that lists the history. A click on an entry undoes or redoes up to it. */
 
 import { byId } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
@@ -41,7 +41,7 @@ export class HistoryList {
     this.#panel.focus();
   }
 
-  /** @param {number} limit entries each way; 0 for no more */
+  /** @param {number} limit entries in each direction; 0 to end updates */
   #ask(limit) {
     this.#limit = limit;
     this.#send({ type: "history", limit });
@@ -143,7 +143,7 @@ export class HistoryList {
 }
 
 /**
- * `drag left wrist, frame 3` as what was done and where.
+ * Split `drag left wrist, frame 3` into action and frame.
  *
  * @param {string} label
  */

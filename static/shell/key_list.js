@@ -1,4 +1,4 @@
-/** The list of keys: grouped by what they are about, and searched by a few letters. */
+/** Dialog that lists the keys by area, with a search field. */
 
 import { button, byId, keyCaps } from "../widgets/elements.js";
 import { fitness } from "../widgets/fuzzy.js";

@@ -1,27 +1,27 @@
-/** The table of all keys, and the listener that obeys it. */
+/** Table of all keys, and the listener that runs them. */
 
 import { keepsUndo } from "../widgets/typing.js";
 
 /** @typedef {import("../widgets/key_matching.js").Binding} Binding */
 
-/** The areas of the table, in the order in which they are listed and tried. */
+/** Areas of the table, in the order in which they are listed and matched. */
 const AREAS = [
   "Frames",
   "History and help",
   "Search",
   "Tracking",
   "Timeline",
-  "3-D view", // before posing: Enter belongs to the floor while it is being set
+  "3-D view", // before posing: while the floor is being set, Enter belongs to it
   "Posing",
   "People",
   "Pins",
   "Views",
 ];
 
-/** Keys that belong to viser's camera while the 3-D view has the focus. */
+/** Keys of viser's camera while the 3-D view has the focus. */
 const VISER_KEYS = new Set(["s", "w", "a", "d", "q", "e", "arrowleft", "arrowright", "arrowup", "arrowdown"]);
 
-/** Keys that move a slider which has the focus. */
+/** Keys that move a focused slider. */
 const SLIDER_KEYS = new Set([
   "ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown",
 ]); // prettier-ignore
@@ -36,12 +36,12 @@ export function orderedByArea(rooms) {
 }
 
 /**
- * Obey the keys pressed in a document.
+ * Run bindings for the keys pressed in a document.
  *
- * @param {Document} target the page's, or that of the 3-D view
+ * @param {Document} target the page or the 3-D view
  * @param {import("../widgets/key_matching.js").Binding[]} table
- * @param {{viser: boolean, isDragging: () => boolean, say: (why: string) => void}} options `say` tells the user why a key
- *   does nothing now
+ * @param {{viser: boolean, isDragging: () => boolean, say: (why: string) => void}} options `say` shows why a
+ *   command is unavailable
  */
 export function listen(target, table, { viser, isDragging, say }) {
   target.addEventListener("keydown", (event) => {
@@ -61,13 +61,13 @@ export function listen(target, table, { viser, isDragging, say }) {
 
 /** @param {HTMLElement | null} element */
 function writes(element) {
-  // A field of a dialog that has just been closed has the focus until the page is drawn again.
+  // A field of a closed dialog keeps the focus until the page is drawn again.
   if (element?.closest?.("dialog:not([open])")) return false;
   return !!element?.matches?.("input:not([type=radio], [type=checkbox], [type=range]), textarea, select, [contenteditable=true]");
 }
 
 /**
- * Whether the key means something to the control that has the focus.
+ * Whether the focused control handles the key.
  *
  * @param {HTMLElement | null} element
  * @param {KeyboardEvent} event

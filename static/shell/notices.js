@@ -1,4 +1,4 @@
-/** What the program has to say: sentences that pass, errors that wait to be read, a log of them all, and the banner while it is away. */
+/** Notices that disappear after a while, the message log, and the banner while disconnected. */
 
 import { button, byId } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
@@ -21,7 +21,7 @@ export class Notices {
   #button = byId("show-notices", HTMLButtonElement);
   /** @type {Shown[]} oldest first */
   #shown = [];
-  /** @type {Logged[]} latest first */
+  /** @type {Logged[]} newest first */
   #log = [];
 
   constructor() {
@@ -49,7 +49,7 @@ export class Notices {
     togglePopover(this.#panel, this.#button);
   }
 
-  /** Close the notice that came last; says whether there was one. */
+  /** Close the newest notice. Returns whether there was one. */
   dismiss() {
     const last = this.#shown.at(-1);
     if (last) this.#remove(last);
@@ -58,11 +58,6 @@ export class Notices {
 
   dismissAll() {
     for (const shown of [...this.#shown]) this.#remove(shown);
-  }
-
-  /** Whether there is a notice to close. */
-  get areShown() {
-    return this.#shown.length > 0;
   }
 
   /**
@@ -83,7 +78,7 @@ export class Notices {
     element.append(sentence, close);
     const shown = { element, text, count: 1, timer: 0 };
     close.addEventListener("click", () => this.#remove(shown));
-    // Nothing goes while it is being read.
+    // A notice stays while the pointer or the focus is on it.
     for (const event of ["pointerenter", "focusin"]) element.addEventListener(event, () => clearTimeout(shown.timer));
     for (const event of ["pointerleave", "focusout"]) element.addEventListener(event, () => this.#wait(shown, level));
     this.#shown.push(shown);
@@ -93,7 +88,7 @@ export class Notices {
   }
 
   /**
-   * The same sentence again, by a key held down, say: counted, not repeated.
+   * Count a repeated notice instead of showing it again.
    *
    * @param {Shown} shown
    * @param {"error" | "info"} level

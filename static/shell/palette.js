@@ -1,4 +1,4 @@
-/** The command palette: everything that can be done, found by a few letters, done by Enter. */
+/** Command palette: find commands by a few letters, run them with Enter. */
 
 import { buttonCommands, keyCommands, contextCommands } from "./commands.js";
 import { byId, keyCaps } from "../widgets/elements.js";
@@ -7,7 +7,7 @@ import { fitness } from "../widgets/fuzzy.js";
 const RECENT = "quadrille.palette.recent";
 const MAX_RECENT = 12;
 const MAX_SHOWN = 60;
-/** What was recent comes a little before what fits as well. */
+/** Bonus of recent commands, which ranks them before equal matches. */
 const RECENT_BONUS = 6;
 
 /** @typedef {import("./commands.js").Command} Command */
@@ -20,7 +20,7 @@ export class Palette {
   #context;
   /** @type {import("../widgets/key_matching.js").Binding[]} */
   #table = [];
-  /** @type {Command[]} what is shown, in order */
+  /** @type {Command[]} the listed commands */
   #found = [];
   #at = 0;
 
@@ -65,7 +65,7 @@ export class Palette {
       const bonus = lately < 0 ? 0 : RECENT_BONUS * (query.trim() ? 1 : 1000) * (1 - lately / MAX_RECENT);
       return [{ command, isRecent: lately >= 0 && !query.trim(), score: found + inLabel + bonus }];
     });
-    // Without a query the order is that of the table, but for what was recent.
+    // Without a query: recent commands first, then the order of the table.
     scored.sort((a, b) => (query.trim() || a.isRecent || b.isRecent ? b.score - a.score : 0));
     const shown = scored.slice(0, MAX_SHOWN);
     this.#found = shown.map(({ command }) => command);
@@ -111,7 +111,7 @@ export class Palette {
     this.#show(index);
     if (command.why() !== null) {
       this.#why.classList.remove("is-asked");
-      void this.#why.offsetWidth; // begins its animation again
+      void this.#why.offsetWidth; // restart the animation
       this.#why.classList.add("is-asked");
       return;
     }

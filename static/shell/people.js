@@ -1,4 +1,4 @@
-/** The people of the session: who is worked on, who is shown, who is dimmed, and whom searches and fits move. */
+/** People of the session: active person, visibility, solo, and the people that searches move. */
 
 import { button, byId, iconButton } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
@@ -7,7 +7,7 @@ const EYE = "M1.5 8S4 3.5 8 3.5 14.5 8 14.5 8 12 12.5 8 12.5 1.5 8 1.5 8zM8 6a2 
 const SHUT = "M1.5 7.5S4 11.5 8 11.5s6.5-4 6.5-4M3.5 10.3 2.3 12M8 11.5v2M12.5 10.3l1.2 1.7";
 const COPY = "M5.5 5.5h8v8h-8zM3.5 10.5h-1v-8h8v1";
 
-/** @typedef {{row: HTMLElement, radio: HTMLInputElement, eye: HTMLButtonElement, copy: HTMLButtonElement, told: HTMLElement}} Row */
+/** @typedef {{row: HTMLElement, radio: HTMLInputElement, eye: HTMLButtonElement, copy: HTMLButtonElement, summary: HTMLElement}} Row */
 
 export class People {
   #store;
@@ -60,10 +60,10 @@ export class People {
   }
 
   /**
-   * A switch among the people, in a person's colour.
+   * Make a switch for a person, in the person's colour.
    *
    * @param {HTMLElement} within
-   * @param {string} name of the group of switches
+   * @param {string} name of the radio group
    * @param {import("../model/protocol.js").PersonInfo} info
    * @param {number} person
    */
@@ -94,16 +94,16 @@ export class People {
     const model = document.createElement("span");
     model.className = "quiet";
     model.textContent = `${info.model}, ${info.height_m.toFixed(2)} m`;
-    const told = document.createElement("span");
-    told.className = "quiet";
+    const summary = document.createElement("span");
+    summary.className = "quiet";
     const bend = `Copy the joint angles of ${info.name}; position and orientation stay`;
     const copy = iconButton(COPY, bend, () => this.#posing.copyPerson(person));
     copy.setAttribute("aria-label", `Copy the pose of ${info.name}`);
     const eye = iconButton(EYE, `Show ${info.name}`, () =>
       this.#actions.showPerson(person, !this.#store.facts.state?.people[person]?.shown),
     );
-    row.append(/** @type {HTMLElement} */ (radio.parentElement), model, told, copy, eye);
-    return { row, radio, eye, copy, told };
+    row.append(/** @type {HTMLElement} */ (radio.parentElement), model, summary, copy, eye);
+    return { row, radio, eye, copy, summary };
   }
 
   #show() {
@@ -115,12 +115,12 @@ export class People {
       chip.disabled = !connected;
       chip.parentElement?.classList.toggle("is-unseen", !state.people[person]?.shown);
     });
-    this.#rows.forEach(({ radio, eye, copy, told }, person) => {
+    this.#rows.forEach(({ radio, eye, copy, summary }, person) => {
       const { shown, source, status } = state.people[person];
       radio.checked = person === state.person;
       radio.disabled = eye.disabled = !connected;
       copy.disabled = !connected || person === state.person;
-      told.textContent = source === null ? "not placed" : [source, status].filter(Boolean).join(", ");
+      summary.textContent = source === null ? "not placed" : [source, status].filter(Boolean).join(", ");
       eye.setAttribute("aria-pressed", String(shown));
       eye.title = `${shown ? "Hide" : "Show"} ${session.people[person].name} in all views${person === state.person ? " (Shift+V)" : ""}`;
       eye.querySelector("path")?.setAttribute("d", shown ? EYE : SHUT);

@@ -1,4 +1,4 @@
-/** Says what goes on beside the page after an installation or with new footage: kernels are compiled, frames are listed. */
+/** Show the progress of background work: compilation after installation, and indexing of new footage. */
 
 import { byId } from "../widgets/elements.js";
 
@@ -14,7 +14,7 @@ export function showProgressMarks(store) {
 }
 
 /**
- * Frames that are not listed yet can be asked for, and are waited for.
+ * Frames that are not indexed yet can be requested; they are shown when they are indexed.
  * @param {HTMLElement} mark
  * @param {import("../model/protocol.js").StateMessage["footage"] | undefined} footage
  */

@@ -1,4 +1,4 @@
-/** Whether everything is on disk: always visible, with the reason and another try where it is not. */
+/** Show whether all edits are saved, and retry if saving failed. */
 
 import { button, byId } from "../widgets/elements.js";
 
@@ -24,11 +24,11 @@ export class SavedMark {
     addEventListener("beforeunload", (event) => {
       if (this.isSafe) return;
       event.preventDefault();
-      event.returnValue = true; // older browsers ask for this
+      event.returnValue = true; // required by older browsers
     });
   }
 
-  /** Whether nothing is lost when the page closes: all is on disk, and no hand holds anything. */
+  /** Whether closing the page loses nothing: all edits are saved and nothing is being dragged. */
   get isSafe() {
     const { state, dragging } = this.#store.facts;
     return !state || (state.save_error === null && !dragging);

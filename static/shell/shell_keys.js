@@ -39,7 +39,7 @@ export function helpBindings({ actions, history, notices, palette, keyList, firs
 }
 
 /**
- * Esc ends the first of these that is going on.
+ * Esc ends the first of the activities below that is in progress.
  *
  * @param {{store: import("../model/store.js").Store, actions: import("../model/actions.js").Actions,
  *   notices: import("./notices.js").Notices, grid: import("../panes/pane_grid.js").PaneGrid,

@@ -8,7 +8,7 @@ export function exposeState({ store, latency }, grid) {
   const quadrille = {
     latencies: latency.latencies,
     toClient: grid.toClient.bind(grid),
-    /** A copy of the facts that can be serialized: sizes stand for bitmaps. */
+    /** Serializable copy of the facts, with sizes instead of bitmaps. */
     get state() {
       const { facts } = store;
       const { frame, pictures = new Map() } = facts.shown ?? {};

@@ -1,4 +1,4 @@
-/** The bar at the top: search, cost, history. */
+/** Top bar: session, search or tracking progress, cost, undo and redo. */
 
 import { hasSearch, hasTrack } from "../model/selectors.js";
 import { button, byId } from "../widgets/elements.js";
@@ -62,14 +62,14 @@ export class TopBar {
 
   /** @param {import("../model/protocol.js").Job} job */
   #showJob(job) {
-    const stands = job.running || job.kind !== null;
-    const at = stands && job.stage !== null ? job.stages.indexOf(job.stage) : -1;
+    const isActive = job.running || job.kind !== null;
+    const at = isActive && job.stage !== null ? job.stages.indexOf(job.stage) : -1;
     const stage = (job.stage ?? "starting").replaceAll("_", " ");
-    this.#stage.textContent = stands ? `${stage} · ${count(job.evaluations)} poses` : job.message;
+    this.#stage.textContent = isActive ? `${stage} · ${count(job.evaluations)} poses` : job.message;
     this.#stage.title = this.#stage.textContent;
-    this.#figures.textContent = stands ? `best ${px(job.best_px)} · ${count(job.per_second)}/s` : "";
+    this.#figures.textContent = isActive ? `best ${px(job.best_px)} · ${count(job.per_second)}/s` : "";
     this.#stages.replaceChildren(
-      ...(stands ? job.stages : []).map((_, index) => {
+      ...(isActive ? job.stages : []).map((_, index) => {
         const mark = document.createElement("i");
         mark.className = index < at ? "is-done" : index === at ? "is-current" : "";
         return mark;
@@ -79,18 +79,18 @@ export class TopBar {
 
   /** @param {import("../model/protocol.js").Track} track */
   #showTrack({ running, first, last, at, done, total, per_second, doubtful, lost, back, message }) {
-    const stands = first !== null;
+    const isActive = first !== null;
     const [how, ...rest] = message.split(", ");
     const work = back ? "followed" : "tracked";
     const way = back ? "Tracking lost people backward" : `Frame ${at ?? first}, tracking to frame ${last}`;
-    this.#stage.textContent = stands ? `${running ? work : "paused"} ${done} of ${total}` : how;
-    this.#stage.title = stands ? way : message;
+    this.#stage.textContent = isActive ? `${running ? work : "paused"} ${done} of ${total}` : how;
+    this.#stage.title = isActive ? way : message;
     const counts = [doubtful && `${doubtful} doubtful`, lost && `${lost} lost`].filter(Boolean);
     const figures = [`${per_second.toFixed(1)}/s`, ...counts].join(" · ");
-    this.#figures.textContent = stands ? figures : rest.join(" · ");
+    this.#figures.textContent = isActive ? figures : rest.join(" · ");
     const bar = document.createElement("i");
     bar.style.setProperty("--done", `${(100 * done) / Math.max(1, total)}%`);
     bar.className = "is-share";
-    this.#stages.replaceChildren(...(stands ? [bar] : []));
+    this.#stages.replaceChildren(...(isActive ? [bar] : []));
   }
 }

@@ -1,4 +1,4 @@
-/** Draws plots of curves above one another, along the timeline's axis of frames. Sizes are CSS pixels. */
+/** Draw plots of curves below one another, on the axis of the timeline. Sizes are CSS pixels. */
 
 import { roundUp } from "../widgets/frame_axis.js";
 import { extent, trace } from "../model/series.js";
@@ -7,13 +7,13 @@ import { drawDiamond, markPositions } from "./timeline_drawing.js";
 /**
  * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
  * @typedef {import("../model/series.js").Curves} Curves
- * @typedef {{top: number, bottom: number, least: number, most: number}} Scale
+ * @typedef {{top: number, bottom: number, min: number, max: number}} Scale
  */
 
 const TICKS_HEIGHT = 16;
 const PLOT_GAP = 6;
 const TICK_GAP = 22;
-/** An angle that hardly moves must not look like one that swings. */
+/** Minimum range of a plot, so that small changes do not look large. */
 const MIN_SPAN = { deg: 20, cm: 10, px: 1 };
 const UNITS = { deg: "degrees", cm: "cm", px: "px" };
 
@@ -22,7 +22,7 @@ const UNITS = { deg: "degrees", cm: "cm", px: "px" };
  * @param {FrameAxis} axis
  * @param {number} height
  * @param {Curves} curves
- * @param {string[]} labels all names of curves, in the order of the colours
+ * @param {string[]} labels all names of curves, in the order of their colours
  * @param {Set<string>} hidden names of the curves that are switched off
  * @param {Iterable<number>} keyframes
  * @param {CSSStyleDeclaration} style
@@ -55,7 +55,7 @@ export function drawCurves(context, axis, height, curves, labels, hidden, keyfra
 }
 
 /**
- * Name of the style's colour of a curve.
+ * CSS variable with the colour of a curve.
  *
  * @param {number} index
  */
@@ -64,7 +64,7 @@ export function colorName(index) {
 }
 
 /**
- * Round limits round the values, with 0 among them for costs.
+ * Scale with a margin around the values. For costs it starts at 0.
  *
  * @param {import("../model/protocol.js").Plot["unit"]} unit
  * @param {Float32Array[]} curves
@@ -73,25 +73,25 @@ export function colorName(index) {
  * @returns {Scale}
  */
 function scaleOf(unit, curves, top, bottom) {
-  let { least, most } = extent(curves) ?? { least: 0, most: 0 };
-  if (unit === "px") least = 0;
-  const lacking = Math.max(0, MIN_SPAN[unit] - (most - least));
-  if (unit !== "px") least -= lacking / 2;
-  most += unit === "px" ? lacking : lacking / 2;
-  const margin = 0.06 * (most - least);
-  return { top, bottom, least: unit === "px" ? 0 : least - margin, most: most + margin };
+  let { min, max } = extent(curves) ?? { min: 0, max: 0 };
+  if (unit === "px") min = 0;
+  const lacking = Math.max(0, MIN_SPAN[unit] - (max - min));
+  if (unit !== "px") min -= lacking / 2;
+  max += unit === "px" ? lacking : lacking / 2;
+  const margin = 0.06 * (max - min);
+  return { top, bottom, min: unit === "px" ? 0 : min - margin, max: max + margin };
 }
 
 /**
  * @param {Scale} scale
  * @param {number} value
  */
-function toY({ top, bottom, least, most }, value) {
-  return bottom - ((bottom - top) * (value - least)) / (most - least);
+function toY({ top, bottom, min, max }, value) {
+  return bottom - ((bottom - top) * (value - min)) / (max - min);
 }
 
 /**
- * The ground of a plot, with lines at round values and their numbers in the gutter.
+ * Draw the background of a plot, grid lines at round values and their labels.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
@@ -101,15 +101,15 @@ function toY({ top, bottom, least, most }, value) {
 function drawFrame(context, axis, scale, style) {
   context.fillStyle = style.getPropertyValue("--plot");
   context.fillRect(axis.left, scale.top, axis.right - axis.left, scale.bottom - scale.top);
-  const step = roundUp(((scale.most - scale.least) * TICK_GAP) / (scale.bottom - scale.top));
+  const step = roundUp(((scale.max - scale.min) * TICK_GAP) / (scale.bottom - scale.top));
   context.font = "10.5px system-ui, sans-serif";
   context.textAlign = "right";
   context.textBaseline = "middle";
-  for (let value = Math.ceil(scale.least / step) * step; value <= scale.most; value += step) {
+  for (let value = Math.ceil(scale.min / step) * step; value <= scale.max; value += step) {
     const y = Math.round(toY(scale, value));
     context.fillStyle = style.getPropertyValue("--line");
     context.fillRect(axis.left, y, axis.right - axis.left, 1);
-    // Numbers at the edges would touch those of the next plot.
+    // Labels at the edges would touch those of the next plot.
     if (y < scale.top + 5 || y > scale.bottom - 4) continue;
     context.fillStyle = style.getPropertyValue("--muted");
     context.fillText(String(Number(value.toPrecision(6))), axis.left - 6, y);

@@ -1,6 +1,6 @@
 /**
- * The curves above the timeline: parameters of the pose, or costs, against the frame (GD96 Fig. 8). They share the timeline's
- * axis; a click goes to the frame. The program sends them only while they are open.
+ * Curves of pose parameters or costs by frame (GD96 Fig. 8), on the axis of the timeline. A click goes to the frame. The
+ * program sends curves only while they are open.
  */
 
 import { colorName, drawCurves } from "./curve_drawing.js";
@@ -29,12 +29,12 @@ export class Curves {
   #person = byId("curves-person", HTMLElement);
   #lines = document.createElement("canvas");
   #cursor = document.createElement("canvas");
-  /** The group that is shown; null while the drawer is closed or shows something else. */
+  /** The group that is shown; null while the drawer is closed or shows another tab. */
   #group = /** @type {CurveGroup | null} */ (null);
   /** Names of the curves that are switched off. */
   #hidden = new Set(/** @type {string[]} */ (JSON.parse(localStorage.getItem(STORED_HIDDEN) ?? "[]")));
   #hovered = /** @type {number | null} */ (null);
-  /** What the legend was built for. */
+  /** The labels that the legend was built for. */
   #described = "";
 
   /**
@@ -56,7 +56,7 @@ export class Curves {
     this.#open();
   }
 
-  /** The curves to be drawn; null while those asked for are on their way. */
+  /** The curves to draw; null while they are loading. */
   get #data() {
     const { curves } = this.#store.facts;
     return this.#group !== null && curves?.group === this.#group ? curves : null;
@@ -78,7 +78,7 @@ export class Curves {
     if (moved || changed.has("target")) this.#drawCursor();
   }
 
-  /** Ask for the group that the drawer calls for, or for no more. */
+  /** Request the group of the open tab, or end the request. */
   #open() {
     const { drawer } = this.#store.facts;
     const group = CURVE_GROUPS.find((one) => one === drawer) ?? null;
@@ -113,7 +113,7 @@ export class Curves {
     requestAnimationFrame(() => this.#drawCursor());
   }
 
-  /** Build the legend: one switch per name, which stands for the curves of that name in all plots. */
+  /** Build the legend: one switch per name, for the curves of that name in all plots. */
   #describe() {
     const data = this.#data;
     this.#showPerson(data);
@@ -139,7 +139,7 @@ export class Curves {
   }
 
   /**
-   * Say whose the curves are, where there are several people.
+   * Show the person's name if there are several people.
    *
    * @param {Data | null} data
    */
@@ -182,7 +182,7 @@ export class Curves {
     drawCurves(context, this.#axis, clientHeight, data, labelsOf(data), this.#hidden, keyframes, style);
   }
 
-  /** Lines at the current frame and under the pointer, and in the legend the values at the latter, else the former. */
+  /** Draw lines at the current frame and the pointer. The legend shows the values at the pointer, or else the frame. */
   #drawCursor() {
     const { clientWidth, clientHeight } = this.#stage;
     if (clientWidth === 0 || this.#group === null) return;
@@ -218,7 +218,7 @@ export class Curves {
 }
 
 /**
- * Names of curves, each once.
+ * Unique names of the curves.
  *
  * @param {Data | null} data
  */

@@ -1,4 +1,4 @@
-/** The drawer above the timeline: one tab of curves, of the search, or of the cost's landscape; its height and tab are kept. */
+/** Drawer above the timeline with tabs for curves, search and cost landscape. Its height and tab are stored. */
 
 import { button, byId } from "../widgets/elements.js";
 
@@ -10,12 +10,12 @@ const STORED_OPEN = "quadrille.drawer-open";
 const STORED_TAB = "quadrille.drawer-tab";
 const STORED_CURVES = "quadrille.drawer-curves";
 const STORED_HEIGHT = "quadrille.drawer-height-";
-/** Height of what lies below the tabs: the usual share of the window, and what it never goes below, CSS pixels. */
+/** Height below the tabs: default fraction of the window, and minimum in CSS pixels. */
 const DEFAULT_SHARES = { curves: 0.21, search: 0.3 };
 const MIN_PX = 140;
-/** What the panes keep of the window, CSS pixels. */
+/** Minimum height of the rest of the window, CSS pixels. */
 const PANES_PX = 340;
-/** Height of the tabs, between the grip and the stage, CSS pixels. */
+/** Height of the tabs, CSS pixels. */
 const BAR_PX = 34;
 const KEY_STEP_PX = 16;
 
@@ -44,7 +44,7 @@ export class Drawer {
   }
 
   /**
-   * Open a tab, or close the drawer where it is the one that is open.
+   * Open a tab, or close the drawer if that tab is open.
    *
    * @param {import("../model/series.js").Tab} tab
    */
@@ -52,7 +52,7 @@ export class Drawer {
     this.#open(this.#store.facts.drawer === tab ? null : tab);
   }
 
-  /** The curves shown last, or none. */
+  /** Open the last group of curves, or close the drawer if curves are shown. */
   toggleCurves() {
     const stored = localStorage.getItem(STORED_CURVES);
     const isShown = CURVE_GROUPS.some((group) => group === this.#store.facts.drawer);
@@ -80,23 +80,23 @@ export class Drawer {
     this.#fit();
   }
 
-  /** Curves are content with less than the search: each keeps its height. */
+  /** Curves need less height than the search, so each kind has its own. */
   get #kind() {
     return CURVE_GROUPS.some((group) => group === this.#store.facts.drawer) ? "curves" : "search";
   }
 
-  /** Give the stage the height that was chosen, as far as the window has room for it. */
+  /** Apply the stored height, as far as the window has room for it. */
   #fit() {
-    const most = Math.max(MIN_PX, innerHeight - PANES_PX);
+    const max = Math.max(MIN_PX, innerHeight - PANES_PX);
     const chosen = Number(localStorage.getItem(STORED_HEIGHT + this.#kind)) || DEFAULT_SHARES[this.#kind] * innerHeight;
-    const height = Math.round(Math.max(MIN_PX, Math.min(most, chosen)));
+    const height = Math.round(Math.max(MIN_PX, Math.min(max, chosen)));
     this.#stage.style.height = `${height}px`;
     this.#grip.setAttribute("aria-valuenow", String(height));
     this.#grip.setAttribute("aria-valuemin", String(MIN_PX));
-    this.#grip.setAttribute("aria-valuemax", String(most));
+    this.#grip.setAttribute("aria-valuemax", String(max));
   }
 
-  /** @param {number | null} height null for the usual one */
+  /** @param {number | null} height null for the default */
   #resize(height) {
     localStorage.setItem(STORED_HEIGHT + this.#kind, height === null ? "" : String(Math.max(MIN_PX, Math.round(height))));
     this.#fit();

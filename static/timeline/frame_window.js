@@ -1,18 +1,18 @@
-/** Which part of the recording timeline and curves show: zoomed about a place, moved along, and following the frame. */
+/** Visible part of the recording in timeline and curves: zoomed about a position, panned, and following the current frame. */
 
 /**
  * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
  * @typedef {import("../widgets/frame_axis.js").Span} Span
  */
 
-/** Frames that the closest zoom shows. */
+/** Number of frames at maximum zoom. */
 const LEAST = 12;
 const STEP = 1.6;
-/** Change of the zoom by one pixel of the wheel. */
+/** Zoom per pixel of the wheel. */
 const PER_PIXEL = 0.002;
-/** Pixels of a line, for wheels that count lines. */
+/** Pixels per line, for wheels that count lines. */
 const LINE_PX = 24;
-/** Where a frame that left the view comes back to, as a share of its width. */
+/** Position of a frame after a page turn, as a fraction of the width. */
 const LEAD = 0.1;
 
 export class FrameWindow {
@@ -27,7 +27,7 @@ export class FrameWindow {
     });
   }
 
-  /** What is shown, also where that is everything. */
+  /** The visible part, also if that is everything. */
   get span() {
     return this.#store.facts.visible ?? { start: 0, end: this.#frames };
   }
@@ -37,10 +37,10 @@ export class FrameWindow {
   }
 
   /**
-   * Show more or less of the recording; a place stays where it is.
+   * Zoom about a position.
    *
-   * @param {number} factor above 1 to see fewer frames
-   * @param {number} place in frames
+   * @param {number} factor above 1 to zoom in
+   * @param {number} place position in fractional frames
    */
   zoom(factor, place) {
     const { start, end } = this.span;
@@ -49,7 +49,7 @@ export class FrameWindow {
     this.#show(place - share * length, length);
   }
 
-  /** See fewer frames around the one that is shown. */
+  /** Zoom in about the current frame. */
   zoomIn() {
     this.zoom(STEP, this.#store.facts.target + 0.5);
   }
@@ -58,7 +58,7 @@ export class FrameWindow {
     this.zoom(1 / STEP, this.#store.facts.target + 0.5);
   }
 
-  /** Show the marked range, or all where it is shown or none is marked. */
+  /** Show the marked range, or everything if it is shown already or no range is marked. */
   fit() {
     const { range } = this.#store.facts;
     if (!range) return this.#show(0, this.#frames);
@@ -71,13 +71,13 @@ export class FrameWindow {
     else this.#show(start, length);
   }
 
-  /** @param {number} frames to the right, or to the left where negative */
+  /** @param {number} frames negative to move left */
   move(frames) {
     const { start, end } = this.span;
     this.#show(start + frames, end - start);
   }
 
-  /** @param {number} place in frames, to be in the middle */
+  /** @param {number} place new centre in fractional frames */
   centre(place) {
     const { start, end } = this.span;
     this.#show(place - (end - start) / 2, end - start);
@@ -102,7 +102,7 @@ export class FrameWindow {
     if (visible) this.#show(visible.start, visible.end - visible.start);
   }
 
-  /** Turn the page when the frame leaves the view. */
+  /** Turn the page when the current frame leaves the visible part. */
   #follow() {
     const { visible, target } = this.#store.facts;
     if (!visible || (target >= visible.start && target + 1 <= visible.end)) return;
@@ -112,7 +112,7 @@ export class FrameWindow {
 }
 
 /**
- * Let the wheel zoom with Ctrl (which is also how a touchpad's pinch arrives), and move what is zoomed without.
+ * Zoom with Ctrl+wheel, which is also how browsers report a pinch, and pan with the wheel.
  *
  * @param {HTMLElement} element
  * @param {FrameWindow} view

@@ -1,4 +1,4 @@
-/** The buttons that lead from one doubtful frame to the next, and the menu of everything else there is to go to. */
+/** Buttons that go to doubtful frames, and a menu of other kinds of frames to go to. */
 
 import { button, byId, iconButton } from "../widgets/elements.js";
 import { KINDS } from "./jumps.js";
@@ -33,9 +33,9 @@ export class JumpMenu {
       const at = /** @type {Node} */ (event.target);
       if (!this.#menu.contains(at) && !this.#open.contains(at)) this.#show(false);
     });
-    // A click into the 3-D view reaches this page only as the loss of its focus.
+    // A click into the 3-D view is noticed only as a loss of focus.
     addEventListener("blur", () => this.#show(false));
-    // Opened by the mouse it has no focus; Escape closes it all the same, and does nothing else.
+    // Opened by the mouse, the menu has no focus. Esc closes it all the same, and does nothing else.
     const closes = (/** @type {KeyboardEvent} */ event) => {
       if (event.key !== "Escape" || this.#menu.hidden) return;
       event.preventDefault();

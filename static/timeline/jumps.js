@@ -1,4 +1,4 @@
-/** Frames worth going to: by kind, how many there are, and the next of them in either direction. */
+/** Frames to go to, by kind: their number, and the next one in either direction. */
 
 import { AMBIGUOUS, KEYFRAME, NO_POSE, REVIEWED, STATUSES, keyframesOf } from "../model/cells.js";
 
@@ -65,7 +65,7 @@ export class Jumps {
   }
 
   /**
-   * Go to the nearest frame of a kind in one direction; nowhere where there is none.
+   * Go to the nearest frame of a kind in one direction, if there is one.
    *
    * @param {Kind} kind
    * @param {1 | -1} way
@@ -80,19 +80,19 @@ export class Jumps {
     }
   }
 
-  /** The longest stretch without a keyframe; null where there is none. */
+  /** The longest gap between keyframes; null if there is none. */
   get longestGap() {
     const { timeline } = this.#store.facts;
     let [first, last] = [0, -1];
-    let former = -1;
+    let previous = -1;
     for (const frame of [...keyframesOf(timeline), timeline.frames]) {
-      if (frame - former - 2 > last - first) [first, last] = [former + 1, frame - 1];
-      former = frame;
+      if (frame - previous - 2 > last - first) [first, last] = [previous + 1, frame - 1];
+      previous = frame;
     }
     return last >= first ? { first, last } : null;
   }
 
-  /** Go to the middle of the longest stretch without a keyframe: the best place for the next one. */
+  /** Go to the middle of the longest gap between keyframes, the best place for a new one. */
   toLongestGap() {
     const gap = this.longestGap;
     this.#navigation.pause();
@@ -100,7 +100,7 @@ export class Jumps {
   }
 
   /**
-   * The stretch between the keyframes around a frame, both included; the recording's end where there is none.
+   * The interval between the keyframes around a frame, both included, or the ends of the recording.
    *
    * @param {number} frame
    */
@@ -110,7 +110,7 @@ export class Jumps {
     let [first, last] = [frame, frame];
     while (first > 0 && !(first < frame && isKey(first))) first -= 1;
     while (last < timeline.frames - 1 && !(last > frame && isKey(last))) last += 1;
-    // On a keyframe the stretch that begins there is meant.
+    // On a keyframe, use the interval that starts there.
     return { first: isKey(frame) && last > frame ? frame : first, last };
   }
 }

@@ -1,20 +1,20 @@
 /**
- * Playing: at real time or a share or multiple of it, in a loop or to the end. Frames that would come late are skipped, or,
- * where every frame is wanted, waited for.
+ * Playback in real time or at another speed, to the end or in a loop. Late frames are skipped, or waited for if every
+ * frame is to be shown.
  */
 
 const GAP_MS = 2000;
 
-/** Shares and multiples of real time. */
-export const RATES = [1 / 8, 1 / 4, 1 / 2, 1, 2, 4];
+/** Playback speeds relative to real time. */
+const RATES = [1 / 8, 1 / 4, 1 / 2, 1, 2, 4];
 
 export class Playback {
   #store;
   #navigation;
-  /** Where it counts from. */
+  /** Frame and time from which due frames are counted. */
   #anchor = { frame: 0, time: 0 };
   #ticked = 0;
-  /** The frame it asked for last. */
+  /** The frame requested last. */
   #requested = 0;
 
   /**
@@ -49,7 +49,7 @@ export class Playback {
     this.#store.set({ everyFrame: !this.#store.facts.everyFrame });
   }
 
-  /** @param {1 | -1} way to the next of the rates */
+  /** @param {1 | -1} way to the next faster or slower speed */
   changeRate(way) {
     const at = RATES.indexOf(this.#store.facts.rate);
     this.#store.set({ rate: RATES[Math.max(0, Math.min(RATES.length - 1, at + way))] });
@@ -60,7 +60,7 @@ export class Playback {
     if (RATES.includes(rate)) this.#store.set({ rate });
   }
 
-  /** First and last frame that are played: in a loop those of the marked range, else to the end of the recording. */
+  /** First and last frame to play: the marked range in a loop, else the whole recording. */
   get #interval() {
     const { session, range, loops } = this.#store.facts;
     return loops && range ? range : { first: 0, last: (session?.n_frames ?? 1) - 1 };
@@ -75,8 +75,8 @@ export class Playback {
     const { playing, session, rate, everyFrame, target, loops } = this.#store.facts;
     if (!playing || !session) return;
     requestAnimationFrame((then) => this.#tick(then));
-    // A hidden tab draws nothing, and a hand may have gone elsewhere: go on from there instead of jumping.
-    // The next frame is due at once, so that a machine that draws so seldom goes on all the same.
+    // A hidden tab draws nothing, and the user may have gone elsewhere: continue from the current frame.
+    // The next frame is due now, so that slow machines still make progress.
     if (now - this.#ticked > GAP_MS) this.#anchor = { frame: target + 1, time: now };
     if (target !== this.#requested) {
       this.#requested = target;
@@ -88,7 +88,7 @@ export class Playback {
     let due = this.#anchor.frame + Math.floor(((now - this.#anchor.time) * session.fps * rate) / 1000);
     if (everyFrame && due > target + 1) {
       due = target + 1;
-      this.#anchor = { frame: due, time: now }; // what was late is not made up for
+      this.#anchor = { frame: due, time: now }; // late frames are not made up for
     }
     if (due > last || (due >= last && !loops)) {
       if (loops) this.#anchor = { frame: first, time: now };

@@ -1,4 +1,4 @@
-/** The bar over a marked range of frames: what can be done with it, how far that is, and how it ended. */
+/** Bar over the marked range: actions, progress and result. */
 
 import { button, byId } from "../widgets/elements.js";
 import { FrameAxis } from "../widgets/frame_axis.js";
@@ -24,7 +24,7 @@ export class RangeBar {
   #scope = byId("range-scope", HTMLSelectElement);
   #buttons;
   #stop;
-  /** The message of the work that ended before this range was marked. */
+  /** Message of the work that ended before this range was marked. */
   #old = "";
 
   /**
@@ -70,17 +70,17 @@ export class RangeBar {
     for (const one of this.#buttons) one.disabled = !connected || isBusy || !!state?.track.running;
     this.#stop.disabled = !connected || !isBusy;
     this.#stop.hidden = !isBusy;
-    const told = work?.message === this.#old ? "" : (work?.message ?? "");
+    const message = work?.message === this.#old ? "" : (work?.message ?? "");
     this.#work.textContent = isBusy
       ? `${work.what} ${count(work.done)} of ${count(work.total)}`
-      : told || `${count(n)} frame${n === 1 ? "" : "s"}`;
+      : message || `${count(n)} frame${n === 1 ? "" : "s"}`;
     const one = session?.people[state?.person ?? 0]?.name ?? "";
     const option = this.#scope.options[1];
     if (option.textContent !== `Only ${one}`) option.textContent = `Only ${one}`;
     this.#place();
   }
 
-  /** In the middle over the range, and within the window. */
+  /** Centre the bar over the range, within the window. */
   #place() {
     const { range, session, visible } = this.#store.facts;
     if (!range || !session) return;

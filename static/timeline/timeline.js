@@ -1,6 +1,6 @@
 /**
- * One cell per frame, coloured by who set it, with its status and cost above it and what has been reviewed below. A click or a
- * drag goes there; with Shift it marks a range of frames. It can be zoomed; the strip at the bottom is the whole recording.
+ * Timeline: one cell per frame, coloured by source, with cost and status above and review marks below. A click or drag goes
+ * to a frame; with Shift it marks a range. The strip at the bottom is an overview of the whole recording.
  */
 
 import { AMBIGUOUS, framesWith, keyframesOf } from "../model/cells.js";
@@ -10,11 +10,11 @@ import { zoomByWheel } from "./frame_window.js";
 import { px } from "../widgets/text.js";
 import * as drawing from "./timeline_drawing.js";
 
-/** The strip of the whole recording takes the pointer a little beyond its edge. */
+/** Margin of the overview for the pointer. */
 const REACH = 1;
 const MIDDLE_BUTTON = 1;
 
-/** @typedef {"scrub" | "mark" | "pan" | "overview"} Gesture what the pointer does while it is down */
+/** @typedef {"scrub" | "mark" | "pan" | "overview"} Gesture of the pointer while it is down */
 
 export class Timeline {
   #element;
@@ -26,9 +26,9 @@ export class Timeline {
   #cursor = document.createElement("canvas");
   #hovered = /** @type {number | null} */ (null);
   #gesture = /** @type {Gesture | null} */ (null);
-  /** Where a range began that is being marked. */
+  /** Start of the range that is being marked. */
   #marked = 0;
-  /** The place under the pointer that pans, which stays under it. */
+  /** Position that stays under the pointer while panning. */
   #held = 0;
 
   /**
@@ -63,7 +63,7 @@ export class Timeline {
     return new FrameAxis(this.#element.clientWidth, this.#store.facts.session?.n_frames ?? 1, this.#store.facts.visible);
   }
 
-  /** The axis of the strip at the bottom. */
+  /** Axis of the overview. */
   get #whole() {
     return new FrameAxis(this.#element.clientWidth, this.#store.facts.session?.n_frames ?? 1, null);
   }
@@ -173,7 +173,7 @@ export class Timeline {
     context.clip();
     for (const [lane, band] of bands.entries()) {
       const cells = bands.length > 1 ? lanes[lane] : timeline;
-      if (!cells) continue; // it comes right behind
+      if (!cells) continue; // arrives shortly
       drawing.drawSources(context, axis, cells, style, band);
       drawing.drawKeyframes(context, axis, keyframesOf(cells), band);
       drawing.drawAmbiguous(context, axis, framesWith(cells, AMBIGUOUS), band);
@@ -222,7 +222,7 @@ export class Timeline {
   }
 
   /**
-   * A line for each of several people.
+   * One line per person, if there are several.
    *
    * @param {number} frame
    */
@@ -231,8 +231,8 @@ export class Timeline {
     return lanes
       .map((lane, person) => {
         const { source = "no pose", keyframe = false, status = "" } = lane.get(frame) ?? {};
-        const told = [source, keyframe && "keyframe", status].filter(Boolean).join(", ");
-        return `\n${session?.people[person]?.name}: ${told}`;
+        const text = [source, keyframe && "keyframe", status].filter(Boolean).join(", ");
+        return `\n${session?.people[person]?.name}: ${text}`;
       })
       .join("");
   }

@@ -1,6 +1,6 @@
 /**
- * Draws the timeline: cost curve, strip of statuses, cells by source with their keyframes, what has been reviewed, the marked
- * range, and the whole recording small. Sizes are CSS pixels.
+ * Draw the timeline: costs, statuses, cells by source with keyframes, review marks, the marked range and the overview. Sizes
+ * are CSS pixels.
  */
 
 import { NO_POSE, REVIEWED, SOURCES, STATUSES as ALL, keyframesOf } from "../model/cells.js";
@@ -15,13 +15,13 @@ const COST = { top: 4, bottom: 24 };
 const STATUS = { top: 28, bottom: 40 };
 const KEYFRAME_GAP = 5;
 const CELLS_TOP = 44;
-/** Height of the cells, of one person and of each of several, and the gap between lanes. */
+/** Height of the cells of a single person, and of each of several people; gap between lanes. */
 const [CELL_HEIGHT, LANE_HEIGHT, LANE_GAP] = [12, 10, 2];
 
 /** @typedef {{top: number, bottom: number}} Band */
 
 /**
- * Where things lie below each other: one person has a single lane of cells, each of several a lane of his own.
+ * Vertical layout. Each person has a lane of cells.
  *
  * @param {number} people
  * @returns {{cells: Band, lanes: Band[], review: Band, overview: Band, height: number}}
@@ -39,7 +39,7 @@ export function layout(people) {
   return { cells, lanes, review: { top: bottom + 2, bottom: bottom + 4 }, overview, height: overview.bottom + 2 };
 }
 
-/** Statuses that are drawn, the worst last and on top: each has a height of its own besides its colour. */
+/** Statuses that are drawn, the worst last and on top. Besides its colour, each has its own height. */
 export const STATUSES = /** @type {const} */ (["good", "doubtful", "lost"]);
 const STATUS_HEIGHTS = { good: 3, doubtful: 7, lost: 12 };
 
@@ -47,7 +47,7 @@ const STATUS_HEIGHTS = { good: 3, doubtful: 7, lost: 12 };
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
  * @param {CSSStyleDeclaration} style
- * @param {Band[]} lanes of the cells
+ * @param {Band[]} lanes one per person
  * @param {import("../model/protocol.js").PersonInfo[]} people
  */
 export function drawLabels(context, axis, style, lanes, people) {
@@ -63,7 +63,7 @@ export function drawLabels(context, axis, style, lanes, people) {
 }
 
 /**
- * The name of a lane, as much of it as there is room for, and a strip in the colour of its person.
+ * Draw the name of a lane, shortened to fit, and a strip in the person's colour.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
@@ -82,12 +82,12 @@ function drawName(context, axis, { name, color }, { top, bottom }) {
 }
 
 /**
- * Runs of neighbouring frames that look the same, each as one rectangle: where frames share a pixel the next one begins where
- * the run ends, so that a long recording costs as many rectangles as it has changes, or pixels.
+ * Draw runs of equal neighbouring frames as rectangles. Where frames share a pixel, the number of rectangles is bounded by
+ * the number of changes or pixels.
  *
  * @param {FrameAxis} axis
- * @param {(frame: number) => number} look of a frame; below 0 for nothing to draw
- * @param {number} gap between frames, pixels
+ * @param {(frame: number) => number} look value of a frame; below 0 for nothing to draw
+ * @param {number} gap between frames, CSS pixels
  * @param {(look: number, x: number, width: number) => void} draw
  */
 function eachRun(axis, look, gap, draw) {
@@ -136,7 +136,7 @@ export function drawKeyframes(context, axis, keyframes, { top, bottom }) {
 }
 
 /**
- * Two rings, one over the other, where another pose is as good.
+ * Draw two rings at ambiguous frames.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
@@ -159,7 +159,7 @@ export function drawAmbiguous(context, axis, frames, { top, bottom }) {
 }
 
 /**
- * Where keyframes are marked: of those that would cover each other only one, and none out of sight.
+ * Visible positions of marks, thinned so that they do not overlap.
  *
  * @param {Iterable<number>} frames
  * @param {FrameAxis} axis
@@ -173,7 +173,7 @@ export function markPositions(frames, axis) {
 }
 
 /**
- * A line under the frames that a person has vouched for or looked at.
+ * Draw a line below frames that are reviewed or keyframes.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
@@ -190,7 +190,7 @@ export function drawReviewed(context, axis, cells, style, { top, bottom }) {
 }
 
 /**
- * Bars that stand the higher the worse a frame is; the worst of the frames that share a pixel is the one seen.
+ * Draw statuses as bars, higher for worse ones. Where frames share a pixel, the worst is visible.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
@@ -202,17 +202,17 @@ export function drawStatuses(context, axis, cells, style) {
   for (const status of STATUSES) {
     const index = ALL.indexOf(status);
     const height = STATUS_HEIGHTS[status];
-    // What is seldom must still be seen: a single bad frame among thousands is two pixels wide.
-    const least = status === "good" ? 1 : 2;
+    // Rare bad frames must remain visible, so bars are at least two pixels wide.
+    const min = status === "good" ? 1 : 2;
     context.fillStyle = style.getPropertyValue(`--status-${status}`);
     eachRun(axis, (frame) => (statuses[frame] === index ? index : -1), gapOf(axis), (_, x, width) => {
-      context.fillRect(x, STATUS.bottom - height, Math.max(least, width), height);
+      context.fillRect(x, STATUS.bottom - height, Math.max(min, width), height);
     });
   }
 }
 
 /**
- * The cost curve, from 0 at the bottom to the 98th percentile at the top: one lost frame must not flatten the rest.
+ * Draw the cost curve from 0 to the 98th percentile, so that single lost frames do not flatten the rest.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
@@ -222,9 +222,9 @@ export function drawStatuses(context, axis, cells, style) {
 export function drawCosts(context, axis, cells, style) {
   const ordered = cells.costs.filter((value) => value === value).sort();
   if (ordered.length === 0) return;
-  const most = Math.max(1e-6, ordered[Math.floor(0.98 * (ordered.length - 1))]);
+  const max = Math.max(1e-6, ordered[Math.floor(0.98 * (ordered.length - 1))]);
   const path = new Path2D();
-  trace(path, cells.costs, axis, (value) => COST.bottom - (COST.bottom - COST.top) * Math.min(1, value / most));
+  trace(path, cells.costs, axis, (value) => COST.bottom - (COST.bottom - COST.top) * Math.min(1, value / max));
   context.save();
   context.beginPath();
   context.rect(axis.left, 0, axis.right - axis.left, STATUS.top);
@@ -238,7 +238,7 @@ export function drawCosts(context, axis, cells, style) {
 }
 
 /**
- * The whole recording small: what has been reviewed, keyframes, what is doubtful or lost.
+ * Draw the overview of the recording: poses, review marks, keyframes, doubtful and lost frames.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} whole axis of all frames
@@ -251,17 +251,17 @@ export function drawOverview(context, whole, cells, style, overview) {
   context.fillStyle = style.getPropertyValue("--track");
   context.fillRect(whole.left, overview.top, whole.right - whole.left, height);
   const { statuses, marks, sources } = cells;
-  /** @type {[(frame: number) => boolean, string, number, number][]} what, colour, share of the height, least width */
+  /** @type {[(frame: number) => boolean, string, number, number][]} condition, colour, fraction of the height, minimum width */
   const layers = [
     [(frame) => sources[frame] !== NO_POSE, "--faint", 0.5, 1],
     [(frame) => (marks[frame] & REVIEWED) !== 0, "--good", 0.5, 1],
     [(frame) => STATUSES[statuses[frame] - 1] === "doubtful", "--status-doubtful", 1, 1],
     [(frame) => STATUSES[statuses[frame] - 1] === "lost", "--status-lost", 1, 1],
   ];
-  for (const [is, color, share, least] of layers) {
+  for (const [is, color, share, min] of layers) {
     context.fillStyle = style.getPropertyValue(color);
     eachRun(whole, (frame) => (is(frame) ? 0 : -1), 0, (_, x, width) => {
-      context.fillRect(x, overview.bottom - share * height, Math.max(least, width), share * height);
+      context.fillRect(x, overview.bottom - share * height, Math.max(min, width), share * height);
     });
   }
   context.fillStyle = style.getPropertyValue("--text");
@@ -269,7 +269,7 @@ export function drawOverview(context, whole, cells, style, overview) {
 }
 
 /**
- * The frame round the part of the overview that is shown, and where in it the shown frame lies.
+ * Draw the visible part and the current frame in the overview.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} whole axis of all frames
@@ -293,13 +293,13 @@ export function drawWindow(context, whole, visible, target, style, overview) {
 }
 
 /**
- * A bracket over the frames that the user has marked.
+ * Draw a bracket over the marked range.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
  * @param {{first: number, last: number}} range
  * @param {CSSStyleDeclaration} style
- * @param {number} bottom of what is marked
+ * @param {number} bottom lower end of the bracket
  */
 export function drawRange(context, axis, { first, last }, style, bottom) {
   const left = Math.max(axis.left, axis.start(first));
@@ -315,7 +315,7 @@ export function drawRange(context, axis, { first, last }, style, bottom) {
 }
 
 /**
- * The mark of a keyframe.
+ * Draw the diamond of a keyframe.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {number} x

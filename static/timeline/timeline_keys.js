@@ -163,9 +163,9 @@ function jumpKeys(jumps, kind, key, what) {
   const why = () => (jumps.count(kind) > 0 ? null : `There is no ${what}.`);
   const match = (/** @type {boolean} */ shift) =>
     key.startsWith("Alt ") ? alt(`Key${letter}`, shift) : plain(letter.toLowerCase(), undefined, shift);
-  const former = key.startsWith("Alt ") ? `Alt Shift ${letter}` : `Shift ${letter}`;
+  const previous = key.startsWith("Alt ") ? `Alt Shift ${letter}` : `Shift ${letter}`;
   return [
     { keys: [key], label: `Next ${what}`, matches: match(false), why, run: () => jumps.go(kind, 1) },
-    { keys: [former], label: `Previous ${what}`, matches: match(true), why, run: () => jumps.go(kind, -1) },
+    { keys: [previous], label: `Previous ${what}`, matches: match(true), why, run: () => jumps.go(kind, -1) },
   ];
 }

@@ -1,4 +1,4 @@
-/** The buttons that track. */
+/** Buttons for tracking. */
 
 import { hasTrack } from "../model/selectors.js";
 import { button, byId } from "../widgets/elements.js";
@@ -32,16 +32,16 @@ export class TrackBar {
 
   #showRun() {
     const { state, connected, range } = this.#store.facts;
-    const stands = hasTrack(state);
+    const isActive = hasTrack(state);
     const isRunning = !!state?.track.running;
     this.#back.disabled = this.#forward.disabled = !connected || !state || isRunning;
-    this.#pause.disabled = this.#stop.disabled = this.#follow.disabled = !connected || !stands;
+    this.#pause.disabled = this.#stop.disabled = this.#follow.disabled = !connected || !isActive;
     const to = range ? "to the end of the marked range" : "to the end of the recording";
     this.#forward.title = `Track forward from this frame ${to} (T)`;
     this.#back.title = `Track backward from this frame ${range ? to : "to its beginning"} (Shift+T)`;
-    this.#pause.classList.toggle("is-paused", stands && !isRunning);
-    this.#pause.title = stands && !isRunning ? "Continue tracking (Alt+P)" : "Pause tracking (Alt+P)";
-    this.#pause.setAttribute("aria-label", stands && !isRunning ? "Continue tracking" : "Pause tracking");
+    this.#pause.classList.toggle("is-paused", isActive && !isRunning);
+    this.#pause.title = isActive && !isRunning ? "Continue tracking (Alt+P)" : "Pause tracking (Alt+P)";
+    this.#pause.setAttribute("aria-label", isActive && !isRunning ? "Continue tracking" : "Pause tracking");
     this.#follow.checked = state?.follow ?? true;
   }
 }

@@ -1,4 +1,4 @@
-/** The row above the timeline: where the recording stands, how to move it, and what the colours mean. */
+/** Transport row above the timeline: playback, current frame, its marks and source, and the legend. */
 
 import { button, byId } from "../widgets/elements.js";
 import { clock } from "../widgets/text.js";
@@ -123,8 +123,8 @@ export class Transport {
 
 /**
  * @param {string} text
- * @param {string} color name of the style's colour
- * @param {string} kind class of the mark, which gives it its shape
+ * @param {string} color CSS variable
+ * @param {string} kind class that sets the shape of the mark
  */
 function swatch(text, color, kind) {
   const item = document.createElement("span");

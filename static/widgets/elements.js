@@ -1,4 +1,4 @@
-/** Elements of the page that must be there. */
+/** Find elements of the page, and build buttons and key caps. */
 
 /**
  * @template {HTMLElement} T
@@ -13,7 +13,7 @@ export function byId(id, kind) {
 }
 
 /**
- * A button that does what it says and gives the focus back after a click by pointer, so that Space goes on to mean "play".
+ * Find a button and call a function on click. After a click by pointer the button loses focus, so that Space still plays.
  *
  * @param {string} id
  * @param {() => void} run
@@ -28,9 +28,9 @@ export function button(id, run) {
 }
 
 /**
- * Keys as they are printed on a keyboard.
+ * Show keyboard keys as key caps.
  *
- * @param {string[]} keys alternatives, each of keys pressed together
+ * @param {string[]} keys alternatives, each of them keys that are pressed together
  */
 export function keyCaps(keys) {
   const caps = document.createElement("span");
@@ -47,10 +47,10 @@ export function keyCaps(keys) {
 }
 
 /**
- * A small button with a sign in place of words.
+ * Make a button with an icon instead of text.
  *
- * @param {string} path of the sign, in a box of 16 by 16
- * @param {string} title what it does, and its key in parentheses; its name without the key
+ * @param {string} path of the icon, in a box of 16 by 16
+ * @param {string} title tooltip, with the key in parentheses; without the key it is the button's name
  * @param {() => void} run
  */
 export function iconButton(path, title, run) {

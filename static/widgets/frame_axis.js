@@ -1,33 +1,33 @@
-/** Where frames lie along the width of the page: one axis for the timeline and all curves. */
+/** Horizontal axis of frames, shared by the timeline and all curves. */
 
-/** Room for labels on the left, CSS pixels. */
-export const GUTTER = 52;
+/** Width of the labels on the left, CSS pixels. */
+const GUTTER = 52;
 const PADDING = 8;
 
-/** @typedef {{start: number, end: number}} Span a part of the recording, in frames and their parts, `end` not included */
+/** @typedef {{start: number, end: number}} Span part of the recording in fractional frames, `end` not included */
 
 export class FrameAxis {
   /**
    * @param {number} width of the element, CSS pixels
-   * @param {number} frames how many there are
-   * @param {Span | null} visible the part that is shown; null for all of it
+   * @param {number} frames number of frames of the recording
+   * @param {Span | null} visible the visible part; null for all of it
    */
   constructor(width, frames, visible) {
     this.frames = frames;
     this.left = GUTTER;
     this.right = Math.max(GUTTER + 1, width - PADDING);
     const { start, end } = visible ?? { start: 0, end: frames };
-    /** Where the axis begins, in frames. */
+    /** Left end of the axis, in fractional frames. */
     this.origin = start;
-    /** Width of a frame, CSS pixels; below 1 where several share a pixel. */
+    /** Width of a frame, CSS pixels; below 1 where several frames share a pixel. */
     this.pitch = (this.right - this.left) / (end - start);
-    /** First and last frame of which something shows. */
+    /** First and last frame that is at least partly visible. */
     this.first = Math.max(0, Math.floor(start));
     this.last = Math.min(frames, Math.ceil(end)) - 1;
   }
 
   /**
-   * Left edge of a frame.
+   * Left edge of a frame, CSS pixels.
    *
    * @param {number} frame
    */
@@ -36,7 +36,7 @@ export class FrameAxis {
   }
 
   /**
-   * Middle of a frame.
+   * Centre of a frame, CSS pixels.
    *
    * @param {number} frame
    */
@@ -45,7 +45,7 @@ export class FrameAxis {
   }
 
   /**
-   * Whether a frame lies within what is shown.
+   * Whether a frame is visible.
    *
    * @param {number} frame
    */
@@ -54,7 +54,7 @@ export class FrameAxis {
   }
 
   /**
-   * The frame at a place, the nearest end outside.
+   * Frame at a position, clamped to the recording.
    *
    * @param {number} x
    */
@@ -63,7 +63,7 @@ export class FrameAxis {
   }
 
   /**
-   * The place on the axis, in frames and their parts.
+   * Position on the axis, in fractional frames.
    *
    * @param {number} x
    */
@@ -72,19 +72,19 @@ export class FrameAxis {
   }
 
   /**
-   * The frame under a pointer.
+   * Frame under the pointer.
    *
    * @param {MouseEvent} event
-   * @param {HTMLElement} element that has this axis
+   * @param {HTMLElement} element the element that has this axis
    */
   frameUnder(event, element) {
     return this.frameAt(event.clientX - element.getBoundingClientRect().left);
   }
 
   /**
-   * Frames to put numbers at: round ones, far enough from each other.
+   * Round frame numbers for tick labels.
    *
-   * @param {number} gap least distance of two, CSS pixels
+   * @param {number} gap minimum distance of two ticks, CSS pixels
    */
   ticks(gap) {
     const step = roundUp(Math.max(1, gap / this.pitch));
@@ -94,9 +94,9 @@ export class FrameAxis {
 }
 
 /**
- * The next of 1, 2, 5, 10, 20, 50 …
+ * Round up to 1, 2, 5, 10, 20, 50 …
  *
- * @param {number} value above 0
+ * @param {number} value greater than 0
  */
 export function roundUp(value) {
   const power = 10 ** Math.floor(Math.log10(value));

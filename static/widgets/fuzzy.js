@@ -1,4 +1,4 @@
-/** How well a few typed letters fit a text: whole beginnings of words first, then pieces of words, then scattered letters. */
+/** Score how well typed letters match a text: starts of words first, then parts of words, then scattered letters. */
 
 const START = 30;
 const WORD = 20;
@@ -7,7 +7,7 @@ const INSIDE = 10;
 /**
  * @param {string} query words in any order
  * @param {string} text
- * @returns {number | null} the higher the better; null where some word of the query does not fit
+ * @returns {number | null} a higher score is better; null if a word of the query does not match
  */
 export function fitness(query, text) {
   const there = text.toLowerCase();
@@ -34,7 +34,7 @@ function wordFitness(word, text) {
 }
 
 /**
- * Letters in their order with others between them; the fewer the better, and not from all over the text.
+ * Match letters in their order with others between them. Fewer letters between are better; too many are no match.
  *
  * @param {string} word
  * @param {string} text

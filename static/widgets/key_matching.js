@@ -1,18 +1,18 @@
-/** Which key press means what: by character, or, since Shift and Alt change that by keyboard layout, by place. */
+/** Match key presses by character, or by key position, since Shift and Alt change characters depending on the keyboard layout. */
 
 /**
  * @typedef {object} Binding
- * @property {string[]} keys how the keys are written for people
+ * @property {string[]} keys keys as they are displayed
  * @property {string} label
  * @property {(event: KeyboardEvent) => boolean} matches
  * @property {(event: KeyboardEvent) => void} run
- * @property {string} [area] what it is about
- * @property {() => string | null} [why] why it is not possible now; null where it is
- * @property {boolean} [anywhere] obeyed while something is typed, too
+ * @property {string} [area] area of the key list
+ * @property {() => string | null} [why] why the command is unavailable; null if it is available
+ * @property {boolean} [anywhere] whether it also applies while the user types text
  */
 
 /**
- * A plain key, by its character or its place.
+ * Match a plain key by its character or its position.
  *
  * @param {string} key
  * @param {string} [code]
@@ -39,7 +39,7 @@ export function control(key, shift) {
 }
 
 /**
- * @param {string} code place of the key
+ * @param {string} code position of the key
  * @param {boolean} shift
  * @returns {(event: KeyboardEvent) => boolean}
  */

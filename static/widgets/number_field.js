@@ -1,17 +1,17 @@
-/** A field for one number: Enter applies, Esc restores, the arrows step, and what is no number is refused with a sentence. */
+/** Text field for one number: Enter applies, Esc restores, arrows step, and invalid input is refused with a message. */
 
 /**
  * @typedef {object} NumberField
  * @property {HTMLInputElement} element
- * @property {(text: string) => void} show what stands there while nobody types
+ * @property {(text: string) => void} show set the text to display while the user is not typing
  */
 
 /**
  * @param {object} options
  * @param {string} options.name for screen readers
- * @param {(text: string) => string | null} options.take apply what was typed; says why where it cannot
- * @param {(why: string) => void} options.refuse tell the user why
- * @param {((factor: number) => void) | null} options.step what the up and down arrows do, null for nothing
+ * @param {(text: string) => string | null} options.take apply the text; returns a message if it is invalid
+ * @param {(why: string) => void} options.refuse show that message
+ * @param {((factor: number) => void) | null} options.step handle the up and down arrows; null for no steps
  * @returns {NumberField}
  */
 export function numberField({ name, take, refuse, step }) {
@@ -52,7 +52,7 @@ export function numberField({ name, take, refuse, step }) {
       event.preventDefault();
       if (apply()) element.select();
     } else if (event.key === "Escape") {
-      // Only this: it would also stop what is at work.
+      // Esc must not also stop a running search.
       event.preventDefault();
       restore();
       element.blur();

@@ -1,4 +1,4 @@
-/** A plot with two axes of numbers, for what has no axis of frames. Sizes are CSS pixels. */
+/** Plot with two numeric axes. Sizes are CSS pixels. */
 
 import { roundUp } from "./frame_axis.js";
 
@@ -9,7 +9,7 @@ const TOP = 6;
 const TICK_X = 80;
 const TICK_Y = 22;
 
-/** @typedef {{least: number, most: number}} Range */
+/** @typedef {{min: number, max: number}} Range */
 
 export class Plot {
   /**
@@ -17,7 +17,7 @@ export class Plot {
    * @param {number} height
    * @param {Range} xs
    * @param {Range} ys
-   * @param {number} top room above the plot
+   * @param {number} top space above the plot
    */
   constructor(width, height, xs, ys, top = TOP) {
     this.xs = xs;
@@ -30,26 +30,26 @@ export class Plot {
 
   /** @param {number} value */
   x(value) {
-    return this.left + ((this.right - this.left) * (value - this.xs.least)) / (this.xs.most - this.xs.least);
+    return this.left + ((this.right - this.left) * (value - this.xs.min)) / (this.xs.max - this.xs.min);
   }
 
   /** @param {number} value */
   y(value) {
-    return this.bottom - ((this.bottom - this.top) * (value - this.ys.least)) / (this.ys.most - this.ys.least);
+    return this.bottom - ((this.bottom - this.top) * (value - this.ys.min)) / (this.ys.max - this.ys.min);
   }
 
   /**
-   * The value at a place, the nearest end outside.
+   * Value at a position, clamped to the range.
    *
    * @param {number} x
    */
   valueAt(x) {
     const share = Math.max(0, Math.min(1, (x - this.left) / (this.right - this.left)));
-    return this.xs.least + share * (this.xs.most - this.xs.least);
+    return this.xs.min + share * (this.xs.max - this.xs.min);
   }
 
   /**
-   * Ground, lines at round values, and their numbers.
+   * Draw the background, grid lines at round values and their labels.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {CSSStyleDeclaration} style
@@ -79,12 +79,12 @@ export class Plot {
   }
 
   /**
-   * A line through points.
+   * Draw a line through points.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {ArrayLike<number>} xs
    * @param {ArrayLike<number>} ys NaN leaves a gap
-   * @param {boolean} isStepped whether a value holds until the next
+   * @param {boolean} isStepped whether a value applies until the next point
    */
   drawLine(context, xs, ys, isStepped = false) {
     const line = new Path2D();
@@ -104,7 +104,7 @@ export class Plot {
   }
 
   /**
-   * Draw only within the plot.
+   * Clip drawing to the plot.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {() => void} draw
@@ -121,10 +121,10 @@ export class Plot {
 
 /**
  * @param {Range} range
- * @param {number} share least distance of two, as a share of the range
+ * @param {number} share minimum distance of two ticks as a fraction of the range
  */
-function ticks({ least, most }, share) {
-  const step = roundUp(Math.max(1e-12, (most - least) * share));
-  const first = Math.ceil(least / step - 1e-9);
-  return Array.from({ length: Math.max(0, Math.floor(most / step + 1e-9) - first + 1) }, (_, i) => (first + i) * step);
+function ticks({ min, max }, share) {
+  const step = roundUp(Math.max(1e-12, (max - min) * share));
+  const first = Math.ceil(min / step - 1e-9);
+  return Array.from({ length: Math.max(0, Math.floor(max / step + 1e-9) - first + 1) }, (_, i) => (first + i) * step);
 }

@@ -1,9 +1,9 @@
-/** Small panels over the page: opened at a button, closed by a click elsewhere or by Esc. */
+/** Popover panels: a button opens them; Esc or a click outside closes them. */
 
 const MARGIN_PX = 8;
 
 /**
- * Open a panel below or above a button, within the window; close it where it is open already.
+ * Open a panel below or above a button, inside the window, or close it if it is open.
  *
  * @param {HTMLElement} panel
  * @param {HTMLElement} button
@@ -24,7 +24,7 @@ export function togglePopover(panel, button) {
 }
 
 /**
- * Let a button open a panel. Its press closes an open one before the click comes: that click means "close".
+ * Let a button open a panel. The press on the button closes an open panel before the click, which must not open it again.
  *
  * @param {HTMLElement} panel
  * @param {HTMLElement} button
@@ -40,7 +40,7 @@ export function opensPopover(panel, button, toggle) {
   panel.addEventListener("toggle", () => button.setAttribute("aria-expanded", String(panel.matches(":popover-open"))));
 }
 
-/** Close what is open; says whether anything was. */
+/** Close the open popover. Returns whether one was open. */
 export function closePopover() {
   const open = document.querySelector(":popover-open");
   if (open instanceof HTMLElement) open.hidePopover();
@@ -48,14 +48,14 @@ export function closePopover() {
 }
 
 /**
- * A slider with a caption and its value in words.
+ * Make a slider that shows its value as text.
  *
- * @param {{label: string, title: string, least: number, most: number, step: number,
+ * @param {{label: string, title: string, min: number, max: number, step: number,
  *   format: (value: number) => string, onInput: (value: number) => void}} options
  */
-export function slider({ label, title, least, most, step, format, onInput }) {
+export function slider({ label, title, min, max, step, format, onInput }) {
   const input = document.createElement("input");
-  Object.assign(input, { type: "range", min: String(least), max: String(most), step: String(step), title });
+  Object.assign(input, { type: "range", min: String(min), max: String(max), step: String(step), title });
   input.setAttribute("aria-label", label);
   const value = document.createElement("output");
   const show = (/** @type {number} */ shown) => {

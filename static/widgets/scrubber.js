@@ -1,12 +1,12 @@
-/** Turns a label into a slider: pressed and drawn sideways it changes a number, and one gesture is one entry of the history. */
+/** Turn a label into a slider: dragging it sideways changes a number. Each drag is one entry of the history. */
 
 const FINE = 0.1;
 
 /**
- * @param {HTMLElement} element to be pressed
+ * @param {HTMLElement} element the label
  * @param {object} options
- * @param {() => number | null} options.begin the number at the press; null where it cannot be changed
- * @param {number} options.perPixel how much a CSS pixel is worth; with Shift a tenth
+ * @param {() => number | null} options.begin returns the number at the start of a drag; null if it cannot be changed
+ * @param {number} options.perPixel change per CSS pixel; a tenth of it with Shift
  * @param {(value: number) => void} options.change called at most once per animation frame
  */
 export function makeScrubber(element, { begin, perPixel, change }) {

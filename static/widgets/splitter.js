@@ -1,4 +1,4 @@
-/** The bar between panes and 3-D view: dragged, moved by arrow keys, put back by a double click; remembered. */
+/** Splitter between panes and 3-D view, moved by pointer or arrow keys and reset by a double-click. Its position is stored. */
 
 const STORED = "quadrille.panes-fraction";
 const DEFAULT_FRACTION = 0.62;
@@ -15,8 +15,8 @@ export function makeSplitter(workspace, bar) {
 
   const show = () => {
     const width = workspace.clientWidth;
-    const most = width - MIN_SCENE_PX;
-    const panes = Math.round(Math.max(Math.min(MIN_PANES_PX, most), Math.min(most, fraction * width)));
+    const max = width - MIN_SCENE_PX;
+    const panes = Math.round(Math.max(Math.min(MIN_PANES_PX, max), Math.min(max, fraction * width)));
     workspace.style.setProperty("--panes-width", `${panes}px`);
     bar.setAttribute("aria-valuenow", String(Math.round((100 * panes) / Math.max(1, width))));
     return panes;

@@ -1,14 +1,14 @@
-/** How figures are written. */
+/** Format numbers and names for display. */
 
 const COUNT = new Intl.NumberFormat("en", { maximumFractionDigits: 0 });
 
-/** @param {number | null} value a cost in pixels */
+/** @param {number | null} value cost in pixels */
 export function px(value) {
   return value === null ? "–" : `${value.toFixed(2)} px`;
 }
 
 /**
- * `left_elbow` as people say it.
+ * Replace underscores by spaces, as in `left elbow`.
  *
  * @param {string} name
  */

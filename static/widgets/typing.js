@@ -1,6 +1,6 @@
-/** Whether text is being written in a field: what was typed there and not yet taken over is undone first, and by the field. */
+/** Track fields with unapplied text. In those, undo and redo belong to the field. */
 
-/** @type {WeakSet<Element>} fields with text that was typed and not yet taken over */
+/** @type {WeakSet<Element>} fields with unapplied text */
 const unfinished = new WeakSet();
 
 /**
@@ -10,7 +10,7 @@ const unfinished = new WeakSet();
  */
 export function watchTyping(target) {
   const note = (/** @type {Event} */ { type, target: field }) => {
-    // Not `instanceof`: the 3-D view's elements are of another window.
+    // Not `instanceof`: elements of the 3-D view belong to another window.
     if (!field || !("tagName" in field)) return;
     if (type === "input") unfinished.add(/** @type {Element} */ (field));
     else unfinished.delete(/** @type {Element} */ (field));
@@ -19,7 +19,7 @@ export function watchTyping(target) {
 }
 
 /**
- * Whether a key means undo or redo of what is being typed.
+ * Whether a key means undo or redo of unapplied text.
  *
  * @param {Element | null} field
  * @param {KeyboardEvent} event

@@ -1,7 +1,7 @@
-/** How the browser draws 3-D. */
+/** Detect whether WebGL renders in software. */
 
 /**
- * Whether WebGL is drawn without a graphics card, so that the 3-D view takes the time that the panes need.
+ * Whether WebGL renders without a graphics card. The 3-D view then competes with the panes for processor time.
  *
  * @returns {boolean}
  */

@@ -44,7 +44,7 @@ def session(tmp_path):
 
 @pytest.fixture
 def opened(session):
-    """Open the session anew; as often as wanted, each time as a restart."""
+    """Open the session; each call is a restart."""
     open_now = []
 
     def close():

@@ -1,4 +1,4 @@
-"""What each piece of the tracker is good for: docs/accuracy.md, made anew by `python tests/benchmarks/ablation.py`.
+"""Measure what each piece of the tracker contributes (docs/accuracy.md): `python tests/benchmarks/ablation.py`.
 
 Every variant tracks the same recordings from the pose fitted to the true joints of frame 0: simulated scenes that this
 script makes itself (smooth-skinned people whose bones are not the model's, clutter, noise) and, with `--data DIR`, the

@@ -1,6 +1,6 @@
 """What mutual occlusion, joint refinement and the penalty on interpenetration are good for, by how near two people are.
 
-A section of docs/accuracy.md, made anew by `python tests/benchmarks/closeness.py`. Every variant tracks the same
+A section of docs/accuracy.md, made by `python tests/benchmarks/closeness.py`. Every variant tracks the same
 simulated couples (smooth-skinned people whose bones are not the model's, in a furnished room, with noise) from the
 poses fitted to the true joints of frame 0. Accuracy is the mean error of the 12 limb joints of both; a frame of a
 person is lost when one of them is off by more than 150 mm.

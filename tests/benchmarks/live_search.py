@@ -49,7 +49,7 @@ async def watched(page, speed: str, seconds: float) -> None:
         await page.keyboard.press("m")  # mirrored, the body is far from its edges: there is something to search
         known = await page.evaluate("seen.spans.length")
         await page.keyboard.press("f")
-        # Whoever asks whether it runs may come too late: at full speed a search takes a quarter of a second.
+        # Asking whether it runs may come too late: at full speed a search takes a quarter of a second.
         await shows(page, f"seen.spans.length > {known} && !quadrille.state.state.job.running", 120)
         left = seconds - sum(await page.evaluate("seen.spans.map((s) => s.to - s.from)")) / 1e3
     spans, waits = await page.evaluate("[seen.spans, seen.waits]")

@@ -44,7 +44,7 @@ def forth_and_back(n_frames: int, n: int) -> Iterator[int]:
 
 
 def lengthened(source: CameraSource, folder: Path, fps: float, n: int) -> CameraSource:
-    """Write the footage of a camera anew, n frames long."""
+    """Write footage of a camera, n frames long."""
     path = folder / f"{source.camera.name}.mp4"
     with closing(open_footage(source.footage, source.camera.name)) as footage:
         images = [footage.read(k) for k in range(footage.n_frames)]

@@ -73,7 +73,7 @@ def film(path: Path, size: tuple[int, int], n: int, gop: int) -> None:
 
 
 def repeated(source: Path, path: Path, times: int) -> None:
-    """Write a film again and again into one, without encoding it anew."""
+    """Repeat a film in one file, without encoding it again."""
     with av.open(str(path), "w") as out:
         stream, shift = None, 0
         for _ in range(times):

@@ -19,8 +19,8 @@ HOUSE = {
     ],
     "app/  the viewer": [
         ["__main__"],
-        ["cli", "bench"],
-        ["server"],
+        ["cli"],
+        ["bench", "server"],
         ["page", "scene3d"],
         ["control"],
         ["control/posing", "control/tracking"],

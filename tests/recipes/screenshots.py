@@ -194,7 +194,7 @@ TUTORIAL = ("empty", "posing", "pins", "search-replay", "landscape", "curves", "
 
 
 def make_sessions(folder: Path, wanted: set[str]) -> dict[str, Path]:
-    """The sessions that pictures are taken of, each anew."""
+    """Make the sessions that pictures are taken of."""
     made = {name: folder / name for name in wanted}
     for name, at in made.items():
         if name == "eight":

@@ -1,4 +1,4 @@
-"""Several people at a time: nobody is mixed up with anybody, and nobody is refined in vain."""
+"""Several people at a time: no identity swaps, and no refinement without effect."""
 
 from dataclasses import replace
 

@@ -8,7 +8,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.compute.numba_options import BORROW
+from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.geometry.arrays import Array
 
 ALONG = 7
@@ -28,7 +28,7 @@ def unit_balls(shapes: Array) -> Array:
     return out
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def ray_transform(eye: Array, T: Array, shape: Array, ray: Array) -> None:
     """Fill the transform of rays to the coordinates in which a part is the unit ball, (13,).
 
@@ -46,7 +46,7 @@ def ray_transform(eye: Array, T: Array, shape: Array, ray: Array) -> None:
     ray[12] = C
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def occludes(ray: Array, x: float, y: float, z: float) -> bool:
     """Return whether a part occludes the point at (x, y, z) from the eye.
 
@@ -60,13 +60,13 @@ def occludes(ray: Array, x: float, y: float, z: float) -> bool:
     return B < 0.0 and -B < A and B * B - A * ray[12] > 0.0
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def axis_sample(shape: Array, sample: int) -> float:
     """Return the position of a sample along the axis of a part, from its centre, metres."""
     return shape[5] * 0.8 * (2.0 * sample / (ALONG - 1) - 1.0)
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def project_axis(P: Array, eye: Array, T: Array, shape: Array, axis: Array) -> None:
     """Fill the axis of a part relative to the eye and in the image, (4, 3).
 
@@ -85,7 +85,7 @@ def project_axis(P: Array, eye: Array, T: Array, shape: Array, axis: Array) -> N
         axis[3, i] = (P[i, 0] * sx + P[i, 1] * sy + P[i, 2] * sz) / norm
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def is_occluded(
     T: Array, axis: Array, along_m: float, own: int, rays: Array, among: NDArray[np.int64], n_among: int
 ) -> bool:
@@ -108,7 +108,7 @@ def is_occluded(
     return False
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def pixel_on_axis(axis: Array, along_m: float) -> tuple[float, float, float, float]:
     """Return the image of a point on an axis, px, and its change sideways, px per metre.
 

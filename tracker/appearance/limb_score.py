@@ -22,7 +22,7 @@ from tracker.appearance.axis_visibility import (
 )
 from tracker.body.kinematics import Kinematics, chain_poses
 from tracker.body.model import BodyModel
-from tracker.compute.numba_options import BORROW
+from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.geometry.arrays import Array, FloatArray, Image, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M
 from tracker.images.color_histogram import BINS, bin_of
@@ -141,7 +141,7 @@ def _backdrop(view: ColorView, standing: StaticParts, root: Array, reach: float)
     return _Backdrop(depths, owners, low)
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _draw(
     to_px: Array, rays: Array, eyes: Array, own: IntArray, corner: IntArray, depths: NDArray[np.float32],
     owners: NDArray[np.int16], bounds: Array,
@@ -181,7 +181,7 @@ def _draw(
                     owners[row, column] = owner
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _bounds(to_px: Array, bounds: Array) -> None:
     """Fill the bounds u0, v0, u1, v1 of a ball in an image, (4,), px.
 
@@ -203,14 +203,14 @@ def _bounds(to_px: Array, bounds: Array) -> None:
             bounds[i], bounds[i + 2] = (uw + root) / ww, (uw - root) / ww
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _touch(to_px: Array, i: int, j: int) -> float:
     """An entry of the dual conic of a ball's outline: a line l touches it where l^T C l = 0."""
     near = to_px[i, 0] * to_px[j, 0] + to_px[i, 1] * to_px[j, 1] + to_px[i, 2] * to_px[j, 2]
     return float(near - to_px[i, 3] * to_px[j, 3])
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _look_along(
     P: Array, eye: Array, image: Image, distance: FloatArray, theta_px: float,
     depths: NDArray[np.float32], owners: NDArray[np.int16], corner: IntArray,
@@ -261,7 +261,7 @@ def _look_along(
         nats[c] = total
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _sample_nats(
     u: float, v: float, du: float, dv: float, image: Image, distance: FloatArray, theta_px: float, ratios: Array,
     part: int, behind: int,

@@ -25,7 +25,7 @@ from tracker.appearance.axis_visibility import (
 from tracker.appearance.limb_score import ColorView, LimbScorer, StaticParts
 from tracker.body.kinematics import Kinematics, chain_poses
 from tracker.body.model import BodyModel, PosedBody, parts_of
-from tracker.compute.numba_options import BORROW
+from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.contours.occluding_contours import part_poses
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, Image
@@ -226,7 +226,7 @@ def _twins(model: BodyModel) -> NDArray[np.int64]:
     return np.array([names.index(n) if n in names else i for i, n in enumerate(swapped)])
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _add_nats(
     P: Array, eye: Array, image: Image, Ts: Array, placed: Array, first: int, shapes: Array, log_ratios: Array,
     found: NDArray[np.int64], rays: Array, cones: Array, near: NDArray[np.int64], axis: Array, nats: Array,
@@ -253,7 +253,7 @@ def _add_nats(
             nats[c] += log_ratios[found[i, 0], found[i, 1]]
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _look(
     P: Array, eye: Array, Ts: Array, shapes: Array, first: int, last: int, image: Image, out: NDArray[np.int64],
     rays: Array, cones: Array, near: NDArray[np.int64], axis: Array,
@@ -297,7 +297,7 @@ def _look(
     return n
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _cone(eye: Array, T: Array, shape: Array, cone: Array) -> None:
     """Fill the direction to the centre of a part and the angle of the ball around it, (4,)."""
     for i in range(3):
@@ -310,7 +310,7 @@ def _cone(eye: Array, T: Array, shape: Array, cone: Array) -> None:
         cone[3] = np.pi
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _possible_occluders(part: int, cones: Array, near: NDArray[np.int64]) -> int:
     """List the parts that may occlude some of a part; return their number."""
     n = 0

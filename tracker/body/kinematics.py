@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import BORROW
+from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.geometry.arrays import Array, IntArray
 
 TRANSLATE, REVOLVE, BALL = 0, 1, 2
@@ -37,7 +37,7 @@ class Kinematics(NamedTuple):
     """A point on each rotation axis, (n_dofs, 3), metres."""
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def forward_kinematics(values: Array, tree: Tree, Ts: Array, axes: Array, origins: Array) -> None:
     """Fill the arrays of a `Kinematics` from the values of a pose, (n_values,)."""
     op, dof, value = 0, 0, 0
@@ -65,7 +65,7 @@ def chain_poses(tree: Tree, rest: Kinematics, chain: IntArray, poses: Array) -> 
     return out
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _place_chain(
     poses: Array, tree: Tree, starts: IntArray, Ts: Array, unread: Array, chain: IntArray, out: Array
 ) -> None:
@@ -97,7 +97,7 @@ def _starts(tree: Tree) -> IntArray:
     return out
 
 
-@njit(inline="always", **BORROW)
+@njit(inline="always", **NO_REFCOUNT)
 def _place_part(  # noqa: C901
     part: int, op: int, dof: int, value: int, values: Array, parents: IntArray, offsets: Array, ops: IntArray,
     op_axes: Array, Ts: Array, axes: Array, origins: Array,
@@ -169,7 +169,7 @@ def _place_part(  # noqa: C901
     return op, dof, value
 
 
-@njit(inline="always", **BORROW)
+@njit(inline="always", **NO_REFCOUNT)
 def _turn(T: Array, w: float, x: float, y: float, z: float) -> None:
     """Multiply the rotation of a pose (4, 4) from the right by the rotation of a unit quaternion."""
     xx, xy, xz = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)

@@ -9,7 +9,7 @@ surface points.
 import numpy as np
 from numba import njit
 
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.surfaces import N_RINGS, N_SECTORS, Surfaces
 from tracker.geometry.arrays import Array, FloatArray
 
@@ -20,7 +20,7 @@ _ON_AXIS = 1e-9
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def revolved_generator(
     part: int, n_profile: int, profile: FloatArray, eye: Array, turn: np.float32, half: FloatArray, out: FloatArray
 ) -> int:
@@ -71,7 +71,7 @@ def revolved_generator(
     return 2 * n - 2  # the mirrored first point is the first itself
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def _strip(
     c0: np.float32, c1: np.float32, n0: np.float32, n1: np.float32, first: np.float32, last: np.float32,
     r0: np.float32, z0: np.float32, r1: np.float32, z1: np.float32, turn: np.float32, n: int, half: FloatArray,
@@ -111,7 +111,7 @@ def _strip(
     return n
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def _arccos(x: np.float32) -> np.float32:
     """Return the arc cosine within 7e-5 rad (Abramowitz and Stegun 4.4.45), in a third of the exact function's time."""
     a = min(abs(x), _ONE)
@@ -121,7 +121,7 @@ def _arccos(x: np.float32) -> np.float32:
     return angle if x >= _ZERO else np.float32(np.pi) - angle
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def grid_generator(part: int, eye: Array, surfaces: Surfaces, f: FloatArray, out: FloatArray) -> int:
     """Follow the contour generator around the grid of a part, from cell to cell.
 
@@ -174,7 +174,7 @@ def grid_generator(part: int, eye: Array, surfaces: Surfaces, f: FloatArray, out
     return 0
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _start(f: FloatArray) -> tuple[int, int, int]:
     """Return ring, sector and side at which the zero line enters a cell; ring is -1 without a zero line."""
     for ring in range(N_RINGS + 1):

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.occluding_contours import part_poses
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
@@ -67,7 +67,7 @@ def _mesh(models: tuple[BodyModel, ...]) -> _Mesh:
     )
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _project(T: NDArray[np.float32], points: NDArray[np.float32], owners: NDArray[np.int32], image: Array) -> None:
     """Fill u, v and 1 / depth of each corner, px and 1/m; 1 / depth is 0 nearer than the near plane and behind the
     camera."""
@@ -83,7 +83,7 @@ def _project(T: NDArray[np.float32], points: NDArray[np.float32], owners: NDArra
         image[k, 2] = near
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _fill(
     faces: NDArray[np.int32], owners: NDArray[np.int32], image: Array, nearness: NDArray[np.float32],
     labels: NDArray[np.uint8],

@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.model import PosedBody
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.generator import grid_generator, revolved_generator
 from tracker.contours.pieces import (
     PIECE_PX,
@@ -83,7 +83,7 @@ def contour_buffer(camera: Camera, n_bodies: int, piece_px: float = PIECE_PX) ->
     )  # fmt: skip
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def mark_all_occluded(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
     """Mark the pieces that parts occlude of one another.
 
@@ -130,13 +130,13 @@ def mark_all_occluded(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
             mark_occluded(b, solids, Q, margin, middles, firsts[a], firsts[a + 1], shared, occluded)
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def focal_px(P: Array) -> float:
     """Return the focal length of a projection matrix, (3, 4), px."""
     return np.sqrt(P[0, 0] ** 2 + P[0, 1] ** 2 + P[0, 2] ** 2)
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def trace_part(
     part: int, P: Array, focal: float, surfaces: Surfaces, piece_px: float, n: int, edge: int, out: Pieces
 ) -> tuple[int, int]:  # fmt: skip
@@ -163,7 +163,7 @@ def trace_part(
     return n, edge
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def trace_pieces(P: Array, eye: Array, surfaces: Surfaces, piece_px: float, out: Pieces) -> int:
     """Fill the pieces of placed parts in one view and return their number; see `trace_view`."""
     n_parts, focal = surfaces.radii.shape[0], focal_px(P)

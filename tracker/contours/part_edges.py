@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.model import PosedBody
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.contours import occluding_contours
 from tracker.contours.pieces import PIECE_PX
 from tracker.contours.surfaces import N_RINGS, N_SECTORS, Surfaces, surfaces_of
@@ -143,7 +143,7 @@ def _occluded_points(
     return occluded[:n]
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _mark_occluded_points(
     eye: Array, Ts: Array, centers: Array, half_axes: Array, solids: FloatArray, ignored: NDArray[np.bool_],
     Q: FloatArray, shared: FloatArray, by_part: NDArray[np.bool_], points: FloatArray, occluded: NDArray[np.bool_],

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.generator import MAX_POINTS
 from tracker.contours.surfaces import Surfaces
 from tracker.contours.visibility import LANES
@@ -79,7 +79,7 @@ def piece_buffer(surfaces: Surfaces, room: int) -> Pieces:
     )  # fmt: skip
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def place_parts(Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
     """Fill the transforms between the parts' unit coordinates and the world, which all views share."""
     to_world, to_unit = out.Ts_world_unit, out.Ts_unit_world
@@ -100,7 +100,7 @@ def place_parts(Ts: Array, surfaces: Surfaces, out: Pieces) -> None:
                 to_unit[part, i, 3] -= to_unit[part, i, k] * to_world[part, k, 3]
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def place_eye(eye: Array, out: Pieces) -> None:
     """Fill the eye in the unit coordinates of placed parts, and its distance from them."""
     to_world, to_unit = out.Ts_world_unit, out.Ts_unit_world
@@ -111,7 +111,7 @@ def place_eye(eye: Array, out: Pieces) -> None:
             to_unit[part, i, 4] = to_unit[part, i, 0] * x + to_unit[part, i, 1] * y + to_unit[part, i, 2] * z
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def project_generator(
     part: int, P: Array, n: int, Ts_world_unit: Array, generator: FloatArray, image: FloatArray, boxes: Array
 ) -> int:
@@ -149,7 +149,7 @@ def project_generator(
     return n_kept
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _image_row(i: int, part: int, P: Array, W: Array) -> tuple[np.float32, np.float32, np.float32, np.float32]:
     """Return row i of the projection from the unit coordinates of a part to the image."""
     p, q, r = P[i, 0], P[i, 1], P[i, 2]
@@ -161,7 +161,7 @@ def _image_row(i: int, part: int, P: Array, W: Array) -> tuple[np.float32, np.fl
     )
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def cut_into_pieces(
     n_edges: int, edge: int, piece_px: float, n: int, generator: FloatArray, image: FloatArray, ends: FloatArray,
     middles: FloatArray, edges: NDArray[np.int32],

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import BORROW, FAST
+from tracker.compute.numba_options import FAST_MATH, NO_REFCOUNT
 from tracker.contours.generator import MAX_POINTS
 from tracker.contours.occluding_contours import focal_px, mark_all_occluded, trace_part
 from tracker.contours.pieces import Pieces, place_eye
@@ -67,7 +67,7 @@ def static_contours_buffer(n_views: int, room: int, n_points: int, moves: NDArra
     )  # fmt: skip
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def is_static_unchanged(Ts: Array, moves: NDArray[np.bool_], static: Array) -> bool:
     """Return whether all static parts are exactly where they were cached; poses are (P, 4, 4)."""
     for part in range(Ts.shape[0]):
@@ -79,7 +79,7 @@ def is_static_unchanged(Ts: Array, moves: NDArray[np.bool_], static: Array) -> b
     return True
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def copy_poses(Ts: Array, static: Array) -> None:
     """Copy the poses of all parts, (P, 4, 4), when the cache is filled."""
     for part in range(Ts.shape[0]):
@@ -88,7 +88,7 @@ def copy_poses(Ts: Array, static: Array) -> None:
                 static[part, i, k] = Ts[part, i, k]
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def trace_static(
     P: Array, eye: Array, surfaces: Surfaces, piece_px: float, static: StaticContours, out: Pieces
 ) -> None:
@@ -106,7 +106,7 @@ def trace_static(
     mark_all_occluded(n_parts, surfaces, out)
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def store_pieces(view: int, traced: Pieces, static: StaticContours) -> None:
     """Store the pieces of a view after those of the views before it."""
     n_parts = traced.firsts.shape[0] - 1
@@ -125,7 +125,7 @@ def store_pieces(view: int, traced: Pieces, static: StaticContours) -> None:
     static.firsts[view, n_parts] = at + traced.firsts[n_parts]
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def trace_moving_parts(
     view: int, P: Array, eye: Array, surfaces: Surfaces, piece_px: float, static: StaticContours, out: Pieces
 ) -> int:
@@ -157,7 +157,7 @@ def trace_moving_parts(
     return n
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def mark_covered_segments(view: int, traced: Pieces, static: StaticContours) -> bool:
     """Mark the cached segments of a view that moving parts occlude partly; return whether there are any."""
     static.covered[: static.firsts[view, -1] - static.firsts[view, 0]] = False

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.surfaces import ALONG, N_ALONG, N_SECTION, SECTION
 from tracker.geometry.arrays import FloatArray
 
@@ -24,7 +24,7 @@ _TRIES = (0.5, 0.25, 0.75, 0.001)
 """Where in the common interval of line and quadric the shape is tested, from its far end (0) to the near one (1)."""
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def _meet_quadric(
     part: int, solids: FloatArray, Q: FloatArray, margin: float, points: FloatArray, first: int, last: int,
     shared: FloatArray,
@@ -65,7 +65,7 @@ def _meet_quadric(
         shared[1, i] = high if disc > _ZERO else -_FAR
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _is_inside(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: np.float32) -> bool:
     """Return whether a point in unit coordinates is inside a superquadric, by the tables of its shape."""
     at = abs(z) * np.float32(N_ALONG)
@@ -90,7 +90,7 @@ def _is_inside(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: n
     return larger * (below + (at - np.float32(k)) * (solids[part, cell + np.uint64(1)] - below)) < size
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def mark_occluded(
     part: int, solids: FloatArray, Q: FloatArray, margin: float, points: FloatArray, first: int, last: int,
     shared: FloatArray, occluded: NDArray[np.bool_],

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.contours import occluding_contours
 from tracker.contours.pieces import PIECE_PX, place_parts
 from tracker.contours.static_cache import StaticContours, copy_poses, is_static_unchanged, trace_moving_parts
@@ -16,7 +16,7 @@ from tracker.images.distance_transform import bilinear
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # Python floats would promote the kernel's arithmetic to float64
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _model_to_image(
     view: int, first: int, last: int, pixel: int, views: ViewArrays, scale: float, with_jacobian: bool,
     static: StaticContours, scratch: Scratch, sums: Sums,
@@ -55,7 +55,7 @@ def _model_to_image(
     return 0.5 * float(weight) * cost
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _image_to_model(
     view: int, n_segments: int, views: ViewArrays, scale: float, turn: float, with_jacobian: bool,
     static: StaticContours, scratch: Scratch, sums: Sums,
@@ -123,7 +123,7 @@ WITH_JACOBIAN, COST_ONLY = np.bool_(True), np.bool_(False)
 """Values of `with_jacobian`. Literals in a kernel would have `accumulate_normal_equations` compiled once for each."""
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def accumulate_normal_equations(term: ContourTerm, with_jacobian: bool) -> float:
     """Fill the sums for one pose of the fitted parts, the others being fixed; return the cost.
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
 from tracker.body.model import BodyModel
-from tracker.compute.numba_options import BORROW
+from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.fitting import gauss_newton
 from tracker.fitting.contour_kernels import WITH_JACOBIAN, ContourTerm, accumulate_normal_equations
 from tracker.fitting.contour_residuals import ContourResiduals
@@ -183,7 +183,7 @@ def _linearize(blocks: _Blocks, pose: Array, out: _Linear) -> float:
     return cost
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _list_active(
     pose: Array, gradient: Array, is_active: NDArray[np.bool_], limits: Array, active: IntArray
 ) -> int:  # fmt: skip
@@ -197,7 +197,7 @@ def _list_active(
     return n
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _damped_step(gradient: Array, hessian: Array, active: IntArray, damping: float, L: Array, step: Array) -> float:
     """Fill the damped step, (m,), of the listed degrees of freedom, (m,); return the decrease that it predicts.
 
@@ -222,7 +222,7 @@ def _damped_step(gradient: Array, hessian: Array, active: IntArray, damping: flo
     return promised
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _factor(hessian: Array, active: IntArray, damping: float, floor: float, L: Array) -> bool:
     """Fill the Cholesky factor of the damped Hessian, the lower triangle of (m, m); return False if it is not
     definite."""
@@ -242,7 +242,7 @@ def _factor(hessian: Array, active: IntArray, damping: float, floor: float, L: A
     return True
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _substitute(L: Array, gradient: Array, active: IntArray, step: Array) -> None:
     """Fill the step, (m,), by substitution in a Cholesky factor, (m, m)."""
     m = active.shape[0]
@@ -258,7 +258,7 @@ def _substitute(L: Array, gradient: Array, active: IntArray, step: Array) -> Non
         step[i] = total / L[i, i]
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _move(pose: Array, step: Array, active: IntArray, limits: Array, out: Array) -> float:
     """Fill a pose, (n_dofs,), after a step, (m,), within the limits; return the largest change."""
     farthest = 0.0

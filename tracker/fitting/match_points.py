@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import BORROW
+from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import SCENE_SPACING_PX, ViewEvidence
 from tracker.geometry.arrays import FloatArray, IntArray
@@ -52,7 +52,7 @@ def points_to_match(
     return points[: _pack(points[:n], near)]
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _merge(points: FloatArray, n_edges: int, cells: IntArray) -> int:
     """Merge silhouette points, which follow the edge points, into the edges that they lie on.
 

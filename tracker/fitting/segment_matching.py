@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.pieces import PIECE_PX
 from tracker.contours.static_cache import StaticContours, mark_covered_segments, store_pieces, trace_static
 from tracker.contours.surfaces import Surfaces
@@ -18,7 +18,7 @@ _JOINED = 10
 """Largest number of pieces of a segment: longer segments would reach too many points."""
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def nearest_oriented_segment(
     u: FloatArray, v: FloatArray, nu: FloatArray, nv: FloatArray, rows: IntArray, segments: FloatArray, n: int,
     wanted: NDArray[np.bool_], turn: float, reach: float, best: FloatArray, nearest: NDArray[np.int32],
@@ -65,7 +65,7 @@ def nearest_oriented_segment(
                 best[i] = squared if closer else best[i]
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def pack_visible(n_parts: int, scratch: Scratch) -> int:
     """Pack the visible pieces and join them to segments; return the number of segments."""
     traced, pieces, segments, of_segment = scratch.traced, scratch.pieces, scratch.segments, scratch.of_segment
@@ -99,7 +99,7 @@ def pack_visible(n_parts: int, scratch: Scratch) -> int:
     return int(n)
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _match_segments(
     view: int, n: int, views: ViewArrays, turn: float, scratch: Scratch, best: FloatArray, nearest: NDArray[np.int32]
 ) -> None:  # fmt: skip
@@ -113,7 +113,7 @@ def _match_segments(
     )  # fmt: skip
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def match_points(
     view: int, n_segments: int, views: ViewArrays, turn: float, static: StaticContours, scratch: Scratch
 ) -> None:
@@ -132,7 +132,7 @@ def match_points(
     _match_segments(view, n_segments, views, turn, scratch, best, nearest)
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _rematch_covered(view: int, n_segments: int, views: ViewArrays, static: StaticContours, scratch: Scratch) -> None:
     """Match the points again whose nearest static segment is covered by moving parts."""
     start, stop, reach = views.firsts[view], views.firsts[view + 1], np.float32(views.thetas[view])
@@ -152,7 +152,7 @@ def _rematch_covered(view: int, n_segments: int, views: ViewArrays, static: Stat
             scratch.wanted[k] = True
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def store_static(
     view: int, surfaces: Surfaces, views: ViewArrays, turn: float, static: StaticContours,
     scratch: Scratch,

@@ -8,11 +8,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.geometry.arrays import Array, FloatArray, IntArray
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def add_twists(span: IntArray, pieces: FloatArray, pulls: Array, P: Array, W: Array, M: Array, b: Array) -> None:
     """Add the sums of a part's pieces in one view to the normal matrix and gradient of the part's twist.
 

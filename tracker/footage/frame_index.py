@@ -40,11 +40,11 @@ def load(video: Path, folder: Path | None) -> Index | None:
     if folder is None:
         return None
     try:
-        with np.load(_place(video, folder)) as kept:
-            if str(kept["stamp"]) != stamp_of(video) or int(kept["version"]) != VERSION:
+        with np.load(_place(video, folder)) as cached:
+            if str(cached["stamp"]) != stamp_of(video) or int(cached["version"]) != VERSION:
                 return None
-            every = kept["every"].tolist()
-            return Index(kept["pts"], {pts: i for i, pts in enumerate(every)}, kept["key_pts"])
+            every = cached["every"].tolist()
+            return Index(cached["pts"], {pts: i for i, pts in enumerate(every)}, cached["key_pts"])
     except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # missing or incomplete: list the packets again
         return None
 

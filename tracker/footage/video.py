@@ -70,9 +70,9 @@ class VideoFile:
             raise RecordingError(f"{self._where} not found; check the path")
         try:
             self._open()
-            kept = frame_index.load(path, indices)
-            if kept is not None:
-                self._finish(kept)
+            cached = frame_index.load(path, indices)
+            if cached is not None:
+                self._finish(cached)
             elif not in_background:
                 self._list()
             self._index = self._listed.frames

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import BORROW, FAST
+from tracker.compute.numba_options import FAST_MATH, NO_REFCOUNT
 from tracker.geometry.arrays import FloatArray, IntArray
 
 _ZERO, _HALF, _ONE = (
@@ -110,7 +110,7 @@ def within_reach(
     return RowSortedPoints(points[:, : _room_for(n)], rows)
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def _keep_within(
     points: FloatArray, rows: IntArray, pieces: FloatArray, hidden: NDArray[np.bool_], reach: float,
     segments: Segments, distances: FloatArray,
@@ -154,7 +154,7 @@ def stack_rows(rows: Sequence[IntArray]) -> IntArray:
     return out
 
 
-@njit(**BORROW)
+@njit(**NO_REFCOUNT)
 def cells_within(
     u0: np.float32, v0: np.float32, u1: np.float32, v1: np.float32, reach: np.float32, rows: IntArray
 ) -> tuple[int, int, int, int]:
@@ -168,7 +168,7 @@ def cells_within(
     )  # fmt: skip
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def nearest_segment(
     u: FloatArray, v: FloatArray, rows: IntArray, segments: Segments, n: int, reach: float, out: FloatArray
 ) -> None:

@@ -138,8 +138,8 @@ class TaperedSuperquadric:
         s = 1 + k * z
         away = np.cos(eta) ** (2 - e1) / s
         along = _signed_power(np.sin(eta), 2 - e1) - k * np.cos(eta) ** 2 / s
-        kept = _chords(np.stack([max(a1, a2) * r * s, a3 * z], axis=1), tolerance_m)
-        return _with_ends((r * s)[kept], z[kept], away[kept], along[kept])
+        selected = _chords(np.stack([max(a1, a2) * r * s, a3 * z], axis=1), tolerance_m)
+        return _with_ends((r * s)[selected], z[selected], away[selected], along[selected])
 
     @property
     def enclosure(self) -> Enclosure:
@@ -263,18 +263,18 @@ def _with_ends(radii: Array, heights: Array, outward: Array, along: Array) -> Pr
 
 def _chords(curve: Array, tolerance: float) -> list[int]:
     """Thin a curve (n, 2) to chords that deviate from it by at most the tolerance; return the indices of their ends."""
-    kept, last = [0], 1
-    while kept[-1] < len(curve) - 1:
+    selected, last = [0], 1
+    while selected[-1] < len(curve) - 1:
         while last + 1 < len(curve):
-            chord = curve[last + 1] - curve[kept[-1]]
-            between = curve[kept[-1] + 1 : last + 1] - curve[kept[-1]]
+            chord = curve[last + 1] - curve[selected[-1]]
+            between = curve[selected[-1] + 1 : last + 1] - curve[selected[-1]]
             off = np.abs(chord[0] * between[:, 1] - chord[1] * between[:, 0])
             if off.max() > tolerance * np.hypot(*chord):
                 break
             last += 1
-        kept.append(last)
+        selected.append(last)
         last += 1
-    return kept
+    return selected
 
 
 def _closed(rings: Array, end: float) -> Triangles:

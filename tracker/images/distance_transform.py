@@ -4,13 +4,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.geometry.arrays import FloatArray
 
 _ZERO = np.float32(0.0)  # a Python float would promote the kernel's arithmetic to float64
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def bilinear(
     image: FloatArray, width: int, height: int, u: np.float32, v: np.float32
 ) -> tuple[np.float32, np.float32, np.float32]:
@@ -69,7 +69,7 @@ def distance_image(edge_map: NDArray[np.bool_] | NDArray[np.uint8], limit_px: fl
     return out
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _measure(edges: NDArray[np.uint8], limit: np.float32, rows: FloatArray, out: FloatArray) -> None:
     """Fill a distance image: one pass of steps down and right, one pass of steps up and left.
 
@@ -97,7 +97,7 @@ def _measure(edges: NDArray[np.uint8], limit: np.float32, rows: FloatArray, out:
                 out[y, x] = rows[here, x + np.uint64(_BORDER)]
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def _step_down(before: FloatArray, before2: FloatArray, own: FloatArray, out: FloatArray) -> None:
     """Fill a row, (W,), from its own distances and steps from the two rows before it, (W + 2 `_BORDER`,)."""
     for x in range(np.uint64(before.shape[0] - 2 * _BORDER)):
@@ -109,7 +109,7 @@ def _step_down(before: FloatArray, before2: FloatArray, own: FloatArray, out: Fl
         out[x] = min(min(own[x], straight), min(aside, min(far, steep) + _KNIGHT))
 
 
-@njit(inline="always", **FAST)
+@njit(inline="always", **FAST_MATH)
 def _step_aside(right: bool, limit: np.float32, a: FloatArray, b: FloatArray, out: FloatArray) -> None:
     """Fill a row, (W + 2 `_BORDER`,), by steps along it to one side.
 

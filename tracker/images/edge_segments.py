@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.geometry.arrays import FloatArray, IntArray
 from tracker.geometry.segment_distance import LANES, RowSortedPoints, cells_within, sort_points
 
@@ -228,7 +228,7 @@ def _cut(points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_], fir
     return count
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def nearest_parallel_segment(
     pixels: FloatArray, rows: IntArray, pieces: FloatArray, reach: float, max_angle: float, out: FloatArray
 ) -> None:

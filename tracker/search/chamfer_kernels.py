@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import Tree, forward_kinematics
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.occluding_contours import trace_pieces
 from tracker.contours.pieces import PIECE_PX, Pieces, place_parts
 from tracker.contours.surfaces import Surfaces
@@ -74,7 +74,7 @@ class TracedContours(NamedTuple):
     """Index of the first piece of each view, then the number of all, (V + 1,); (0,) without contours."""
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool) -> float:
     """Return the mean of n distances with weights w and outliers as in `ChamferCost`; theta without any."""
     total, weight = 0.0, 0.0
@@ -102,7 +102,7 @@ def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool
     return total / weight if weight >= 0.5 * everything else theta
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _distance(image: FloatArray, width: int, height: int, u: np.float32, v: np.float32) -> np.float32:
     """Return the distance at a pixel; outside the image, that of the nearest border pixel plus the distance to it."""
     inside = bilinear(image, width, height, u, v)[0]
@@ -112,7 +112,7 @@ def _distance(image: FloatArray, width: int, height: int, u: np.float32, v: np.f
     return inside + np.sqrt(off_u * off_u + off_v * off_v)
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, visible: FloatArray) -> float:
     """Return the mean distance of n visible pieces, see `Scratch`, cut off at theta; theta if none is visible.
 
@@ -128,7 +128,7 @@ def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, v
     return theta - spared / weight if weight > 0.0 else theta
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: float, scratch: Scratch) -> float:
     """Return the same by the paper's robust mean."""
     visible, lengths, d = scratch.visible, scratch.lengths, scratch.distances
@@ -138,7 +138,7 @@ def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: fl
     return _robust_mean(d, lengths, n, theta, True)
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _take_visible(n: int, pieces: Pieces, visible: FloatArray, segments: Segments) -> tuple[int, int]:
     """Pack the visible ones of n pieces and join them to segments; return both numbers."""
     ends, occluded, edges = pieces.ends, pieces.occluded, pieces.edges
@@ -181,7 +181,7 @@ def trace_views(
     return at
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _take_traced(view: int, contours: TracedContours, pieces: Pieces) -> int:
     """Copy the traced pieces of a view; return their number."""
     first, last = contours.firsts[view], contours.firsts[view + 1]
@@ -193,7 +193,7 @@ def _take_traced(view: int, contours: TracedContours, pieces: Pieces) -> int:
     return n
 
 
-@njit(**FAST)
+@njit(**FAST_MATH)
 def _score(
     Ts: Array,
     surfaces: Surfaces,

@@ -2,6 +2,9 @@
 
 A lock file works on network drives, where the system's own locks are unreliable. A lock left by a dead program is
 recognized on the machine on which it ran; a lock of another machine counts as held.
+
+`filelock.SoftFileLock` would replace only the exclusive creation of the file. The holder's note, the recognition of
+reused process numbers and the safe replacement of a stale lock would remain.
 """
 
 import json

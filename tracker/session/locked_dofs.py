@@ -20,9 +20,9 @@ def load_locks(people: Sequence[Person], setting: Callable[[str, Any], Any]) -> 
         people: of the session.
         setting: returns the session's setting of a name, or a default.
     """
-    kept = setting(SETTING, {})
+    stored = setting(SETTING, {})
     return tuple(
-        frozenset(i for i, name in enumerate(p.model.dof_names) if name in kept.get(p.name, ())) for p in people
+        frozenset(i for i, name in enumerate(p.model.dof_names) if name in stored.get(p.name, ())) for p in people
     )
 
 

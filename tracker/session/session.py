@@ -177,9 +177,9 @@ def load_session(folder: str | Path) -> Session:
             _load_floor(data.get("floor"), str(path)),
         )
     except KeyError as error:
-        raise SessionError(f"session {path}: the key {error} is missing; add it or make the session anew") from error
+        raise SessionError(f"session {path}: the key {error} is missing; add it or make a new session") from error
     except (TypeError, ValueError, AttributeError) as error:
-        raise SessionError(f"session {path} is malformed: {error}; correct it or make the session anew") from error
+        raise SessionError(f"session {path} is malformed: {error}; correct it or make a new session") from error
     _check(session)
     return session
 

@@ -194,8 +194,8 @@ def _write_truth(
     for role, model, values in zip(cast, models, poses, strict=True):
         suffix = "" if len(cast) == 1 else f"_{role.name}"
         # The root lies within the trunk; no marker set has it.
-        kept = [i for i, name in enumerate(model.point_names) if name != model.joints[0].name]
-        points = np.array([model.points_world(v)[kept] for v in values])
-        write_trc(folder / f"truth{suffix}.trc", [model.point_names[i] for i in kept], points, fps)
+        marked = [i for i, name in enumerate(model.point_names) if name != model.joints[0].name]
+        points = np.array([model.points_world(v)[marked] for v in values])
+        write_trc(folder / f"truth{suffix}.trc", [model.point_names[i] for i in marked], points, fps)
         write_pose_table(folder / f"truth{suffix}.csv", model, values)
         write_text_atomic(folder / f"truth{suffix}_model.toml", format_model(model))

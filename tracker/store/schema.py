@@ -24,7 +24,7 @@ CREATE TABLE moves (                                             -- undo and red
 CREATE TABLE model_revisions (
     id INTEGER PRIMARY KEY AUTOINCREMENT, person TEXT NOT NULL, toml TEXT NOT NULL, time TEXT NOT NULL
 );
-CREATE TABLE told (                                              -- what programs were told: once, not with each pose
+CREATE TABLE told (                                              -- settings of programs, shared by poses
     id INTEGER PRIMARY KEY, settings TEXT NOT NULL UNIQUE
 );
 CREATE TABLE pose_changes (
@@ -35,11 +35,11 @@ CREATE TABLE pose_changes (
     numbers BLOB,                                                -- little-endian float64; NULL: cleared
     sources BLOB, keyframe INTEGER, status TEXT, cost_px REAL,
     model_revision INTEGER REFERENCES model_revisions,
-    settings TEXT,                                               -- as versions 1 and 2 kept them; NULL since: see told
+    settings TEXT,                                               -- of versions 1 and 2; NULL since: see told
     views_px BLOB, parts_px BLOB,                                -- little-endian float64, NaN: unknown; NULL: none
     remark TEXT,
     told INTEGER REFERENCES told,
-    reviewed INTEGER                                             -- NULL: written before version 4, nobody has said so
+    reviewed INTEGER                                             -- NULL: written before version 4, not reviewed
 );
 CREATE INDEX pose_changes_edit ON pose_changes (edit);
 CREATE TABLE poses (

@@ -4,14 +4,17 @@ import json
 import shutil
 from contextlib import closing
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
 from command_line import SAMPLE, assert_refused, stored
 
+from app.cli.track import _SETTINGS, TrackArguments
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
+from tracker.pipeline.methods import METHODS
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange
@@ -29,33 +32,33 @@ def test_new_info_init_track_evaluate(run, tmp_path):
     assert (status, out) == (0, f"made {s}: 4 cameras, 50 frames at 25 per second\n")
 
     status, out, err = run("info", s, "--json")
-    told = json.loads(out)
+    summary = json.loads(out)
     assert (status, err) == (0, "")
-    assert (told["frames"], told["fps"], told["up"]) == (50, 25.0, "z")
-    assert [c["name"] for c in told["cameras"]] == ["FRONT", "RIGHT", "BACK", "LEFT"]
-    assert all(c["background"] and not c["masks"] for c in told["cameras"])
-    assert told["people"] == [
+    assert (summary["frames"], summary["fps"], summary["up"]) == (50, 25.0, "z")
+    assert [c["name"] for c in summary["cameras"]] == ["FRONT", "RIGHT", "BACK", "LEFT"]
+    assert all(c["background"] and not c["masks"] for c in summary["cameras"])
+    assert summary["people"] == [
         {"name": "ann", "model": "gavrila22", "height_m": 1.78, "dofs": 22, "poses": 0, "keyframes": 0}
     ]
 
     status, out, _ = run("init", s, "--joints", SAMPLE / "truth.trc", "--frame", "20", "--json")
-    told = json.loads(out)
+    summary = json.loads(out)
     assert status == 0
-    assert (told["person"], told["frame"], len(told["residual_mm"])) == ("ann", 20, 12)
-    assert told["mean_mm"] == pytest.approx(np.mean(list(told["residual_mm"].values())))
-    assert 1 < told["mean_mm"] < 40
+    assert (summary["person"], summary["frame"], len(summary["residual_mm"])) == ("ann", 20, 12)
+    assert summary["mean_mm"] == pytest.approx(np.mean(list(summary["residual_mm"].values())))
+    assert 1 < summary["mean_mm"] < 40
 
     status, out, err = run("track", s, "--frames", "20:23", "--json")
-    told = json.loads(out)  # one JSON object and nothing else
+    summary = json.loads(out)  # one JSON object and nothing else
     assert (status, err) == (0, "")
-    assert (told["frames"], told["people"]) == (3, ["ann"])
-    assert 0 < told["mean_cost_px"] < 19.2
+    assert (summary["frames"], summary["people"]) == (3, ["ann"])
+    assert 0 < summary["mean_cost_px"] < 19.2
 
     status, out, _ = run("evaluate", s, "--reference", SAMPLE / "truth.trc", "--json")
-    told = json.loads(out)
+    summary = json.loads(out)
     assert status == 0
-    assert (told["frames"], told["missing_frames"], told["lost_frames"]) == (3, 0, 0)
-    assert told["mpjpe_mm"] < 60
+    assert (summary["frames"], summary["missing_frames"], summary["lost_frames"]) == (3, 0, 0)
+    assert summary["mpjpe_mm"] < 60
     assert run("evaluate", s, "--reference", SAMPLE / "truth.trc", "--frames", "18:23", "--json")[0] == 0
 
     _, out, _ = run("info", s)
@@ -90,6 +93,14 @@ def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
     assert store.undo() == "track frames 0:4"  # one entry, however many frames
     assert [row.frame for row in store.frames("person")] == [0, 2]
     store.close()
+
+
+def test_every_tracking_method_can_be_named():
+    choices = get_args(get_type_hints(TrackArguments)["method"])
+    assert set(choices) == METHODS.keys() == _SETTINGS.keys()
+    for method in choices:
+        arguments = TrackArguments(SAMPLE, method=method)
+        assert _SETTINGS[method](arguments).method == method
 
 
 @pytest.mark.parametrize("compiled", [False, True])
@@ -139,7 +150,7 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     assert {k: found[k].time for k in (1, 2)} == done
     assert {found[k].status for k in range(1, 6)} <= {"good", "doubtful"}
     assert len(found[3].view_costs_px) == 4
-    status, out, _ = run("track", session, "--frames", "0:6", "--json")  # and once done, it begins anew
+    status, out, _ = run("track", session, "--frames", "0:6", "--json")  # a finished run starts over
     assert (json.loads(out)["frames"], json.loads(out)["resumed_at"]) == (6, None)
 
 
@@ -170,9 +181,9 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
     monkeypatch.setattr("tracker.tracking.chamfer.tracker.track_lost_backward", ways_back)
     words = ("track", session, "--frames", "0:5", "--json")
     status, out, _ = run(*words)
-    told = json.loads(out)
-    assert (status, told["frames"], told["stopped_at"], told["followed_back"]) == (130, 5, 1, 1)
-    assert told["statuses"] == {"person": {"good": 4, "lost": 1}}
+    summary = json.loads(out)
+    assert (status, summary["frames"], summary["stopped_at"], summary["followed_back"]) == (130, 5, 1, 1)
+    assert summary["statuses"] == {"person": {"good": 4, "lost": 1}}
     found = stored(session)
     np.testing.assert_array_equal(found[1].values, estimates[1].poses[0] + 0.01)
     assert (found[1].status, found[1].remark) == ("good", "tracked back from frame 2")
@@ -184,16 +195,16 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
         raise AssertionError("the first pass is done")
 
     monkeypatch.setattr(ChamferTracker, "estimates", never)
-    told = json.loads(run(*words)[1])  # the same call goes on with the second pass alone
-    assert (told["frames"], told["stopped_at"], told["followed_back"]) == (0, None, 2)
+    summary = json.loads(run(*words)[1])  # the same call goes on with the second pass alone
+    assert (summary["frames"], summary["stopped_at"], summary["followed_back"]) == (0, None, 2)
     assert [f.frame for f in offered[1]] == [0, 1, 2, 3, 4]
     assert [f.statuses for f in offered[1]] == [("good",)] * 3 + [("lost",), ("good",)]
     for k, f in enumerate(offered[1]):
         np.testing.assert_array_equal(f.poses[0], found[k].values)
     np.testing.assert_array_equal(stored(session)[3].values, estimates[3].poses[0] + 0.01)
     monkeypatch.setattr(ChamferTracker, "estimates", tracked)
-    told = json.loads(run(*words)[1])  # once done it begins anew, all of it one entry
-    assert (told["frames"], told["resumed_at"]) == (5, None)
+    summary = json.loads(run(*words)[1])  # a finished run starts over, as one entry
+    assert (summary["frames"], summary["resumed_at"]) == (5, None)
     with closing(AnnotationStore(session / "annotations.sqlite")) as store:
         assert [store.undo() for _ in range(3)] == ["track frames 0:5"] * 3
         assert [row.frame for row in store.frames("person")] == [0]
@@ -314,6 +325,6 @@ def test_poses_of_a_reference_that_is_a_session(run, session, tmp_path):
     moved = record.values + np.pad([0.03, 0.0, 0.04], (0, 19))
     store.commit("move", [PoseChange("person", 0, type(record)(moved, record.sources, record.model_revision))])
     store.close()
-    told = json.loads(run("evaluate", session, "--reference", other, "--json")[1])
-    assert told["mpjpe_mm"] == pytest.approx(50)
-    assert told["axis_error_deg"] == pytest.approx(0, abs=1e-6)
+    summary = json.loads(run("evaluate", session, "--reference", other, "--json")[1])
+    assert summary["mpjpe_mm"] == pytest.approx(50)
+    assert summary["axis_error_deg"] == pytest.approx(0, abs=1e-6)

@@ -1,4 +1,4 @@
-"""Trails from stored poses: which poses they join, what is computed anew, what they cost on long footage."""
+"""Trails from stored poses: which poses they join, what is computed again, what they cost on long footage."""
 
 import numpy as np
 import pytest

@@ -100,7 +100,7 @@ async def test_pause_go_on_follow_and_stop(controller, tracker):
 
 
 async def go_on_slowly(tracker):
-    """Whoever pauses waits for the step at hand, which must come to its end."""
+    """A pause waits for the present step, which must come to its end."""
     while True:
         await asyncio.sleep(0.2)
         tracker.let_go(1)

@@ -64,7 +64,7 @@ async def while_frames_go_by(page):
 
 
 async def beside_a_search(page, endpoint):
-    """Whoever points at it sees it go on."""
+    """A pointer over the view resumes it."""
     box = await page.locator("#scene").bounding_box()
     await page.keyboard.press("f")
     await until(lambda: endpoint.state["job"]["running"])

@@ -1,4 +1,4 @@
-"""For whoever cannot see well, or has no mouse: names, contrast, focus, motion, and a page that does not jump."""
+"""Accessibility: names, contrast, focus, reduced motion, and a page that does not jump."""
 
 import pytest
 from page_driver import dragging, shows, state_of, until

@@ -118,7 +118,7 @@ async def test_a_range_is_marked_by_keys(page):
 async def test_statuses_differ_by_colour_and_by_height(page, dark):
     await page.emulate_media(color_scheme="dark" if dark else "light")
     async with asyncio.timeout(20):
-        while (await page.evaluate(STRIP, 15))[0] is None:  # drawn anew in the colours of the theme
+        while (await page.evaluate(STRIP, 15))[0] is None:  # drawn again in the colors of the theme
             await asyncio.sleep(0.05)
     found = {frame: await page.evaluate(STRIP, frame) for frame in (3, 15, 31, 50, 110)}
     assert found[3] == [None, 0]  # nobody has judged it

@@ -48,7 +48,7 @@ from numba import njit
 
 from tracker.near import callee
 from tracker.near.callee import Pair, least
-from tracker.compute.numba_options import FAST
+from tracker.compute.numba_options import FAST_MATH
 
 @njit(nogil=True, cache=True)
 def twice(pair: Pair) -> float:
@@ -129,7 +129,7 @@ def test_kernels_are_compiled_again_only_if_their_text_changes(clone, tmp_path):
         ("callee", "    left: float\n", "    first: float\n    left: float\n", {"least", "twice"}),
         ("callee", "\n\ndef unrelated", "\nOTHER += 1\n\ndef unrelated", {"least", "twice", "by_module"}),
         ("caller", "2 * least", "3 * least", {"twice"}),
-        ("caller", "(nogil=True, cache=True)\ndef twice", "(**FAST)\ndef twice", {"twice"}),
+        ("caller", "(nogil=True, cache=True)\ndef twice", "(**FAST_MATH)\ndef twice", {"twice"}),
         ("callee", '"""The left one."""', '"""The one on the left."""', set()),
         ("callee", '    """The left one, limited."""\n', "", set()),
         ("callee", "min(pair.left, LIMIT)", "min(\n        pair.left, LIMIT,  # both\n    )", set()),

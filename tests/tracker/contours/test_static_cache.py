@@ -108,7 +108,7 @@ def test_pose_after_pose_costs_what_each_costs_by_itself(gavrila, staged, person
 
 
 def test_a_match_of_a_limb_is_that_of_the_body_as_far_as_the_limb_goes(gavrila, staged):
-    """Also after the rest has moved: what is static is then static anew."""
+    """Also after the rest has moved: the static parts are then cached again."""
     start, rng = staged[1], np.random.default_rng(2)
     whole = afresh(staged, start)
     for limb in limbs(gavrila):

@@ -82,7 +82,7 @@ def test_hessian_is_positive_semidefinite(model, match):
 @each_model
 @each_direction
 def test_gradient_is_the_slope_of_the_cost(model, match):
-    """Of the whole cost, matched and hidden anew at each pose, over steps of 1 cm and half a degree.
+    """Of the whole cost, matched and occluded again at each pose, over steps of 1 cm and half a degree.
 
     As the body moves, pieces also grow and vanish, which no Gauss-Newton sees: a tenth of the possible slope on average
     over the degrees of freedom, and a quarter along the whole gradient. Measured: 0.06 and 0.2.

@@ -33,7 +33,7 @@ def test_a_body_within_another_is_pushed_out():
     assert fit.pose[0] > 0.05  # away from the other, who stands
     assert np.abs(fit.pose[1:]).max() < 1e-3
     assert fit.cost < 1e-3
-    # Of two the push is the same whoever is fitted.
+    # The push between two people does not depend on who is fitted.
     pushes = [normal(BodyPenetration(bodies, i, 1.0), bodies[i]).gradient[:3] for i in (0, 1)]
     np.testing.assert_allclose(pushes[0], -pushes[1], atol=1e-9)
     assert pushes[1][0] < 0

@@ -47,7 +47,7 @@ def test_nothing_is_kept_unless_asked_for(clip, tmp_path, listed):
     assert [p.name for p in tmp_path.iterdir()] == ["cam.mp4"]
 
 
-def test_a_video_that_was_changed_is_listed_anew(clip, tmp_path, listed):
+def test_a_video_that_was_changed_is_listed_again(clip, tmp_path, listed):
     frames(clip, tmp_path / "kept")
     encode(clip, n=N, gop=5, bframes=0)
     assert [number(i) for i in frames(clip, tmp_path / "kept")] == [0, 31, 5, N - 1]
@@ -58,7 +58,7 @@ def test_a_video_that_was_changed_is_listed_anew(clip, tmp_path, listed):
 
 
 @pytest.mark.parametrize("damage", [b"", b"PK\x03\x04 half a file", b"nothing of the kind"])
-def test_a_damaged_list_is_made_anew(clip, tmp_path, listed, damage):
+def test_a_damaged_list_is_made_again(clip, tmp_path, listed, damage):
     frames(clip, tmp_path / "kept")
     (kept,) = (tmp_path / "kept").iterdir()
     kept.write_bytes(damage)

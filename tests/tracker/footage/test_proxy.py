@@ -69,7 +69,7 @@ def test_what_a_dead_program_left_half_is_cut_off(proxy, clip, tmp_path):
     assert number(again.read(N - 1)) == N - 1
 
 
-def test_other_footage_is_recognised_and_done_anew(proxy, clip):
+def test_other_footage_is_recognised_and_done_again(proxy, clip):
     make(proxy, clip)
     encode(clip, n=40)
     assert proxy.exists()

@@ -84,7 +84,7 @@ def test_the_best_never_gets_worse(gavrila, views, start, steps):
 
 
 def test_a_step_tells_the_truth(gavrila, views, start, steps):
-    """Whoever stops the search anywhere holds poses that cost what the step says."""
+    """A search stopped anywhere leaves poses that cost what its last step states."""
     cost = ChamferCost(views, [PosedBody(gavrila, start)])
     for step in steps[::7]:
         found = cost(step.best)

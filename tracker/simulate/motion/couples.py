@@ -72,12 +72,12 @@ def tango(man_m: float, woman_m: float) -> tuple[Partner, Partner]:
     def turn(t: float) -> float:
         return 2 * np.pi * t / TANGO_TURN_S
 
-    def held(t: float) -> tuple[float, float]:
+    def joined_hands(t: float) -> tuple[float, float]:
         """Return the sideways position and the height of the joined hands."""
         return 0.505 + _wave(t, 0.03, 2.1), 0.812 * woman_m + _wave(t, 0.05, 1.5)
 
     def his(t: float) -> Reaches:
-        aside, height = held(t)
+        aside, height = joined_hands(t)
         back = (half + 0.075, -0.215, 0.748 * woman_m + _wave(t, 0.012, 1.7))
         return {
             "right": Reach(back, (-0.45, -1.0, -0.45)),
@@ -85,7 +85,7 @@ def tango(man_m: float, woman_m: float) -> tuple[Partner, Partner]:
         }
 
     def hers(t: float) -> Reaches:
-        aside, height = held(t)
+        aside, height = joined_hands(t)
         return {
             "left": Reach((0.080 - half, -0.185, 0.842 * man_m), (0.15, -1.0, -0.1)),
             "right": Reach((_CLASP_M, aside, height), (0.3, 0.2, -1.0)),

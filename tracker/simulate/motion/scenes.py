@@ -81,12 +81,12 @@ def _crowd(n: int, seed: int) -> tuple[Role, ...]:
     return tuple(roles)
 
 
-Casting = Callable[[int], tuple[Role, ...]]
+MakeRoles = Callable[[int], tuple[Role, ...]]
 
 MAN_M, WOMAN_M = 1.80, 1.66
 CROWD_APART_M = 1.0
 
-SCENES: Mapping[str, Casting] = MappingProxyType(
+SCENES: Mapping[str, MakeRoles] = MappingProxyType(
     {
         "elbow_rotation": lambda seed: (Role("person", 1.78, elbow_rotation),),
         "walk_in_place": lambda seed: (Role("person", 1.78, walk_in_place),),
