@@ -64,4 +64,4 @@ class Visibility:
     hidden: frozenset[int] = frozenset()
     """Indices of the people that no view shows."""
     solo: bool = False
-    """Whether everybody but the selected person is dimmed and cannot be dragged."""
+    """Whether all people but the selected one are dimmed and cannot be dragged."""

@@ -36,7 +36,7 @@ class BodySizeEditing:
         """Edit nothing yet.
 
         Args:
-            screen: holds the state.
+            session_state: holds the state.
             runs: recorded searches, which are discarded when sizes change.
             activities: ends jobs and gestures before an edit.
         """
@@ -129,9 +129,9 @@ class BodySizeEditing:
                 )
             n = len(refitted.changes)
             counted = f", {n} keyframe{'' if n == 1 else 's'} refitted" if n else ""
-            told = counted if refit else ", poses kept"
+            outcome = counted if refit else ", poses kept"
             edit = session_state.saver.write(
-                f"sizes of {name}{told}", refitted.changes, None, by_program=False, even_empty=True
+                f"sizes of {name}{outcome}", refitted.changes, None, by_program=False, even_empty=True
             )
             if edit is not None and session_state.saver.error is None:
                 saver = session_state.saver
@@ -140,7 +140,7 @@ class BodySizeEditing:
             off = f", joints {refitted.off_m * 1000:.0f} mm off on average" if n else ""
             self._runs.clear()
             session_state.refresh_saving()
-            session_state.show_frame(session_state.state.frame, draft=None, sizes_message=f"Applied{told}{off}.")
+            session_state.show_frame(session_state.state.frame, draft=None, sizes_message=f"Applied{outcome}{off}.")
 
     def follow(self) -> None:
         """Restore the bodies that belong to the present entry of the history, after a move.
@@ -194,9 +194,9 @@ class BodySizeEditing:
                 continue
             was, pins = saver.revisions.body(record.model_revision), saver.pins(person, row.frame)
             values = retarget_pose(record.values, was, becomes, pins, cameras, session_state.active_dofs(person))
-            told = {"method": "refit", "model_revision": record.model_revision}
+            settings = {"method": "refit", "model_revision": record.model_revision}
             pose = replace(
-                record, values=values, model_revision=revision, status="", cost_px=None, settings=told,
+                record, values=values, model_revision=revision, status="", cost_px=None, settings=settings,
                 view_costs_px=(), part_costs_px=(), remark="refitted to other sizes",
             )  # fmt: skip
             changes.append(PoseChange(name, row.frame, pose))

@@ -45,7 +45,7 @@ class Pinning:
         """Drag no pin yet.
 
         Args:
-            screen: holds the state.
+            session_state: holds the state.
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities
@@ -177,8 +177,8 @@ class Pinning:
                 )
             people = sorted(meant) if views is not None else pinned
             self._show_fit(people, state.people, state.pins)
-            told = " and ".join([*(["pins"] if pinned else []), *(["edges"] if views is not None else [])])
-            self._session_state.save(f"fit to {told}", "fitted")
+            evidence = " and ".join([*(["pins"] if pinned else []), *(["edges"] if views is not None else [])])
+            self._session_state.save(f"fit to {evidence}", "fitted")
 
     def _show_fit(self, fitted: Iterable[int], start: tuple[ShownPose, ...], pins: Pins) -> None:
         """Fit some people, with all others fixed, and show them.

@@ -31,7 +31,7 @@ class PoseEdits:
         """Change nothing yet.
 
         Args:
-            screen: holds the state.
+            session_state: holds the state.
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities

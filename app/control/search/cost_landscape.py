@@ -31,7 +31,7 @@ class CostLandscapes:
         """Subscribe to the state; nothing is computed until a page displays the landscape.
 
         Args:
-            screen: holds the state.
+            session_state: holds the state.
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities

@@ -21,7 +21,7 @@ class Replay:
         """Replay nothing yet.
 
         Args:
-            screen: holds the state.
+            session_state: holds the state.
             runs: the recorded searches.
             activities: ends jobs and gestures before an edit.
         """

@@ -155,12 +155,12 @@ class SearchRun:
         near = [c for c in self.candidates if np.linalg.norm(c.points_world - points, axis=1).max() < _DISTINCT_M]
         if any(c.px <= px for c in near):
             return
-        kept = [c for c in self.candidates if all(c is not n for n in near)]
-        self.candidates = sorted([*kept, Candidate(px, poses, points)], key=lambda c: c.px)[:_MAX_CANDIDATES]
+        survivors = [c for c in self.candidates if all(c is not n for n in near)]
+        self.candidates = sorted([*survivors, Candidate(px, poses, points)], key=lambda c: c.px)[:_MAX_CANDIDATES]
 
     def _thin(self) -> None:
-        kept = [s for i, s in enumerate(self.steps) if s.matters or i % 2 == 0]
-        self.steps = kept if len(kept) <= 0.9 * MAX_STEPS else self.steps[1::2]
+        survivors = [s for i, s in enumerate(self.steps) if s.matters or i % 2 == 0]
+        self.steps = survivors if len(survivors) <= 0.9 * MAX_STEPS else self.steps[1::2]
         self.thinned += 1
 
 

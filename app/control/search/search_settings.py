@@ -131,29 +131,29 @@ def described(settings: TrackSettings) -> dict[str, str]:
 
 def differences(all_settings: Sequence[TrackSettings]) -> list[dict[str, str]]:
     """Return for each settings the values, by label, that are not equal in all of them."""
-    told = [described(s) for s in all_settings]
-    labels = dict.fromkeys(label for one in told for label in one)
-    differing = [label for label in labels if len({one.get(label) for one in told}) > 1]
-    return [{label: one.get(label, "as all") for label in differing} for one in told]
+    texts = [described(s) for s in all_settings]
+    labels = dict.fromkeys(label for one in texts for label in one)
+    differing = [label for label in labels if len({one.get(label) for one in texts}) > 1]
+    return [{label: one.get(label, "as all") for label in differing} for one in texts]
 
 
-def _of_leaf(search: SearchSettings, models: Sequence[BodyModel], told: Mapping[str, Any]) -> dict[str, Any]:
+def _of_leaf(search: SearchSettings, models: Sequence[BodyModel], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Return bounds and steps by degree of freedom after a change of one leaf."""
-    person, name = int(told["person"]), str(told["name"])
+    person, name = int(changes["person"]), str(changes["name"])
     found = next((leaf for leaf in leaves(models, search) if (leaf.person, leaf.name) == (person, name)), None)
     if found is None:
         raise TrackerError(
             f"expected a group of the search, found '{name}'; it no longer exists, so choose one from the present list"
         )
     model, single = models[person], {"bounds": dict(search.bounds), "steps": dict(search.steps)}
-    for key in (k for k in _PLAIN if k in told):
+    for key in (k for k in _PLAIN if k in changes):
         of = single["bounds" if key.startswith("bound") else "steps"]
         for dof in found.dofs:
             if bool(model.dof_is_length[model.dof_names.index(dof)]) == key.endswith("_m"):
-                if told[key] is None or float(told[key]) == getattr(search, key):
+                if changes[key] is None or float(changes[key]) == getattr(search, key):
                     of.pop(dof, None)
                 else:
-                    of[dof] = float(told[key])
+                    of[dof] = float(changes[key])
     return dict(single)
 
 

@@ -14,7 +14,7 @@ class History:
         """Move along the history of this session.
 
         Args:
-            screen: what is shown.
+            session_state: holds the state.
             activities: ends jobs and gestures before an edit.
             follow: restores body models after a move (`BodySizeEditing.follow`).
         """

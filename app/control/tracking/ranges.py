@@ -45,7 +45,7 @@ class Ranges:
         """Work on nothing yet.
 
         Args:
-            screen: holds the state.
+            session_state: holds the state.
             tracking: tracks within a range.
             activities: ends jobs and gestures before an edit.
         """
@@ -221,10 +221,10 @@ class Ranges:
         return max(0, first), min(last, end)
 
     def _checked(self, people: Sequence[int] | None) -> Sequence[int]:
-        everybody = range(len(self._session_state.models))
-        if people is not None and not set(people) <= set(everybody):
-            raise TrackerError(f"expected people from 0 to {everybody[-1]}, found {list(people)}; reload the page")
-        return everybody if people is None else people
+        indices = range(len(self._session_state.models))
+        if people is not None and not set(people) <= set(indices):
+            raise TrackerError(f"expected people from 0 to {indices[-1]}, found {list(people)}; reload the page")
+        return indices if people is None else people
 
     def _rows(self, first: int, last: int, people: Sequence[int] | None) -> list[tuple[int, FrameRow]]:
         return [

@@ -23,7 +23,7 @@ class FloorEditing:
         """Show the session's floor.
 
         Args:
-            screen: holds the state.
+            session_state: holds the state.
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities
