@@ -109,7 +109,7 @@ class State:
             people=people,
             search=search,
             cost_px=replayed.best_px,
-            view_costs_px=replayed.best_views_px,
+            view_costs_px=replayed.best_view_costs_px,
             drag=None,
         )
 

@@ -10,6 +10,7 @@ from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.state.people import ShownPose
 from tracker.body.limbs import display_name
+from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.geometry.triangulation import PointObservation
 from tracker.posing.pinned_fit import fit_frame
@@ -193,8 +194,7 @@ class Pinning:
         cameras = [c.camera for c in session_state.session.cameras]
         free = [session_state.active_dofs(person) for person in range(len(session_state.models))]
         found = fit_frame(
-            session_state.models,
-            [p.values for p in start],
+            [PosedBody(m, p.values) for m, p in zip(session_state.models, start, strict=True)],
             pins,
             cameras,
             views,

@@ -13,7 +13,7 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.posing import drag
-from tracker.posing.edits import bent_alike, limb_of, mirrored, taken_over
+from tracker.posing.edits import copy_dofs, copy_joint_angles, limb_of, mirror_pose
 from tracker.posing.orient import orient
 from tracker.posing.retarget import retarget_pose
 
@@ -120,7 +120,7 @@ class PoseEdits:
             values = self._session_state.state.poses[person]
             self._apply(
                 person,
-                taken_over(model, values, mirrored(model, values), self._session_state.active_dofs(person)),
+                copy_dofs(model, values, mirror_pose(model, values), self._session_state.active_dofs(person)),
                 "mirror",
             )
 
@@ -139,7 +139,7 @@ class PoseEdits:
                 )
             assert stored.revision is not None
             copied = retarget_pose(stored.values, self._session_state.saver.revisions.body(stored.revision), model)
-            values = taken_over(
+            values = copy_dofs(
                 model, self._session_state.state.poses[person], copied, self._session_state.active_dofs(person)
             )
             self._apply(person, values, f"copy frame {other}")
@@ -154,7 +154,9 @@ class PoseEdits:
             raise TrackerError(f"expected another person to copy the pose of, found number {other}; choose another")
         with self._on(person, frame) as model:
             values, body = self._session_state.state.poses, self._session_state.models[other]
-            bent = bent_alike(model, values[person], body, values[other], self._session_state.active_dofs(person))
+            bent = copy_joint_angles(
+                model, values[person], body, values[other], self._session_state.active_dofs(person)
+            )
             self._apply(person, bent, f"copy the pose of {self._session_state.session.people[other].name}")
 
     def reset(self, person: int, point: str | None, frame: int | None = None) -> None:
@@ -162,7 +164,7 @@ class PoseEdits:
         with self._on(person, frame) as model:
             limb, dofs = limb_of(model, point)
             dofs = dofs & self._session_state.active_dofs(person)
-            values = taken_over(model, self._session_state.state.poses[person], model.neutral(), dofs)
+            values = copy_dofs(model, self._session_state.state.poses[person], model.neutral(), dofs)
             self._apply(person, values, f"reset {limb_display_name(limb)}")
 
     @contextmanager
@@ -182,7 +184,7 @@ class PoseEdits:
         if dof in self._session_state.state.locked[person]:
             raise TrackerError(f"{display_name(model.dof_names[dof])} is locked; unlock it to change it")
         changed = model.clip(model.retract(model.neutral(), dof_values))
-        self._apply(person, taken_over(model, before, changed, np.arange(model.n_dofs) == dof), label, ("dof", dof))
+        self._apply(person, copy_dofs(model, before, changed, np.arange(model.n_dofs) == dof), label, ("dof", dof))
 
     def _apply(self, person: int, values: Array, label: str, gesture: object = None, lasting: bool = False) -> None:
         """Show and save a pose.

@@ -58,7 +58,7 @@ class Replay:
                 shown = ReplayState(
                     number, at, len(run.steps), run.poses_of(recorded.candidate), run.poses_of(recorded.best),
                     run.stages[recorded.stage].name, recorded.candidate_px, recorded.best_px,
-                    tuple(finite_or_none(float(c)) for c in recorded.best_views_px), recorded.evaluations,
+                    tuple(finite_or_none(float(c)) for c in recorded.best_view_costs_px), recorded.evaluations,
                 )  # fmt: skip
             self._set_view(replace(self._view, replay=shown, preview=None))
 

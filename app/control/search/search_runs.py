@@ -34,7 +34,7 @@ class RecordedStep(NamedTuple):
     """Cost of the best pose of this expansion, px."""
     best_px: float
     """Lowest cost so far, px."""
-    best_views_px: FloatArray
+    best_view_costs_px: FloatArray
     """That cost in each view, (V,), px; NaN for views without edges."""
     candidate: FloatArray
     """Values of all people, concatenated, for the best pose of this expansion."""
@@ -90,7 +90,7 @@ class SearchRun:
             free: of each person the degrees of freedom that may move, (n_dofs,); all by default.
         """
         self.number, self.frame, self.start, self.settings = number, frame, start, settings
-        self.stages: list[Stage] = stages(models, settings.search, free=free)
+        self.stages: list[Stage] = stages(models, settings.search, active_dofs=free)
         self.counts = [StageCount(0, 0, 0.0, False) for _ in self.stages]
         self.steps: list[RecordedStep] = []
         self.best, self.best_px = start, start_px
@@ -133,7 +133,7 @@ class SearchRun:
             self.start_px = step.best_px
         self.steps.append(
             RecordedStep(
-                self._at, step.evaluations, step.candidate_px, step.best_px, step.best_views_px.astype(np.float32),
+                self._at, step.evaluations, step.candidate_px, step.best_px, step.best_view_costs_px.astype(np.float32),
                 np.concatenate(step.candidate).astype(np.float32), self._best_row, better or step.stage_done,
             )
         )  # fmt: skip

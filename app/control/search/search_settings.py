@@ -53,7 +53,7 @@ def leaves(
         free: of each person the degrees of freedom that may move, (n_dofs,); all by default.
     """
     found = []
-    for stage in stages(models, replace(settings, passes=(1.0,)), free=free):
+    for stage in stages(models, replace(settings, passes=(1.0,)), active_dofs=free):
         model = models[stage.person]
         at = [model.dof_names.index(n) for n in stage.group.dofs]
         bounds, steps = settings.lattice(model, at)

@@ -141,7 +141,7 @@ class SearchRunner:
             frame, settings, models = state.frame, state.settings, session_state.models
             poses = state.poses if start is None else session_state.within_locks(start)
             free = [session_state.active_dofs(i) & (person is None or i == person) for i in range(len(models))]
-            if not stages(models, settings.search, free=free):
+            if not stages(models, settings.search, active_dofs=free):
                 raise TrackerError("expected degrees of freedom to search, found all of them locked; unlock some")
             if self._run is not None:
                 self._run.over = True
@@ -177,7 +177,7 @@ class SearchRunner:
                 best_px=step.best_px, candidate=step.candidate, message="",
             )  # fmt: skip
             changed = any(a is not b for a, b in zip(people, session_state.state.people, strict=True))
-            view_costs_px = tuple(finite_or_none(c) for c in step.best_views_px)
+            view_costs_px = tuple(finite_or_none(c) for c in step.best_view_costs_px)
             session_state.set(people=people, search=shown, cost_px=step.best_px, view_costs_px=view_costs_px)
             if changed and time.monotonic() - session_state.last_save > _SAVE_S:
                 session_state.save("search", "searched", job)
