@@ -38,7 +38,7 @@ def main() -> None:
     while not mark.exists():
         try:
             with SessionLock(mark.parent):
-                if not mark.exists():  # now that whoever held the lock is done
+                if not mark.exists():  # another process may have compiled them meanwhile
                     _call_kernels()
                     record_compiled()
         except SessionError:

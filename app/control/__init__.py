@@ -1,1 +1,5 @@
-"""Who may change the state: the controller and its parts, one room per kind of intention."""
+"""The only room that changes the state of an open session: a controller and its parts.
+
+May import `tracker`, `app.runtime`, `app.state`, `app.storage` and `app.session`. Views use `controller.Controller`
+and its public parts.
+"""

@@ -11,6 +11,8 @@ from app.state.state import State
 from tracker.body.model import BodyModel, PosedBody
 from tracker.contours import occluding_contours, part_edges
 from tracker.contours.occluding_contours import Contour
+from tracker.contours.pieces import PIECE_PX
+from tracker.contours.surfaces import surfaces_of
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, FloatArray
@@ -136,7 +138,7 @@ def part_colors(people: Sequence[Person]) -> list[str]:
 
 
 def _traced(bodies: Sequence[PosedBody], camera: Camera) -> Contour:
-    return occluding_contours.trace(bodies, camera, occluding_contours.PIECE_PX * max(1.0, max(camera.size) / 640))
+    return occluding_contours.trace(bodies, camera, PIECE_PX * max(1.0, max(camera.size) / 640))
 
 
 def _model(session: Session, bodies: Sequence[PosedBody], camera: Camera, index: int, view: View) -> list[Path]:
@@ -175,9 +177,12 @@ def _with_draft(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
 
 def _alternatives(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
     """Return the bodies with everybody who has alternatives in the best of these; empty if nobody has any."""
-    if not any(shown.others for shown in state.people):
+    if not any(shown.alternatives for shown in state.people):
         return []
-    return [PosedBody(b.model, s.others[0]) if s.others else b for b, s in zip(bodies, state.people, strict=True)]
+    return [
+        PosedBody(b.model, s.alternatives[0]) if s.alternatives else b
+        for b, s in zip(bodies, state.people, strict=True)
+    ]
 
 
 def _ghosts(chosen: Collection[int], people: Sequence[PosedBody], camera: Camera, index: int, color: str) -> list[Path]:
@@ -191,7 +196,7 @@ def _by_person(
     bodies: Sequence[PosedBody], contour: Contour, chosen: Mask, index: int, kind: PathKind, colors: Sequence[str]
 ) -> list[Path]:
     """Return some pieces of a contour as one path per person."""
-    people = occluding_contours.surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
+    people = surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
     return [
         Path(index, person, kind, colors[person], contour.pieces_px[chosen & (people == person)])
         for person in range(len(bodies))
@@ -202,7 +207,7 @@ def _by_part(
     session: Session, bodies: Sequence[PosedBody], contour: Contour, chosen: Mask, index: int, kind: PathKind
 ) -> list[Path]:
     """Return some pieces of a contour as one path per part that has any."""
-    people, colors = occluding_contours.surfaces_of(tuple(b.model for b in bodies)).people, part_colors(session.people)
+    people, colors = surfaces_of(tuple(b.model for b in bodies)).people, part_colors(session.people)
     return [
         Path(index, int(people[part]), kind, colors[part], contour.pieces_px[chosen & (contour.parts == part)])
         for part in np.unique(contour.parts[chosen])

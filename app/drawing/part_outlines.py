@@ -12,7 +12,7 @@ from tracker.posing import picking
 from tracker.session.session import Session
 
 
-class PartHull(NamedTuple):
+class PartOutline(NamedTuple):
     """The convex hull of a part in a view."""
 
     camera: int
@@ -24,7 +24,7 @@ class PartHull(NamedTuple):
     """Its closed outline as x0, y0, x1, y1, (N, 4), undistorted px."""
 
 
-def part_hulls(session: Session, state: State, view: View) -> list[PartHull]:
+def part_hulls(session: Session, state: State, view: View) -> list[PartOutline]:
     """Return the hulls of all visible people in the views that a page shows.
 
     While a point is dragged there are none, and while a part is dragged there is only its own, because they would only
@@ -46,7 +46,7 @@ def part_hulls(session: Session, state: State, view: View) -> list[PartHull]:
             if one.body in state.visibility.hidden:
                 continue
             if drag is None or (one.body, one.part) == (drag.person, drag.part):
-                out.append(PartHull(index, one.body, one.part, one.depth_m, _closed(one.polygon_px)))
+                out.append(PartOutline(index, one.body, one.part, one.depth_m, _closed(one.polygon_px)))
     return out
 
 

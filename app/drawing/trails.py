@@ -24,7 +24,7 @@ Poses = Callable[[range], Mapping[int, Array]]
 """Returns the stored poses of a person in a range, by frame."""
 
 
-class Segments(NamedTuple):
+class TrailSegments(NamedTuple):
     """Line segments in space."""
 
     points_world: NDArray[np.float32]
@@ -46,7 +46,7 @@ class Trails:
         for frame in frames:
             self._points.pop(frame, None)
 
-    def segments(self, frame: int, length: int, names: frozenset[str], n_frames: int) -> Segments:
+    def segments(self, frame: int, length: int, names: frozenset[str], n_frames: int) -> TrailSegments:
         """Return the trails around a frame.
 
         Args:
@@ -60,13 +60,13 @@ class Trails:
         found = self._at(window) if chosen else {}
         frames = np.array(sorted(found), dtype=np.int64)
         if len(frames) < 2:
-            return Segments(np.zeros((0, 2, 3), np.float32), np.zeros((0, 2, 3), np.uint8))
+            return TrailSegments(np.zeros((0, 2, 3), np.float32), np.zeros((0, 2, 3), np.uint8))
         points = np.stack([found[k] for k in frames])[:, chosen]  # (frames, points, 3)
         colors = np.broadcast_to(_colors(frames - frame, length)[:, None], points.shape)
         joined = np.diff(frames) <= _MAX_GAP
         pairs = np.stack([points[:-1], points[1:]], axis=2)[joined]  # (joined, points, 2, 3)
         tints = np.stack([colors[:-1], colors[1:]], axis=2)[joined]
-        return Segments(pairs.reshape(-1, 2, 3).astype(np.float32), tints.reshape(-1, 2, 3).astype(np.uint8))
+        return TrailSegments(pairs.reshape(-1, 2, 3).astype(np.float32), tints.reshape(-1, 2, 3).astype(np.uint8))
 
     def _at(self, window: range) -> dict[int, Array]:
         missing = [k for k in window if k not in self._points]

@@ -64,7 +64,7 @@ def state(session: Session, state: State) -> wire.StateMessage:
     """Describe the texts and figures of the page."""
     shown, drawn = state.people[state.person], state.drawn
     people = tuple(
-        wire.PersonState(p.source, _status(p.status), i not in state.visibility.hidden, len(p.others))
+        wire.PersonState(p.source, _status(p.status), i not in state.visibility.hidden, len(p.alternatives))
         for i, p in enumerate(state.people)
     )
     return wire.StateMessage(

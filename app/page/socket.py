@@ -180,8 +180,8 @@ class PageConnection:
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
                 if self._view is not None:
                     await self._send_drawn(state, self._view)
-                if sent is None or sent.disagreeing != state.disagreeing:
-                    await self._send(InconsistentMessage(state.disagreeing))
+                if sent is None or sent.inconsistent_frames != state.inconsistent_frames:
+                    await self._send(InconsistentMessage(state.inconsistent_frames))
                 await self._send_curves(state)
                 await self._send_history()
                 for update in await asyncio.to_thread(self._feed.updates, self._controller, with_figures):

@@ -1,4 +1,4 @@
-"""Results kept for a while: each is computed once, whoever asks, and all together stay below a number of bytes."""
+"""Cache results by key within a number of bytes; each result is computed once, also with several threads."""
 
 import threading
 from collections import OrderedDict
@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 
 class _Cell(Generic[T]):
-    """One result, or the place for it."""
+    """One result, or the place for one that is being computed."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
@@ -23,21 +23,24 @@ class _Cell(Generic[T]):
 
 
 class ByteBoundedCache(Generic[K, T]):
-    """The results of a function, those asked for last. Safe to use from several threads."""
+    """The most recently used results of a function. Safe to use from several threads.
 
-    def __init__(self, compute: Callable[[K], T], most_bytes: int) -> None:
-        """Keep nothing yet.
+    Unlike `cachetools.LRUCache` it keeps a result that is larger than the bound: the evidence of many large views.
+    """
+
+    def __init__(self, compute: Callable[[K], T], max_bytes: int) -> None:
+        """Begin empty.
 
         Args:
-            compute: the function; called without a lock that anybody else waits for.
-            most_bytes: what all results may take; the one asked for last is kept however large it is.
+            compute: the function; other keys can be read while it runs.
+            max_bytes: bound on the size of all results; the last one requested is kept even if it is larger.
         """
-        self._compute, self._most_bytes = compute, most_bytes
+        self._compute, self._max_bytes = compute, max_bytes
         self._lock = threading.Lock()
         self._cells: OrderedDict[K, _Cell[T]] = OrderedDict()
 
     def get(self, key: K) -> T:
-        """The result for a key; waits for it."""
+        """Return the result for a key; computes it or waits for it."""
         with self._lock:
             cell = self._cells.setdefault(key, _Cell())
             self._cells.move_to_end(key)
@@ -53,14 +56,14 @@ class ByteBoundedCache(Generic[K, T]):
             return cell.results[0]
 
     def peek(self, key: K) -> T | None:
-        """The result for a key if it is there."""
+        """Return the result for a key if it is cached."""
         with self._lock:
             cell = self._cells.get(key)
         return cell.results[0] if cell is not None and cell.results else None
 
     @property
     def n_bytes(self) -> int:
-        """What the results take."""
+        """Size of all results, bytes."""
         with self._lock:
             return sum(cell.n_bytes for cell in self._cells.values())
 
@@ -70,22 +73,22 @@ class ByteBoundedCache(Generic[K, T]):
                 del self._cells[key]
 
     def _shrink(self) -> None:
-        """Let the oldest go until the rest has room."""
+        """Discard the least recently used results until the rest fits."""
         with self._lock:
             taken = sum(cell.n_bytes for cell in self._cells.values())
             for key, cell in list(self._cells.items())[:-1]:
-                if taken <= self._most_bytes:
+                if taken <= self._max_bytes:
                     return
                 taken -= cell.n_bytes
-                if cell.n_bytes:  # else somebody computes it now
+                if cell.n_bytes:  # else it is being computed
                     del self._cells[key]
 
 
 def bytes_of(value: object) -> int:
-    """What the arrays and byte strings within a value take; each counts as often as it is named.
+    """Return the size of the arrays and byte strings within a value; one that occurs twice counts twice.
 
-    What a dataclass computes when it is asked for the first time counts from the beginning, at the size of the largest
-    array beside it, since by then nobody weighs it again.
+    Cached properties of a dataclass count at the size of its largest field, because a value is measured only once,
+    before they are computed.
     """
     if isinstance(value, np.ndarray):
         return value.nbytes

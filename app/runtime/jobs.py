@@ -1,4 +1,4 @@
-"""Long work in a worker thread: one step at a time or to the end, stopped at any step."""
+"""Run long work in a worker thread, step by step or to the end; it can be stopped after any step."""
 
 import logging
 import threading
@@ -16,10 +16,10 @@ T = TypeVar("T")
 
 
 class Job(Generic[T]):
-    """Drains a generator of steps in the background.
+    """Exhausts a generator of steps in the background.
 
-    `on_step(step, seconds)` is called in the worker with each step and the time worked so far, `on_end(error)` once
-    when the generator is exhausted or has raised. A stopped job stands: it can be stepped or run on.
+    `on_step(step, seconds)` is called in the worker with each step and the time worked so far. `on_end(error)` is
+    called once, when the generator is exhausted or has raised. A stopped job is paused: it can be continued.
     """
 
     def __init__(
@@ -29,13 +29,13 @@ class Job(Generic[T]):
         on_end: Callable[[Exception | None], None],
         on_pause: Callable[[], None],
     ) -> None:
-        """Take the work; nothing is done yet.
+        """Prepare the job; it does not start yet.
 
         Args:
             start: makes the generator, in the worker.
             on_step: see above.
             on_end: see above.
-            on_pause: called in the worker when the job stands still before its end.
+            on_pause: called in the worker when the job pauses before its end.
         """
         self._start, self._on_step, self._on_end, self._on_pause = start, on_step, on_end, on_pause
         self._steps: Iterator[T] | None = None
@@ -45,25 +45,25 @@ class Job(Generic[T]):
         self._future: Future[None] | None = None
         self._seconds = 0.0
         self.running = False
-        """Whether the worker is at it; already false when `on_pause` and `on_end` are called."""
+        """Whether the worker is active; already false when `on_pause` and `on_end` are called."""
         self.ended = False
         """Whether there are no more steps."""
 
     def step(self) -> None:
-        """Do one step in the background; nothing if the job runs already."""
+        """Do one step in the background; no effect on a running job."""
         self._launch(lambda _: True)
 
     def run(self, until: Callable[[T], bool] = lambda _: False) -> None:
-        """Go on in the background to a step that `until` accepts, or to the end; nothing if the job runs already."""
+        """Continue in the background to a step that `until` accepts, or to the end; no effect on a running job."""
         self._launch(until)
 
     def pace(self, rest_s: float) -> None:
-        """Do a step only every so many seconds, so that a person can watch; a rest at hand is changed at once."""
+        """Set the time between two steps, seconds, so that the user can watch; also changes the present rest."""
         self._rest_s = rest_s
         self._wake.set()
 
     def stop(self, timeout: float = 30.0) -> None:
-        """Stop after the step at hand, and wait for that. Never call it holding a lock that `on_step` takes.
+        """Stop after the current step, and wait for it. The caller must not hold a lock that `on_step` takes.
 
         Raises:
             TrackerError: the step takes longer than `timeout`, s.
@@ -75,7 +75,7 @@ class Job(Generic[T]):
                 self._future.exception(timeout)
         except TimeoutError as error:
             raise TrackerError(
-                f"expected the step at hand to end within {timeout:g} s, found it still at work, as it may be the "
+                f"expected the current step to end within {timeout:g} s, found it still at work, as may happen the "
                 "first time; it stops as soon as it can, so wait and try again"
             ) from error
 
@@ -110,9 +110,12 @@ class Job(Generic[T]):
             self._on_end(error)
 
     def _rest(self, due: float) -> float:
-        """Rest from a step that was due then until the next one is; the moment when that was to be.
+        """Rest until the next step is due; returns that time.
 
-        Steps that take a while are made up for by shorter rests, but no more than one of them.
+        Slow steps are compensated by shorter rests, by one step at most.
+
+        Args:
+            due: when the last step was due, s of the monotonic clock.
         """
         while not self._stop.is_set() and (left := due + self._rest_s - time.monotonic()) > 0:
             self._wake.wait(left)
@@ -121,7 +124,7 @@ class Job(Generic[T]):
 
 
 class LatestWinsWorker(Generic[T]):
-    """Hands values to a slow consumer in a thread of its own: per key only the newest that waits, in order of offer."""
+    """Passes values to a slow consumer in its own thread; a newer value replaces a waiting one of the same key."""
 
     def __init__(self, consume: Callable[[T], None], name: str, rest_s: float = 0.0) -> None:
         """Start the thread.
@@ -129,7 +132,7 @@ class LatestWinsWorker(Generic[T]):
         Args:
             consume: called with one value at a time.
             name: of the thread.
-            rest_s: least time between the end of one call and the begin of the next, seconds.
+            rest_s: minimum time between the end of one call and the start of the next, seconds.
         """
         self._consume, self._rest_s = consume, rest_s
         self._waiting: dict[object, T] = {}
@@ -138,13 +141,13 @@ class LatestWinsWorker(Generic[T]):
         threading.Thread(target=self._work, name=name, daemon=True).start()
 
     def offer(self, value: T, key: object = None) -> None:
-        """Let a value wait for its turn, in place of one of the same key that waits."""
+        """Queue a value, in place of a waiting one of the same key."""
         with self._condition:
             self._waiting[key] = value
             self._condition.notify()
 
     def close(self) -> None:
-        """End the thread; what waits is dropped."""
+        """End the thread; waiting values are discarded."""
         with self._condition:
             self._closed = True
             self._condition.notify()

@@ -1,4 +1,4 @@
-"""Memory that was freed goes back to the system."""
+"""Return freed memory to the system."""
 
 import ctypes
 import sys
@@ -7,15 +7,14 @@ import time
 
 
 def give_back_freed_memory(every_s: float = 5.0) -> None:
-    """Give back what is free within the C library's heaps, now and then, for as long as the process lives.
+    """Trim the heaps of the C library at intervals, for as long as the process lives.
 
-    Images come and go among things that stay, in the heaps of a dozen threads. Glibc gives back only what is free at
-    the end of a heap, so a viewer of footage would grow for as long as it is used. Images could be memory of their own
-    (M_MMAP_THRESHOLD), but getting that anew from the system for each makes pictures a tenth later. Does nothing where
-    the C library is not glibc.
+    Images are allocated between long-lived objects in the heaps of a dozen threads. Glibc returns only the free end
+    of a heap, so the process would grow. Mapping each image separately (M_MMAP_THRESHOLD) is a tenth slower. Has no
+    effect if the C library is not glibc.
 
     Args:
-        every_s: seconds between two times.
+        every_s: interval, seconds.
     """
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform.startswith("linux") else None
     if trim is None:
@@ -24,6 +23,6 @@ def give_back_freed_memory(every_s: float = 5.0) -> None:
     def work() -> None:
         while True:
             time.sleep(every_s)
-            trim(0)  # without the interpreter's lock
+            trim(0)  # releases the interpreter's lock
 
     threading.Thread(target=work, name="allocation", daemon=True).start()

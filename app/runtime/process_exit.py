@@ -1,4 +1,4 @@
-"""How the program ends as a process."""
+"""End the process with the program's status."""
 
 import atexit
 import os
@@ -7,19 +7,19 @@ from collections.abc import Callable
 
 
 def run(main: Callable[[], None]) -> None:
-    """Run the program, and end the process with its status as soon as all is closed.
+    """Run the program, and end the process with its status when all is closed.
 
-    Views work in threads that nobody waits for. Where one of them is just in OpenCV, Python's own way of ending takes
-    the thread from under it, and the process aborts instead of ending with its status.
+    Views work in daemon threads. If one is inside OpenCV while Python finalizes, the process aborts instead of
+    ending with its status.
     """
-    status = 1  # unless it ends in order
+    status = 1  # unless it ends normally
 
     def end() -> None:
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)
 
-    atexit.register(end)  # the first to be registered is the last to be called
+    atexit.register(end)  # the first function registered is called last
     try:
         main()
         status = 0

@@ -10,7 +10,7 @@ from rich.text import Text
 
 
 class Reporter:
-    """Progress on a terminal as a bar, elsewhere as plain lines; nothing with `--json`."""
+    """Progress as a bar on a terminal, as plain lines elsewhere, and none with `--json`."""
 
     def __init__(self, silent: bool = False) -> None:
         """Report on standard error unless silent."""
@@ -23,7 +23,7 @@ class Reporter:
 
     @contextmanager
     def over(self, total: int, what: str) -> Iterator[Callable[[], None]]:
-        """Give a function to call after each of `total` pieces of work."""
+        """Yield a function to call after each of `total` items."""
         if self._silent:
             yield lambda: None
         elif self._console.is_terminal:
@@ -46,7 +46,7 @@ class Reporter:
 
 
 class _RateColumn(ProgressColumn):
-    """Pieces of work a second."""
+    """Items per second."""
 
     def render(self, task: Task) -> Text:
         """Text of the column."""

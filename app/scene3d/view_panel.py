@@ -10,7 +10,7 @@ from app.control.controller import Controller
 from app.runtime.jobs import LatestWinsWorker
 from app.state.floor_picking import FloorState
 from app.state.state import State
-from app.state.view_3d import MOST_TRAIL_FRAMES
+from app.state.view_3d import MAX_TRAIL_FRAMES
 from tracker.errors import TrackerError
 from tracker.posing.drag import minor_points
 
@@ -82,7 +82,7 @@ class ViewPanel:
         gui, view = self._server.gui, self._controller.state.view_3d
         with gui.add_folder("Trails", expand_by_default=False):
             self._controls["trail_frames"] = gui.add_slider(
-                "frames", 1, MOST_TRAIL_FRAMES, 1, view.trail_frames,
+                "frames", 1, MAX_TRAIL_FRAMES, 1, view.trail_frames,
                 hint="Length of a trail to either side of the shown frame: blue before it, orange after it",
             )  # fmt: skip
             none = gui.add_button("None", hint="No trails")

@@ -1,4 +1,4 @@
-"""Frames and their evidence for the page: computed once in the background, kept for a few frames."""
+"""Cache images and evidence of a few frames for the page; evidence is computed in the background."""
 
 import logging
 import threading
@@ -21,50 +21,50 @@ from tracker.images.working_view import WorkingView
 
 _LOG = logging.getLogger(__name__)
 _IMAGE_BYTES = 16 * 2**20
-"""What undistorted images may take: of four 640x480 views some four frames; decoded ones are kept by the recording."""
+"""Bound on undistorted images: about four frames of four 640x480 views. The recording caches decoded ones."""
 _PICTURE_BYTES = 16 * 2**20
-"""What pictures of them may take: of four panes some hundred and fifty frames."""
+"""Bound on JPEG pictures: about 150 frames of four panes."""
 _SIZES = 64
-"""Sizes of pictures of which it is kept where their pixels lie in the footage."""
+"""Number of picture sizes whose resampling maps are cached."""
 _EVIDENCE_BYTES = 96 * 2**20
 _REST_S = 0.2
-"""A frame has evidence after it has been shown for so long: pictures go out first, and who scrubs by wants no more."""
+"""Time a frame is shown before its evidence is computed: pictures are sent first, and scrubbing needs no evidence."""
 _WAIT_S = 1.0
-"""Evidence waits no longer than this for pictures that are being made."""
+"""Maximum time that evidence waits for pictures in the making."""
 
 
 class FrameCache:
-    """What the page needs of a recording. Safe to use from several threads."""
+    """Images, pictures and evidence of a recording. Safe to use from several threads."""
 
     def __init__(self, observer: Observer, proxies: Sequence[Proxy | None] = ()) -> None:
         """Wrap an observer; nothing is read yet.
 
         Args:
             observer: gives images and evidence.
-            proxies: of each camera's footage, where there is one; what is looked at comes from them, all else from the
+            proxies: of each camera's footage, or None. Images to look at come from the proxies, evidence comes from the
                 footage.
         """
         self.observer, self._proxies = observer, proxies
-        self._images = ByteBoundedCache(self._look, _IMAGE_BYTES)
+        self._images = ByteBoundedCache(self._undistorted, _IMAGE_BYTES)
         self._pictures = ByteBoundedCache(self._picture, _PICTURE_BYTES)
-        self._ways = lru_cache(_SIZES)(self._way)
+        self._resamplers = lru_cache(_SIZES)(self._resampler)
         self._evidence = ByteBoundedCache(observer.evidence, _EVIDENCE_BYTES)
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="evidence")
         self._wanted: int | None = None
-        self._looking = 0  # how many pictures are being made
+        self._n_pictures = 0  # number of pictures in the making
         self._idle = threading.Condition()
 
     def images(self, frame: int) -> tuple[Image | None, ...]:
-        """Undistorted images of all views, as whoever else shows the frame has them too; None for a damaged one."""
+        """Return the undistorted images of all views, shared by all callers; None for a damaged image."""
         return tuple(self._images.get((frame, camera)) for camera in range(len(self.observer.cameras)))
 
     def evidence(self, frame: int) -> tuple[ViewEvidence, ...]:
-        """Evidence of a frame; waits for it.
+        """Return the evidence of a frame; computes it if needed.
 
         Raises:
-            RecordingError: the frame is not listed yet, or cannot be read.
+            RecordingError: the frame is not indexed yet, or cannot be read.
         """
-        if not self._matched(frame):
+        if not self._is_indexed(frame):
             share = self.observer.recording.listed_share or 0.0
             raise RecordingError(
                 f"frame {frame} is not there yet: the footage is being indexed ({share:.0%} so far); wait a moment"
@@ -73,33 +73,37 @@ class FrameCache:
 
     @property
     def listed_share(self) -> float | None:
-        """How far the footage has been listed, 0 to 1; None when all is.
+        """Share of the footage that is indexed, 0 to 1; None for all of it.
 
         Raises:
-            RecordingError: what was wrong with a file came out on the way.
+            RecordingError: indexing found a damaged file.
         """
         return self.observer.recording.listed_share
 
     def listed(self, frame: int) -> bool:
-        """Whether the pictures of a frame can be made without waiting for the lists of frames."""
+        """Return whether the pictures of a frame can be made without waiting for the index."""
         return all(
             self._proxy_of(frame, camera) is not None or self.observer.recording.listed(camera, frame)
             for camera in range(len(self.observer.cameras))
         )
 
-    def _matched(self, frame: int) -> bool:
-        """Whether the footage itself can be read without waiting, as evidence needs it."""
+    def _is_indexed(self, frame: int) -> bool:
+        """Return whether the footage itself is indexed at a frame, as evidence requires."""
         recording = self.observer.recording
         return all(recording.listed(camera, frame) for camera in range(len(self.observer.cameras)))
 
     def cached_evidence(self, frame: int) -> tuple[ViewEvidence, ...] | None:
-        """Evidence of a frame if it has been computed."""
+        """Return the evidence of a frame if it is cached."""
         return self._evidence.peek(frame)
 
     def request(self, frame: int, done: Callable[[int], None]) -> None:
-        """Compute the evidence of a frame in the background, unless another is requested before its turn comes.
+        """Compute the evidence of a frame in the background, unless another is requested first.
 
-        Its turn comes when the frame has rested for a moment and nobody waits for a picture.
+        Work starts when the request is a moment old and no picture is in the making.
+
+        Args:
+            frame: whose evidence is computed.
+            done: called with the frame afterwards.
         """
         self._wanted, asked = frame, time.monotonic()
 
@@ -107,12 +111,12 @@ class FrameCache:
             while self._wanted == frame and time.monotonic() < asked + _REST_S:
                 time.sleep(_REST_S / 8)
             with self._idle:
-                self._idle.wait_for(lambda: not self._looking, _WAIT_S)
+                self._idle.wait_for(lambda: not self._n_pictures, _WAIT_S)
             try:
-                if self._wanted == frame and self._matched(frame):
+                if self._wanted == frame and self._is_indexed(frame):
                     self._evidence.get(frame)
                     done(frame)
-            except RecordingError as error:  # the pictures of the frame say it to whoever looks
+            except RecordingError as error:  # the pictures of the frame show it
                 _LOG.warning("no evidence of frame %d: %s", frame, error)
             except Exception:
                 _LOG.exception("no evidence of frame %d", frame)
@@ -120,49 +124,49 @@ class FrameCache:
         self._pool.submit(work)
 
     def close(self) -> None:
-        """Give up what is still requested."""
+        """Cancel the requests."""
         self._wanted = None
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     def image(self, frame: int, camera: int, reduction: float = 1) -> bytes:
-        """The undistorted image of one view as JPEG; `reduction` pixels of it, along either side, become one."""
-        with self._somebody_looks():
+        """Return the undistorted image of one view as JPEG, reduced by a factor along either side."""
+        with self._making_picture():
             return self._pictures.get((frame, camera, reduction))
 
     @contextmanager
-    def _somebody_looks(self) -> Iterator[None]:
+    def _making_picture(self) -> Iterator[None]:
         with self._idle:
-            self._looking += 1
+            self._n_pictures += 1
         try:
             yield
         finally:
             with self._idle:
-                self._looking -= 1
+                self._n_pictures -= 1
                 self._idle.notify_all()
 
     def _picture(self, key: tuple[int, int, float]) -> bytes:
-        """The picture of a frame, camera and reduction: resampled once, at its size."""
+        """Make the picture of a frame, camera and reduction, resampled once."""
         frame, camera, reduction = key
-        image, way = self._read(frame, camera), self._ways(camera, reduction)
-        return pictures.footage(None if image is None else way.image(image, way.whole), way.camera.size)
+        image, view = self._read(frame, camera), self._resamplers(camera, reduction)
+        return pictures.footage(None if image is None else view.image(image, view.whole), view.camera.size)
 
-    def _way(self, camera: int, reduction: float) -> WorkingView:
+    def _resampler(self, camera: int, reduction: float) -> WorkingView:
         return WorkingView(self.observer.cameras[camera].camera, 1 / reduction, cv2.BORDER_CONSTANT)
 
-    def _look(self, key: tuple[int, int]) -> Image | None:
-        """Undistorted image of a frame and camera."""
+    def _undistorted(self, key: tuple[int, int]) -> Image | None:
+        """Return the undistorted image of a frame and camera."""
         image = self._read(*key)
         return None if image is None else self.observer.cameras[key[1]].camera.undistort_image(image)
 
     def _read(self, frame: int, camera: int) -> Image | None:
-        """A frame of a camera as filmed, from its proxy where there is one that goes so far."""
+        """Read a frame of a camera as filmed, from its proxy if that contains the frame."""
         proxy = self._proxy_of(frame, camera)
         if proxy is None:
             return self.observer.recording.read_view(camera, frame)
         return proxy.read(frame + self.observer.cameras[camera].offset)
 
     def _proxy_of(self, frame: int, camera: int) -> Proxy | None:
-        """The proxy of a camera, where there is one that goes so far."""
+        """Return the proxy of a camera if it contains the frame."""
         proxy = self._proxies[camera] if self._proxies else None
         at = frame + self.observer.cameras[camera].offset
         return None if proxy is None or at >= proxy.n_frames else proxy

@@ -1,4 +1,4 @@
-"""`quadrille index`: an intra-frame proxy of a session's videos, so that any frame is on the screen at once."""
+"""Make intra-frame proxies of a session's videos, so that any frame is shown at once (`quadrille index`)."""
 
 from contextlib import closing
 from typing import Any
@@ -12,15 +12,15 @@ from tracker.session.session import Session
 
 
 def index(session: Session, progress: Reporter) -> dict[str, Any]:
-    """Make the proxies that are missing, half made, or made of other footage.
+    """Make the proxies that are missing, incomplete, or made of other footage.
 
-    Interrupted, it keeps what is done, and the same call again goes on from there.
+    An interrupted call keeps its frames, and the next call continues there.
 
     Returns:
-        Frames of each camera's proxy, bytes of all, and whether it was stopped.
+        Number of frames of each camera's proxy, size of all proxies in bytes, and whether the call was interrupted.
 
     Raises:
-        RecordingError: footage cannot be read, or a proxy not be written.
+        RecordingError: footage cannot be read, or a proxy cannot be written.
         SessionError: another program is making them.
     """
     folder = session.folder / FOLDER
@@ -30,7 +30,7 @@ def index(session: Session, progress: Reporter) -> dict[str, Any]:
     with SessionLock(folder):
         for source in session.cameras:
             name = source.camera.name
-            if source.footage.is_dir():  # its frames are pictures of their own
+            if source.footage.is_dir():  # a folder of images needs no proxy
                 continue
             with closing(open_footage(source.footage, name)) as footage:
                 assert not isinstance(footage, ImageFolder)
@@ -50,13 +50,13 @@ def index(session: Session, progress: Reporter) -> dict[str, Any]:
 
 
 def proxies(session: Session) -> list[Proxy | None]:
-    """The proxy of each camera; None where there is none of the footage as it is now."""
+    """Return the proxy of each camera; None for a camera without a proxy of its present footage."""
     found = [Proxy(session.folder / FOLDER, c.camera.name) for c in session.cameras]
     return [p if _fits(p, c) else None for p, c in zip(found, session.cameras, strict=True)]
 
 
 def stale(session: Session) -> list[str]:
-    """Names of the cameras whose proxy was made of other footage."""
+    """Return the names of the cameras whose proxy was made of other footage."""
     found = [(Proxy(session.folder / FOLDER, c.camera.name), c) for c in session.cameras]
     return [c.camera.name for p, c in found if p.exists() and not _fits(p, c)]
 

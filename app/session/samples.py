@@ -1,4 +1,4 @@
-"""The bundled samples, and the working copies that people open."""
+"""Find the bundled samples, and make working copies of them."""
 
 import shutil
 from collections.abc import Iterable
@@ -14,11 +14,11 @@ DEFAULT_SAMPLE = "tango"
 
 
 def sample_copy(name: str = DEFAULT_SAMPLE, afresh: bool = False) -> Path:
-    """Working copy of a bundled sample in the user's data folder, made where it is missing.
+    """Return the working copy of a bundled sample in the user's data folder; makes it if it is missing.
 
     Args:
         name: of the sample.
-        afresh: throw the working copy away and start again.
+        afresh: replace the working copy.
 
     Raises:
         SessionError: the sample is unknown, or the copy is open in another program.
@@ -27,7 +27,7 @@ def sample_copy(name: str = DEFAULT_SAMPLE, afresh: bool = False) -> Path:
     copy = user_data_path("quadrille", appauthor=False) / "samples" / name
     if afresh and copy.exists():
         with SessionLock(copy):
-            pass  # nobody works on it
+            pass  # not open in another program
         shutil.rmtree(copy)
     if not copy.exists():
         unfinished = copy.with_name(f".{name}.unfinished")
@@ -40,7 +40,7 @@ def sample_copy(name: str = DEFAULT_SAMPLE, afresh: bool = False) -> Path:
 
 
 def bundled(name: str) -> Path:
-    """Folder of a sample as it came, which may be read-only.
+    """Return the folder of a bundled sample, which may be read-only.
 
     Raises:
         SessionError: the sample is unknown.
@@ -52,7 +52,7 @@ def bundled(name: str) -> Path:
 
 
 def samples() -> Iterable[str]:
-    """Names of the bundled samples."""
+    """Return the names of the bundled samples."""
     return sorted(p.parent.name for p in _folder().glob(f"*/{SESSION_FILE}"))
 
 

@@ -1,4 +1,4 @@
-"""The floor on the screen: the plane that is set, and the three points that are being clicked for another."""
+"""The floor of the session, and the three points that the user clicks to set another."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,28 +16,28 @@ N_POINTS = 3
 
 @dataclass(frozen=True, eq=False)
 class Pick:
-    """One point of the floor, as it is clicked view by view."""
+    """One point of the floor, clicked in several views."""
 
     marks: tuple[tuple[int, float, float], ...] = ()
-    """Camera by index, and where it was clicked, undistorted px; each camera at most once, in the order of clicking."""
+    """Index of the camera and clicked position, undistorted px; each camera at most once, in the order of clicks."""
     point_world: Array | None = None
-    """Where the lines of sight meet, (3,), metres; None where they do not."""
+    """Triangulated point, (3,), metres; None if the lines of sight do not meet."""
     error_px: float | None = None
-    """Largest distance of a click from the image of that point, px."""
+    """Largest reprojection error, px."""
     why: str = "click it in a second view"
-    """Why there is no point."""
+    """Why there is no point, as text for the user."""
 
 
 @dataclass(frozen=True, eq=False)
 class Picking:
-    """Points that are being clicked."""
+    """The points clicked so far."""
 
     picks: tuple[Pick, ...] = (Pick(),)
-    """Up to `N_POINTS`; the last is at hand."""
+    """Up to `N_POINTS`; the last is the current one."""
     plane: GroundPlane | None = None
     """The plane through three points."""
     why: str = ""
-    """Why three points give none."""
+    """Why three points give no plane, as text for the user."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,28 +47,28 @@ class FloorState:
     up: str = "z"
     """World axis that points up, or is nearest to it."""
     plane: GroundPlane | None = None
-    """As a person has set it; None for the plane through the world's origin."""
+    """As set by the user; None for the plane through the world's origin."""
     picking: Picking | None = None
-    """None while nobody sets another."""
+    """None while no floor is being set."""
     former: bool = False
-    """Whether there is a former floor to go back to."""
+    """Whether a former floor can be restored."""
 
 
 def with_mark(picking: Picking, cameras: Sequence[Camera], camera: int, u: float, v: float) -> Picking:
-    """Mark the point at hand in a view, in place of its mark there if it has one; undistorted px."""
+    """Mark the current point in a view, undistorted px, in place of its former mark there."""
     marks = (*(m for m in picking.picks[-1].marks if m[0] != camera), (camera, u, v))
     return _solved(replace(picking, picks=(*picking.picks[:-1], _met(marks, cameras))), cameras)
 
 
 def with_next(picking: Picking) -> Picking:
-    """Go on to the next point, where the one at hand is known and there is one."""
+    """Begin the next point, if the current one is known and is not the last."""
     if picking.picks[-1].point_world is None or len(picking.picks) == N_POINTS:
         return picking
     return replace(picking, picks=(*picking.picks, Pick()))
 
 
 def without_last(picking: Picking, cameras: Sequence[Camera]) -> Picking:
-    """Take the last mark back, of the point before where the one at hand has none."""
+    """Remove the last mark: of the current point, or of the one before if it has none."""
     picks = picking.picks
     if not picks[-1].marks and len(picks) > 1:
         picks = picks[:-1]

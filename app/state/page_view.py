@@ -39,7 +39,7 @@ class View:
     reductions: tuple[float, ...]
     """By camera: image pixels per picture pixel along either side; 0 for a pane that is not visible."""
     by_part: bool = False
-    """Whether contours have the colours of the parts instead of those of the people."""
+    """Whether contours have the colours of parts instead of those of people."""
 
     @property
     def cameras(self) -> frozenset[int]:

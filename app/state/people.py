@@ -24,7 +24,7 @@ class ShownPose:
     """Source of each value of a pose that is not stored yet, (n_values,); empty if `source` applies to all."""
     revision: int | None = None
     """Model revision of a stored pose; None for a pose that is not stored as shown."""
-    others: tuple[Array, ...] = ()
+    alternatives: tuple[Array, ...] = ()
     """Alternatives that the tracker found, (n_values,) each, best first; empty for a keyframe."""
 
 
@@ -64,4 +64,4 @@ class Visibility:
     hidden: frozenset[int] = frozenset()
     """Indices of the people that no view shows."""
     solo: bool = False
-    """Whether everybody but the selected person is dimmed and cannot be dragged."""
+    """Whether all people but the selected one are dimmed and cannot be dragged."""

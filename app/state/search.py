@@ -48,7 +48,7 @@ class ReplayState:
     """Cost of the candidate, px."""
     best_px: float | None
     """Cost of the best poses, px."""
-    best_views_px: tuple[float | None, ...]
+    best_view_costs_px: tuple[float | None, ...]
     """Cost of the best poses in each view, px; empty where unknown."""
     evaluations: int
     """Poses scored so far."""

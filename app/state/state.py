@@ -53,7 +53,7 @@ class State:
     locked: tuple[frozenset[int], ...] = ()
     """Indices of the locked degrees of freedom of each person."""
     ranges: RangeState = field(default_factory=RangeState)
-    disagreeing: tuple[int, ...] = ()
+    inconsistent_frames: tuple[int, ...] = ()
     """Frames whose poses disagree with their neighbours, ascending (see `tracker.motion.consistency`)."""
     pins: tuple[tuple[PointObservation, ...], ...] = ()
     """The pins of each person on the frame, by point and camera."""
@@ -109,7 +109,7 @@ class State:
             people=people,
             search=search,
             cost_px=replayed.best_px,
-            view_costs_px=replayed.best_views_px,
+            view_costs_px=replayed.best_view_costs_px,
             drag=None,
         )
 
@@ -158,7 +158,7 @@ class StateChanges(TypedDict, total=False):
     follow: bool
     locked: tuple[frozenset[int], ...]
     ranges: RangeState
-    disagreeing: tuple[int, ...]
+    inconsistent_frames: tuple[int, ...]
     pins: tuple[tuple[PointObservation, ...], ...]
     is_pin_held: bool
     drag: DragState | None

@@ -1,1 +1,4 @@
-"""State to the annotation store and back; what cannot be written waits."""
+"""Store the annotations of an open session, and queue edits that cannot be written.
+
+May import `tracker` and `app.state`. Callers use `saver.Saver`, and through it `revisions` and `index`.
+"""

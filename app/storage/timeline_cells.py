@@ -1,4 +1,4 @@
-"""Cells of the timeline: what is said of each frame, of all people together and of each of several."""
+"""Cells of the timeline: a summary of each frame, for all people together and for each of several."""
 
 from collections.abc import Iterable, Mapping
 from itertools import takewhile
@@ -9,10 +9,10 @@ _WORST_FIRST = ("lost", "doubtful", "good", "")
 
 
 class TimelineCells:
-    """The cells of all frames that have poses. Not locked by itself: whoever changes them holds the screen's lock."""
+    """The cells of all frames that have poses. The caller holds the session's lock."""
 
     def __init__(self, names: Iterable[str]) -> None:
-        """Know of no pose yet.
+        """Begin without poses.
 
         Args:
             names: of the people.
@@ -20,16 +20,16 @@ class TimelineCells:
         self._all: dict[int, dict] = {}
         names = list(names)
         self._lanes: dict[str, dict[int, dict]] = {name: {} for name in names} if len(names) > 1 else {}
-        self._changed: dict[int, int] = {}  # frame -> version of the timeline it changed in last, latest last
+        self._changed: dict[int, int] = {}  # frame -> version of its last change, latest last
         self.version = 1
-        """Rises with every change of stored poses."""
+        """Increases with every change of stored poses."""
 
     def begin(self, rows: Mapping[int, Mapping[str, FrameRow]]) -> None:
-        """List all frames, from the rows of everybody who has a pose there."""
+        """List all frames, from the rows of the people who have a pose there."""
         self._put(rows)
 
     def change(self, frames: Iterable[int], rows: Mapping[int, Mapping[str, FrameRow]]) -> None:
-        """Bring some frames up to date; those without rows have no pose any more."""
+        """Update some frames; those without rows no longer have a pose."""
         changed = set(frames)
         self.version += 1
         for frame in changed:
@@ -40,11 +40,11 @@ class TimelineCells:
         self._put({frame: people for frame, people in rows.items() if frame in changed})
 
     def since(self, version: int, name: str | None = None) -> dict[int, dict | None]:
-        """Cells of the frames that changed after a version; all for 0.
+        """Return the cells of the frames that changed after a version.
 
         Args:
-            version: of the timeline.
-            name: of one person among several; by default what is said of all together.
+            version: of the timeline; 0 returns all cells.
+            name: of one of several people; None summarizes all people.
         """
         cells = self._all if name is None else self._lanes[name]
         if version <= 0:
@@ -59,7 +59,7 @@ class TimelineCells:
 
 
 def _cell(rows: Mapping[str, FrameRow]) -> dict:
-    """What the timeline says of a frame: of several people the worst, and the source nearest to a person's hand."""
+    """Summarize a frame: the worst status and cost of the people, and the source nearest to a person's own work."""
     costs = [row.cost_px for row in rows.values() if row.cost_px is not None]
     remarks = [row.remark if len(rows) == 1 else f"{name}: {row.remark}" for name, row in rows.items() if row.remark]
     return {

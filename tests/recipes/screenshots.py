@@ -42,7 +42,7 @@ Act = Callable[[Page], Awaitable[None]]
 
 
 @dataclass(frozen=True)
-class Screen:
+class Screenshot:
     """A picture to take."""
 
     name: str
@@ -164,30 +164,30 @@ async def filled(page: Page) -> None:
 
 
 SCREENS = [
-    Screen("empty", "fresh", nothing),
-    Screen("empty-light", "fresh", nothing, scheme="light"),
-    Screen("posing", "placed", posing),
-    Screen("posing-large", "placed", posing, LARGE),
-    Screen("filled", "placed", filled),
-    Screen("pins", "placed", pins),
-    Screen("pins-light", "placed", pins, scheme="light"),
-    Screen("layers", "placed", layers),
-    Screen("search-running", "near", searching),
-    Screen("search-replay", "near", replaying),
-    Screen("search-replay-large", "near", replaying, LARGE, "light"),
-    Screen("landscape", "placed", landscape),
-    Screen("tracking", "placed", tracking),
-    Screen("curves", "placed", tracked),
-    Screen("curves-light-large", "placed", tracked, LARGE, "light"),
-    Screen("notice", "fresh", refused),
-    Screen("keys", "placed", helping),
-    Screen("palette", "placed", palette),
-    Screen("history", "placed", history),
-    Screen("one-camera", "one", nothing),
-    Screen("eight-cameras", "eight", nothing),
-    Screen("eight-cameras-large-light", "eight", nothing, LARGE, "light"),
-    Screen("two-people", "tango", nothing),
-    Screen("page", "tango", fitted, (1600, 900)),
+    Screenshot("empty", "fresh", nothing),
+    Screenshot("empty-light", "fresh", nothing, scheme="light"),
+    Screenshot("posing", "placed", posing),
+    Screenshot("posing-large", "placed", posing, LARGE),
+    Screenshot("filled", "placed", filled),
+    Screenshot("pins", "placed", pins),
+    Screenshot("pins-light", "placed", pins, scheme="light"),
+    Screenshot("layers", "placed", layers),
+    Screenshot("search-running", "near", searching),
+    Screenshot("search-replay", "near", replaying),
+    Screenshot("search-replay-large", "near", replaying, LARGE, "light"),
+    Screenshot("landscape", "placed", landscape),
+    Screenshot("tracking", "placed", tracking),
+    Screenshot("curves", "placed", tracked),
+    Screenshot("curves-light-large", "placed", tracked, LARGE, "light"),
+    Screenshot("notice", "fresh", refused),
+    Screenshot("keys", "placed", helping),
+    Screenshot("palette", "placed", palette),
+    Screenshot("history", "placed", history),
+    Screenshot("one-camera", "one", nothing),
+    Screenshot("eight-cameras", "eight", nothing),
+    Screenshot("eight-cameras-large-light", "eight", nothing, LARGE, "light"),
+    Screenshot("two-people", "tango", nothing),
+    Screenshot("page", "tango", fitted, (1600, 900)),
 ]
 
 TUTORIAL = ("empty", "posing", "pins", "search-replay", "landscape", "curves", "palette")
@@ -230,7 +230,7 @@ def place(session: Session, near: bool) -> None:
 
 
 @asynccontextmanager
-async def opened(browser: Browser, folder: Path, screen: Screen):
+async def opened(browser: Browser, folder: Path, screen: Screenshot):
     """The page of a session, with its first frame and its cost on the screen."""
     with tempfile.TemporaryDirectory() as name:
         program = Program(shutil.copytree(folder, Path(name) / folder.name))

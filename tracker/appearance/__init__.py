@@ -1,1 +1,5 @@
-"""Colours of the parts, and a quick colour-and-edge score of one limb in thousands of poses."""
+"""Score poses by colours of body parts, and single limbs by colours and edges.
+
+The room imports `compute`, `geometry`, `body`, `images`, `contours` and `evidence`. Callers use `part_colors.Colors`
+and the `limb_score.LimbScorer` that it makes.
+"""

@@ -1,6 +1,6 @@
-"""Lines of sight past the parts of posed bodies, and what lies under the axes of parts in images.
+"""Occlusion and image positions of samples along the axes of body parts.
 
-An ellipsoid stands for each part: quick to ask, and near enough where only samples along the axes of parts are.
+Each part is represented by an ellipsoid: fast, and accurate enough for samples on axes.
 """
 
 import numpy as np
@@ -16,12 +16,13 @@ ALONG = 7
 
 
 def ellipsoids(model: BodyModel) -> Array:
-    """Centre and half-axes of the ellipsoids that stand for the parts, (n_parts, 6), metres."""
+    """Return centre and half-axes of the ellipsoids that represent the parts, (n_parts, 6), metres."""
     return np.array([(*c, *s.half_axes) for c, s in zip(model.centers_part, model.shapes, strict=True)])
 
 
 def unit_balls(shapes: Array) -> Array:
-    """From the coordinates in which ellipsoids (N, 6) are the unit ball to the frames of their parts, (N, 4, 4)."""
+    """Return the transforms from coordinates in which ellipsoids, (N, 6), are the unit ball to their parts, (N, 4,
+    4)."""
     out = np.zeros((len(shapes), 4, 4))
     out[:, range(3), range(3)], out[:, :3, 3], out[:, 3, 3] = shapes[:, 3:], shapes[:, :3], 1.0
     return out
@@ -29,8 +30,10 @@ def unit_balls(shapes: Array) -> Array:
 
 @njit(**NO_REFCOUNT)
 def ray_transform(eye: Array, T: Array, shape: Array, ray: Array) -> None:
-    """Fill what lines of sight ask of a part, (13,): what turns directions into the coordinates in which the part is
-    the unit ball, the eye in these, and the square of its distance from the ball."""
+    """Fill the transform of rays to the coordinates in which a part is the unit ball, (13,).
+
+    It holds the transform of directions, the eye in these coordinates, and the squared distance of the eye minus 1.
+    """
     C = -1.0
     for i in range(3):
         o = -shape[i]
@@ -45,8 +48,10 @@ def ray_transform(eye: Array, T: Array, shape: Array, ray: Array) -> None:
 
 @njit(**NO_REFCOUNT)
 def occludes(ray: Array, x: float, y: float, z: float) -> bool:
-    """Whether a part lies before a point, which is at (x, y, z) from the eye: the middle of the chord that the line of
-    sight shares with it is nearer than the point."""
+    """Return whether a part occludes the point at (x, y, z) from the eye.
+
+    It does if the middle of the chord that the ray cuts from the part is nearer than the point.
+    """
     d0 = ray[0] * x + ray[1] * y + ray[2] * z
     d1 = ray[3] * x + ray[4] * y + ray[5] * z
     d2 = ray[6] * x + ray[7] * y + ray[8] * z
@@ -57,14 +62,17 @@ def occludes(ray: Array, x: float, y: float, z: float) -> bool:
 
 @njit(**NO_REFCOUNT)
 def axis_sample(shape: Array, sample: int) -> float:
-    """Place of a sample along the axis of a part, from its centre, metres."""
+    """Return the position of a sample along the axis of a part, from its centre, metres."""
     return shape[5] * 0.8 * (2.0 * sample / (ALONG - 1) - 1.0)
 
 
 @njit(**NO_REFCOUNT)
 def project_axis(P: Array, eye: Array, T: Array, shape: Array, axis: Array) -> None:
-    """Fill where the axis of a part is from the eye and in the image, (4, 3): its centre from the eye, metres; its
-    centre, the change for a metre along the axis and for a metre across axis and sight in homogeneous pixels."""
+    """Fill the axis of a part relative to the eye and in the image, (4, 3).
+
+    The rows are: its centre from the eye, metres; its centre in homogeneous pixels; the change of these per metre along
+    the axis; and per metre across axis and ray.
+    """
     for i in range(3):
         axis[0, i] = T[i, 0] * shape[0] + T[i, 1] * shape[1] + T[i, 2] * shape[2] + T[i, 3] - eye[i]
     x, y, z = axis[0, 0], axis[0, 1], axis[0, 2]
@@ -81,15 +89,15 @@ def project_axis(P: Array, eye: Array, T: Array, shape: Array, axis: Array) -> N
 def is_occluded(
     T: Array, axis: Array, along_m: float, own: int, rays: Array, among: NDArray[np.int64], n_among: int
 ) -> bool:
-    """Whether another part lies before a place along the axis of one.
+    """Return whether another part occludes a point on the axis of a part.
 
     Args:
         T: pose of the part, (4, 4), metres.
         axis: see `project_axis`.
-        along_m: from the centre of the part, metres.
+        along_m: position from the centre of the part, metres.
         own: index of the part.
         rays: of all parts, see `ray_transform`, (P, 13).
-        among: indices of the parts that may hide it, (room,).
+        among: indices of possible occluders, (room,).
         n_among: their number.
     """
     x, y, z = axis[0, 0] + along_m * T[0, 2], axis[0, 1] + along_m * T[1, 2], axis[0, 2] + along_m * T[2, 2]
@@ -102,8 +110,10 @@ def is_occluded(
 
 @njit(**NO_REFCOUNT)
 def pixel_on_axis(axis: Array, along_m: float) -> tuple[float, float, float, float]:
-    """Where a place along the axis of a part is in an image, px, and how that changes to the side, px per metre; see
-    `project_axis`. So near the axis the image is as good as linear."""
+    """Return the image of a point on an axis, px, and its change sideways, px per metre.
+
+    See `project_axis`. Near the axis the projection is practically linear.
+    """
     near = 1.0 / (axis[1, 2] + along_m * axis[2, 2])
     u = (axis[1, 0] + along_m * axis[2, 0]) * near
     v = (axis[1, 1] + along_m * axis[2, 1]) * near

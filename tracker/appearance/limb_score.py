@@ -1,8 +1,8 @@
-"""A quick look at one limb in thousands of poses: does what the images show along it go with it?
+"""Score one limb in thousands of poses by the colours and edges along it, with the rest of the scene static.
 
-All but the limb stands still. What stands is drawn once for each view, as far as the limb reaches: in each cell of the
-image the nearest part and its depth. A sample of a limb then finds at one place whether something hides it, and what
-would be seen there without the limb; only the limb's own parts are asked by themselves.
+The static parts are drawn once per view, within reach of the limb: the nearest part and its depth in each image cell. A
+sample of a limb then finds in one lookup whether it is occluded, and what would be visible without the limb. Only the
+limb's own parts are tested one by one.
 """
 
 from collections.abc import Sequence
@@ -30,22 +30,22 @@ from tracker.images.color_histogram import BINS, bin_of
 _STEP_PX = 2
 """Size of a cell, working px."""
 _BESIDE_PX = 3.0
-"""Room about all places that the limb may reach, px."""
+"""Margin around all positions that the limb can reach, px."""
 _OPEN = -1
-"""Index of no part: nothing stands there."""
+"""Part index of cells without a part."""
 _OFF_NATS = -0.25
-"""What a pixel that is not in the image says: little against the limb, for nobody sees it."""
+"""Score of a pixel outside the image: slightly against the limb, because it is not seen."""
 _EDGE_NATS, _EDGE_EVEN = 1.5, 0.3
-"""Weight of an edge beside the limb, and the distance of an edge that says nothing, in outlier distances."""
+"""Weight of an edge beside the limb, and the distance of an edge that counts nothing, in outlier distances."""
 
 
 class ColorView(NamedTuple):
-    """What a look is told of one view."""
+    """Evidence of one view for scoring limbs."""
 
     P: Array
-    """Projection matrix of working pixels, (3, 4)."""
+    """Projection matrix to working pixels, (3, 4)."""
     eye: Array
-    """Centre of the camera in the world, (3,), metres."""
+    """Camera centre in the world, (3,), metres."""
     image: Image
     """Colours, (H, W, 3)."""
     distance: FloatArray
@@ -55,58 +55,57 @@ class ColorView(NamedTuple):
 
 
 class StaticParts(NamedTuple):
-    """Whatever may hide a limb or be seen without it."""
+    """Parts that may occlude a limb, or be visible without it."""
 
     Ts_world_unit: Array
     """From the coordinates in which each part is the unit ball to the world, (S, 4, 4), metres."""
     owners: IntArray
-    """Index of each part in the body that is looked at, (S,); -1 for parts of other bodies."""
+    """Index of each part in the scored body, (S,); -1 for parts of other bodies."""
 
 
 class _Backdrop(NamedTuple):
-    """What stands in one view, as far as a limb reaches."""
+    """Static parts in one view within reach of a limb."""
 
     depths: NDArray[np.float32]
-    """Depth of the middle of the nearest part along the line of sight, (h, w), metres; infinite in the open."""
+    """Depth of the middle of the nearest part along the ray, (h, w), metres; infinite without a part."""
     owners: NDArray[np.int16]
-    """Index of that part in the body that is looked at, (h, w); -1 for parts of other bodies and in the open."""
+    """Index of that part in the scored body, (h, w); -1 for parts of other bodies and without a part."""
     corner_px: IntArray
     """Pixel at the middle of the first cell, u and v, (2,)."""
 
 
 class LimbScorer:
-    """A look at one limb of a body that stands still otherwise: prepared once, asked of many poses."""
+    """Scores one limb of an otherwise static body in many poses."""
 
     def __init__(
         self, views: Sequence[ColorView], model: BodyModel, rest: Kinematics, limb: IntArray, standing: StaticParts,
         shapes: Array, log_ratios: Array | None,
     ) -> None:  # fmt: skip
-        """Draw what stands.
+        """Draw the static parts.
 
         Args:
-            views: the views that show colours.
-            model: the body whose limb it is.
-            rest: where it stands; the limb may be anywhere.
+            views: views with colours.
+            model: the body.
+            rest: kinematics of the body; the limb may be anywhere.
             limb: indices of the limb's parts, from the trunk outwards, (n,).
-            standing: what stands besides.
+            static: the static parts.
             shapes: ellipsoids of all parts of the body, (n_parts, 6), metres.
-            log_ratios: what is known of the colours of the body's parts, see `PartColors`; None: nothing.
+            log_ratios: log ratios of the colours of the body's parts, see `PartColors`; None if unknown.
         """
         self._views, self._model, self._rest, self._limb = list(views), model, rest, limb
         self._shapes = np.ascontiguousarray(shapes[limb])
         self._ratios = np.zeros((len(shapes), BINS**3)) if log_ratios is None else log_ratios
         reach = _reach(model, limb, self._shapes)
         root = rest.Ts_world_part[limb[0], :3, 3]
-        # Not side by side: it is so little work that threads would wait longer for one another.
+        # Sequential: the work is too small for threads.
         self._backdrops = [_backdrop(view, standing, root, reach) for view in self._views]
 
     def __call__(self, poses: Array) -> Array:
-        """How good the limb seems in many poses, (C, n_values), that differ in it alone, (C,), nats; more is better.
+        """Return the score of the limb in many poses, (C, n_values), that differ in the limb only, (C,), nats.
 
-        At samples along the axes of its parts, where nothing hides them, the colours speak, and the edges at both
-        sides: near ones for it, none against it. Where the limb is hidden nothing is said.
-
-        In the thread that asks; several may ask at a time.
+        Larger is better. Visible samples along the axes of the limb's parts count with their colours and with the edges
+        on both sides: near edges for the limb, missing edges against it. Occluded samples count nothing. Runs in the
+        calling thread; several threads may call at a time.
         """
         Ts = chain_poses(self._model.tree, self._rest, self._limb, poses)
         room = np.arange(len(self._limb)), np.empty((len(self._limb), 13)), np.empty((4, 3))
@@ -118,18 +117,18 @@ class LimbScorer:
 
 
 def _reach(model: BodyModel, limb: IntArray, shapes: Array) -> float:
-    """How far the samples of a limb can be from its first joint, metres."""
+    """Return the largest distance of a limb's samples from its first joint, metres."""
     lengths = np.linalg.norm(model.tree.offsets[limb], axis=1)
     lengths[0] = 0.0
     return float((np.cumsum(lengths) + np.linalg.norm(shapes[:, :3], axis=1) + shapes[:, 5]).max())
 
 
 def _backdrop(view: ColorView, standing: StaticParts, root: Array, reach: float) -> _Backdrop:
-    """Draw what stands within reach, metres, of a place, (3,)."""
+    """Draw the static parts within reach, metres, of a position, (3,)."""
     bounds, ball = np.empty(4), np.diag([reach, reach, reach, 1.0])
     ball[:3, 3] = root
     _bounds(view.P @ ball, bounds)
-    # Farther beside an image than its own size nobody needs to know what hides a limb.
+    # Occlusion farther outside an image than its own size is irrelevant.
     size = np.array(view.distance.shape[::-1])
     low = np.clip(np.floor(bounds[:2] - _BESIDE_PX), -size, 2 * size).astype(np.int64)
     high = np.clip(np.ceil(bounds[2:] + _BESIDE_PX), -size, 2 * size).astype(np.int64)
@@ -152,12 +151,12 @@ def _draw(
     Args:
         to_px: from the coordinates in which each part is the unit ball to homogeneous pixels, (S, 3, 4).
         rays: from pixels to directions of depth 1 in these coordinates, (S, 3, 3).
-        eyes: the eye in them, (S, 3).
+        eyes: the eye in these coordinates, (S, 3).
         own: owners of the parts, see `StaticParts`.
         corner: see `_Backdrop`.
-        depths: what is filled, see `_Backdrop`.
-        owners: the same.
-        bounds: room, (4,).
+        depths: filled, see `_Backdrop`.
+        owners: filled, see `_Backdrop`.
+        bounds: scratch, (4,).
     """
     for p in range(len(to_px)):
         _bounds(to_px[p], bounds)
@@ -165,7 +164,7 @@ def _draw(
         top, bottom = (bounds[1] - corner[1]) / _STEP_PX, (bounds[3] - corner[1]) / _STEP_PX
         left, right = max(0.0, np.ceil(left)), min(depths.shape[1] - 1.0, np.floor(right))
         top, bottom = max(0.0, np.ceil(top)), min(depths.shape[0] - 1.0, np.floor(bottom))
-        if left > right or top > bottom:  # what is infinite would not fit an integer
+        if left > right or top > bottom:  # infinite bounds would overflow an integer
             continue
         N, x, y, z = rays[p], eyes[p, 0], eyes[p, 1], eyes[p, 2]
         C, owner = x * x + y * y + z * z - 1.0, np.int16(own[p])
@@ -184,12 +183,13 @@ def _draw(
 
 @njit(**NO_REFCOUNT)
 def _bounds(to_px: Array, bounds: Array) -> None:
-    """Fill the bounds u0, v0, u1, v1 of a ball in an image, px, (4,); all are infinite where it reaches the camera's
-    plane, and nothing lies within them where it is behind.
+    """Fill the bounds u0, v0, u1, v1 of a ball in an image, (4,), px.
+
+    They are infinite if the ball reaches the camera plane, and empty if it is behind.
 
     Args:
         to_px: from the coordinates in which it is the unit ball to homogeneous pixels, (3, 4).
-        bounds: what is filled.
+        bounds: filled.
     """
     ww = _touch(to_px, 2, 2)
     for i in range(2):
@@ -266,7 +266,18 @@ def _sample_nats(
     u: float, v: float, du: float, dv: float, image: Image, distance: FloatArray, theta_px: float, ratios: Array,
     part: int, behind: int,
 ) -> float:  # fmt: skip
-    """What the pixels across a part say, two steps to either side of a place along its axis."""
+    """Return the score of the pixels across a part, two steps to either side of a sample on its axis.
+
+    Args:
+        u: column of the sample, px.
+        v: row of the sample, px.
+        du: step across, px.
+        dv: step across, px.
+        view: the view.
+        log_ratios: see `_Limb`.
+        part: index of the part.
+        behind: index of the part visible without the limb; -1 for none.
+    """
     height, width = distance.shape
     nats, per_theta = 0.0, 1.0 / theta_px
     for s in range(-2, 3):
@@ -278,6 +289,6 @@ def _sample_nats(
         else:
             color = bin_of(image, y, x)
             nats += ratios[part, color]
-            if behind >= 0:  # To show again the colour of what would be seen without the limb says nothing for it.
+            if behind >= 0:  # Matching the colour behind the limb is no evidence for it.
                 nats -= ratios[behind, color]
     return nats

@@ -1,8 +1,7 @@
-"""The colours of the parts: what edges cannot tell, which of two limbs an outline belongs to.
+"""Learn the colours of body parts, which tell apart limbs whose edges look alike.
 
-Where a pose is known the colours under each part are remembered as a histogram; of another pose they tell how well
-the pixels under each part go with that part rather than with anything else in sight. Where all is of one colour the
-ratio is one, and nothing is said.
+At a known pose the colours under each part are collected in a histogram. At another pose the log ratio of these colours
+against everything else in view scores the pixels under each part. If everything has one colour, the ratio is 0.
 """
 
 from collections.abc import Sequence
@@ -39,35 +38,35 @@ _ACROSS = 3
 _MOST_NATS = 3.0
 """One pixel says at most this much."""
 _DOUBT = 0.02
-"""Share of pixels under a part that may show anything: what has never been seen there is not impossible."""
+"""Share of arbitrary pixels under a part: a colour that was never seen there is not impossible."""
 _LEAST_SEEN = 6
 """In a view that shows fewer samples of a part, its colour there says nothing."""
 _TWIN_SHARE = 0.2
-"""Share of what is seen under a part's twin in what is expected under itself: sleeves are mostly alike."""
+"""Share of the colours of a part's counterpart on the other side in its own: sleeves are mostly alike."""
 _SAME = 0.25
-"""Colours have changed much where their mean log ratio is below this share of the usual."""
+"""Share of the usual mean log ratio below which colours have changed much."""
 
 
 class PartColors(NamedTuple):
-    """What is remembered of the colours of one person's parts."""
+    """Learnt colours of one person's parts."""
 
     log_ratios: Array
-    """Logarithm of how much likelier each colour is on the part than elsewhere, (n_parts, BINS^3), nats."""
+    """Log of how much likelier each colour is on the part than elsewhere, (n_parts, BINS^3), nats."""
     usual: Array
-    """Mean of that under each part where it was first learnt, (n_parts,), nats."""
+    """Mean log ratio under each part where it was first learnt, (n_parts,), nats."""
     shares: Array
     """Share of each colour under each part, (n_parts, BINS^3)."""
     around: Array
-    """Share of each colour in the regions looked at, (BINS^3,)."""
+    """Share of each colour in the regions of all views, (BINS^3,)."""
 
 
 class ColorScore(NamedTuple):
-    """How well the colours under a posed body go with its parts."""
+    """Score of the colours under a posed body."""
 
     nats: float
     """Sum of the log ratios of all visible samples."""
     parts: Array
-    """Their mean under each part, (n_parts,), nats; 0 where nothing of it is visible."""
+    """Mean log ratio under each part, (n_parts,), nats; 0 if it is not visible."""
     samples: Array
     """Visible samples of each part, (n_parts,)."""
     views: Array
@@ -75,15 +74,15 @@ class ColorScore(NamedTuple):
 
 
 class Colors:
-    """The colours of the parts of one person in the views of one frame."""
+    """Colours of the parts of one person in the views of one frame."""
 
     def __init__(self, views: Sequence[ViewEvidence], bodies: Sequence[PosedBody], person: int = 0) -> None:
         """Take the colours of the views.
 
         Args:
-            views: the evidence of the frame; views without colours are passed over.
-            bodies: everybody, for they hide each other.
-            person: index of the body that is looked at.
+            views: evidence of the frame; views without colours are ignored.
+            bodies: all bodies; they occlude each other.
+            person: index of the scored body.
         """
         self._views = [
             ColorView(v.camera.projection, v.camera.center_world, v.colors, v.distance, v.theta_px)
@@ -96,12 +95,12 @@ class Colors:
         self._own = parts_of([b.model for b in bodies], person)
 
     def learn(self, before: PartColors | None = None, share: float = 1.0) -> PartColors:
-        """Remember the colours under the parts where the bodies stand; left and right parts share some of theirs.
+        """Learn the colours under the parts at the current poses; left and right parts share some of theirs.
 
         Args:
-            before: what was known; None where nothing was.
-            share: what this frame counts against it, 0 to 1. Parts under which the colours have changed much keep
-                what was known: the part may not be there.
+            before: learnt so far; None at first.
+            share: weight of this frame, 0 to 1. Parts whose colours have changed much keep the learnt ones, because the
+                part may be elsewhere.
         """
         model = self._bodies[self._person].model
         parts, colors, _ = self._samples(self._bodies[self._person].values)
@@ -117,7 +116,7 @@ class Colors:
             seen = before.shares + share * trusted[:, None] * (seen - before.shares)
             around = before.around + share * (around - before.around)
             usual = before.usual
-        # Half of what a part is told from is the rest of the body, however small it is in the picture.
+        # Half of the alternative to a part's colours is the rest of the body, however small it is in the image.
         other = 0.5 * _smoothed(around) + 0.5 * _share(_smoothed(seen.sum(axis=0)))
         blank = seen.sum(axis=1, keepdims=True) == 0
         own = np.where(blank, seen[twins], (1 - _TWIN_SHARE) * seen + _TWIN_SHARE * seen[twins])
@@ -130,7 +129,8 @@ class Colors:
         return PartColors(ratios, usual, seen, around)
 
     def score(self, values: Array, known: PartColors) -> ColorScore:
-        """How well the colours under the person in a pose, (n_values,), go with what is known of its parts."""
+        """Return how well the colours under the person in a pose, (n_values,), match the learnt colours of its
+        parts."""
         n_parts = known.log_ratios.shape[0]
         parts, colors, views = self._samples(values)
         nats = known.log_ratios[parts, colors]
@@ -139,7 +139,7 @@ class Colors:
         return ColorScore(float(nats.sum()), *_mean_by_part(nats, parts, n_parts), by_view)
 
     def nats(self, poses: Array, known: PartColors) -> Array:
-        """The sum of `score` by itself in many poses, (C, n_values), (C,)."""
+        """Return `score(...).nats` of many poses, (C, n_values), (C,)."""
         model = self._bodies[self._person].model
         Ts, first, ratios = self._Ts_world_part.copy(), self._own.start, known.log_ratios
         placed = chain_poses(model.tree, model.kinematics(poses[0]), np.arange(len(model.parts)), poses)
@@ -151,13 +151,13 @@ class Colors:
     def limb_scorer(
         self, values: Array, limb: NDArray[np.int64], known: PartColors | None, away: Sequence[int] = ()
     ) -> LimbScorer:
-        """Prepare a quick look at one limb in many poses.
+        """Return a scorer of one limb in many poses.
 
         Args:
-            values: the pose of all but the limb, (n_values,).
+            pose: pose of everything but the limb, (n_values,).
             limb: indices of its parts, from the trunk outwards.
-            known: what is known of the colours; None: nothing, and the edges alone speak.
-            away: indices of parts that are taken away: they hide nothing.
+            known: learnt colours; None to score edges only.
+            away: indices of parts that are removed and occlude nothing.
         """
         model = self._bodies[self._person].model
         rest = model.kinematics(values)
@@ -171,7 +171,7 @@ class Colors:
         )  # fmt: skip
 
     def _Ts(self, own: Kinematics) -> Array:
-        """Poses of all parts where the person stands somewhere, (P, 4, 4), metres."""
+        """Return the poses of all parts, (P, 4, 4), metres, with the person's from its kinematics."""
         Ts = self._Ts_world_part.copy()
         Ts[self._own] = own.Ts_world_part
         return Ts
@@ -181,7 +181,7 @@ class Colors:
         return part_poses(self._bodies)
 
     def _samples(self, values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-        """Part, colour and view of each visible sample, (n,) each."""
+        """Return part, colour and view of each visible sample, (n,) each."""
         model = self._bodies[self._person].model
         Ts = self._Ts(model.kinematics(values))
         out, room = np.empty((self._most_samples * len(self._views), 3), np.int64), self._room()
@@ -204,7 +204,7 @@ class Colors:
 
 
 def _smoothed(counts: Array) -> Array:
-    from scipy.ndimage import gaussian_filter  # takes a tenth of a second, which who opens a session need not wait
+    from scipy.ndimage import gaussian_filter  # imported lazily: loading takes 0.1 s
 
     cubes = np.asarray(counts, dtype=np.float64).reshape(*counts.shape[:-1], BINS, BINS, BINS)
     return np.asarray(gaussian_filter(cubes, _SMOOTHING_BINS, mode="nearest", axes=(-3, -2, -1))).reshape(counts.shape)
@@ -231,7 +231,18 @@ def _add_nats(
     P: Array, eye: Array, image: Image, Ts: Array, placed: Array, first: int, shapes: Array, log_ratios: Array,
     found: NDArray[np.int64], rays: Array, cones: Array, near: NDArray[np.int64], axis: Array, nats: Array,
 ) -> None:  # fmt: skip
-    """Add what one view says of many poses, (C,), of the parts from first on, (C, n, 4, 4); see `_look`."""
+    """Add the score of one view to each of many poses, (C,).
+
+    Args:
+        view: the view.
+        Ts: poses of all parts, (P, 4, 4), metres; those of the person are overwritten.
+        placed: poses of the person's parts, (C, n, 4, 4), metres.
+        first: index of the person's first part.
+        shapes: ellipsoids of all parts, (P, 6), metres.
+        log_ratios: see `PartColors`.
+        samples: buffers.
+        nats: added to.
+    """
     last = first + placed.shape[1]
     for c in range(placed.shape[0]):
         for part in range(placed.shape[1]):
@@ -288,7 +299,7 @@ def _look(
 
 @njit(**NO_REFCOUNT)
 def _cone(eye: Array, T: Array, shape: Array, cone: Array) -> None:
-    """Fill the direction to the centre of a part and the angle under which the ball around it is seen, (4,)."""
+    """Fill the direction to the centre of a part and the angle of the ball around it, (4,)."""
     for i in range(3):
         cone[i] = T[i, 0] * shape[0] + T[i, 1] * shape[1] + T[i, 2] * shape[2] + T[i, 3] - eye[i]
     distance = np.sqrt(cone[0] ** 2 + cone[1] ** 2 + cone[2] ** 2)
@@ -301,13 +312,13 @@ def _cone(eye: Array, T: Array, shape: Array, cone: Array) -> None:
 
 @njit(**NO_REFCOUNT)
 def _possible_occluders(part: int, cones: Array, near: NDArray[np.int64]) -> int:
-    """List the parts that may hide some of a part; their number."""
+    """List the parts that may occlude some of a part; return their number."""
     n = 0
     for p in range(cones.shape[0]):
         apart, most = 0.0, cones[p, 3] + cones[part, 3]
         for i in range(3):
             apart += (cones[p, i] - cones[part, i]) ** 2
-        # A chord is no longer than its arc: what lies farther apart than this shares no line of sight.
+        # A chord is no longer than its arc: cones farther apart than this share no ray.
         if apart < most * most and p != part:
             near[n] = p
             n += 1

@@ -1,2 +1,5 @@
-"""Synthesis: what a posed body looks like in a camera. The contour generator, what hides it, the curves where parts
-meet, label images."""
+"""Synthesize what a camera sees of posed bodies: occluding contours, occlusion, part intersections and label images.
+
+The room imports `compute`, `geometry` and `body`. Callers use `occluding_contours.trace`, `part_edges`,
+`label_image.part_labels`, `surfaces.surfaces_of` and, for searches, `static_cache`.
+"""

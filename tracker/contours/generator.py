@@ -1,8 +1,9 @@
-"""The contour generator of one convex part: the closed curve of surface points that lines of sight graze.
+"""Compute the contour generator of one convex part: the closed curve of surface points that lines of sight graze.
 
-A point belongs to it where `n . (x - e) = 0` for the normal n and the eye e, all in the part's unit coordinates
-(see `shapes`), which keep tangent planes tangent. On a solid of revolution that condition has a closed form at every
-point of the profile; on other parts the zero line of the function is followed around a grid of surface points.
+A surface point x belongs to the generator where `n . (x - e) = 0`, with the normal n and the eye e. All are in the
+part's unit coordinates (see `shapes`), which preserve tangent planes. On a solid of revolution the condition has a
+closed form at every point of the profile. On other parts the zero line of the function is followed around a grid of
+surface points.
 """
 
 import numpy as np
@@ -13,34 +14,34 @@ from tracker.contours.surfaces import N_RINGS, N_SECTORS, Surfaces
 from tracker.geometry.arrays import Array, FloatArray
 
 MAX_POINTS = 512
-"""Room for the points of one curve."""
+"""Room for the points of one generator."""
 _ON_AXIS = 1e-9
-"""An eye nearer to the axis has no direction from it, unit coordinates."""
+"""Smallest distance of an eye from the axis at which its direction is defined, unit coordinates."""
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 
 
 @njit(inline="always", **FAST_MATH)
-def revolved_outline(
+def revolved_generator(
     part: int, n_profile: int, profile: FloatArray, eye: Array, turn: np.float32, half: FloatArray, out: FloatArray
 ) -> int:
-    """Trace the contour generator of a solid of revolution.
+    """Compute the contour generator of a solid of revolution.
 
-    At the profile point (r, z) whose normal is (1, b) the condition reads `|e_xy| cos d = r + b (z - e_z)`, d the
-    angle about the axis from the eye's direction. On a cone r + b z and b are constant, hence d: the contour is the
-    two rulings of KRH08 Eq. 8-13, by the arc cosine that keeps both roots. Between neighbouring points of the profile
-    point and normal are interpolated; where they share r and z, around the rim of a flat end, that is exact too.
+    At the profile point (r, z) with normal (1, b) the condition is `|e_xy| cos d = r + b (z - e_z)`, with d the angle
+    about the axis from the eye's direction. On a cone r + b z and b are constant, hence d: the generator is the two
+    rulings of KRH08 Eq. 8-13, by the arc cosine that keeps both roots. Between neighbouring profile points, point and
+    normal are interpolated. Where neighbours share r and z, around the rim of a flat end, interpolation is exact too.
 
     Args:
         part: index of the part.
         n_profile: number of points of its profile.
-        profile: radius, height, the normal's slope and its outward component at the points of all profiles, (P, 4, n).
+        profile: radius, height, slope of the normal and its outward component at the points of all profiles, (P, 4, n).
         eye: camera centre, (3,), unit coordinates.
         turn: largest angle about the axis between neighbouring points, rad.
-        half: room for one side of the curve, (3, MAX_POINTS).
-        out: the points in order, (3, MAX_POINTS), unit coordinates; the last joins the first.
+        half: scratch for one side of the curve, (3, MAX_POINTS).
+        out: filled with the points in order, (3, MAX_POINTS), unit coordinates; the last joins the first.
 
     Returns:
-        Their number.
+        Number of points.
     """
     distance = np.sqrt(eye[0] * eye[0] + eye[1] * eye[1])
     inverse = np.float32(1.0 / max(distance, _ON_AXIS))
@@ -58,7 +59,7 @@ def revolved_outline(
     if n < 3:
         return 0
     cos_eye, sin_eye = np.float32(eye[0]) * inverse, np.float32(eye[1]) * inverse
-    if distance < _ON_AXIS:  # any direction will do
+    if distance < _ON_AXIS:  # any direction is right
         cos_eye, sin_eye = _ONE, _ZERO
     for k in range(n):
         mirrored = 2 * n - 2 - k
@@ -75,11 +76,11 @@ def _strip(
     c0: np.float32, c1: np.float32, n0: np.float32, n1: np.float32, first: np.float32, last: np.float32,
     r0: np.float32, z0: np.float32, r1: np.float32, z1: np.float32, turn: np.float32, n: int, half: FloatArray,
 ) -> int:  # fmt: skip
-    """Append one side of the curve between two points of a profile; c is cos d there, first and last the same clipped.
+    """Append one side of the curve between two profile points; return the new number of points.
 
-    The points (r cos d, r sin d, z) are appended, the first only where the curve begins; returns their number. The
-    normal turns evenly along the strip, so the way t to where cos d = c follows from
-    `(1 - t) n0 (c - c0) = t n1 (c1 - c)`, n its outward component.
+    Points are (r cos d, r sin d, z). The first is appended only where the curve begins. The normal turns evenly along
+    the strip, so the position t where cos d = c follows from `(1 - t) n0 (c - c0) = t n1 (c1 - c)`, with n its outward
+    component. Here c is cos d at a profile point; first and last are c0 and c1 clipped to [-1, 1].
     """
     s0, s1 = np.sqrt(_ONE - first * first), np.sqrt(_ONE - last * last)
     if n == 0:
@@ -97,7 +98,7 @@ def _strip(
         c, s, is_rim, t = first, s0, r0 == r1 and z0 == z1, _ZERO
         for _ in range(1, count):
             c, s = c * cos_step - s * sin_step, s * cos_step + c * sin_step
-            if not is_rim:  # a division for each point takes as long as all the rest
+            if not is_rim:  # one division per point takes as long as everything else
                 t = min(max(n0 * (c - c0) / (n0 * (c - c0) + n1 * (c1 - c)), _ZERO), _ONE)
             r = r0 + t * (r1 - r0)
             half[0, n], half[1, n], half[2, n] = r * c, r * s, z0 + t * (z1 - z0)
@@ -112,7 +113,7 @@ def _strip(
 
 @njit(inline="always", **FAST_MATH)
 def _arccos(x: np.float32) -> np.float32:
-    """The arc cosine within 7e-5 rad (Abramowitz and Stegun 4.4.45), in a third of the time of the exact one."""
+    """Return the arc cosine within 7e-5 rad (Abramowitz and Stegun 4.4.45), in a third of the exact function's time."""
     a = min(abs(x), _ONE)
     angle = np.float32(-0.0187293) * a + np.float32(0.0742610)
     angle = (angle * a - np.float32(0.2121144)) * a + np.float32(1.5707288)
@@ -121,21 +122,21 @@ def _arccos(x: np.float32) -> np.float32:
 
 
 @njit(**FAST_MATH)
-def grid_outline(part: int, eye: Array, surfaces: Surfaces, f: FloatArray, out: FloatArray) -> int:
+def grid_generator(part: int, eye: Array, surfaces: Surfaces, f: FloatArray, out: FloatArray) -> int:
     """Follow the contour generator around the grid of a part, from cell to cell.
 
-    The solid is convex, so the curve is one loop. It cannot leave the grid, whose first and last ring have one normal
-    each.
+    The solid is convex, so the curve is one loop. It cannot leave the grid, because the first and last ring have one
+    normal each.
 
     Args:
         part: index of the part.
         eye: camera centre, (3,), unit coordinates.
         surfaces: the shapes.
-        f: room for the function, (rings * sectors,).
-        out: the points in order, (3, MAX_POINTS), unit coordinates; the last joins the first.
+        f: scratch for the function on the grid, (rings * sectors,).
+        out: filled with the points in order, (3, MAX_POINTS), unit coordinates; the last joins the first.
 
     Returns:
-        Their number.
+        Number of points.
     """
     normals, offsets, grid = surfaces.normals, surfaces.offsets, surfaces.grids
     x, y, z = np.float32(eye[0]), np.float32(eye[1]), np.float32(eye[2])
@@ -175,7 +176,7 @@ def grid_outline(part: int, eye: Array, surfaces: Surfaces, f: FloatArray, out: 
 
 @njit(**FAST_MATH)
 def _start(f: FloatArray) -> tuple[int, int, int]:
-    """Where the zero line enters a cell, as ring, sector and side; ring -1 where there is none."""
+    """Return ring, sector and side at which the zero line enters a cell; ring is -1 without a zero line."""
     for ring in range(N_RINGS + 1):
         for sector in range(N_SECTORS):
             i = ring * N_SECTORS + sector

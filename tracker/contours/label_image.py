@@ -1,4 +1,4 @@
-"""Which part of which body a camera sees at each pixel: the surfaces of all parts in one buffer of depths."""
+"""Label each pixel with the body part that a camera sees there, by a depth buffer over all surfaces."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -29,14 +29,14 @@ class _Mesh(NamedTuple):
 
 
 def part_labels(bodies: Sequence[PosedBody], camera: Camera) -> NDArray[np.uint8]:
-    """Label the pixels that the bodies cover, occlusion by depth.
+    """Label the pixels that bodies cover, with occlusion by depth.
 
     Args:
-        bodies: everybody in the scene; at most 255 parts in all.
-        camera: the view; its lens distortion is left out (undistorted pixels).
+        bodies: all bodies in the scene; at most 255 parts in all.
+        camera: the view; its lens distortion is ignored (undistorted pixels).
 
     Returns:
-        (H, W): 1 + the index of the part seen, counted through all bodies; 0 where there is none.
+        (H, W): 1 + the index of the visible part, counted through all bodies; 0 for none.
     """
     labels = np.zeros((camera.height, camera.width), np.uint8)
     if not bodies:
@@ -69,7 +69,8 @@ def _mesh(models: tuple[BodyModel, ...]) -> _Mesh:
 
 @njit(**FAST_MATH)
 def _project(T: NDArray[np.float32], points: NDArray[np.float32], owners: NDArray[np.int32], image: Array) -> None:
-    """Fill u, v in px and 1 / depth of each corner; 0 where it lies too near to the camera's plane or behind it."""
+    """Fill u, v and 1 / depth of each corner, px and 1/m; 1 / depth is 0 nearer than the near plane and behind the
+    camera."""
     for k in range(points.shape[1]):
         p, x, y, z = owners[k], points[0, k], points[1, k], points[2, k]
         w = T[p, 2, 0] * x + T[p, 2, 1] * y + T[p, 2, 2] * z + T[p, 2, 3]
@@ -87,7 +88,7 @@ def _fill(
     faces: NDArray[np.int32], owners: NDArray[np.int32], image: Array, nearness: NDArray[np.float32],
     labels: NDArray[np.uint8],
 ) -> None:  # fmt: skip
-    """Draw the triangles; 1 / depth, which is linear across the image of a plane, says which is in front."""
+    """Draw the triangles with a depth test on 1 / depth, which is linear in the image of a plane."""
     height, width = labels.shape
     for f in range(faces.shape[0]):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
@@ -99,7 +100,7 @@ def _fill(
         area = (ub - ua) * (vc - va) - (uc - ua) * (vb - va)
         if area == 0.0:
             continue
-        # A corner far out of the image would not fit an integer.
+        # A corner far outside the image would overflow an integer.
         top, bottom = max(0.0, min(va, vb, vc)), min(height - 1.0, max(va, vb, vc))
         left, right = max(0.0, min(ua, ub, uc)), min(width - 1.0, max(ua, ub, uc))
         if top > bottom or left > right:

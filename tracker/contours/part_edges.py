@@ -1,4 +1,4 @@
-"""What of posed bodies a camera sees besides their contours: single points, and the curves where parts meet."""
+"""Find the occlusion of single points, and the curves where parts intersect."""
 
 from collections.abc import Sequence
 
@@ -9,24 +9,27 @@ from numpy.typing import NDArray
 from tracker.body.model import PosedBody
 from tracker.compute.numba_options import FAST_MATH
 from tracker.contours import occluding_contours
-from tracker.contours.surfaces import N_RINGS, N_SECTORS
+from tracker.contours.pieces import PIECE_PX
+from tracker.contours.surfaces import N_RINGS, N_SECTORS, Surfaces, surfaces_of
 from tracker.contours.visibility import LANES, mark_occluded
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera
 
 _LIFT_M = 0.012
-"""How far a curve is lifted off the surfaces to see whether they hide it, metres."""
+"""Distance by which a curve is lifted off the surfaces before its occlusion is tested, metres."""
 
 
 def points_occluded(bodies: Sequence[PosedBody], cameras: Sequence[Camera], points_world: Array) -> NDArray[np.bool_]:
-    """Whether a part hides each point, (V, n); parts that hold the point itself, as around a joint, do not count.
+    """Return whether a part occludes each point, (V, n).
+
+    Parts that contain the point itself, as around a joint, do not count.
 
     Args:
-        bodies: everybody in the scene.
+        bodies: all bodies in the scene.
         cameras: the views.
         points_world: (n, 3), metres.
     """
-    surfaces = occluding_contours.surfaces_of(tuple(b.model for b in bodies))
+    surfaces = surfaces_of(tuple(b.model for b in bodies))
     Ts = occluding_contours.part_poses(bodies)
     shapes = [s for b in bodies for s in b.model.shapes]
     holds = np.stack(
@@ -40,14 +43,14 @@ def points_occluded(bodies: Sequence[PosedBody], cameras: Sequence[Camera], poin
 
 
 def part_edges(bodies: Sequence[PosedBody], camera: Camera) -> FloatArray:
-    """Where surfaces of parts intersect: drawn for the eye, never matched (GD96 Sect. 5).
+    """Return the visible curves in which surfaces of parts intersect: drawn, but never matched (GD96 Sect. 5).
 
-    The surface of each part is cut by the implicit function of every part near it; what some part hides is left out.
+    The surface of each part is cut by the implicit function of every part near it.
 
     Returns:
         End points x0, y0, x1, y1 in undistorted px, (N, 4).
     """
-    surfaces = occluding_contours.surfaces_of(tuple(b.model for b in bodies))
+    surfaces = surfaces_of(tuple(b.model for b in bodies))
     Ts = occluding_contours.part_poses(bodies)
     shapes = [s for b in bodies for s in b.model.shapes]
     grids = [s.grid(N_RINGS, N_SECTORS)[0] + c for s, c in zip(shapes, surfaces.centers, strict=True)]
@@ -60,11 +63,11 @@ def part_edges(bodies: Sequence[PosedBody], camera: Camera) -> FloatArray:
             if np.linalg.norm(apart) > surfaces.radii[a] + surfaces.radii[b]:
                 continue
             local = (grid - Ts[b, :3, 3]) @ Ts[b, :3, :3] - surfaces.centers[b]
-            # The root makes the implicit function nearly linear across the surface, as interpolation wants it.
+            # The root makes the implicit function nearly linear across the surface, for interpolation.
             depth = shapes[b].inside_outside(local) ** (1 / shapes[b].degree) - 1.0
             n = _zero_line(depth.astype(np.float32), grid.astype(np.float32), segments)
             pieces, points = _cut(segments[:n].astype(np.float64), camera)
-            # Where both surfaces face the camera, a small way towards it leads out of both parts.
+            # Where both surfaces face the camera, a small step towards it leaves both parts.
             towards = camera.center_world - points
             lifted = points + _LIFT_M * towards / np.linalg.norm(towards, axis=-1, keepdims=True)
             nothing = np.zeros((len(shapes), len(points)), dtype=bool)
@@ -82,7 +85,7 @@ def _cut(segments: Array, camera: Camera) -> tuple[FloatArray, Array]:
         return np.empty((0, 4), np.float32), np.empty((0, 3))
     px = camera.project(segments.reshape(-1, 3)).reshape(-1, 2, 2)
     lengths = np.linalg.norm(px[:, 1] - px[:, 0], axis=1)
-    counts = np.maximum(1, np.ceil(lengths / occluding_contours.PIECE_PX)).astype(int)
+    counts = np.maximum(1, np.ceil(lengths / PIECE_PX)).astype(int)
     which = np.repeat(np.arange(len(segments)), counts)
     starts = (np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[which]
     along = starts[:, None] + [0.0, 0.5, 1.0] / counts[which, None]  # (N, 3)
@@ -93,7 +96,8 @@ def _cut(segments: Array, camera: Camera) -> tuple[FloatArray, Array]:
 
 @njit(nogil=True, cache=True)
 def _zero_line(f: FloatArray, g: FloatArray, segments: FloatArray) -> int:
-    """Zero line of f over the surface grid g as segments (n, 2, 3), by marching squares; their number."""
+    """Fill the zero line of f over the surface grid g as segments (n, 2, 3) by marching squares; return their
+    number."""
     n_rings, n_sectors = f.shape
     n = 0
     for r in range(n_rings - 1):
@@ -124,9 +128,9 @@ def _zero_line(f: FloatArray, g: FloatArray, segments: FloatArray) -> int:
 
 
 def _occluded_points(
-    camera: Camera, Ts: Array, surfaces: occluding_contours.Surfaces, points: Array, ignored: NDArray[np.bool_]
+    camera: Camera, Ts: Array, surfaces: Surfaces, points: Array, ignored: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Whether some part lies before each point (n, 3), but for the parts ignored for it, (P, n)."""
+    """Return whether a part occludes each point (n, 3), apart from the parts ignored for it, (P, n)."""
     n = len(points)
     room = np.zeros((3, n + LANES), np.float32)
     room[:, :n] = points.T
@@ -144,7 +148,7 @@ def _mark_occluded_points(
     eye: Array, Ts: Array, centers: Array, half_axes: Array, solids: FloatArray, ignored: NDArray[np.bool_],
     Q: FloatArray, shared: FloatArray, by_part: NDArray[np.bool_], points: FloatArray, occluded: NDArray[np.bool_],
 ) -> None:  # fmt: skip
-    """Mark the points, (3, n and `LANES` more), before which a part lies; see `mark_occluded` for Q and shared."""
+    """Mark the points, (3, n and `LANES` more), that a part occludes; see `mark_occluded` for Q and shared."""
     n = ignored.shape[1]
     for part in range(Ts.shape[0]):
         for i in range(3):

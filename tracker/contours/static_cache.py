@@ -1,8 +1,8 @@
-"""Contours of what is_static still while parts of the scene move, static from pose to pose.
+"""Cache the contours of static parts while other parts move.
 
-A search of a limb, or a refinement of one of several people, asks for many poses in which most parts stand. Their
-pieces, what they hide of each other and the points that are nearest to them are the same each time; only what moves
-is traced, and what it hides.
+A search of one limb, or a refinement of one of several people, asks for many poses in which most parts are static. The
+pieces of static parts, their mutual occlusion and the image points nearest to them do not change. Only moving parts are
+traced, and what they occlude.
 """
 
 from typing import NamedTuple
@@ -13,42 +13,50 @@ from numpy.typing import NDArray
 
 from tracker.compute.numba_options import FAST_MATH, NO_REFCOUNT
 from tracker.contours.generator import MAX_POINTS
-from tracker.contours.occluding_contours import Pieces, focal_px, mark_all_occluded, place_eye, trace_part
+from tracker.contours.occluding_contours import focal_px, mark_all_occluded, trace_part
+from tracker.contours.pieces import Pieces, place_eye
 from tracker.contours.surfaces import Surfaces
 from tracker.geometry.arrays import Array, FloatArray, IntArray
 
 
 class StaticContours(NamedTuple):
-    """The contours of what is_static, in all views; without any room where nothing does."""
+    """Contours of the static parts in all views; without room if all parts move."""
 
     moves: NDArray[np.bool_]
-    """Which parts move, (P,); the others are expected to stand, and are static anew where they do not."""
+    """Which parts move, (P,). The others are expected to be static; if they move, the cache is refilled."""
     Ts: Array
-    """Poses of all parts when what is_static was static, (P, 4, 4), metres; NaN before."""
+    """Poses of all parts when the cache was filled, (P, 4, 4), metres; NaN before."""
     ends: FloatArray
-    """As the following three see `Pieces`; those of one view after those of another, (4, room), undistorted px."""
+    """See `Pieces`, as the next three; one view after the other, (4, room), undistorted px."""
     middles: FloatArray
     """(3, room)."""
     edges: NDArray[np.int32]
     """(room,)."""
     occluded: NDArray[np.bool_]
-    """Whether another part that is_static hides the piece, (room,)."""
+    """Whether another static part occludes the piece, (room,)."""
     firsts: IntArray
-    """Index of the first piece of each part in each view, and after the last, (V, P + 1)."""
+    """Index of the first piece of each part in each view, then the index after the last, (V, P + 1)."""
     boxes: Array
     """Bounds u0, v0, u1, v1 of each part in each view, (V, P, 4), px."""
     segments: NDArray[np.int32]
-    """Index of the segment that each visible piece is joined to, in its view, (room,)."""
+    """Index, within its view, of the segment that each visible piece is joined to, (room,)."""
     covered: NDArray[np.bool_]
-    """Of the segments of one view, whether what moves hides some of them, (room,)."""
+    """Whether moving parts occlude some of each segment of one view, (room,)."""
     best: FloatArray
-    """Squared distance of each point of the image to the nearest segment, (N,); see `matching.Scratch`."""
+    """Squared distance of each image point to the nearest segment, (N,); see `contour_arrays.Scratch`."""
     nearest: NDArray[np.int32]
-    """Index of that segment, in its view, (N,)."""
+    """Index of that segment within its view, (N,)."""
 
 
 def static_contours_buffer(n_views: int, room: int, n_points: int, moves: NDArray[np.bool_]) -> StaticContours:
-    """Room for what is_static where the parts in `moves`, (P,), move, in views with room for as many pieces each."""
+    """Return room for the static contours of views with a number of pieces each.
+
+    Args:
+        n_views: number of views.
+        room: largest number of pieces of a view.
+        n_points: number of image points of all views.
+        moves: which parts move, (P,).
+    """
     n_parts, any_static = len(moves), not moves.all()
     pieces, points = (n_views * room, n_points) if any_static else (0, 0)
     return StaticContours(
@@ -61,7 +69,7 @@ def static_contours_buffer(n_views: int, room: int, n_points: int, moves: NDArra
 
 @njit(**NO_REFCOUNT)
 def is_static_unchanged(Ts: Array, moves: NDArray[np.bool_], static: Array) -> bool:
-    """Whether all parts but those that move are where they were static, poses (P, 4, 4), to the last digit."""
+    """Return whether all static parts are exactly where they were cached; poses are (P, 4, 4)."""
     for part in range(Ts.shape[0]):
         if not moves[part]:
             for i in range(3):
@@ -73,7 +81,7 @@ def is_static_unchanged(Ts: Array, moves: NDArray[np.bool_], static: Array) -> b
 
 @njit(**NO_REFCOUNT)
 def copy_poses(Ts: Array, static: Array) -> None:
-    """Note where all parts are, poses (P, 4, 4), when what is_static is static."""
+    """Copy the poses of all parts, (P, 4, 4), when the cache is filled."""
     for part in range(Ts.shape[0]):
         for i in range(3):
             for k in range(4):
@@ -84,8 +92,7 @@ def copy_poses(Ts: Array, static: Array) -> None:
 def trace_static(
     P: Array, eye: Array, surfaces: Surfaces, piece_px: float, static: StaticContours, out: Pieces
 ) -> None:
-    """Fill the pieces of one view with those of the parts that stand, all being placed, as if the others were not
-    there."""
+    """Fill the pieces of the static parts in one view, as if the moving parts did not exist; parts are placed."""
     n_parts, focal = static.moves.shape[0], focal_px(P)
     n = edge = 0
     place_eye(eye, out)
@@ -101,7 +108,7 @@ def trace_static(
 
 @njit(**FAST_MATH)
 def store_pieces(view: int, traced: Pieces, static: StaticContours) -> None:
-    """Keep the pieces of a view after those of the views before it."""
+    """Store the pieces of a view after those of the views before it."""
     n_parts = traced.firsts.shape[0] - 1
     at = static.firsts[view - 1, n_parts] if view > 0 else 0
     for i in range(np.uint64(traced.firsts[n_parts])):
@@ -122,9 +129,9 @@ def store_pieces(view: int, traced: Pieces, static: StaticContours) -> None:
 def trace_moving_parts(
     view: int, P: Array, eye: Array, surfaces: Surfaces, piece_px: float, static: StaticContours, out: Pieces
 ) -> int:
-    """Fill the pieces of one view as `contours.trace_pieces` does, those of what is_static as they were static."""
+    """Fill the pieces of one view as `occluding_contours.trace_pieces` does; static parts come from the cache."""
     n_parts, room = static.moves.shape[0], out.edges.shape[0]
-    # The edges of what is_static keep their numbers; there are fewer of them.
+    # Cached edges keep their numbers, which are smaller.
     n, edge, focal = 0, n_parts * MAX_POINTS, focal_px(P)
     place_eye(eye, out)
     for part in range(n_parts):
@@ -152,7 +159,7 @@ def trace_moving_parts(
 
 @njit(**FAST_MATH)
 def mark_covered_segments(view: int, traced: Pieces, static: StaticContours) -> bool:
-    """Mark the static segments of a view of which something that moves hides a piece; whether there are any."""
+    """Mark the cached segments of a view that moving parts occlude partly; return whether there are any."""
     static.covered[: static.firsts[view, -1] - static.firsts[view, 0]] = False
     some = False
     for part in range(static.moves.shape[0]):

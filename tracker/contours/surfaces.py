@@ -1,4 +1,4 @@
-"""The shapes of several bodies as arrays, for the kernels that trace contours."""
+"""Shapes of several bodies as arrays, for the kernels that trace contours."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -11,22 +11,22 @@ from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.shapes import Shape, TaperedSuperquadric
 
 N_RINGS, N_SECTORS = 14, 24
-"""Of the grid on a part that is no solid of revolution."""
+"""Cells of the grid on a part that is no solid of revolution."""
 PROFILE_TOLERANCE_M = 8e-4
-"""How far the chords of a profile may stray from it, metres: a tenth of a pixel where a person fills 640x480."""
+"""Largest distance of a profile's chords from it, metres: 0.1 px where a person fills 640x480."""
 N_SECTION, N_ALONG = 32, 128
 """Cells of the tables of a shape's cross-section and of its size along the axis."""
 SECTION = 8
-"""Where the table of the cross-section begins among the numbers of a solid. Before it: 1/g_x, 1/g_y, k and b of the
-quadric around it (see `shapes.Enclosure`), 1 if that is the solid itself, the tapers k_x, k_y of a superquadric, and
-1 if it is a solid of revolution."""
+"""Offset of the cross-section table in the numbers of a solid. Before it are: 1/g_x, 1/g_y, k and b of the enclosing
+quadric (see `shapes.Enclosure`); 1 if the quadric is the solid; the tapers k_x and k_y of a superquadric; 1 for a solid
+of revolution."""
 ALONG = SECTION + N_SECTION + 1
-"""Where the table of its size along the axis begins."""
+"""Offset of the table of size along the axis."""
 SOLID = ALONG + N_ALONG + 1
 
 
 class Surfaces(NamedTuple):
-    """The shapes of several bodies. Parts are counted through all bodies; unit coordinates are those of `shapes`."""
+    """Shapes of several bodies. Parts are counted through all bodies; unit coordinates are those of `shapes`."""
 
     half_axes: Array
     """Half-axes of each shape, (P, 3), metres."""
@@ -35,17 +35,17 @@ class Surfaces(NamedTuple):
     radii: Array
     """Bounding radius around the centre, (P,), metres."""
     profile_sizes: NDArray[np.int64]
-    """Number of points of each part's profile, 0 for no solid of revolution, (P,)."""
+    """Number of points of each part's profile, (P,); 0 if the part is no solid of revolution."""
     profiles: FloatArray
-    """Radius, height, and the normal's slope and outward component at the points of each profile, (P, 4, n)."""
+    """Radius, height, slope of the normal and its outward component at the points of each profile, (P, 4, n)."""
     grids: FloatArray
     """Grid of surface points in unit coordinates, ring by ring, (P, 3, rings * sectors)."""
     normals: FloatArray
-    """Their outward unit normals times the half-axes, (P, 3, rings * sectors), metres."""
+    """Outward unit normals at these points times the half-axes, (P, 3, rings * sectors), metres."""
     offsets: FloatArray
-    """Unit normal times point, (P, rings * sectors), metres."""
+    """Dot product of unit normal and point, (P, rings * sectors), metres."""
     solids: FloatArray
-    """What `hiding` asks of each shape, (P, `SOLID` numbers)."""
+    """Numbers of each shape for `visibility`, (P, `SOLID`)."""
     adjoining: NDArray[np.bool_]
     """Whether two parts share a joint, (P, P)."""
     people: NDArray[np.int64]
@@ -54,7 +54,7 @@ class Surfaces(NamedTuple):
 
 @lru_cache(maxsize=32)
 def surfaces_of(models: tuple[BodyModel, ...]) -> Surfaces:
-    """Arrays of the shapes of the given bodies; kept, because models are immutable."""
+    """Return the arrays of the shapes of some bodies; cached, because models are immutable."""
     shapes = [s for m in models for s in m.shapes]
     half_axes = np.array([s.half_axes for s in shapes])
     profiles = [s.profile(PROFILE_TOLERANCE_M) for s in shapes]
@@ -70,7 +70,7 @@ def surfaces_of(models: tuple[BodyModel, ...]) -> Surfaces:
         np.linalg.norm(points, axis=1).max(axis=-1),
         profile_sizes,
         table,
-        # Row by row, which kernels read as whole vectors; as they are stacked they stand point by point.
+        # Contiguous rows, which kernels read as vectors; stacking leaves them point by point.
         np.ascontiguousarray(points / half_axes[..., None], np.float32),
         np.ascontiguousarray(normals * half_axes[..., None], np.float32),
         np.sum(points * normals, axis=1).astype(np.float32),
@@ -81,7 +81,8 @@ def surfaces_of(models: tuple[BodyModel, ...]) -> Surfaces:
 
 
 def _closed_grid(shape: Shape) -> tuple[Array, Array]:
-    """Points and normals of a shape's grid, (3, rings * sectors), with a flat end beyond its first and last ring."""
+    """Return points and normals of a shape's grid, (3, rings * sectors), with flat ends beyond the first and last
+    ring."""
     points, normals = shape.grid(N_RINGS, N_SECTORS)
     points = np.concatenate([points[:1], points, points[-1:]])
     normals = np.concatenate([np.zeros_like(normals[:1]), normals, np.zeros_like(normals[:1])])
@@ -90,11 +91,11 @@ def _closed_grid(shape: Shape) -> tuple[Array, Array]:
 
 
 def _solid(shape: Shape) -> FloatArray:
-    """The numbers of a solid, (SOLID,).
+    """Return the numbers of a solid, (SOLID,).
 
-    The section through a point is larger than its larger coordinate by `(1 + m^p)^(1/p)`, p = 2/e2, tabulated over
-    the ratio m of the smaller one to it; at z, `(1 - |z|^(2/e1))^(e1/2)` of the widest section is left, tabulated over
-    |z| from 0 to 1.
+    The section through a point is larger than its larger coordinate by the factor `(1 + m^p)^(1/p)`, p = 2/e2,
+    tabulated over the ratio m of the smaller coordinate to the larger. At height z, `(1 - |z|^(2/e1))^(e1/2)` of the
+    widest section remains, tabulated over |z| from 0 to 1.
     """
     around = shape.enclosure
     (e1, e2), tapers = ((1.0, 1.0), (0.0, 0.0))

@@ -1,8 +1,8 @@
-"""What of the contour of a part other parts hide.
+"""Mark the contour points of a part that another part occludes.
 
-The line of sight is followed from a point (s = 0) to the eye (s = 1) in the unit coordinates of the part that may
-hide it. The quadric around that part is met in closed form, for many points at once and without branches; where the
-part does not fill its quadric, its own shape is asked on what line and quadric share.
+A line of sight runs from a point (s = 0) to the eye (s = 1) in the unit coordinates of the possible occluder. Its
+intersection with the enclosing quadric has a closed form, computed for many points at once without branches. Where the
+part does not fill its quadric, its own shape is tested on the common interval.
 """
 
 import numpy as np
@@ -14,14 +14,14 @@ from tracker.contours.surfaces import ALONG, N_ALONG, N_SECTION, SECTION
 from tracker.geometry.arrays import FloatArray
 
 JOINT_MARGIN_M = 0.03
-"""How far in front of an adjoining part a contour must lie to be seen as one, metres."""
+"""Distance in front of an adjoining part at which a contour becomes visible, metres."""
 
 LANES = 16
-"""Numbers that are worked on together; rooms for points have as many to spare."""
+"""Numbers per vector; buffers of points have this many to spare."""
 _TINY, _FAR = np.float32(1e-9), np.float32(1e9)
-_ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # plain numbers would turn the kernels' arithmetic into float64
+_ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # Python floats would promote the kernels' arithmetic to float64
 _TRIES = (0.5, 0.25, 0.75, 0.001)
-"""Where on what the line of sight shares with the quadric the shape is asked, from its far end (0) to the near."""
+"""Where in the common interval of line and quadric the shape is tested, from its far end (0) to the near one (1)."""
 
 
 @njit(inline="always", **FAST_MATH)
@@ -29,14 +29,14 @@ def _meet_quadric(
     part: int, solids: FloatArray, Q: FloatArray, margin: float, points: FloatArray, first: int, last: int,
     shared: FloatArray,
 ) -> None:  # fmt: skip
-    """Cut lines of sight with the quadric around a part, between its ends, the point and the eye."""
+    """Intersect lines of sight, between point and eye, with the quadric around a part; see `mark_occluded`."""
     gx, gy, k, bulge = solids[part, 0], solids[part, 1], solids[part, 2], solids[part, 3]
     q00, q01, q02, q03, ex = Q[0, 0] * gx, Q[0, 1] * gx, Q[0, 2] * gx, Q[0, 3] * gx, Q[0, 4] * gx
     q10, q11, q12, q13, ey = Q[1, 0] * gy, Q[1, 1] * gy, Q[1, 2] * gy, Q[1, 3] * gy, Q[1, 4] * gy
     q20, q21, q22, q23, ez = Q[2, 0], Q[2, 1], Q[2, 2], Q[2, 3], Q[2, 4]
     behind = np.float32(-margin)
-    # Whole vectors: their last numbers may be of no point and are not read again. The index is unsigned because one
-    # that may be negative is not vectorized.
+    # Whole vectors; the numbers after the last point are not read again. The index is unsigned, because loops over
+    # signed indices are not vectorized.
     for j in range(np.uint64((last - first + LANES - 1) // LANES * LANES)):
         i = np.uint64(first) + j
         a, b, c = points[0, i], points[1, i], points[2, i]
@@ -53,7 +53,7 @@ def _meet_quadric(
         root = np.sqrt(max(disc, _ZERO))
         inverse = _ONE / A
         s0, s1 = (-B - root) * inverse, (-B + root) * inverse
-        # Steeper than the cone (A < 0), a line is inside beyond one of the roots, on the side of the cone's base.
+        # A line steeper than the cone (A < 0) is inside beyond one of the roots, on the side of the cone's base.
         low = s0 if A > _ZERO else (s0 if dw > _ZERO else -_FAR)
         high = s1 if A > _ZERO else (_FAR if dw > _ZERO else s1)
         dz = dz if abs(dz) > _TINY else _TINY
@@ -67,9 +67,9 @@ def _meet_quadric(
 
 @njit(**FAST_MATH)
 def _is_inside(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: np.float32) -> bool:
-    """Whether a point in unit coordinates is within a superquadric, by the tables of its shape."""
+    """Return whether a point in unit coordinates is inside a superquadric, by the tables of its shape."""
     at = abs(z) * np.float32(N_ALONG)
-    k = np.uint64(at)  # a signed index might count from the end
+    k = np.uint64(at)  # a signed index may wrap around
     if k >= N_ALONG:
         return False
     cell = np.uint64(ALONG) + k
@@ -95,18 +95,18 @@ def mark_occluded(
     part: int, solids: FloatArray, Q: FloatArray, margin: float, points: FloatArray, first: int, last: int,
     shared: FloatArray, occluded: NDArray[np.bool_],
 ) -> None:  # fmt: skip
-    """Mark the points that a part hides: exactly, but for lines that graze a superquadric.
+    """Mark the points that a part occludes: exact, except for lines that graze a superquadric.
 
     Args:
-        part: index of the part that may hide them.
-        solids: the shapes, see `Surfaces`. (All of `Surfaces` would cost more to hand over than the work is.)
-        Q: from the frame of the points to the part's unit coordinates, and the eye in those as last column, (3, 5).
-        margin: how far behind the point, as a share of the way to the eye, the part still hides it.
+        part: index of the possible occluder.
+        solids: shapes, see `Surfaces`. Passing all of `Surfaces` would cost more than the work.
+        Q: from the frame of the points to the part's unit coordinates, with the eye there as last column, (3, 5).
+        margin: how far behind the point the part still occludes it, as a share of the distance to the eye.
         points: (3, room), with room for `LANES` more.
         first: index of the first point.
-        last: index after the last.
-        shared: room for where each line of sight is inside the quadric, from and to, (2, room) too.
-        occluded: what is marked, (room,).
+        last: index after the last point.
+        shared: scratch for the interval of each line of sight inside the quadric, (2, room + LANES).
+        occluded: marked, (room,).
     """
     _meet_quadric(part, solids, Q, margin, points, first, last, shared)
     if solids[part, 4] > 0:  # the quadric is the part
@@ -114,7 +114,7 @@ def mark_occluded(
             i = np.uint64(first) + j
             occluded[i] |= shared[0, i] < shared[1, i]
         return
-    # Read once: for all the compiler knows, marking a point might change them.
+    # Read once: the compiler cannot know that marking a point does not change them.
     q00, q01, q02, q03, ex = Q[0, 0], Q[0, 1], Q[0, 2], Q[0, 3], Q[0, 4]
     q10, q11, q12, q13, ey = Q[1, 0], Q[1, 1], Q[1, 2], Q[1, 3], Q[1, 4]
     q20, q21, q22, q23, ez = Q[2, 0], Q[2, 1], Q[2, 2], Q[2, 3], Q[2, 4]

@@ -1,1 +1,6 @@
-"""The one Gauss-Newton and its residual blocks: points, priors, pins, interpenetration, contours against edges."""
+"""Fit poses with one Gauss-Newton solver and its residual blocks: points, priors, pins, penetration and contours.
+
+The room imports `compute`, `geometry`, `body`, `images`, `contours` and `evidence`. Callers use `gauss_newton`
+(`solve`, `fit_to_points` and the plain blocks), `gauss_newton_compiled.solve_compiled`, `contour_residuals`,
+`interpenetration` and `pins`.
+"""

@@ -1,16 +1,15 @@
-"""Contours drawn to edges: the image's residuals in the Gauss-Newton (KRH08 Sect. 5, made symmetric and robust).
+"""Contour residuals: contours of a posed body against edges (KRH08 Sect. 5, made symmetric and robust).
 
-Both directions of the chamfer distance pull at the pose. A visible piece of the model's contour looks up its distance
-to the nearest edge, and the slope of the distance image there (KRH08 Eq. 59-61, with the derivative of the bilinear
-distance as DESIGN section 7 has it); an edge point finds the nearest piece of contour that runs its way (Eq. 58). How
-a residual changes with the pose is asked of the surface point under the piece: across its tangent the occluding
-contour moves as that material point does, because what it slides on the surface it slides along the line of sight
-(KRH08 Sect. 4).
+Both directions of the chamfer distance are residuals. A visible piece of contour reads its distance to the nearest
+edge, and the slope of the distance image there (KRH08 Eq. 59-61, with the derivative of the bilinear distance). An edge
+point finds the nearest piece of contour of similar direction (Eq. 58). The derivative of a residual by the pose is that
+of the surface point under the piece. Across its tangent the occluding contour moves with that material point, because
+the contour slides on the surface along the line of sight only (KRH08 Sect. 4).
 
-Residuals are not kept one by one. Their squares and pulls are summed for each piece in the image, then for each part:
-a point X of a part moves by the part's spatial twist (omega, v) as omega x X + v, so the row of a residual is
-(X x g, g), g its derivative by X. Only the parts' 6x6 normal matrices are carried over to the degrees of freedom,
-whatever the shapes of the parts.
+Residuals are not stored one by one. Their squares and gradients are summed for each piece in the image, then for each
+part. A point X of a part moves by the part's spatial twist (omega, v) as omega x X + v. The row of a residual is
+therefore (X x g, g), with g its derivative by X. Only the parts' 6x6 normal matrices are converted to the degrees of
+freedom, whatever the shapes of the parts.
 """
 
 from collections.abc import Sequence
@@ -25,16 +24,10 @@ from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import StaticContours, static_contours_buffer
+from tracker.contours.surfaces import surfaces_of
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.contour_kernels import (
-    COST_ONLY,
-    ContourTerm,
-    Scratch,
-    Sums,
-    ViewArrays,
-    accumulate_normal_equations,
-    scratch_buffer,
-)
+from tracker.fitting.contour_arrays import ContourTerm, Scratch, Sums, ViewArrays, scratch_buffer, sums_buffer
+from tracker.fitting.contour_kernels import COST_ONLY, accumulate_normal_equations
 from tracker.fitting.gauss_newton import NormalEquations
 from tracker.fitting.match_points import points_to_match
 from tracker.fitting.twists import twists_to_dofs
@@ -51,50 +44,53 @@ cost is rougher than this, because points change their piece and pieces appear a
 
 @dataclass(frozen=True)
 class MatchSettings:
-    """How contours and edges are matched."""
+    """Weights and scales of the residuals between contours and edges."""
 
     scale: float = 0.4
-    """Distance at which a residual's pull is down to a quarter (Geman-McClure), in outlier distances."""
+    """Distance at which the influence of a residual falls to a quarter (Geman-McClure), in outlier distances."""
     turn: float = 0.5
-    """What an edge at right angles to the contour counts as squared distance, in squared outlier distances."""
+    """Squared distance that an edge at right angles to the contour counts, in squared outlier distances."""
     model_to_image: float = 0.5
     """Weight of the model-to-image residuals; 0 leaves them out."""
     image_to_model: float = 0.5
     """Weight of the image-to-model residuals; 0 leaves them out."""
     edges: float = 1.0
-    """Weight of the edges among the points of the image; 0 leaves them out."""
+    """Weight of edge points in the image; 0 leaves them out."""
     silhouette: float = 0.5
-    """The same of the silhouette's contour, where its view is fully trusted."""
+    """Weight of points of the silhouette's contour in a fully trusted view."""
     information_per_px: float = 0.0125
-    """What one pixel of contour tells: 1 / (variance in px^2 times the length over which errors are alike, px)."""
+    """Information of one pixel of contour: 1 / (variance in px^2 times the length of correlated errors, px)."""
 
 
 class PartCosts(NamedTuple):
-    """How well the contours of the parts fit, for people and for the judgement of a pose."""
+    """Fit of the contours of each part, for display and for assessing a pose."""
 
     length_px: Array
     """Visible contour within the images, (V, n_parts), working px."""
     forward_px: Array
-    """Mean distance of it to the edges, outliers cut off, (V, n_parts), working px; NaN where nothing is visible."""
+    """Mean distance of that contour to the edges, with outliers cut off, (V, n_parts), working px; NaN if nothing is
+    visible."""
     points: Array
-    """Points of edges and silhouette that the part explains, (V, n_parts)."""
+    """Number of points of edges and silhouette that the part explains, (V, n_parts)."""
     silhouette: Array
     """Share of the silhouette's contour that some part explains, (V,); NaN in views without a silhouette."""
 
 
 class Workspace(NamedTuple):
-    """Room for the sums of a pose; what shares it must be used one at a time."""
+    """Buffers for one pose. Residuals that share a workspace must be used one at a time."""
 
     Ts: Array
-    """Poses of all parts, (P, 4, 4)."""
+    """Poses of all parts, (P, 4, 4), metres."""
     scratch: Scratch
     sums: Sums
 
 
 class ContourResiduals:
-    """The residuals of one person's contours against the edges of all views: a block for `gauss_newton.solve`.
+    """Residuals of one person's contours against the edges of all views; see `ResidualBlock`.
 
-    The others stand where they are; they hide, and draw the edges that are nearer to them.
+    The other people are fixed. They occlude, and take the edges that are nearer to them. Only one thread may use an
+    object at a time, because its kernels work in its `workspace`; `clone_for_thread` makes an object for another
+    thread.
     """
 
     def __init__(
@@ -107,16 +103,16 @@ class ContourResiduals:
         everywhere: bool = False,
         contours: Sequence[occluding_contours.Contour] | None = None,
     ) -> None:
-        """Prepare the evidence for the kernel.
+        """Prepare the evidence for the kernels.
 
         Args:
-            views: the evidence of each view.
-            bodies: everybody in the scene, as predicted.
+            views: evidence of each view.
+            bodies: all bodies in the scene, as predicted.
             person: index of the body that is fitted.
-            settings: how to match.
+            settings: weights and scales.
             theta_px: outlier distance, px of the footage; by default that of each view.
-            everywhere: keep edge points however far from the predicted contours they are, for poses far from it.
-            contours: the predicted contours of everybody in each view; traced here by default.
+            everywhere: keep edge points at any distance from the predicted contours, for poses far from the prediction.
+            contours: predicted contours of all bodies in each view; traced here by default.
         """
         settings = settings or MatchSettings()
         self._model = bodies[person].model
@@ -143,20 +139,20 @@ class ContourResiduals:
             np.cumsum([0] + [s.points.shape[1] for s in sorted_points]),
             stack_rows([s.rows for s in sorted_points]),
             np.array(thetas),
-            # A view without any edge has nothing to say; its distance image is flat.
+            # A view without edges does not count; its distance image is flat.
             np.array([weights if len(v.points_px) else 0 * weights for v in views]),
         )
         widest = max((v.camera for v in views), key=lambda camera: camera.width)
         self._max_pieces = occluding_contours.contour_room(widest, len(bodies))
         surfaces, Ts, own = (
-            occluding_contours.surfaces_of(tuple(b.model for b in bodies)),
+            surfaces_of(tuple(b.model for b in bodies)),
             occluding_contours.part_poses(bodies),
             self._own,
         )
         self._term = ContourTerm(
             Ts, own.start, own.stop, surfaces, arrays, settings.scale, settings.turn,
             self._static_buffer(np.arange(own.start, own.stop), len(Ts), arrays),
-            scratch_buffer(surfaces, self._max_pieces, arrays.points.shape[1]), _sums_buffer(len(Ts), len(views)),
+            scratch_buffer(surfaces, self._max_pieces, arrays.points.shape[1]), sums_buffer(len(Ts), len(views)),
         )  # fmt: skip
 
     def _static_buffer(self, parts: IntArray, n_parts: int, arrays: ViewArrays) -> StaticContours:
@@ -166,18 +162,18 @@ class ContourResiduals:
 
     @property
     def workspace(self) -> Workspace:
-        """The room that this works in."""
+        """Buffers of these residuals."""
         return Workspace(self._term.Ts, self._term.scratch, self._term.sums)
 
     def restricted_to(self, parts: IntArray, workspace: Workspace) -> "ContourResiduals":
-        """The same, quicker, for poses that differ in some parts of the person alone.
+        """Return the residuals for poses that differ in some parts of the person only; faster.
 
-        It speaks for and against these parts only: what pulls at the others counts as cost, and is left out of the
-        derivatives. Poses in which the others move too are as right, and slower.
+        Residuals of other parts count in the cost, but not in the derivatives. Poses in which other parts move too are
+        evaluated correctly, but more slowly.
 
         Args:
             parts: indices of the parts that move, (n,).
-            workspace: room to work in, such as that of this one if the two are used one at a time.
+            workspace: buffers to use, such as those of these residuals if the two are used one at a time.
         """
         out, term = copy(self), self._term
         static = self._static_buffer(self._own.start + parts, len(term.Ts), term.views)
@@ -185,23 +181,23 @@ class ContourResiduals:
         return out
 
     def clone_for_thread(self) -> "ContourResiduals":
-        """The same for another thread: the evidence is shared, the room to work in is not."""
+        """Return the same residuals for another thread: the evidence is shared, the scratch is not."""
         out, term = copy(self), self._term
         moving, n_points = np.flatnonzero(term.static.moves), term.views.points.shape[1]
         out._term = term._replace(
             Ts=term.Ts.copy(),
             static=self._static_buffer(moving, len(term.Ts), term.views),
             scratch=scratch_buffer(term.surfaces, self._max_pieces, n_points),
-            sums=_sums_buffer(len(term.Ts), len(term.views.sizes)),
+            sums=sums_buffer(len(term.Ts), len(term.views.sizes)),
         )
         return out
 
     def term(self, model: BodyModel) -> ContourTerm:
-        """What the kernel needs to match the person, whose model is given."""
+        """Return the arguments of the kernels, for the person's model."""
         assert model is self._model
         return self._term
 
-    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+    def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
         term, own = self.term(model), self._own
         cost = self._accumulate(kinematics)
@@ -213,14 +209,14 @@ class ContourResiduals:
         return NormalEquations(cost, gradient, hessian)
 
     def costs(self, candidates: Array) -> Array:
-        """Costs alone of many poses, (C, n_values) to (C,)."""
+        """Return the costs alone of many poses, (C, n_values) to (C,)."""
         out, model = np.empty(len(candidates)), self._model
         _score(np.ascontiguousarray(candidates, np.float64), model.tree, model.n_dofs, self._term, out)
         return out
 
-    def part_costs(self, values: Array) -> PartCosts:
-        """How well each part of the person fits, at a pose."""
-        self._accumulate(self._model.kinematics(values), with_jacobian=False)
+    def part_costs(self, pose: Array) -> PartCosts:
+        """Return how well each part of the person fits in a pose."""
+        self._accumulate(self._model.kinematics(pose), with_jacobian=False)
         sums = self._term.sums
         length, distance, points = np.moveaxis(sums.parts[:, self._own], -1, 0).copy()
         forward = np.divide(distance, length, out=np.full_like(length, np.nan), where=length > 0)
@@ -233,16 +229,9 @@ class ContourResiduals:
         return accumulate_normal_equations(self._term, with_jacobian)
 
 
-def _sums_buffer(n_parts: int, n_views: int) -> Sums:
-    """Uninitialized room for what the kernel adds up."""
-    return Sums(
-        np.empty((n_parts, 6, 6)), np.empty((n_parts, 6)), np.empty((n_views, n_parts, 3)), np.empty(n_views)
-    )  # fmt: skip
-
-
 @njit(nogil=True, cache=True)
 def _score(candidates: Array, tree: Tree, n_dofs: int, term: ContourTerm, out: Array) -> None:
-    """Fill the costs of poses, (C, n_values), of the person who is matched, (C,)."""
+    """Fill the costs, (C,), of poses of the fitted person, (C, n_values)."""
     axes, origins = np.empty((n_dofs, 3)), np.empty((n_dofs, 3))
     for c in range(candidates.shape[0]):
         forward_kinematics(candidates[c], tree, term.Ts[term.first : term.last], axes, origins)

@@ -1,8 +1,7 @@
-"""The one Gauss-Newton of the project: poses from residual blocks.
+"""Gauss-Newton with damping and joint limits (Levenberg-Marquardt with an active set), over residual blocks.
 
-A block turns a pose into the normal equations of its weighted residuals. Whatever speaks for a pose is one: joints
-known in space, contours and edges (`refine`), a prior. The solver is damped (Levenberg-Marquardt) and holds the joint
-limits.
+A residual block returns the normal equations of its weighted residuals at a pose: known joints, contours and edges
+(`contour_residuals`), pins, priors.
 """
 
 import itertools
@@ -19,22 +18,22 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array, IntArray
 
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e8
-FELT_DAMPING = 1e-2
-"""Damping after a step that was refused, at least: less would hardly change it."""
+INITIAL_DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-3, 1e-9, 1e8
+MIN_RETRY_DAMPING = 1e-2
+"""Smallest damping after a refused step; less would hardly change the step."""
 AT_LIMIT = 1e-9
-"""How near to a limit is at it, rad or metres."""
+"""Distance from a limit that counts as at the limit, rad or metres."""
 _UNKNOWN = 1.0
-"""Variance of a degree of freedom that nothing is known of, rad^2 or m^2."""
+"""Variance of an unobserved degree of freedom, rad^2 or m^2."""
 _PLACE_M = 0.02
-"""How well joints go with the places they are known at (one standard deviation): a body is of other sizes, metres."""
+"""Standard deviation between joints and their known positions, because bodies differ in size, metres."""
 
 
 class NormalEquations(NamedTuple):
-    """The normal equations of some residuals at a pose."""
+    """Normal equations of some residuals at a pose."""
 
     cost: float
-    """Half the sum of the weighted squared residuals; of robust ones, what half the squares are bent to."""
+    """Half the sum of weighted squared residuals; of robust residuals, half their robust squares."""
     gradient: Array
     """Derivative of the cost by the degrees of freedom, (n_dofs,)."""
     hessian: Array
@@ -44,32 +43,33 @@ class NormalEquations(NamedTuple):
 class ResidualBlock(Protocol):
     """One kind of evidence for the pose of one person.
 
-    A block hands over its normal equations and not its residuals, so that thousands of image residuals can be summed
-    where they arise.
+    A block returns normal equations instead of residuals, so that thousands of image residuals are summed where they
+    arise.
     """
 
-    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
-        """Linearize the weighted residuals at a pose."""
+    def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
+        """Return the normal equations of the weighted residuals at a pose."""
         ...
 
 
 def normal_equations(residuals: Array, jacobian: Array) -> NormalEquations:
-    """Normal equations of weighted residuals (N,) with their derivative by the degrees of freedom, (N, n_dofs)."""
+    """Return the normal equations of weighted residuals, (N,), with derivatives by the degrees of freedom, (N,
+    n_dofs)."""
     return NormalEquations(0.5 * float(residuals @ residuals), jacobian.T @ residuals, jacobian.T @ jacobian)
 
 
 @dataclass(frozen=True, eq=False)
 class PointTargets:
-    """Points of the body drawn to known places in the world."""
+    """Points of the body drawn to known positions in the world."""
 
     points: IntArray
     """Indices into `BodyModel.point_names`, (N,)."""
     targets_world: Array
-    """Where they should be, (N, 3), metres."""
+    """Known positions, (N, 3), metres."""
     weights: Array
     """Weight of each point's distance, (N,), per metre."""
 
-    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+    def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
         parts = model.point_parts[self.points]
         points_world = model.points_at(kinematics, self.points)
@@ -80,17 +80,17 @@ class PointTargets:
 
 @dataclass(frozen=True, eq=False)
 class PosePrior:
-    """A prior that keeps a pose near another one; what the evidence leaves open stays as it was."""
+    """Gaussian prior on a pose; unobserved degrees of freedom stay at its mean."""
 
-    values: Array
-    """The pose to stay near, (n_values,)."""
+    pose: Array
+    """Mean of the prior, (n_values,)."""
     weights: Array
     """Weight of each degree of freedom, (n_dofs,), per radian or metre."""
 
-    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+    def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
-        # d(difference)/d(step) is the identity to first order, for balls up to the curvature of the rotation.
-        r = model.difference(values, self.values) * self.weights
+        # d(difference)/d(step) is the identity to first order; for ball joints up to the curvature of the rotation.
+        r = model.difference(pose, self.pose) * self.weights
         return NormalEquations(0.5 * float(r @ r), self.weights * r, self._hessian)
 
     @cached_property
@@ -99,7 +99,7 @@ class PosePrior:
 
 
 class Fit(NamedTuple):
-    """What the solver found."""
+    """Result of the solver."""
 
     pose: Array
     """Pose, (n_values,), within the joint limits."""
@@ -107,14 +107,14 @@ class Fit(NamedTuple):
     """Half the sum of squared residuals."""
     iterations: int
     hessian: Array
-    """Second derivative of the cost at the pose, (n_dofs, n_dofs); `covariance` takes it from there."""
+    """Second derivative of the cost at the pose, (n_dofs, n_dofs), for `covariance`."""
 
 
 def solve(
     model: BodyModel,
-    values: Array,
+    pose: Array,
     blocks: Sequence[ResidualBlock],
-    free: NDArray[np.bool_] | None = None,
+    active_dofs: NDArray[np.bool_] | None = None,
     max_iterations: int = 50,
     tolerance: float = 1e-6,
     gain: float = 0.0,
@@ -123,55 +123,65 @@ def solve(
 
     Args:
         model: the body.
-        values: where to start, (n_values,).
-        blocks: the evidence.
-        free: which degrees of freedom may move, (n_dofs,); all by default.
-        max_iterations: how often to take a step at most.
-        tolerance: smallest step that is worth another iteration, rad or metres.
-        gain: smallest decrease of the cost that is worth another iteration, promised or found. Costs of image
-            residuals are rough at their bottom, where steps are refused over and over.
+        pose: initial pose, (n_values,).
+        blocks: the residual blocks.
+        active_dofs: degrees of freedom that may change, (n_dofs,); all by default.
+        max_iterations: largest number of steps.
+        tolerance: smallest step for another iteration, rad or metres.
+        gain: smallest decrease of the cost, predicted or found, for another iteration. Costs of image residuals are
+            rough near their minimum, where steps are refused repeatedly.
     """
-    may_move = np.ones(model.n_dofs, dtype=bool) if free is None else free
-    start = values  # what may not move stays as it is there, even outside of the limits
-    values = with_locked_dofs(model, model.clip(start), start, free)
-    here = _sum(model, values, blocks)
-    damping, iterations = FIRST_DAMPING, 0
+    is_active = np.ones(model.n_dofs, dtype=bool) if active_dofs is None else active_dofs
+    start = pose  # inactive degrees of freedom stay there, even outside the limits
+    pose = with_locked_dofs(model, model.clip(start), start, active_dofs)
+    here = _sum(model, pose, blocks)
+    damping, iterations = INITIAL_DAMPING, 0
     while iterations < max_iterations:
         iterations += 1
-        moving = np.flatnonzero(may_move & ~_pressed_against_limit(model, values, here.gradient))
-        if not len(moving):
+        active = np.flatnonzero(is_active & ~_pressed_against_limit(model, pose, here.gradient))
+        if not len(active):
             break
-        g, H = here.gradient[moving], here.hessian[moving[:, None], moving]
-        # Damping by the diagonal leaves metres and radians to themselves; the floor serves dofs nothing speaks of.
+        g, H = here.gradient[active], here.hessian[active[:, None], active]
+        # Damping by the diagonal is independent of units; the floor keeps unobserved dofs well conditioned.
         scale = np.diag(H) + 1e-6 * max(1e-12, float(np.trace(H)) / len(H))
         while True:
             step = damped_step(H, g, damping * scale)
             worth = -(g + 0.5 * H @ step) @ step > gain
             change = np.zeros(model.n_dofs)
-            change[moving] = step
-            trial = with_locked_dofs(model, model.clip(model.retract(values, change)), start, free)
-            moved = float(np.abs(model.difference(trial, values)).max())
+            change[active] = step
+            trial = with_locked_dofs(model, model.clip(model.retract(pose, change)), start, active_dofs)
+            moved = float(np.abs(model.difference(trial, pose)).max())
             there = _sum(model, trial, blocks) if worth else here
-            if there.cost < here.cost or not worth or moved < tolerance or damping > MOST_DAMPING:
+            if there.cost < here.cost or not worth or moved < tolerance or damping > MAX_DAMPING:
                 break
-            damping = max(10 * damping, FELT_DAMPING)
+            damping = max(10 * damping, MIN_RETRY_DAMPING)
         if there.cost >= here.cost:
             break
         gained = here.cost - there.cost
-        values, here = trial, there
-        damping = max(LEAST_DAMPING, damping / 10)
+        pose, here = trial, there
+        damping = max(MIN_DAMPING, damping / 10)
         if moved < tolerance or gained < gain:
             break
-    return Fit(values, here.cost, iterations, here.hessian)
+    return Fit(pose, here.cost, iterations, here.hessian)
 
 
-def with_locked_dofs(model: BodyModel, values: Array, still: Array, free: NDArray[np.bool_] | None) -> Array:
-    """A pose, (n_values,), but for what is not `free`, (n_dofs,), to move: that is as in another pose."""
-    return values if free is None else np.where(value_mask(model, ~free), still, values)
+def with_locked_dofs(model: BodyModel, pose: Array, locked: Array, active_dofs: NDArray[np.bool_] | None) -> Array:
+    """Return a pose with the locked degrees of freedom of another pose.
+
+    Args:
+        model: the body.
+        pose: (n_values,).
+        locked: pose from which the locked degrees of freedom are taken, (n_values,).
+        active_dofs: degrees of freedom that are not locked, (n_dofs,); None: all.
+    """
+    return pose if active_dofs is None else np.where(value_mask(model, ~active_dofs), locked, pose)
 
 
 def value_mask(model: BodyModel, of_dofs: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """What is said of degrees of freedom, (n_dofs,), said of the values; of a quaternion where any turn of it is."""
+    """Expand a mask over degrees of freedom, (n_dofs,), to pose values, (n_values,).
+
+    A quaternion is set if any of its axes is.
+    """
     out = np.zeros(len(model.value_names), dtype=bool)
     np.logical_or.at(out, model.dof_value, of_dofs)
     for i, joint in enumerate(model.joints):
@@ -182,34 +192,34 @@ def value_mask(model: BodyModel, of_dofs: NDArray[np.bool_]) -> NDArray[np.bool_
 
 
 def damped_step(H: Array, g: Array, damping: Array) -> Array:
-    """The step from a Hessian (n, n), whose diagonal is raised by a damping (n,), and a gradient (n,)."""
-    from scipy.linalg.lapack import dposv  # takes a sixth of a second, which who opens a session need not wait
+    """Return the step for a Hessian, (n, n), with damping added to its diagonal, (n,), and a gradient, (n,)."""
+    from scipy.linalg.lapack import dposv  # imported lazily: loading LAPACK takes 0.17 s
 
     raised = H.copy()
     raised.flat[:: len(g) + 1] += damping
     _, step, info = dposv(raised, -g)
-    return np.asarray(step) if info == 0 else -g / (np.diag(H) + damping)  # not definite to the last digit
+    return np.asarray(step) if info == 0 else -g / (np.diag(H) + damping)  # numerically not definite
 
 
 def covariance(model: BodyModel, fit: Fit) -> Array:
-    """Covariance of a fitted pose, (n_dofs, n_dofs), rad and metres, from the normal matrix.
+    """Return the covariance of a fitted pose, (n_dofs, n_dofs), rad and metres, from its normal matrix.
 
-    It is as true as the blocks' weights are inverse standard deviations. What nothing speaks of has a variance of
-    `_UNKNOWN`; joint limits are not counted as knowledge.
+    It is valid if the blocks' weights are inverse standard deviations. Unobserved degrees of freedom have variance
+    `_UNKNOWN`. Joint limits are not taken into account.
     """
     return np.asarray(np.linalg.inv(fit.hessian + np.eye(model.n_dofs) / _UNKNOWN), dtype=np.float64)
 
 
 def fit_to_points(model: BodyModel, targets_world: dict[str, Array], near: Array | None = None) -> Fit:
-    """Pose a body so that its points come close to known places (triangulated or measured joints).
+    """Fit a pose to known positions of points of the body (triangulated or measured joints).
 
-    Without a pose to start from, the body is put at the targets' mean, upright, lying and upside down, facing each
-    of eight ways; the best of the fits counts.
+    Without an initial pose the body starts at the mean of the targets: upright, lying and upside down, in each of eight
+    directions. The best fit is returned.
 
     Args:
         model: the body; its sizes stay.
-        targets_world: place of each known point by name, (3,), metres; NaN is passed over.
-        near: pose to start from, (n_values,).
+        targets_world: position of each known point by name, (3,), metres; NaN is ignored.
+        near: initial pose, (n_values,).
 
     Raises:
         TrackerError: fewer than four of the body's points are known.
@@ -234,44 +244,44 @@ def fit_to_points(model: BodyModel, targets_world: dict[str, Array], near: Array
         for tilt, turn in itertools.product(range(4), range(8)):
             step[turns[0]], step[turns[-1]] = tilt * np.pi / 2, turn * np.pi / 4
             starts.append(model.retract(base, step))
-    # Where a body of other sizes could reach the places better by a bend that people do not make, it is not bent so.
+    # Without this prior a body of other sizes would bend unnaturally to come closer to the positions.
     usual = PosePrior(model.neutral(), 1 / model.spreads)
-    # A weak pull to the start decides what the points leave open, such as the twist of a straight arm.
+    # A weak pull to the start determines what the points do not, such as the twist of a straight arm.
     rest = np.full(model.n_dofs, 1e-3 / _PLACE_M)
 
     def fitted(start: Array) -> Fit:
         return solve(model, start, [block, usual, PosePrior(start if near is None else near, rest)], max_iterations=100)
 
     best = min(map(fitted, starts), key=lambda f: f.cost)
-    # Descent cannot lead a limb that is pressed against a limit around to where it belongs: begin again from there.
-    # Measured on random poses: one in eight was 1 to 10 cm off without; a second round mends the last.
+    # Descent cannot lead a limb at a limit around to the right angles: restart from the equivalent angles. Without
+    # this one random pose in eight ended 1 to 10 cm off; a second round corrects the rest.
     limbs = [i for i, j in enumerate(model.joints) if len(j.axes) == 3 and not j.free]
     for joint in 2 * limbs:
         best = min(best, fitted(_by_other_angles(model, best.pose, joint)), key=lambda f: f.cost)
     return best
 
 
-def _by_other_angles(model: BodyModel, values: Array, joint: int) -> Array:
-    """The same pose by the other three angles that turn a joint alike, put within its limits.
+def _by_other_angles(model: BodyModel, pose: Array, joint: int) -> Array:
+    """Return the same pose by the other three angles of a joint that give the same rotation, within its limits.
 
     Where a joint's three axes are at right angles, (a, b, c) and (a + pi, pi - b, c + pi) are one rotation.
     """
-    out = np.array(values)
+    out = np.array(pose)
     at = model.dof_value[model.dof_joint == joint]
-    a, b, c = values[at]
-    # Of the angles that differ by whole turns those within (-pi, pi], where the limits are.
+    a, b, c = pose[at]
+    # Angles within (-pi, pi], where the limits are.
     out[at] = np.remainder([a, -b, c], 2 * np.pi) - np.pi
     return model.clip(out)
 
 
-def _sum(model: BodyModel, values: Array, blocks: Sequence[ResidualBlock]) -> NormalEquations:
-    kinematics = model.kinematics(values)
-    parts = [b.linearize(model, values, kinematics) for b in blocks]
+def _sum(model: BodyModel, pose: Array, blocks: Sequence[ResidualBlock]) -> NormalEquations:
+    kinematics = model.kinematics(pose)
+    parts = [b.linearize(model, pose, kinematics) for b in blocks]
     return NormalEquations(sum(p.cost for p in parts), sum(p.gradient for p in parts), sum(p.hessian for p in parts))  # type: ignore[arg-type]
 
 
-def _pressed_against_limit(model: BodyModel, values: Array, gradient: Array) -> NDArray[np.bool_]:
-    """Degrees of freedom that stand at a limit which descent would cross."""
-    at = values[model.dof_value]
+def _pressed_against_limit(model: BodyModel, pose: Array, gradient: Array) -> NDArray[np.bool_]:
+    """Return the degrees of freedom at a limit that descent would cross, (n_dofs,)."""
+    at = pose[model.dof_value]
     low, high = model.limits[:, 0], model.limits[:, 1]
     return ((at <= low + AT_LIMIT) & (gradient > 0)) | ((at >= high - AT_LIMIT) & (gradient < 0))

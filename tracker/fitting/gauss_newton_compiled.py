@@ -1,8 +1,8 @@
-"""`gauss_newton.solve` in one compiled call, where all that speaks for a pose is the tracker's own blocks.
+"""`gauss_newton.solve` in one compiled call, for contour residuals with priors and penetration terms.
 
-A descent takes a dozen steps of a tenth of a millisecond. Taken one by one, what leads from kernel to kernel takes as
-long as the kernels, and keeps the interpreter's lock from the threads that work on other poses.
-`gauss_newton.solve` is the readable version of what is done here, and solves what this does not know.
+A descent takes a dozen steps of a tenth of a millisecond each. In Python the calls between kernels take as long as the
+kernels, and hold the interpreter's lock. `gauss_newton.solve` is the readable version and the fallback for other blocks
+and for ball joints.
 """
 
 from collections.abc import Sequence
@@ -20,10 +20,10 @@ from tracker.fitting.contour_kernels import WITH_JACOBIAN, ContourTerm, accumula
 from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import (
     AT_LIMIT,
-    FELT_DAMPING,
-    FIRST_DAMPING,
-    LEAST_DAMPING,
-    MOST_DAMPING,
+    INITIAL_DAMPING,
+    MAX_DAMPING,
+    MIN_DAMPING,
+    MIN_RETRY_DAMPING,
     Fit,
     PosePrior,
     ResidualBlock,
@@ -42,63 +42,63 @@ _KNOWN = (ContourResiduals, PosePrior, SelfPenetration, BodyPenetration)
 
 
 class _Blocks(NamedTuple):
-    """What speaks for a pose of a body whose values are its degrees of freedom."""
+    """Residual blocks as arrays, for a body whose pose values are its degrees of freedom."""
 
     tree: Tree
     is_length: NDArray[np.bool_]
-    """Its `BodyModel.dof_is_length`, (n_dofs,)."""
+    """`BodyModel.dof_is_length`, (n_dofs,)."""
     parts: IntArray
-    """Its `dof_joint`, (n_dofs,)."""
+    """`BodyModel.dof_joint`, (n_dofs,)."""
     moves: NDArray[np.bool_]
-    """(n_dofs, n_parts)."""
+    """`BodyModel.moves`, (n_dofs, n_parts)."""
     limits: Array
-    """(n_dofs, 2)."""
+    """Joint limits, (n_dofs, 2), rad or metres."""
     contours: ContourTerm
-    """The residuals of the contours."""
-    expected: Array
-    """Poses to stay near, (S, n_dofs)."""
+    """Contour residuals."""
+    means: Array
+    """Means of the priors, (S, n_dofs)."""
     weights: Array
     """Their weights, see `PosePrior`, (S, n_dofs)."""
     within: PenetrationTerm
-    """What keeps the parts of the body apart."""
+    """Penetration between parts of the body."""
     between: PenetrationTerm
-    """What keeps several bodies apart."""
+    """Penetration between bodies."""
 
 
 class _Linear(NamedTuple):
-    """The normal equations at a pose, and room for where it puts everything."""
+    """Normal equations at a pose, and the kinematics there."""
 
     gradient: Array
     """(n_dofs,)."""
     hessian: Array
     """(n_dofs, n_dofs)."""
     axes: Array
-    """As the next see `Kinematics`, (n_dofs, 3)."""
+    """See `Kinematics.axes_world`, (n_dofs, 3)."""
     origins: Array
-    """(n_dofs, 3)."""
+    """See `Kinematics.origins_world`, (n_dofs, 3), metres."""
 
 
 def solve_compiled(
     model: BodyModel,
-    values: Array,
+    pose: Array,
     blocks: Sequence[ResidualBlock],
-    free: NDArray[np.bool_] | None = None,
+    active_dofs: NDArray[np.bool_] | None = None,
     max_iterations: int = 50,
     tolerance: float = 1e-6,
     gain: float = 0.0,
 ) -> Fit:
-    """Minimize the summed cost of all blocks within the joint limits, as `gauss_newton.solve` does, to rounding."""
+    """Minimize the summed cost of all blocks within the joint limits, as `gauss_newton.solve` does, up to rounding."""
     compiled = _compiled(model, blocks)
     if compiled is None:
-        return gauss_newton.solve(model, values, blocks, free, max_iterations, tolerance, gain)
-    may_move = np.ones(model.n_dofs, dtype=bool) if free is None else free
-    found, hessian = np.where(may_move, model.clip(values), values), np.empty((model.n_dofs, model.n_dofs))
-    cost, iterations = _descend(compiled, found, may_move, max_iterations, tolerance, gain, hessian)
+        return gauss_newton.solve(model, pose, blocks, active_dofs, max_iterations, tolerance, gain)
+    is_active = np.ones(model.n_dofs, dtype=bool) if active_dofs is None else active_dofs
+    found, hessian = np.where(is_active, model.clip(pose), pose), np.empty((model.n_dofs, model.n_dofs))
+    cost, iterations = _descend(compiled, found, is_active, max_iterations, tolerance, gain, hessian)
     return Fit(found, cost, iterations, hessian)
 
 
 def _compiled(model: BodyModel, blocks: Sequence[ResidualBlock]) -> _Blocks | None:
-    """The blocks as arrays; None where they or the body are of other kinds."""
+    """Return the blocks as arrays; None if the blocks or the body are not supported."""
     if any(type(b) not in _KNOWN for b in blocks) or len(model.value_names) != model.n_dofs:
         return None
     contours = [b.term(model) for b in blocks if isinstance(b, ContourResiduals)]
@@ -109,7 +109,7 @@ def _compiled(model: BodyModel, blocks: Sequence[ResidualBlock]) -> _Blocks | No
         return None
     return _Blocks(
         model.tree, model.dof_is_length, model.dof_joint, model.moves, model.limits, contours[0],
-        np.array([p.values for p in priors], np.float64).reshape(-1, model.n_dofs),
+        np.array([p.pose for p in priors], np.float64).reshape(-1, model.n_dofs),
         np.array([p.weights for p in priors], np.float64).reshape(-1, model.n_dofs),
         within[0] if within else NO_PENETRATION, between[0] if between else NO_PENETRATION,
     )  # fmt: skip
@@ -117,36 +117,36 @@ def _compiled(model: BodyModel, blocks: Sequence[ResidualBlock]) -> _Blocks | No
 
 @njit(nogil=True, cache=True)
 def _descend(
-    blocks: _Blocks, values: Array, may_move: NDArray[np.bool_], max_iterations: int, tolerance: float, gain: float,
+    blocks: _Blocks, pose: Array, is_active: NDArray[np.bool_], max_iterations: int, tolerance: float, gain: float,
     hessian: Array,
 ) -> tuple[float, int]:  # fmt: skip
-    """Move a pose, (n_dofs,), to where the cost is least and fill the Hessian there; the cost and the iterations.
+    """Move a pose, (n_dofs,), to a minimum and fill the Hessian there; return the cost and the number of iterations.
 
-    The same step by step as `gauss_newton.solve`.
+    The steps are those of `gauss_newton.solve`.
     """
-    n, damping, iterations = values.shape[0], FIRST_DAMPING, 0
+    n, damping, iterations = pose.shape[0], INITIAL_DAMPING, 0
     here, there = _room(n), _room(n)
-    trial, step, moving, L = values.copy(), np.empty(n), np.empty(n, np.int64), np.empty((n, n))
-    cost = _linearize(blocks, values, here)
+    trial, step, active, L = pose.copy(), np.empty(n), np.empty(n, np.int64), np.empty((n, n))
+    cost = _linearize(blocks, pose, here)
     while iterations < max_iterations:
         iterations += 1
-        n_moving = _list_moving(values, here.gradient, may_move, blocks.limits, moving)
-        if n_moving == 0:
+        n_active = _list_active(pose, here.gradient, is_active, blocks.limits, active)
+        if n_active == 0:
             break
         while True:
-            promised = _damped_step(here.gradient, here.hessian, moving[:n_moving], damping, L, step)
-            moved = _move(values, step, moving[:n_moving], blocks.limits, trial)
+            promised = _damped_step(here.gradient, here.hessian, active[:n_active], damping, L, step)
+            moved = _move(pose, step, active[:n_active], blocks.limits, trial)
             worth = promised > gain
             cost_there = _linearize(blocks, trial, there) if worth else cost
-            if cost_there < cost or not worth or moved < tolerance or damping > MOST_DAMPING:
+            if cost_there < cost or not worth or moved < tolerance or damping > MAX_DAMPING:
                 break
-            damping = max(10.0 * damping, FELT_DAMPING)
+            damping = max(10.0 * damping, MIN_RETRY_DAMPING)
         if cost_there >= cost:
             break
         gained, cost = cost - cost_there, cost_there
-        values[:] = trial
+        pose[:] = trial
         here, there = there, here
-        damping = max(LEAST_DAMPING, damping / 10.0)
+        damping = max(MIN_DAMPING, damping / 10.0)
         if moved < tolerance or gained < gain:
             break
     hessian[:] = here.hessian
@@ -159,21 +159,21 @@ def _room(n: int) -> _Linear:
 
 
 @njit(inline="always", nogil=True, cache=True)
-def _linearize(blocks: _Blocks, values: Array, out: _Linear) -> float:
-    """Fill the normal equations of all blocks at a pose, (n_dofs,); returns the cost."""
-    term, n = blocks.contours, values.shape[0]
+def _linearize(blocks: _Blocks, pose: Array, out: _Linear) -> float:
+    """Fill the normal equations of all blocks at a pose, (n_dofs,); return the cost."""
+    term, n = blocks.contours, pose.shape[0]
     first, last, sums = term.first, term.last, term.sums
     Ts = term.Ts[first:last]
-    forward_kinematics(values, blocks.tree, Ts, out.axes, out.origins)
+    forward_kinematics(pose, blocks.tree, Ts, out.axes, out.origins)
     cost = accumulate_normal_equations(term, WITH_JACOBIAN)
     twists_to_dofs(
         sums.M[first:last], sums.b[first:last], out.axes, out.origins, blocks.is_length, blocks.parts,
         blocks.tree.parents, blocks.moves, out.gradient, out.hessian,
     )  # fmt: skip
-    for s in range(blocks.expected.shape[0]):
+    for s in range(blocks.means.shape[0]):
         for k in range(n):
             w = blocks.weights[s, k]
-            r = w * (values[k] - blocks.expected[s, k])
+            r = w * (pose[k] - blocks.means[s, k])
             cost += 0.5 * r * r
             out.gradient[k] += w * r
             out.hessian[k, k] += w * w
@@ -184,48 +184,51 @@ def _linearize(blocks: _Blocks, values: Array, out: _Linear) -> float:
 
 
 @njit(**NO_REFCOUNT)
-def _list_moving(
-    values: Array, gradient: Array, may_move: NDArray[np.bool_], limits: Array, moving: IntArray
+def _list_active(
+    pose: Array, gradient: Array, is_active: NDArray[np.bool_], limits: Array, active: IntArray
 ) -> int:  # fmt: skip
-    """List what may move and is not pressed against its limit, (n_dofs,); the number."""
+    """List the active degrees of freedom that are not pressed against a limit; return their number."""
     n = 0
-    for k in range(values.shape[0]):
-        low, high = values[k] <= limits[k, 0] + AT_LIMIT, values[k] >= limits[k, 1] - AT_LIMIT
-        if may_move[k] and not (low and gradient[k] > 0.0) and not (high and gradient[k] < 0.0):
-            moving[n] = k
+    for k in range(pose.shape[0]):
+        low, high = pose[k] <= limits[k, 0] + AT_LIMIT, pose[k] >= limits[k, 1] - AT_LIMIT
+        if is_active[k] and not (low and gradient[k] > 0.0) and not (high and gradient[k] < 0.0):
+            active[n] = k
             n += 1
     return n
 
 
 @njit(**NO_REFCOUNT)
-def _damped_step(gradient: Array, hessian: Array, moving: IntArray, damping: float, L: Array, step: Array) -> float:
-    """Fill the step of what moves, indices (m,), (m,), by Cholesky's factor L (room); the decrease that it promises."""
-    m, trace = moving.shape[0], 0.0
+def _damped_step(gradient: Array, hessian: Array, active: IntArray, damping: float, L: Array, step: Array) -> float:
+    """Fill the damped step, (m,), of the listed degrees of freedom, (m,); return the decrease that it predicts.
+
+    L is scratch for the Cholesky factor, (m, m).
+    """
+    m, trace = active.shape[0], 0.0
     for i in range(m):
-        trace += hessian[moving[i], moving[i]]
+        trace += hessian[active[i], active[i]]
     floor = 1e-6 * max(1e-12, trace / m)
-    if _factor(hessian, moving, damping, floor, L):
-        _substitute(L, gradient, moving, step)
+    if _factor(hessian, active, damping, floor, L):
+        _substitute(L, gradient, active, step)
     else:
         for i in range(m):
-            own = hessian[moving[i], moving[i]]
-            step[i] = -gradient[moving[i]] / (own + damping * (own + floor))
+            own = hessian[active[i], active[i]]
+            step[i] = -gradient[active[i]] / (own + damping * (own + floor))
     promised = 0.0
     for i in range(m):
         force = 0.0
         for j in range(m):
-            force += hessian[moving[i], moving[j]] * step[j]
-        promised -= (gradient[moving[i]] + 0.5 * force) * step[i]
+            force += hessian[active[i], active[j]] * step[j]
+        promised -= (gradient[active[i]] + 0.5 * force) * step[i]
     return promised
 
 
 @njit(**NO_REFCOUNT)
-def _factor(hessian: Array, moving: IntArray, damping: float, floor: float, L: Array) -> bool:
-    """Fill Cholesky's factor of the damped Hessian of what moves, the lower triangle of (m, m); False where it is not
-    definite to the last digit."""
-    for i in range(moving.shape[0]):
+def _factor(hessian: Array, active: IntArray, damping: float, floor: float, L: Array) -> bool:
+    """Fill the Cholesky factor of the damped Hessian, the lower triangle of (m, m); return False if it is not
+    definite."""
+    for i in range(active.shape[0]):
         for j in range(i + 1):
-            total = hessian[moving[i], moving[j]]
+            total = hessian[active[i], active[j]]
             if i == j:
                 total += damping * (total + floor)
             for k in range(j):
@@ -240,11 +243,11 @@ def _factor(hessian: Array, moving: IntArray, damping: float, floor: float, L: A
 
 
 @njit(**NO_REFCOUNT)
-def _substitute(L: Array, gradient: Array, moving: IntArray, step: Array) -> None:
-    """Fill the step, (m,), that a factor, (m, m), takes against the gradient of what moves."""
-    m = moving.shape[0]
+def _substitute(L: Array, gradient: Array, active: IntArray, step: Array) -> None:
+    """Fill the step, (m,), by substitution in a Cholesky factor, (m, m)."""
+    m = active.shape[0]
     for i in range(m):
-        total = -gradient[moving[i]]
+        total = -gradient[active[i]]
         for k in range(i):
             total -= L[i, k] * step[k]
         step[i] = total / L[i, i]
@@ -256,13 +259,13 @@ def _substitute(L: Array, gradient: Array, moving: IntArray, step: Array) -> Non
 
 
 @njit(**NO_REFCOUNT)
-def _move(values: Array, step: Array, moving: IntArray, limits: Array, out: Array) -> float:
-    """Fill a pose, (n_dofs,), after a step (m,) of what moves, within the limits; the largest change."""
+def _move(pose: Array, step: Array, active: IntArray, limits: Array, out: Array) -> float:
+    """Fill a pose, (n_dofs,), after a step, (m,), within the limits; return the largest change."""
     farthest = 0.0
-    for k in range(values.shape[0]):
-        out[k] = values[k]
-    for i in range(moving.shape[0]):
-        k = moving[i]
-        out[k] = min(max(values[k] + step[i], limits[k, 0]), limits[k, 1])
-        farthest = max(farthest, abs(out[k] - values[k]))
+    for k in range(pose.shape[0]):
+        out[k] = pose[k]
+    for i in range(active.shape[0]):
+        k = active[i]
+        out[k] = min(max(pose[k] + step[i], limits[k, 0]), limits[k, 1])
+        farthest = max(farthest, abs(out[k] - pose[k]))
     return farthest

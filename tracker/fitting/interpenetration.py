@@ -1,7 +1,7 @@
-"""Parts do not pass through each other, those of one body or of several: residual blocks that push them apart.
+"""Penetration terms: residual blocks that push parts out of each other, within one body or between several.
 
-Flesh gives way and shapes are coarse, so only what lies deep within another part counts. Where two limbs claim one
-outline in the images this is what tells that one of them belongs elsewhere.
+Flesh gives way and shapes are coarse, so only deep penetration counts. Where two limbs claim one contour in the images,
+these terms show that one of them belongs elsewhere.
 """
 
 from collections.abc import Sequence
@@ -20,36 +20,36 @@ from tracker.fitting.gauss_newton import NormalEquations
 from tracker.geometry.arrays import Array, IntArray
 
 _SAMPLES = 5
-"""Points along the axis of each part that are asked whether they lie within another part."""
+"""Sample points along the axis of each part that are tested against other parts."""
 SIGMA_M = 0.02
-"""Depth that is as unlikely as one standard deviation, metres."""
+"""Standard deviation of the depth, metres."""
 SOFTNESS = 0.6
 """Share of a part's radius that may be pressed in without cost."""
 
 
 @dataclass(frozen=True, eq=False)
 class SelfPenetration:
-    """Pushes points on the axes of parts out of the other parts that do not adjoin theirs; see `ResidualBlock`."""
+    """Penetration between parts of one body that neither adjoin nor touch in the neutral pose; see `ResidualBlock`."""
 
     sigma_m: float = SIGMA_M
-    """Depth that is as unlikely as one standard deviation, metres."""
+    """Standard deviation of the depth, metres."""
     softness: float = SOFTNESS
     """Share of a part's radius that may be pressed in without cost."""
 
-    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+    def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
         return _linearized(self.term(model), model, kinematics)
 
     def term(self, model: BodyModel) -> "PenetrationTerm":
-        """What `add_penetration` needs for a body."""
+        """Return the arguments of `add_penetration` for a body."""
         Ts, apart = np.empty((len(model.parts), 4, 4)), separable_parts(model, self.softness)
         return _penetration_term((model,), Ts, apart, self.softness, 0, _weight(self.sigma_m))
 
 
 class BodyPenetration:
-    """Pushes one person's parts out of those of the others, who stand where they are; see `ResidualBlock`.
+    """Penetration between one person and the others, who are fixed; see `ResidualBlock`.
 
-    Points on the axes of both count: a thin part may lie within a thick one whoever's it is.
+    Points on the axes of both count, because a thin part may lie within a thick one of either body.
     """
 
     def __init__(
@@ -60,13 +60,13 @@ class BodyPenetration:
         sigma_m: float = SIGMA_M,
         softness: float = SOFTNESS,
     ) -> None:
-        """Take the others' parts where they are.
+        """Place the parts of the others.
 
         Args:
-            bodies: everybody.
+            bodies: all bodies.
             person: index of the body that is fitted.
-            weight: of the squared depths; 1 takes `sigma_m` at its word.
-            sigma_m: depth that is as unlikely as one standard deviation, metres.
+            weight: weight of the squared depths; 1 is that of `sigma_m`.
+            sigma_m: standard deviation of the depth, metres.
             softness: share of a part's radius that may be pressed in without cost.
         """
         self._models, self._person = tuple(b.model for b in bodies), person
@@ -77,64 +77,64 @@ class BodyPenetration:
         self._apart = mine[:, None] != mine
         self._weight, self._softness = np.sqrt(weight) * _weight(sigma_m), softness
 
-    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+    def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
         return _linearized(self.term(model), model, kinematics)
 
     def term(self, model: BodyModel) -> "PenetrationTerm":
-        """What `add_penetration` needs for the person, whose model is given."""
+        """Return the arguments of `add_penetration` for the person's model."""
         assert model is self._models[self._person]
-        Ts = self._Ts.copy()  # several threads may ask
+        Ts = self._Ts.copy()  # several threads may call this
         return _penetration_term(self._models, Ts, self._apart, self._softness, self._own.start, self._weight)
 
 
 class PenetrationTerm(NamedTuple):
-    """What `add_penetration` needs."""
+    """Arguments of `add_penetration`. The scratch makes it single-threaded."""
 
     Ts: Array
-    """World poses of all parts, (P, 4, 4), metres; those of the body that is fitted are filled in."""
+    """World poses of all parts, (P, 4, 4), metres; those of the fitted body are filled in."""
     first: int
-    """Index of the first of these."""
+    """Index of the first part of the fitted body."""
     centers: Array
-    """Of all parts, see `Surfaces`, (P, 3), metres."""
+    """Centres of all parts, see `Surfaces`, (P, 3), metres."""
     half_axes: Array
     """(P, 3), metres."""
     apart: NDArray[np.bool_]
-    """Which parts are to be apart, (P, P)."""
+    """Which pairs of parts must not penetrate, (P, P)."""
     softness: float
     """See `SelfPenetration`."""
     weight: float
-    """Of the depth of one point, per metre."""
+    """Weight of the depth of one point, per metre."""
     rows: Array
-    """Room for contacts, points on the axes of parts within other parts: depth, the point and the outward normal of the
-    other part there, in the world, (room, 7), metres."""
+    """Scratch for contacts, (room, 7), metres: depth, the point on a part's axis, and the outward normal of the other
+    part there, in the world."""
     parts: IntArray
-    """Index of the part of each such point, and that of the other, (room, 2)."""
+    """Index of the part of each contact's point, and of the other part, (room, 2)."""
 
 
 NO_PENETRATION = PenetrationTerm(
     np.empty((0, 4, 4)), 0, np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 0), np.bool_), 0.0, 0.0,
     np.empty((0, 7)), np.empty((0, 2), np.int64),
 )  # fmt: skip
-"""That pushes nothing."""
+"""A term that adds nothing."""
 
 
 def _weight(sigma_m: float) -> float:
-    """Weight of the depth of one point, per metre."""
+    """Return the weight of the depth of one point, per metre."""
     return float(1 / (sigma_m * np.sqrt(_SAMPLES)))
 
 
 def _penetration_term(
     models: tuple[BodyModel, ...], Ts: Array, apart: NDArray[np.bool_], softness: float, first: int, weight: float
 ) -> PenetrationTerm:
-    """Put together what is said of all bodies, with room for all contacts there may be."""
+    """Return a term with scratch for all possible contacts."""
     room, surfaces = int(np.count_nonzero(apart)) * _SAMPLES, surfaces_of(models)
     rows, parts = np.empty((room, 7)), np.empty((room, 2), np.int64)
     return PenetrationTerm(Ts, first, surfaces.centers, surfaces.half_axes, apart, softness, weight, rows, parts)
 
 
 def _linearized(term: PenetrationTerm, model: BodyModel, kinematics: Kinematics) -> NormalEquations:
-    """Normal equations of the depths for a body."""
+    """Return the normal equations of the depths for a body."""
     n = model.n_dofs
     gradient, hessian = np.zeros(n), np.zeros((n, n))
     cost = add_penetration(term, kinematics, model.dof_is_length, model.moves, gradient, hessian)
@@ -143,7 +143,8 @@ def _linearized(term: PenetrationTerm, model: BodyModel, kinematics: Kinematics)
 
 @lru_cache(maxsize=32)
 def separable_parts(model: BodyModel, softness: float) -> NDArray[np.bool_]:
-    """Which parts are apart in a body that stands at ease: neither adjoining nor overlapping then, (P, P)."""
+    """Return which parts of a body must not penetrate, (P, P): neither adjoining nor overlapping in the neutral
+    pose."""
     everything = ~np.eye(len(model.parts), dtype=bool)
     at_ease = _penetration_term((model,), model.kinematics(model.neutral()).Ts_world_part, everything, softness, 0, 0.0)
     own, other = at_ease.parts[: _list_contacts(at_ease)].T
@@ -156,9 +157,10 @@ def separable_parts(model: BodyModel, softness: float) -> NDArray[np.bool_]:
 
 @njit(nogil=True, cache=True)
 def _list_contacts(bodies: PenetrationTerm) -> int:
-    """List the contacts: depth, point, outward normal of the other part; the part of the point and the other one.
+    """List the contacts: depth, point and normal of the other part; part of the point and the other part.
 
-    A part counts as the elliptic cylinder about its axis, the distance to it along the line from the axis.
+    A part is treated as the elliptic cylinder about its axis. The distance to it is measured along the line from the
+    axis.
     """
     Ts, _, centers, half_axes, apart, softness, _, rows, parts = bodies
     n, n_parts = 0, Ts.shape[0]
@@ -202,7 +204,7 @@ def add_penetration(
     term: PenetrationTerm, kinematics: Kinematics, is_length: NDArray[np.bool_], moves: NDArray[np.bool_],
     gradient: Array, hessian: Array,
 ) -> float:  # fmt: skip
-    """Add the normal equations of the weighted depths, (n_dofs,) and (n_dofs, n_dofs); returns half their squares."""
+    """Add the normal equations of the weighted depths, (n_dofs,) and (n_dofs, n_dofs); return half their squares."""
     if term.Ts.shape[0] == 0:
         return 0.0
     own = kinematics.Ts_world_part
@@ -217,10 +219,10 @@ def _accumulate(
     rows: Array, parts: IntArray, first: int, weight: float, kinematics: Kinematics, is_length: NDArray[np.bool_],
     moves: NDArray[np.bool_], gradient: Array, hessian: Array,
 ) -> float:  # fmt: skip
-    """Add up the normal equations of contacts, (n, 7) and (n, 2); returns half their squares.
+    """Add the normal equations of contacts, (n, 7) and (n, 2); return half their squares.
 
-    A point X in a part moves by a rotation about a through o as a x (X - o), so along the normal n by a . (X - o) x n.
-    The two parts move against each other there; what moves both alike changes nothing.
+    A rotation about a through o moves a point X of a part by a x (X - o), hence along the normal n by a . (X - o) x n.
+    Only the relative motion of the two parts counts.
     """
     n_dofs, n_parts, cost = moves.shape[0], moves.shape[1], 0.0
     row, felt = np.empty(n_dofs), np.empty(n_dofs, np.int64)

@@ -1,7 +1,7 @@
-"""The points of a view that contours are matched with: those of its edges and of its silhouette, each line once.
+"""Collect the image points of a view that contours are matched with, each line once.
 
-Where a silhouette ends there mostly is an edge as well. One point then speaks for both: it lies between them and weighs
-as much as they do together, which pulls at a pose as they both do.
+The contour of a silhouette mostly is an edge as well. One point then stands for both. It lies between them and has
+their summed weight, so that it pulls a pose like both.
 """
 
 import numpy as np
@@ -14,24 +14,25 @@ from tracker.evidence.view_evidence import SCENE_SPACING_PX, ViewEvidence
 from tracker.geometry.arrays import FloatArray, IntArray
 
 N_COLUMNS = 7
-"""u, v, the normal's u and v, the weight, and how many points it stands for: in all, and of the silhouette."""
+"""Columns of a point: u, v, the normal's u and v, the weight, the number of points it stands for, and the number of
+those on the silhouette."""
 _AREA_PX = 8
-"""Size of the areas that are near a contour or not: this only spares work, so that coarse ones are enough."""
+"""Size of the areas that are classified as near a contour or not, px. It only saves work, so coarse areas suffice."""
 _SAME_PX, _SAME_COS = 2.0, 0.9
-"""A silhouette's point is on an edge no farther from it than that, if both run the same way."""
+"""Largest distance, px, and smallest cosine of the angle between a silhouette point and the edge that it lies on."""
 
 
 def points_to_match(
     view: ViewEvidence, contour: occluding_contours.Contour | None, reach_px: float, edges: float, silhouette: float
 ) -> FloatArray:
-    """Points of a view within reach of the visible contours, (N, N_COLUMNS).
+    """Return the points of a view within reach of the visible contours, (N, N_COLUMNS).
 
     Args:
-        view: what the view shows.
-        contour: of everybody in the scene; None keeps all points.
-        reach_px: how far from the visible contour points are kept, working px.
-        edges: weight of a point of an edge.
-        silhouette: weight of a point of the silhouette, where it is fully trusted.
+        view: evidence of the view.
+        contour: contours of all bodies in the view; None keeps all points.
+        reach_px: largest distance of points from the visible contours, working px.
+        edges: weight of an edge point.
+        silhouette: weight of a silhouette point in a fully trusted view.
     """
     shown, n_edges = view.silhouette, len(view.points_px)
     weight = 0.0 if shown is None else silhouette * shown.trust
@@ -53,15 +54,15 @@ def points_to_match(
 
 @njit(**NO_REFCOUNT)
 def _merge(points: FloatArray, n_edges: int, cells: IntArray) -> int:
-    """Add the points of the silhouette, which come after those of the edges, to the edges that they lie on.
+    """Merge silhouette points, which follow the edge points, into the edges that they lie on.
 
     Args:
         points: (N, N_COLUMNS).
-        n_edges: how many of them are of edges.
-        cells: room, -1 in each cell of the spacing of the points.
+        n_edges: number of edge points.
+        cells: scratch, -1 in each cell of the spacing of the points.
 
     Returns:
-        How many are left; they stand at the front.
+        Number of remaining points; they are at the front.
     """
     rows, columns = cells.shape
     for i in range(n_edges):
@@ -94,7 +95,7 @@ def _merge(points: FloatArray, n_edges: int, cells: IntArray) -> int:
 
 @njit(nogil=True, cache=True)
 def _mark(pieces: FloatArray, occluded: NDArray[np.bool_], reach: int, near: NDArray[np.bool_]) -> None:
-    """Mark the areas around the middles of visible pieces, in steps of one for all areas within reach."""
+    """Mark the areas within reach of the middles of visible pieces."""
     rows, columns = near.shape
     for i in range(pieces.shape[0]):
         c = int(0.5 * (pieces[i, 0] + pieces[i, 2])) // _AREA_PX
@@ -106,7 +107,7 @@ def _mark(pieces: FloatArray, occluded: NDArray[np.bool_], reach: int, near: NDA
 
 @njit(nogil=True, cache=True)
 def _pack(points: FloatArray, near: NDArray[np.bool_]) -> int:
-    """Move the points that lie in marked areas to the front; their number."""
+    """Move the points in marked areas to the front; return their number."""
     n = 0
     for i in range(points.shape[0]):
         if near[int(points[i, 1]) // _AREA_PX, int(points[i, 0]) // _AREA_PX]:

@@ -1,6 +1,6 @@
-"""Pins: where a person says that points of the body are seen. What they pull at a pose, and where in space they meet.
+"""Residuals of pins: image positions that a user assigns to points of the body.
 
-Positions are undistorted pixels here; the store keeps original ones.
+Positions are undistorted pixels here; the store holds original pixels.
 """
 
 from collections.abc import Sequence
@@ -19,22 +19,22 @@ from tracker.geometry.triangulation import PointObservation, sigma_px
 
 @dataclass(frozen=True, eq=False)
 class PinBlock:
-    """Points of the body drawn to their pins; a block for `gauss_newton.solve`.
+    """Points of the body drawn to their pins; see `ResidualBlock`.
 
-    The residual of a pin is the distance in the image, in standard deviations, component by component. No robust
-    function bends it: a hand's word counts, and one that is wrong is best seen.
+    The residual of a pin is its distance in the image in standard deviations, component by component. It is not robust:
+    a user's pin counts fully, and a wrong one is then easy to see.
     """
 
     cameras: tuple[Camera, ...]
-    """The camera of each pin, (N,)."""
+    """Camera of each pin, (N,)."""
     points: IntArray
     """Indices into `BodyModel.point_names`, (N,)."""
     positions_px: Array
-    """Where the points are seen, undistorted px, (N, 2)."""
+    """Positions of the pins, undistorted px, (N, 2)."""
     sigmas_px: Array
     """Standard deviation of each pin, (N,), px."""
 
-    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+    def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
         parts = model.point_parts[self.points]
         points_world = model.points_at(kinematics, self.points)
@@ -46,16 +46,16 @@ class PinBlock:
 
     @cached_property
     def _projections(self) -> tuple[Array, Array]:
-        """Inverse pose (N, 4, 4) and pinhole matrix (N, 3, 3) of each pin's camera."""
+        """Inverse pose, (N, 4, 4), and camera matrix, (N, 3, 3), of each pin's camera."""
         return np.stack([c.T_camera_world for c in self.cameras]), np.stack([c.K for c in self.cameras])
 
 
 def pin_block(model: BodyModel, cameras: Sequence[Camera], pins: Sequence[PointObservation]) -> PinBlock:
-    """What the pins of one person pull at its pose.
+    """Return the residual block of the pins of one person.
 
     Args:
         model: the person's body.
-        cameras: all views; distortion is left aside.
+        cameras: all views; their distortion is ignored.
         pins: at least one.
     """
     seen_by = tuple(cameras[p.camera].pinhole for p in pins)

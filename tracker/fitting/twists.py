@@ -1,7 +1,7 @@
-"""From residuals of contours to normal equations: summed per part as twists, carried over to the degrees of freedom.
+"""Convert residuals of contours to normal equations: summed per part as twists, then per degree of freedom.
 
-A point X of a part moves by the part's spatial twist (omega, v) as omega x X + v, so a residual whose gradient in
-space is g has the row (X x g, g), whatever joints move the part.
+A point X of a part moves by the part's spatial twist (omega, v) as omega x X + v. A residual with spatial gradient g
+therefore has the row (X x g, g), whatever joints move the part.
 """
 
 import numpy as np
@@ -14,15 +14,16 @@ from tracker.geometry.arrays import Array, FloatArray, IntArray
 
 @njit(**FAST_MATH)
 def add_twists(span: IntArray, pieces: FloatArray, pulls: Array, P: Array, W: Array, M: Array, b: Array) -> None:
-    """Add what pulls at the pieces of a part in one view to the normal matrix and gradient of the part's twist.
+    """Add the sums of a part's pieces in one view to the normal matrix and gradient of the part's twist.
 
-    The image (u, v) of a surface point X has derivatives (X x a, a) and (X x c, c) by the twist, a and c its gradients
-    in space. Their products with the summed squares S of a piece are those of two rows, by Cholesky's roots of S.
+    The image (u, v) of a surface point X has derivatives (X x a, a) and (X x c, c) by the twist, with a and c the
+    spatial gradients of u and v. Their products with the summed squares S of a piece are those of two rows, by the
+    Cholesky factor of S.
 
     Args:
-        span: index of the part's first piece, and that after its last, (2,).
-        pieces: see `matching.Scratch`, (8, room).
-        pulls: see `matching.Scratch`, (7, room).
+        span: index of the part's first piece, and after its last, (2,).
+        pieces: see `contour_arrays.Scratch`, (8, room).
+        pulls: see `contour_arrays.Scratch`, (7, room).
         P: projection matrix, (3, 4).
         W: from the part's unit coordinates to the world, (3, 4), metres.
         M: upper triangle of the normal matrix, (6, 6), added to.
@@ -93,12 +94,13 @@ def twists_to_dofs(
     M: Array, b: Array, axes: Array, origins: Array, is_length: NDArray[np.bool_], parts: IntArray, parents: IntArray,
     moves: NDArray[np.bool_], gradient: Array, hessian: Array,
 ) -> None:  # fmt: skip
-    """Carry the parts' normal matrices, upper triangles (n_parts, 6, 6), over to the degrees of freedom.
+    """Convert the parts' normal matrices, upper triangles (n_parts, 6, 6), to the degrees of freedom.
 
     The spatial twist of a rotation by axis a through o is (a, o x a), of a translation (0, a). A degree of freedom
-    moves its part and all parts below it alike, so their matrices are summed up the tree first.
+    moves its part and all descendants by the same twist, so their matrices are first summed up the tree. The arguments
+    are not changed.
     """
-    n_parts, n = M.shape[0], axes.shape[0]
+    n_parts, n, M, b = M.shape[0], axes.shape[0], M.copy(), b.copy()
     for p in range(n_parts - 1, 0, -1):
         for i in range(6):
             b[parents[p], i] += b[p, i]
@@ -125,7 +127,7 @@ def twists_to_dofs(
     for k in range(n):
         for m in range(k, n):
             total = 0.0
-            if moves[k, parts[m]]:  # the joints come parent first, so m is the deeper one
+            if moves[k, parts[m]]:  # parents come first, so m is the deeper one
                 for i in range(6):
                     total += twists[k, i] * forces[m, i]
             hessian[k, m] = hessian[m, k] = total

@@ -2,8 +2,8 @@
 
 `T_a_b` maps coordinates of frame b to frame a, so `T_a_c = T_a_b @ T_b_c`.
 
-These functions are used for a few rotations at a time. There scipy's `Rotation` multiplies quaternions and converts
-matrices more slowly, and loading it takes 0.1 s.
+These functions are used for a few rotations at a time. There scipy's `Rotation` multiplies quaternions more slowly, and
+loading it takes 0.1 s.
 """
 
 import numpy as np

@@ -1,2 +1,5 @@
-"""A person's hand in the library: drags, picks, turns, mirrored and copied poses, one frame fitted to pins, a pose
-carried over to other sizes."""
+"""Pose bodies by hand: drags, picks, turns, mirrored and copied poses, fits to pins, and retargeting to other sizes.
+
+The room imports `geometry`, `body`, `evidence`, `fitting` and `tracking.chamfer`. Callers use `drag`, `edits`,
+`orient`, `picking`, `pinned_fit`, `retarget` and `default_pose`.
+"""

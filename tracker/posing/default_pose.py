@@ -1,4 +1,4 @@
-"""Where a body stands before anybody has placed it, and which way is up."""
+"""Default pose of a body before a user has placed it."""
 
 from collections.abc import Sequence
 
@@ -10,19 +10,19 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera, viewed_point
 
 _STRAIGHT_DOWN = 0.1
-"""A camera whose axis has a smaller level component than this looks from above, or from below."""
+"""Level component of a camera's axis below which the camera looks straight down or up."""
 
 
 def default_pose(
     model: BodyModel, cameras: Sequence[Camera], R_world_up: Array | None = None, beside_m: float = 0.0
 ) -> Array:
-    """Upright pose where the cameras look: where a model stands before anybody has placed it.
+    """Return an upright pose where the cameras look.
 
     Args:
         model: the body.
         cameras: the views.
-        R_world_up: rotation whose z axis points up, (3, 3); by default the world's z does.
-        beside_m: how far from the middle it stands, metres to the right as the first camera sees it.
+        R_world_up: rotation whose z axis points up, (3, 3); by default the world's z points up.
+        beside_m: distance from the middle to the right as the first camera sees it, metres.
     """
     R = np.eye(3) if R_world_up is None else R_world_up
     middle = viewed_point(cameras) + beside_m * _rightward(cameras[0], R[:, 2])
@@ -36,7 +36,8 @@ def default_pose(
 
 
 def _rightward(camera: Camera, up: Array) -> Array:
-    """Level direction, (3,), that a camera sees as rightward, however it is rolled; any from straight above."""
+    """Return the level direction, (3,), that a camera sees as rightward, whatever its roll; any if it looks straight
+    down."""
     right = np.cross(camera.T_world_camera[:3, 2], up)
     if np.linalg.norm(right) < _STRAIGHT_DOWN:
         right = np.cross(camera.T_world_camera[:3, 1], up)

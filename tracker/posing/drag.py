@@ -1,8 +1,8 @@
-"""Posing a body by hand: a point of it follows a place in an image, the rest of the chain gives way."""
+"""Drag a point of a body in one view: the point follows the pointer, and its kinematic chain follows the point."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypedDict
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.posing.orient import orient
-from tracker.posing.picking import place_on_part
+from tracker.posing.picking import point_on_part
 
 
 class _Solving(TypedDict):
@@ -24,74 +24,91 @@ class _Solving(TypedDict):
 
 
 _REST_WEIGHT = 0.003
-"""Pull of the rest of the chain to its pose at the grab, per rad, against 1 per metre for the dragged point: it
-decides what the pointer leaves open and holds the point back by some 0.1 mm."""
+"""Weight of keeping the chain at its pose at the grab, per rad, against 1 per metre for the dragged point. It
+determines what the pointer does not, and holds the point back by some 0.1 mm."""
 _STIFF_WEIGHT = 0.015
-"""The same for joints that people bend little, as the waist: limbs move first, the trunk gives way where they end."""
+"""The same for joints that bend little, such as the waist: limbs move first, and the trunk follows beyond their
+reach."""
 _DEPTH_WEIGHT = 0.1
-"""Weight of keeping the point's depth, against 1 for being under the pointer: where the limb's lengths allow only one
-of the two, the point goes where the hand sees it go."""
+"""Weight of keeping the point's depth, against 1 for being under the pointer. If the limb's lengths allow only one of
+the two, the point follows the pointer."""
 
 _ON_JOINT_PX = 8.0
-"""A point grabbed this near to the joint that it turns about does not go round it."""
+"""Largest distance of a grabbed point from its joint at which turning works like a knob, px."""
 _KNOB_M = 0.3
-"""A pointer on the joint turns it by one radian where it goes this far to the right, at the joint's distance."""
+"""Distance to the right by which the pointer turns a knob by one radian, at the joint's depth, metres."""
 _PUSH_GAIN = 2.0
-"""How far a pushed point goes in depth, in ways of the pointer at its distance."""
+"""Motion in depth of a pushed point, in motions of the pointer at the point's depth."""
 _PUSH_DEPTH_WEIGHT = 0.5
-"""Weight of a pushed point's depth, against 1 for staying where the view shows it."""
-_NEAREST_PUSH_M = 0.3
-"""A point is not pulled nearer to the camera than this."""
+"""Weight of a pushed point's depth, against 1 for keeping its position in the view."""
+_MIN_PUSH_DEPTH_M = 0.3
+"""Smallest depth of a pushed point, metres."""
 
 _REACHED_M, _REACHED_DEPTH_M = 0.002, 0.02
-"""A point this near to where it should be, as its view sees it and along its depth, has followed the pointer: the pull
-of the rest holds it back in depth by some 4 mm."""
+"""Tolerances across the line of sight and along it within which a point has reached its target, metres. The pull to the
+rest pose holds a point back in depth by some 4 mm."""
 _BEND_RAD = 0.35
-"""How far the last joint of a chain is bent to leave a straight limb's dead point."""
+"""Angle by which the last joint of a chain is bent to leave the singularity of a straight limb, rad."""
 _STRETCHED = 0.999
-"""A chain has its full length when the point is this share of it away: an elbow bends by 5 degrees there."""
+"""Share of the full length of a chain from which it counts as stretched; an elbow then bends by 5 degrees."""
 
 _QUICK: _Solving = {"max_iterations": 15, "tolerance": 1e-4}
-"""A hand makes dozens of moves a second, each from where the last one ended."""
+"""Solver settings of a move: dozens a second, each from the result of the last one."""
 _BENT: _Solving = {"max_iterations": 6, "tolerance": 1e-4}
-"""So many show whether a limb that was bent comes nearer."""
+"""Solver settings of a test whether a bent limb comes nearer."""
 
 
 @dataclass(frozen=True, eq=False)
 class Grab:
-    """A hand on a point of a body in one view, from press to release."""
+    """A grabbed point of a body in one view, from press to release."""
 
     model: BodyModel
     camera: Camera
-    """The view in which it is dragged; positions are in its undistorted pixels."""
+    """View of the drag; positions are in its undistorted pixels."""
     part: int
     """Index of the part that carries the point."""
-    place_part: Array
-    """Where the point is in the frame of that part, (3,), metres."""
-    values: Array
-    """Pose when it was grabbed, (n_values,)."""
+    point_part: Array
+    """The point in the frame of that part, (3,), metres."""
+    pose: Array
+    """Pose at the grab, (n_values,)."""
     pointer_px: Array
-    """Where the pointer was when it was grabbed, (2,), px."""
+    """Pointer at the grab, (2,), px."""
     depth_m: float
-    """Distance of the point along the optical axis, kept during the drag, metres."""
+    """Depth of the point along the optical axis, kept during the drag, metres."""
     offset_px: Array
-    """From the pointer to the point when it was grabbed, (2,), px; kept, so that nothing jumps."""
-    free: NDArray[np.bool_]
-    """Degrees of freedom that give way, (n_dofs,)."""
-    unlocked: NDArray[np.bool_]
-    """Degrees of freedom that may move at all, (n_dofs,)."""
+    """From the pointer to the point at the grab, (2,), px; kept, so that the point does not jump."""
+    active_dofs: NDArray[np.bool_]
+    """Degrees of freedom that follow the point, (n_dofs,)."""
+    unlocked_dofs: NDArray[np.bool_]
+    """Degrees of freedom that may change at all, (n_dofs,)."""
     moves_body: bool
     """Whether the whole body moves parallel to the image."""
 
-    def place_world(self, values: Array) -> Array:
-        """Where the point is in a pose, (3,), metres."""
-        return rigid.apply(self.model.kinematics(values).Ts_world_part[self.part], self.place_part)
+    def point_world(self, pose: Array) -> Array:
+        """Return the grabbed point in a pose, (3,), metres."""
+        return rigid.apply(self.model.kinematics(pose).Ts_world_part[self.part], self.point_part)
+
+
+class _Handle(NamedTuple):
+    """A point that can be grabbed."""
+
+    part: int
+    """Index of the part that carries it."""
+    point_part: Array
+    """The point in the frame of that part, (3,), metres."""
+    movers: NDArray[np.bool_]
+    """Degrees of freedom that move it, (n_dofs,)."""
+    moves_body: bool
+    """Whether it moves the whole body."""
+    name: str
+    """Name for messages."""
 
 
 def minor_points(model: BodyModel) -> tuple[str, ...]:
-    """Joints that a hand hardly needs: rigid ones, and those that bend the trunk a little (waist, neck, collarbones).
+    """Return the joints that a user rarely drags: rigid ones, and those that bend the trunk a little (waist, neck,
+    collarbones).
 
-    Dragged, they turn the body about its root, as hips, shoulders and head do; and these bend them too.
+    Dragging them turns the body about its root, like hips, shoulders and head, and also bends these joints.
     """
     stiff = [np.all(np.isfinite(model.spreads[model.dof_joint == i])) for i in range(len(model.joints))]
     return tuple(j.name for j, is_stiff in zip(model.joints, stiff, strict=True) if is_stiff)
@@ -99,174 +116,176 @@ def minor_points(model: BodyModel) -> tuple[str, ...]:
 
 def grab(
     model: BodyModel,
-    values: Array,
+    pose: Array,
     camera: Camera,
     point: str,
     pointer_px: Array,
-    free: NDArray[np.bool_] | None = None,
+    active_dofs: NDArray[np.bool_] | None = None,
 ) -> Grab:
-    """Take hold of a point of a body.
+    """Grab a point of a body.
 
-    The root point moves the whole body. A point of a limb, or of a head on a neck that bends, moves its chain up to the
-    trunk; a point of the trunk turns the body about its root, and bends what of the trunk can bend.
+    The root point moves the whole body. A point of a limb, or of a head on a bending neck, moves its chain up to the
+    trunk. A point of the trunk turns the body about its root and bends the trunk.
 
     Args:
         model: the body.
-        values: its pose, (n_values,).
+        pose: its pose, (n_values,).
         camera: the view.
         point: name of the point.
-        pointer_px: where the pointer is, undistorted px, (2,).
-        free: which degrees of freedom may give way, (n_dofs,); all by default.
+        pointer_px: position of the pointer, undistorted px, (2,).
+        active_dofs: degrees of freedom that may change, (n_dofs,); all by default.
 
     Raises:
-        TrackerError: whatever moves the point is locked.
+        TrackerError: everything that moves the point is locked.
     """
     index = model.point_names.index(point)
-    moving = model.moves[:, model.point_parts[index]].copy()
+    movers = model.moves[:, model.point_parts[index]].copy()
     if index < len(model.joints):
-        moving &= model.dof_joint != index  # a joint turns about itself: that does not move it
-    part = int(model.point_parts[index])
-    return _take_hold(
-        model, values, camera, part, model.points_part[index], pointer_px, free, moving, index == 0, point
-    )
+        movers &= model.dof_joint != index  # a joint's own rotation does not move it
+    handle = _Handle(int(model.point_parts[index]), model.points_part[index], movers, index == 0, point)
+    return _grab_handle(model, pose, camera, handle, pointer_px, active_dofs)
 
 
 def grab_part(
     model: BodyModel,
-    values: Array,
+    pose: Array,
     camera: Camera,
     part: int,
     pointer_px: Array,
-    free: NDArray[np.bool_] | None = None,
+    active_dofs: NDArray[np.bool_] | None = None,
 ) -> Grab:
-    """Take hold of a part of a body where a pointer touches its surface.
+    """Grab a part of a body where the pointer touches its surface.
 
-    The root part moves the whole body; any other part follows by that place, as a point of its does.
+    The root part moves the whole body. Any other part follows by the touched point.
 
     Args:
         model: the body.
-        values: its pose, (n_values,).
+        pose: its pose, (n_values,).
         camera: the view.
         part: index of the part.
-        pointer_px: where the pointer is, undistorted px, (2,).
-        free: which degrees of freedom may give way, (n_dofs,); all by default.
+        pointer_px: position of the pointer, undistorted px, (2,).
+        active_dofs: degrees of freedom that may change, (n_dofs,); all by default.
 
     Raises:
-        TrackerError: whatever moves the part is locked.
+        TrackerError: everything that moves the part is locked.
     """
-    place = place_on_part(PosedBody(model, values), camera, part, pointer_px)
-    name, moving = model.parts[part].name, model.moves[:, part]
-    return _take_hold(model, values, camera, part, place, pointer_px, free, moving, part == 0, name)
+    point_part = point_on_part(PosedBody(model, pose), camera, part, pointer_px)
+    handle = _Handle(part, point_part, model.moves[:, part], part == 0, model.parts[part].name)
+    return _grab_handle(model, pose, camera, handle, pointer_px, active_dofs)
 
 
-def _take_hold(
+def _grab_handle(
     model: BodyModel,
-    values: Array,
+    pose: Array,
     camera: Camera,
-    part: int,
-    place_part: Array,
+    handle: _Handle,
     pointer_px: Array,
-    free: NDArray[np.bool_] | None,
-    moving: NDArray[np.bool_],
-    moves_body: bool,
-    name: str,
+    active_dofs: NDArray[np.bool_] | None,
 ) -> Grab:
-    """Decide what gives way where a place of a part is held, which some degrees of freedom move."""
-    place = rigid.apply(model.kinematics(values).Ts_world_part[part], place_part)
-    unlocked = np.ones(model.n_dofs, dtype=bool) if free is None else free
+    """Choose the degrees of freedom that follow a handle."""
+    point_world = rigid.apply(model.kinematics(pose).Ts_world_part[handle.part], handle.point_part)
+    unlocked = np.ones(model.n_dofs, dtype=bool) if active_dofs is None else active_dofs
     of_root = model.dof_joint == 0
-    own = moving & ~of_root
-    carries_others = part in model.parents
-    if moves_body:
-        gives = of_root & model.dof_is_length
+    own = handle.movers & ~of_root
+    carries_others = handle.part in model.parents
+    if handle.moves_body:
+        follows = of_root & model.dof_is_length
     elif np.any(own & ~np.isfinite(model.spreads)) or (np.any(own) and not carries_others):
-        gives = own
+        follows = own
     else:
-        gives = moving & ~model.dof_is_length
-    gives = gives & unlocked
-    # Where the limb is locked as a whole nothing else is moved in its place: a lock is meant to hold the hand too.
-    if not np.any(gives):
-        raise TrackerError(f"expected a point that something moves, found {name} with all of that locked; unlock it")
+        follows = handle.movers & ~model.dof_is_length
+    follows = follows & unlocked
+    # If the whole limb is locked, nothing else moves in its place: the lock is meant to hold the dragged point too.
+    if not np.any(follows):
+        raise TrackerError(
+            f"expected a point that something moves, found {handle.name} with all of that locked; unlock it"
+        )
     pointer_px = np.asarray(pointer_px, dtype=np.float64)
     return Grab(
-        model, camera.pinhole, part, place_part, np.array(values), pointer_px, float(camera.depths(place)),
-        camera.pinhole.project(place) - pointer_px, gives, unlocked, moves_body,
+        model, camera.pinhole, handle.part, handle.point_part, np.array(pose), pointer_px,
+        float(camera.depths(point_world)), camera.pinhole.project(point_world) - pointer_px, follows, unlocked,
+        handle.moves_body,
     )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class _UnderPointer:
-    """A `ResidualBlock` that draws the grabbed point to a line of sight and, more weakly, to a depth."""
+class _PointerTarget:
+    """Residuals of the grabbed point: across the line of sight and, with less weight, in depth; see `ResidualBlock`."""
 
-    hand: Grab
+    grabbed: Grab
     target_world: Array
-    """Where the point should be, (3,), metres: under the pointer, at the depth."""
+    """Target of the point, (3,), metres: under the pointer, at the depth."""
     depth_weight: float = _DEPTH_WEIGHT
 
-    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+    def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
-        hand, (target_px, m_per_px, depth_axis) = self.hand, self._image
-        point_world = rigid.apply(kinematics.Ts_world_part[hand.part], hand.place_part)
-        points_px, px_by_point = hand.camera.project_with_jacobian(point_world[None])
+        grabbed, (target_px, m_per_px, depth_axis) = self.grabbed, self._image
+        point_world = rigid.apply(kinematics.Ts_world_part[grabbed.part], grabbed.point_part)
+        points_px, px_by_point = grabbed.camera.project_with_jacobian(point_world[None])
         r, by_point = np.empty(3), np.empty((3, 3))
         r[:2], by_point[:2] = m_per_px @ (points_px[0] - target_px), m_per_px @ px_by_point[0]
         r[2], by_point[2] = depth_axis @ (point_world - self.target_world), depth_axis
-        J_world = model.point_jacobian(kinematics, np.array([hand.part]), point_world[None])[0]  # (3, n_dofs)
+        J_world = model.point_jacobian(kinematics, np.array([grabbed.part]), point_world[None])[0]  # (3, n_dofs)
         return normal_equations(r, by_point @ J_world)
 
     @cached_property
     def _image(self) -> tuple[Array, Array, Array]:
-        """The target's pixel, (2,), metres at the grab's depth per pixel, (2, 2), and the weighted depth axis, (3,)."""
-        camera = self.hand.camera
+        """Target in the image, (2,), px; metres per pixel at the depth of the grab, (2, 2); weighted depth axis,
+        (3,)."""
+        camera = self.grabbed.camera
         target_px = camera.project_with_jacobian(self.target_world[None])[0][0]
-        m_per_px = np.asarray(self.hand.depth_m * np.linalg.inv(camera.K[:2, :2]), dtype=np.float64)
+        m_per_px = np.asarray(self.grabbed.depth_m * np.linalg.inv(camera.K[:2, :2]), dtype=np.float64)
         return target_px, m_per_px, self.depth_weight * camera.T_camera_world[2, :3]
 
 
-def drag(hand: Grab, pointer_px: Array, values: Array) -> Array:
-    """Let the grabbed point follow the pointer, as near to the depth it had as the limb's lengths allow.
+def drag(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
+    """Let the grabbed point follow the pointer, as near to its depth as the limb's lengths allow.
 
     Args:
-        hand: from `grab`.
-        pointer_px: where the pointer is now, undistorted px, (2,).
-        values: the pose of the last call, from which to go on, (n_values,).
+        grabbed: from `grab` or `grab_part`.
+        pointer_px: position of the pointer, undistorted px, (2,).
+        pose: pose after the last move, (n_values,).
 
     Returns:
-        The new pose, (n_values,); the nearest that limits and lengths allow.
+        The new pose, (n_values,), the nearest that limits and lengths allow.
     """
-    model = hand.model
-    target = hand.camera.back_project(np.asarray(pointer_px) + hand.offset_px, hand.depth_m)
-    if hand.moves_body:
-        return _moved_body(hand, target)
+    model = grabbed.model
+    target = grabbed.camera.back_project(np.asarray(pointer_px) + grabbed.offset_px, grabbed.depth_m)
+    if grabbed.moves_body:
+        return _moved_body(grabbed, target)
     blocks: list[ResidualBlock] = [
-        _UnderPointer(hand, target),
-        _rest(hand),
+        _PointerTarget(grabbed, target),
+        _rest_prior(grabbed),
     ]
-    fit = solve(model, values, blocks, free=hand.free, **_QUICK)
-    joint, first = model.dof_joint[hand.free][[-1, 0]]
-    if joint == first or _has_reached(hand, fit.pose, target) or _is_stretched(hand, fit.pose, int(first), target):
+    fit = solve(model, pose, blocks, active_dofs=grabbed.active_dofs, **_QUICK)
+    joint, first = model.dof_joint[grabbed.active_dofs][[-1, 0]]
+    if (
+        joint == first
+        or _has_reached(grabbed, fit.pose, target)
+        or _is_stretched(grabbed, fit.pose, int(first), target)
+    ):
         return fit.pose
-    # A straight limb cannot see that bending would bring the point nearer: begin with its joint bent, either way.
+    # At a straight limb the gradient of bending is 0: restart with its joint bent, either way.
     for bend in (_BEND_RAD, -_BEND_RAD):
-        start = model.clip(model.retract(values, np.where(hand.free & (model.dof_joint == joint), bend, 0.0)))
-        bent = solve(model, start, blocks, free=hand.free, **_BENT)
+        start = model.clip(model.retract(pose, np.where(grabbed.active_dofs & (model.dof_joint == joint), bend, 0.0)))
+        bent = solve(model, start, blocks, active_dofs=grabbed.active_dofs, **_BENT)
         if bent.cost < fit.cost:
-            fit = solve(model, bent.pose, blocks, free=hand.free, **_QUICK)
+            fit = solve(model, bent.pose, blocks, active_dofs=grabbed.active_dofs, **_QUICK)
     return fit.pose
 
 
-def _has_reached(hand: Grab, values: Array, target_world: Array) -> bool:
-    """Whether the grabbed point is where it should be, as far as a hand can tell."""
-    seen = rigid.apply(hand.camera.T_camera_world, np.stack([hand.place_world(values), target_world]))
-    across = hand.depth_m * np.diff(seen[:, :2] / np.maximum(seen[:, 2:], NEAR_PLANE_M), axis=0)
+def _has_reached(grabbed: Grab, pose: Array, target_world: Array) -> bool:
+    """Return whether the grabbed point is at its target, within visible tolerances."""
+    seen = rigid.apply(grabbed.camera.T_camera_world, np.stack([grabbed.point_world(pose), target_world]))
+    across = grabbed.depth_m * np.diff(seen[:, :2] / np.maximum(seen[:, 2:], NEAR_PLANE_M), axis=0)
     return bool(np.linalg.norm(across) < _REACHED_M and abs(seen[1, 2] - seen[0, 2]) < _REACHED_DEPTH_M)
 
 
-def _is_stretched(hand: Grab, values: Array, first: int, target_world: Array) -> bool:
-    """Whether the chain from a joint on is stretched to its full length, and what it should reach is farther away."""
-    model, part = hand.model, hand.part
-    places = [hand.place_world(values)]
-    Ts_world_part = model.kinematics(values).Ts_world_part
+def _is_stretched(grabbed: Grab, pose: Array, first: int, target_world: Array) -> bool:
+    """Return whether the chain from a joint on has its full length and its target is farther away."""
+    model, part = grabbed.model, grabbed.part
+    places = [grabbed.point_world(pose)]
+    Ts_world_part = model.kinematics(pose).Ts_world_part
     while part != first:
         places.append(Ts_world_part[part, :3, 3])
         part = int(model.parents[part])
@@ -275,73 +294,82 @@ def _is_stretched(hand: Grab, values: Array, first: int, target_world: Array) ->
     return bool(min(np.linalg.norm(p - places[-1]) for p in (places[0], target_world)) > _STRETCHED * length)
 
 
-def regrab(hand: Grab, values: Array, pointer_px: Array) -> Grab:
-    """The same hand on the same place, taken anew in another pose, (n_values,), with the pointer elsewhere, (2,)."""
-    place = hand.place_world(values)
+def regrab(grabbed: Grab, pose: Array, pointer_px: Array) -> Grab:
+    """Return the same grab of the same point in another pose, (n_values,), with the pointer elsewhere, (2,)."""
+    place = grabbed.point_world(pose)
     return replace(
-        hand,
-        values=np.array(values),
+        grabbed,
+        pose=np.array(pose),
         pointer_px=np.asarray(pointer_px, dtype=np.float64),
-        depth_m=float(hand.camera.depths(place)),
-        offset_px=hand.camera.project(place) - pointer_px,
+        depth_m=float(grabbed.camera.depths(place)),
+        offset_px=grabbed.camera.project(place) - pointer_px,
     )
 
 
-def turn(hand: Grab, pointer_px: Array, values: Array) -> Array:
-    """Turn the grabbed part about the line of sight through its joint, as far as the pointer goes round the joint.
+def turn(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
+    """Turn the grabbed part about the line of sight through its joint by the angle that the pointer goes round the
+    joint.
 
-    Of the joints that give way it is the one next to the grabbed point; where the whole body is held, the body turns.
-    Where the pointer is on the joint itself it turns as a knob does, by the way to the right. A joint that cannot turn
-    about the line of sight turns so that the point comes near to its place there.
+    The turned joint is the active one next to the grabbed point; if the whole body is grabbed, the body turns. With the
+    pointer on the joint itself, the part turns like a knob by the pointer's motion to the right. A joint that cannot
+    turn about the line of sight turns so that the point comes near to its target.
 
     Args:
-        hand: from `grab` or `grab_part`.
-        pointer_px: where the pointer is now, undistorted px, (2,).
-        values: the pose of the last call, from which to go on, (n_values,).
+        grabbed: from `grab` or `grab_part`.
+        pointer_px: position of the pointer, undistorted px, (2,).
+        pose: pose after the last move, (n_values,).
     """
-    model, camera = hand.model, hand.camera
-    part = 0 if hand.moves_body else int(model.dof_joint[np.flatnonzero(hand.free & ~model.dof_is_length)[-1]])
-    T_world_part = model.kinematics(hand.values).Ts_world_part[part]
+    model, camera = grabbed.model, grabbed.camera
+    part = (
+        0
+        if grabbed.moves_body
+        else int(model.dof_joint[np.flatnonzero(grabbed.active_dofs & ~model.dof_is_length)[-1]])
+    )
+    T_world_part = model.kinematics(grabbed.pose).Ts_world_part[part]
     pivot_px = camera.project(T_world_part[:3, 3])
-    start, now = hand.pointer_px + hand.offset_px - pivot_px, np.asarray(pointer_px) + hand.offset_px - pivot_px
+    start, now = (
+        grabbed.pointer_px + grabbed.offset_px - pivot_px,
+        np.asarray(pointer_px) + grabbed.offset_px - pivot_px,
+    )
     if np.linalg.norm(start) < _ON_JOINT_PX:
-        angle = float(now[0] - start[0]) * hand.depth_m / camera.K[0, 0] / _KNOB_M
+        angle = float(now[0] - start[0]) * grabbed.depth_m / camera.K[0, 0] / _KNOB_M
     else:
         angle = float(np.arctan2(start[0] * now[1] - start[1] * now[0], start @ now))
     sight = T_world_part[:3, 3] - camera.center_world
     R_turn = rigid.so3_exp(angle * sight / np.linalg.norm(sight))
-    own = (model.dof_joint == part) & ~model.dof_is_length & hand.unlocked
+    own = (model.dof_joint == part) & ~model.dof_is_length & grabbed.unlocked_dofs
     if model.joints[part].kind == "ball" or np.count_nonzero(own) >= 3:
-        return orient(model, values, part, R_turn @ T_world_part[:3, :3], hand.unlocked)
-    target = T_world_part[:3, 3] + R_turn @ (hand.place_world(hand.values) - T_world_part[:3, 3])
-    return solve(model, values, [_UnderPointer(hand, target)], free=own, **_QUICK).pose
+        return orient(model, pose, part, R_turn @ T_world_part[:3, :3], grabbed.unlocked_dofs)
+    target = T_world_part[:3, 3] + R_turn @ (grabbed.point_world(grabbed.pose) - T_world_part[:3, 3])
+    return solve(model, pose, [_PointerTarget(grabbed, target)], active_dofs=own, **_QUICK).pose
 
 
-def push(hand: Grab, pointer_px: Array, values: Array) -> Array:
-    """Move the grabbed point away from the camera, as the pointer goes up, or towards it; in the view it stays.
+def push(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
+    """Move the grabbed point away from the camera as the pointer goes up, or towards it; its position in the view
+    stays.
 
     Args:
-        hand: from `grab` or `grab_part`.
-        pointer_px: where the pointer is now, undistorted px, (2,).
-        values: the pose of the last call, from which to go on, (n_values,).
+        grabbed: from `grab` or `grab_part`.
+        pointer_px: position of the pointer, undistorted px, (2,).
+        pose: pose after the last move, (n_values,).
     """
-    model, camera = hand.model, hand.camera
-    up_m = float(hand.pointer_px[1] - np.asarray(pointer_px)[1]) * hand.depth_m / camera.K[1, 1]
-    depth = max(_NEAREST_PUSH_M, hand.depth_m + _PUSH_GAIN * up_m)
-    target = camera.back_project(hand.pointer_px + hand.offset_px, depth)
-    if hand.moves_body:
-        return _moved_body(hand, target)
-    blocks: list[ResidualBlock] = [_UnderPointer(hand, target, _PUSH_DEPTH_WEIGHT), _rest(hand)]
-    return solve(model, values, blocks, free=hand.free, **_QUICK).pose
+    model, camera = grabbed.model, grabbed.camera
+    up_m = float(grabbed.pointer_px[1] - np.asarray(pointer_px)[1]) * grabbed.depth_m / camera.K[1, 1]
+    depth = max(_MIN_PUSH_DEPTH_M, grabbed.depth_m + _PUSH_GAIN * up_m)
+    target = camera.back_project(grabbed.pointer_px + grabbed.offset_px, depth)
+    if grabbed.moves_body:
+        return _moved_body(grabbed, target)
+    blocks: list[ResidualBlock] = [_PointerTarget(grabbed, target, _PUSH_DEPTH_WEIGHT), _rest_prior(grabbed)]
+    return solve(model, pose, blocks, active_dofs=grabbed.active_dofs, **_QUICK).pose
 
 
-def _moved_body(hand: Grab, target_world: Array) -> Array:
-    """The pose at the grab, moved as a whole so that the grabbed point comes to a place, (3,), metres."""
-    step = np.zeros(hand.model.n_dofs)
-    step[:3] = target_world - hand.place_world(hand.values)
-    return hand.model.retract(hand.values, np.where(hand.free, step, 0.0))
+def _moved_body(grabbed: Grab, target_world: Array) -> Array:
+    """Return the pose at the grab, translated so that the grabbed point comes to a position, (3,), metres."""
+    step = np.zeros(grabbed.model.n_dofs)
+    step[:3] = target_world - grabbed.point_world(grabbed.pose)
+    return grabbed.model.retract(grabbed.pose, np.where(grabbed.active_dofs, step, 0.0))
 
 
-def _rest(hand: Grab) -> PosePrior:
-    """What keeps the chain near its pose at the grab."""
-    return PosePrior(hand.values, np.where(np.isfinite(hand.model.spreads), _STIFF_WEIGHT, _REST_WEIGHT))
+def _rest_prior(grabbed: Grab) -> PosePrior:
+    """Return the prior that keeps the chain near its pose at the grab."""
+    return PosePrior(grabbed.pose, np.where(np.isfinite(grabbed.model.spreads), _STIFF_WEIGHT, _REST_WEIGHT))

@@ -1,4 +1,4 @@
-"""Turning one part of a body to a wanted orientation by the degrees of freedom of its own joint."""
+"""Turn one part of a body to a target orientation by the degrees of freedom of its own joint."""
 
 from dataclasses import dataclass
 
@@ -12,40 +12,40 @@ from tracker.geometry.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)
-class _Orientation:
-    """A `ResidualBlock` that draws the axes of a part to wanted directions."""
+class _OrientationTarget:
+    """Residuals between the axes of a part and target directions; see `ResidualBlock`."""
 
     part: int
-    R_world_wanted: Array
-    """(3, 3)."""
+    R_world_target: Array
+    """Target orientation, (3, 3)."""
 
-    def linearize(self, model: BodyModel, values: Array, kinematics: Kinematics) -> NormalEquations:
+    def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
         R = kinematics.Ts_world_part[self.part, :3, :3]
         turns = np.where(model.dof_is_length[:, None], 0.0, kinematics.axes_world)
         turns = turns * model.moves[:, [self.part]]
         # A turn about a moves the axes of the part, the columns of R, by a x R.
         J = np.cross(turns[:, None, :], R.T[None])  # (n_dofs, axis, 3)
-        return normal_equations((R - self.R_world_wanted).T.ravel(), J.reshape(model.n_dofs, 9).T)
+        return normal_equations((R - self.R_world_target).T.ravel(), J.reshape(model.n_dofs, 9).T)
 
 
 def orient(
-    model: BodyModel, values: Array, part: int, R_world_wanted: Array, free: NDArray[np.bool_] | None = None
+    model: BodyModel, pose: Array, part: int, R_world_target: Array, active_dofs: NDArray[np.bool_] | None = None
 ) -> Array:
-    """Turn a part as near to a wanted orientation as its own joint allows; all other joints stay.
+    """Turn a part as near to a target orientation as its own joint allows; all other joints stay.
 
     Args:
         model: the body.
-        values: its pose, (n_values,).
+        pose: its pose, (n_values,).
         part: index of the part, and of the joint that moves it.
-        R_world_wanted: orientation of the part's frame, (3, 3).
-        free: which degrees of freedom may move, (n_dofs,); all by default.
+        R_world_target: orientation of the part's frame, (3, 3).
+        active_dofs: degrees of freedom that may change, (n_dofs,); all by default.
 
     Returns:
         The new pose, (n_values,), within the joint limits.
     """
     own = (model.dof_joint == part) & ~model.dof_is_length
-    own = own if free is None else own & free
+    own = own if active_dofs is None else own & active_dofs
     if not np.any(own):
-        return np.array(values)
-    return solve(model, values, [_Orientation(part, R_world_wanted)], free=own, tolerance=1e-7).pose
+        return np.array(pose)
+    return solve(model, pose, [_OrientationTarget(part, R_world_target)], active_dofs=own, tolerance=1e-7).pose

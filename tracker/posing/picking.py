@@ -1,4 +1,4 @@
-"""Parts of bodies under a pointer: their outlines in a view, and the place on their surface that it touches."""
+"""Pick body parts with the pointer: their convex hulls in a view, and the touched point on their surface."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -14,26 +14,26 @@ from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.shapes import Shape
 
 _RINGS, _SECTORS = 10, 20
-"""Fineness of an outline: it is within some 1% of the part's girth."""
+"""Resolution of a hull: it is accurate to some 1% of the part's girth."""
 
 
 class PartHull(NamedTuple):
-    """Where a view shows a part, whatever hides it."""
+    """Convex hull of a part in a view, whatever occludes it."""
 
     body: int
     """Index of the body."""
     part: int
     """Index of the part."""
     depth_m: float
-    """Distance of the part's centre along the optical axis: of parts that overlap the nearest is meant."""
+    """Depth of the part's centre along the optical axis, metres; of overlapping parts the nearest is picked."""
     polygon_px: FloatArray
-    """Convex outline, (n, 2), undistorted px."""
+    """Convex polygon, (n, 2), undistorted px."""
 
 
 def part_hulls(bodies: Sequence[PosedBody], cameras: Sequence[Camera]) -> list[list[PartHull]]:
-    """Outlines of all parts in some views; those too near to the camera, or behind it, are left out.
+    """Return the hulls of all parts in some views, without parts before the near plane.
 
-    All kinds of parts are convex, or so nearly that nobody sees it: the hull of the surface is the outline.
+    All kinds of parts are practically convex, so the hull of the surface is their outline.
     """
     found: list[list[PartHull]] = [[] for _ in cameras]
     for b, body in enumerate(bodies):
@@ -47,13 +47,13 @@ def part_hulls(bodies: Sequence[PosedBody], cameras: Sequence[Camera]) -> list[l
     return found
 
 
-def place_on_part(body: PosedBody, camera: Camera, part: int, pointer_px: Array) -> Array:
-    """The place on a part that a pointer touches, (3,), in the part's frame, metres.
+def point_on_part(body: PosedBody, camera: Camera, part: int, pointer_px: Array) -> Array:
+    """Return the point of a part that the pointer touches, (3,), in the part's frame, metres.
 
-    Where the line of sight just misses the part, as it may along its outline, it is the place nearest to the line.
+    If the line of sight just misses the part, this is the surface point nearest to the line.
 
     Args:
-        body: with its pose.
+        body: the posed body.
         camera: the view.
         part: index of the part.
         pointer_px: undistorted px, (2,).
@@ -63,7 +63,7 @@ def place_on_part(body: PosedBody, camera: Camera, part: int, pointer_px: Array)
     ray = rigid.apply(T_part_world, camera.pinhole.back_project(np.asarray(pointer_px, dtype=np.float64), 1.0)) - start
     ray /= np.linalg.norm(ray)
     corners = _triangles(body.model.shapes[part]) + body.model.centers_part[part]  # (n, 3 corners, 3)
-    # Where the line meets each triangle's plane, in the triangle's own coordinates (Moeller & Trumbore 1997).
+    # Intersection of the line with each triangle's plane, in barycentric coordinates (Moeller & Trumbore 1997).
     ab, ac = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     across = np.cross(ray, ac)
     det = np.einsum("ij,ij->i", ab, across)
@@ -82,13 +82,13 @@ def place_on_part(body: PosedBody, camera: Camera, part: int, pointer_px: Array)
 
 @lru_cache(maxsize=32)
 def _surfaces(model: BodyModel) -> Array:
-    """The centre of each part, then points on its surface, (n_parts, 1 + n, 3), in the part's frame, metres."""
+    """Return the centre of each part, then points on its surface, (n_parts, 1 + n, 3), in the part's frame, metres."""
     surfaces = [shape.triangles(_RINGS, _SECTORS).vertices for shape in model.shapes]
     return np.stack([np.vstack([c, s + c]) for s, c in zip(surfaces, model.centers_part, strict=True)])
 
 
 @lru_cache(maxsize=256)
 def _triangles(shape: Shape) -> Array:
-    """Corners of a shape's triangles, (n, 3, 3), in its frame, metres."""
+    """Return the corners of a shape's triangles, (n, 3, 3), in its frame, metres."""
     vertices, faces = shape.triangles()
     return vertices[faces]

@@ -1,14 +1,15 @@
 """Best-first search over a decomposed pose space (GD96 Sect. 4.1, Eq. 4-7 and Fig. 2).
 
-The space of a stage is a lattice around the prediction in a few degrees of freedom, the others held. The cheapest
-node not yet expanded is expanded: its neighbours along each axis are scored. The search is a generator of steps, one
-per expansion, so that a person can watch it and a program can drain it; whoever stops it keeps the best pose so far.
+The space of a stage is a lattice around the prediction in a few degrees of freedom, with the others fixed. The cheapest
+unexpanded node is expanded: its neighbours along each axis are scored. The search is a generator with one step per
+expansion, so that a user can watch it and a program can drain it. It can be stopped after any step.
 """
 
 import heapq
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from tracker.search.chamfer_cost import ChamferCost
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """Bounds and steps of the lattice; the defaults are those of GD96 Sect. 5, but for the finer passes."""
+    """Bounds and steps of the lattice. The defaults are those of GD96 Sect. 5, with finer passes added."""
 
     bound_rad: float = float(np.radians(15))
     """Largest change of an angle from the prediction, rad."""
@@ -33,25 +34,25 @@ class SearchSettings:
     step_m: float = 0.05
     """Spacing of the lattice along a position, metres."""
     bounds: dict[str, float] = field(default_factory=dict)
-    """Bounds of single degrees of freedom by name, rad or metres, where they differ."""
+    """Bounds of single degrees of freedom by name where they differ, rad or metres."""
     steps: dict[str, float] = field(default_factory=dict)
-    """Steps of single degrees of freedom by name, rad or metres, where they differ."""
+    """Steps of single degrees of freedom by name where they differ, rad or metres."""
     passes: tuple[float, ...] = (1.0, 0.5, 0.25)
-    """Factors on the steps: all stages are searched once per factor, each time around the best pose so far.
-    The paper's single pass is `(1.0,)`."""
+    """Factors on the steps. All stages are searched once per factor, each time around the best pose so far. The paper's
+    single pass is `(1.0,)`."""
     patience: int = 3
-    """A stage ends after this many expansions in a row that found nothing better (the paper gives no rule)."""
+    """Number of consecutive expansions without improvement that end a stage (the paper gives no rule)."""
     max_expansions: int = 60
-    """A stage ends after this many expansions in any case."""
+    """Largest number of expansions of a stage."""
     limbs_apart: bool = False
-    """Whether the limbs of a group are searched one after the other. Two arms hardly know of each other, and together
-    each expansion scores the neighbours of both where one moves. The paper searches them together."""
+    """Whether the limbs of a group are searched one after the other. Two arms are nearly independent, and searching
+    them together scores the neighbours of both for each move of one. The paper searches them together."""
 
     def __post_init__(self) -> None:
-        """Refuse what no lattice can be made of.
+        """Check the settings.
 
         Raises:
-            TrackerError: a bound below 0, a step or pass not above 0, or a stage that may not take a single expansion.
+            TrackerError: a bound below 0, a step or pass not above 0, or a stage without a single expansion.
         """
         for name, bound in {"angles": self.bound_rad, "positions": self.bound_m, **self.bounds}.items():
             if not (np.isfinite(bound) and bound >= 0):
@@ -70,7 +71,7 @@ class SearchSettings:
             )
 
     def lattice(self, model: BodyModel, dofs: Sequence[int]) -> tuple[Array, Array]:
-        """Bounds and steps of some degrees of freedom, each (len(dofs),), rad or metres."""
+        """Return bounds and steps of some degrees of freedom, each (len(dofs),), rad or metres."""
         names = [model.dof_names[d] for d in dofs]
         lengths = model.dof_is_length[list(dofs)]
         bounds = [
@@ -83,9 +84,7 @@ class SearchSettings:
 
 
 COARSE_SEARCH = SearchSettings(passes=(1.5,), patience=1, limbs_apart=True)
-"""A search that only has to come near, because a refinement follows. Of 90 starts 8 to 12 degrees and 5 to 8 cm off in
-every degree of freedom 70 were refined to the true pose after it, with 145 poses scored; after the defaults it were 76,
-with 1,100; without a search 10."""
+"""A coarse search before a refinement; it scores a small fraction of the poses of the default search."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,30 +94,30 @@ class Stage:
     person: int
     """Index of the person whose pose is searched."""
     group: SearchGroup
-    """The degrees of freedom searched together."""
+    """Degrees of freedom searched together."""
     factor: float
     """Factor on the steps of the lattice."""
 
     @property
     def name(self) -> str:
-        """Name for people to read."""
+        """Name for display."""
         return self.group.name if self.factor == 1 else f"{self.group.name}, steps x {self.factor:g}"
 
 
 @dataclass(frozen=True, eq=False)
 class SearchStep:
-    """What one expansion did."""
+    """Result of one expansion."""
 
     stage: Stage
     candidate: tuple[Array, ...]
-    """Pose of each person with the cheapest of the nodes just scored, (n_values,) each."""
+    """Pose of each person, with the cheapest of the nodes just scored, (n_values,) each."""
     candidate_px: float
-    """Its cost, px."""
+    """Cost of the candidate, px."""
     best: tuple[Array, ...]
     """Cheapest poses so far, (n_values,) each."""
     best_px: float
     """Their cost, px."""
-    best_views_px: Array
+    best_view_costs_px: Array
     """Their cost in each view, (V,), px; NaN for views without edges."""
     evaluations: int
     """Poses scored since the search began."""
@@ -126,15 +125,34 @@ class SearchStep:
     """Whether this was the last step of its stage."""
 
 
+class _Progress(NamedTuple):
+    """State of the search between stages."""
+
+    best: tuple[Array, ...]
+    """Cheapest poses so far, (n_values,) each."""
+    best_px: float
+    """Their cost, px."""
+    best_view_costs_px: Array
+    """Their cost in each view, (V,), px."""
+    evaluations: int
+    """Poses scored so far."""
+
+
 def stages(
     models: Sequence[BodyModel],
     settings: SearchSettings,
     people: Sequence[int] | None = None,
-    free: Sequence[NDArray[np.bool_]] | None = None,
+    active_dofs: Sequence[NDArray[np.bool_]] | None = None,
 ) -> list[Stage]:
-    """List the leaves of the decomposition in the order of search: pass by pass, person by person (GD96 Fig. 2).
+    """List the leaves of the decomposition in order of search: pass by pass, person by person (GD96 Fig. 2).
 
-    Degrees of freedom that are not `free`, (n_dofs,) of each person, are left out, and so are leaves left empty.
+    Leaves without any active degree of freedom are left out.
+
+    Args:
+        models: body of each person.
+        settings: passes and decomposition.
+        people: indices of the people to search; all by default.
+        active_dofs: degrees of freedom of each person that may change, (n_dofs,); all by default.
     """
     chosen = range(len(models)) if people is None else people
     return [
@@ -143,19 +161,19 @@ def stages(
         for person in chosen
         for group in models[person].search_groups
         for leaf in (_limbs(models[person], group) if settings.limbs_apart else (group,))
-        if (left := _free_of(leaf, models[person], None if free is None else free[person])).dofs
+        if (left := _active_group(leaf, models[person], None if active_dofs is None else active_dofs[person])).dofs
     ]
 
 
-def _free_of(group: SearchGroup, model: BodyModel, free: NDArray[np.bool_] | None) -> SearchGroup:
-    """What of a group may move."""
-    if free is None:
+def _active_group(group: SearchGroup, model: BodyModel, active_dofs: NDArray[np.bool_] | None) -> SearchGroup:
+    """Return a group restricted to active degrees of freedom."""
+    if active_dofs is None:
         return group
-    return replace(group, dofs=tuple(d for d in group.dofs if free[model.dof_names.index(d)]))
+    return replace(group, dofs=tuple(d for d in group.dofs if active_dofs[model.dof_names.index(d)]))
 
 
 def _limbs(model: BodyModel, group: SearchGroup) -> list[SearchGroup]:
-    """Divide a group into the joints that the body branches below, and its limbs one by one."""
+    """Divide a group into the joints above a branch of the body, and its limbs one by one."""
     children = Counter(model.parents)
     branches = [children[part] > 1 for part in range(len(model.parts))]
     for part in range(len(model.parts) - 1, 0, -1):
@@ -176,34 +194,31 @@ def search(
     poses: Sequence[Array],
     settings: SearchSettings | None = None,
     people: Sequence[int] | None = None,
-    free: Sequence[NDArray[np.bool_]] | None = None,
+    active_dofs: Sequence[NDArray[np.bool_]] | None = None,
 ) -> Iterator[SearchStep]:
     """Search the poses of all people one stage after the other.
 
-    While person i is searched, people before it stand at their found poses and those after at their predicted ones.
+    While person i is searched, people before it have their found poses, and people after it their predicted ones.
 
     Args:
-        cost: what to minimize.
-        poses: the predicted pose of each person, (n_values,) each.
+        cost: cost to minimize.
+        poses: predicted pose of each person, (n_values,) each.
         settings: bounds, steps and stopping rule.
-        people: whom to search; everybody by default. The others are held, and still hide and explain.
-        free: of each person the degrees of freedom that may move, (n_dofs,); all by default.
+        people: indices of the people to search; all by default. The others are fixed, but still occlude and explain
+            edges.
+        active_dofs: degrees of freedom of each person that may change, (n_dofs,); all by default.
 
     Yields:
         One step per expansion; at least one per stage.
     """
     settings = settings or SearchSettings()
     predicted = [np.array(p, dtype=np.float64) for p in poses]
-    best = list(predicted)
-    first = cost(best)
-    best_px, view_costs_px, evaluations = first.total_px, first.view_costs_px, 1
-    for stage in stages(cost.models, settings, people, free):
-        for step in _search_stage(
-            cost, stage, settings, predicted[stage.person], best, best_px, view_costs_px, evaluations
-        ):
+    first = cost(predicted)
+    progress = _Progress(tuple(predicted), first.total_px, first.view_costs_px, 1)
+    for stage in stages(cost.models, settings, people, active_dofs):
+        for step in _search_stage(cost, stage, settings, predicted[stage.person], progress):
             yield step
-            best, best_px, view_costs_px = list(step.best), step.best_px, step.best_views_px
-            evaluations = step.evaluations
+            progress = _Progress(step.best, step.best_px, step.best_view_costs_px, step.evaluations)
 
 
 def _search_stage(
@@ -211,19 +226,17 @@ def _search_stage(
     stage: Stage,
     settings: SearchSettings,
     predicted: Array,
-    best: Sequence[Array],
-    best_px: float,
-    view_costs_px: Array,
-    evaluations: int,
+    progress: _Progress,
 ) -> Iterator[SearchStep]:
-    """Best-first search of one stage around the best pose so far, within the bounds around the prediction."""
+    """Search one stage best-first around the best pose so far, within the bounds around the prediction."""
     model, person = cost.models[stage.person], stage.person
+    best, best_px, view_costs_px, evaluations = progress
     dofs = [model.dof_names.index(d) for d in stage.group.dofs]
     bounds, steps = settings.lattice(model, dofs)
     steps = steps * stage.factor
     center = best[person]
     offset = model.difference(center, predicted)[dofs]
-    # Lattice coordinates that stay within the bounds around the prediction; the centre itself is always allowed.
+    # Lattice coordinates within the bounds around the prediction; the centre itself is always allowed.
     low = np.minimum(0, np.ceil((-bounds - offset) / steps - 1e-9)).astype(int)
     high = np.maximum(0, np.floor((bounds - offset) / steps + 1e-9)).astype(int)
 
@@ -256,10 +269,10 @@ def _search_stage(
             cheapest = int(np.argmin(totals))
             candidate, candidate_px = candidates[cheapest], float(totals[cheapest])
             if candidate_px < best_px:
-                best = [*best[:person], candidate, *best[person + 1 :]]
+                best = (*best[:person], candidate, *best[person + 1 :])
                 best_px, view_costs_px, idle = candidate_px, views[cheapest], 0
         done = not queue or idle >= settings.patience or expansions >= settings.max_expansions
         shown = tuple(candidate if i == person else p for i, p in enumerate(best))
-        yield SearchStep(stage, shown, candidate_px, tuple(best), best_px, view_costs_px, evaluations, done)
+        yield SearchStep(stage, shown, candidate_px, best, best_px, view_costs_px, evaluations, done)
         if done:
             return

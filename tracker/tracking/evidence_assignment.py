@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
-from tracker.contours.occluding_contours import PIECE_PX, Contour, trace_view
-from tracker.contours.surfaces import Surfaces
+from tracker.contours.occluding_contours import Contour, trace_view
+from tracker.contours.pieces import PIECE_PX
+from tracker.contours.surfaces import Surfaces, surfaces_of
 from tracker.evidence.view_evidence import (
     ACCEPTED_SHARE,
     ViewEvidence,
@@ -83,7 +84,7 @@ class EvidenceAssignment:
     @cached_property
     def _views(self) -> list["_View"]:
         surfaces, Ts = (
-            occluding_contours.surfaces_of(tuple(b.model for b in self.bodies)),
+            surfaces_of(tuple(b.model for b in self.bodies)),
             occluding_contours.part_poses(self.bodies),
         )
         pool = self._pool

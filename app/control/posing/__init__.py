@@ -1,1 +1,4 @@
-"""Poses changed by a person: drags, steps, pins, locks, sizes, alternatives."""
+"""Poses changed by a person: drags, steps, pins, locks, body sizes, alternatives.
+
+May import `app.control.session` and `app.control.search`. Its classes are used through the controller.
+"""

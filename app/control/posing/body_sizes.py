@@ -1,4 +1,4 @@
-"""Editing the sizes of bodies: a draft that the views show, then a new revision of the model, undone as edits are."""
+"""Edit body sizes: first a draft that the views show, then a new model revision, as an entry of the history."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -17,49 +17,49 @@ from tracker.session.session import save_model
 from tracker.store.records import Change, PoseChange
 
 _KEY = "sizes_edits"
-"""Setting of the session: by entry of the history the name of the person whose sizes it changed, and the revisions
+"""Setting of the session: for each entry of the history that changed sizes, the name of the person and the revisions
 before and after it."""
 
 
 class _Refitted(NamedTuple):
-    """Keyframes taken over into another body."""
+    """Keyframes retargeted to another body."""
 
     changes: list[Change]
     off_m: float
-    """Mean distance of their joints from where they were, metres."""
+    """Mean distance between their joints before and after, metres."""
 
 
 class BodySizeEditing:
-    """The sizes of everybody in the session; at most one person's are being edited."""
+    """The body sizes of all people; at most one person's are being edited."""
 
     def __init__(self, session_state: SessionState, runs: SearchRuns, activities: Activities) -> None:
-        """Edit the sizes of who is on this screen.
+        """Edit nothing yet.
 
         Args:
-            screen: holds the state.
-            runs: searches as they went; of other sizes they mean nothing any more.
+            session_state: holds the state.
+            runs: recorded searches, which are discarded when sizes change.
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._runs, self._activities = session_state, runs, activities
 
     def model(self, person: int) -> BodyModel:
-        """The body of a person as it is being edited, else the present one."""
+        """Return the edited body of a person, else the present one."""
         draft = self._session_state.state.draft
         return draft.model if draft is not None and draft.person == person else self._session_state.present[person]
 
     def couple(self, alike: bool) -> None:
-        """Edit both sides at once from now on, or each by itself."""
+        """Choose whether both sides are edited at once."""
         self._session_state.set(sides_alike=alike)
 
     def set_height(self, person: int, height_m: float) -> None:
-        """Scale the draft as a whole to another body height, metres.
+        """Scale the draft to another body height, metres.
 
         Raises:
-            TrackerError: nobody is that tall.
+            TrackerError: the height is out of range.
         """
         with self._session_state.lock:
             sizes = self._sizes(person)
-            # Lengths are checked against the height, which a wrong number must not divide by.
+            # Lengths are divided by the height, so it is checked before they are scaled.
             wrong = not (np.isfinite(height_m) and height_m > 0)
             self._draft(person, sizes._replace(height_m=height_m) if wrong else scaled(sizes, height_m))
 
@@ -67,7 +67,7 @@ class BodySizeEditing:
         """Give a part of the draft other sizes, and its mirror_part where both sides are edited at once.
 
         Raises:
-            TrackerError: no part has such sizes.
+            TrackerError: a size is out of range.
         """
         with self._session_state.lock:
             before = self._sizes(person)
@@ -76,46 +76,46 @@ class BodySizeEditing:
             self._draft(person, before._replace(parts={**before.parts, **both}))
 
     def set_width(self, person: int, girdle: str, width_m: float) -> None:
-        """Set the hips, or shoulders, of the draft apart, metres.
+        """Set the width of the hips or shoulders of the draft, metres.
 
         Raises:
-            TrackerError: no body is that wide.
+            TrackerError: the width is out of range.
         """
         with self._session_state.lock:
             before = self._sizes(person)
             self._draft(person, before._replace(widths_m={**before.widths_m, girdle: width_m}))
 
     def recall(self, person: int) -> None:
-        """Take the sizes before the present ones as the draft.
+        """Make the former sizes the draft.
 
         Raises:
-            TrackerError: the person has always had these.
+            TrackerError: the person has no former sizes.
         """
         with self._session_state.lock:
-            former = self._session_state.saver.former_body(person)
+            former = self._session_state.saver.revisions.former_body(person)
             if former is None:
                 name = self._session_state.session.people[person].name
                 raise TrackerError(f"expected sizes that {name} had before, found none; these are the first")
             self._session_state.set(draft=SizeDraft(person, former), sizes_message="")
 
     def discard(self) -> None:
-        """Edit no more; the sizes stay as they are."""
+        """Discard the draft."""
         self._session_state.set(draft=None, sizes_message="")
 
     def apply(self, person: int, refit: bool) -> None:
-        """Make the draft the present body: a new revision, on disk when this returns, and one entry of the history.
+        """Make the draft the present body: a new revision and one entry of the history, on disk when this returns.
 
         Args:
-            person: index of whose.
-            refit: take the person's keyframes over into it, to their joints and pins; else every stored pose stays
-                what it is, of the body that it was made with.
+            person: index of the person.
+            refit: retarget the person's keyframes to it, by their joints and pins; else stored poses keep their
+                bodies.
 
         Raises:
-            TrackerError: there is nothing to change, or it cannot be written.
+            TrackerError: there is nothing to change, or the change cannot be written.
         """
         with self._activities.editing():
             session_state, name = self._session_state, self._session_state.session.people[person].name
-            before, model = session_state.saver.revision(person), self.model(person)
+            before, model = session_state.saver.revisions.current(person), self.model(person)
             same = model is session_state.present[person] or dimensions_of(model) == dimensions_of(
                 session_state.present[person]
             )
@@ -129,21 +129,21 @@ class BodySizeEditing:
                 )
             n = len(refitted.changes)
             counted = f", {n} keyframe{'' if n == 1 else 's'} refitted" if n else ""
-            told = counted if refit else ", poses kept"
+            outcome = counted if refit else ", poses kept"
             edit = session_state.saver.write(
-                f"sizes of {name}{told}", refitted.changes, None, by_program=False, even_empty=True
+                f"sizes of {name}{outcome}", refitted.changes, None, by_program=False, even_empty=True
             )
             if edit is not None and session_state.saver.error is None:
                 saver = session_state.saver
-                change = {str(edit): [name, before, saver.revision(person)]}
-                saver.keep_setting(_KEY, {**saver.setting(_KEY, {}), **change})
+                change = {str(edit): [name, before, saver.revisions.current(person)]}
+                saver.store_setting(_KEY, {**saver.setting(_KEY, {}), **change})
             off = f", joints {refitted.off_m * 1000:.0f} mm off on average" if n else ""
             self._runs.clear()
             session_state.refresh_saving()
-            session_state.show_frame(session_state.state.frame, draft=None, sizes_message=f"Applied{told}{off}.")
+            session_state.show_frame(session_state.state.frame, draft=None, sizes_message=f"Applied{outcome}{off}.")
 
     def follow(self) -> None:
-        """Bring back the bodies that belong to where the history has just been moved.
+        """Restore the bodies that belong to the present entry of the history, after a move.
 
         Raises:
             TrackerError: a body cannot be written.
@@ -156,9 +156,9 @@ class BodySizeEditing:
             person = next((i for i, p in enumerate(session_state.session.people) if p.name == name), None)
             if person is None:
                 continue
-            # A move goes one way: where its last entry is done now, all of them are.
+            # A move has one direction: if its last entry is applied now, all of them are.
             done = latest is not None and latest.edit == saver.moved_edits[-1]
-            model = saver.body(after if done else before)
+            model = saver.revisions.body(after if done else before)
             if model is not session_state.present[person]:
                 session_state.set_body_models(save_model(session_state.session, person, model))
             self._runs.clear()
@@ -174,25 +174,29 @@ class BodySizeEditing:
         self._session_state.set(draft=SizeDraft(person, model), sizes_message="")
 
     def _refit(self, person: int) -> _Refitted:
-        """The keyframes of a person that were made with another body, taken over into the present one."""
+        """Return the keyframes of a person that were made with another body, retargeted to the present one."""
         session_state, saver = self._session_state, self._session_state.saver
         cameras = [c.camera for c in session_state.session.cameras]
         becomes, revision, name = (
             session_state.present[person],
-            saver.revision(person),
+            saver.revisions.current(person),
             session_state.session.people[person].name,
         )
         changes: list[Change] = []
         off_m: list[float] = []
         for row in saver.rows(person, range(session_state.session.n_frames)):
             record = saver.record(person, row.frame) if row.keyframe else None
-            if record is None or record.model_revision == revision or not saver.fits(person, record.model_revision):
+            if (
+                record is None
+                or record.model_revision == revision
+                or not saver.revisions.fits(person, record.model_revision)
+            ):
                 continue
-            was, pins = saver.body(record.model_revision), saver.pins(person, row.frame)
+            was, pins = saver.revisions.body(record.model_revision), saver.pins(person, row.frame)
             values = retarget_pose(record.values, was, becomes, pins, cameras, session_state.active_dofs(person))
-            told = {"method": "refit", "model_revision": record.model_revision}
+            settings = {"method": "refit", "model_revision": record.model_revision}
             pose = replace(
-                record, values=values, model_revision=revision, status="", cost_px=None, settings=told,
+                record, values=values, model_revision=revision, status="", cost_px=None, settings=settings,
                 view_costs_px=(), part_costs_px=(), remark="refitted to other sizes",
             )  # fmt: skip
             changes.append(PoseChange(name, row.frame, pose))

@@ -1,4 +1,4 @@
-"""Locked degrees of freedom: what neither a hand nor a search nor a fit moves; kept with the session."""
+"""Lock degrees of freedom, so that no drag, search or fit moves them; stored with the session."""
 
 from collections.abc import Collection
 
@@ -9,20 +9,25 @@ from tracker.session.locked_dofs import SETTING, load_locks, locks_setting
 
 
 class DofLocks:
-    """The locks of everybody in the session."""
+    """The locked degrees of freedom of all people."""
 
     def __init__(self, session_state: SessionState, activities: Activities) -> None:
-        """Take over the locks that are kept with the session.
+        """Restore the locks of the session.
 
         Args:
-            screen: holds the state.
+            session_state: holds the state.
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities
         session_state.set(locked=load_locks(session_state.session.people, session_state.saver.setting))
 
     def set(self, person: int, dofs: Collection[int], locked: bool) -> None:
-        """Lock or unlock degrees of freedom of a person, each ball joint as a whole; on disk when this returns.
+        """Lock or unlock degrees of freedom, each ball joint as a whole; on disk when this returns.
+
+        Args:
+            person: index of the person.
+            dofs: indices of the degrees of freedom; unknown ones are ignored.
+            locked: whether to lock them.
 
         Raises:
             TrackerError: the session's settings cannot be written.
@@ -34,15 +39,13 @@ class DofLocks:
             now = before[person] | chosen if locked else before[person] - chosen
             if now == before[person]:
                 return
-            everybody = (*before[:person], now, *before[person + 1 :])
-            self._session_state.saver.keep_setting(
-                SETTING, locks_setting(self._session_state.session.people, everybody)
-            )
-            self._session_state.set(locked=everybody)
+            after = (*before[:person], now, *before[person + 1 :])
+            self._session_state.saver.store_setting(SETTING, locks_setting(self._session_state.session.people, after))
+            self._session_state.set(locked=after)
 
 
 def _with_whole_balls(model: BodyModel, dofs: Collection[int]) -> frozenset[int]:
-    """Degrees of freedom with the others of their ball joints: a rotation vector has no component to hold alone."""
+    """Add the other axes of ball joints: one component of a rotation vector cannot be locked alone."""
     balls = {int(model.dof_joint[d]) for d in dofs if model.joints[model.dof_joint[d]].kind == "ball"}
-    turned = (i for i in range(model.n_dofs) if model.dof_joint[i] in balls and not model.dof_is_length[i])
-    return frozenset(dofs) | frozenset(turned)
+    axes = (i for i in range(model.n_dofs) if model.dof_joint[i] in balls and not model.dof_is_length[i])
+    return frozenset(dofs) | frozenset(axes)

@@ -87,7 +87,7 @@ class Dragging:
                 selected, name = model.joints[part].name, model.parts[part].name
             self._gesture_grab = self._mode_grab = grab
             self._page, session_state.last_save = page, time.monotonic()
-            x, y, z = (float(c) for c in grab.place_part)
+            x, y, z = (float(c) for c in grab.point_part)
             drag = DragState(camera, person, name, pointer_px, grab.part, (x, y, z), part is not None)
             session_state.set(person=person, point=selected, drag=drag)
 
@@ -146,7 +146,7 @@ class Dragging:
         if grab is None or drag is None:
             return
         self._scores_moves = False
-        has_moved = not np.array_equal(grab.values, session_state.state.poses[drag.person])
+        has_moved = not np.array_equal(grab.pose, session_state.state.poses[drag.person])
         if has_moved or session_state.open_edit_owner is grab:
             session_state.save(f"drag {display_name(drag.point)}", "manual", grab)
         self._gesture_grab = self._mode_grab = session_state.open_edit_owner = None

@@ -1,4 +1,4 @@
-"""Pins by hand: set, moved, removed; the fit that takes them in. Each gesture is one entry of the history."""
+"""Set, move and remove pins, and fit people to them. Each gesture is one entry of the history."""
 
 import time
 from collections.abc import Iterable
@@ -10,63 +10,64 @@ from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.state.people import ShownPose
 from tracker.body.limbs import display_name
+from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.geometry.triangulation import PointObservation
 from tracker.posing.pinned_fit import fit_frame
 
 _CHECKPOINT_S = 1.0
-"""A long drag of a pin is on disk at least this often."""
+"""A long drag of a pin is saved at least this often."""
 
 Pins = tuple[tuple[PointObservation, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)
-class _Held:
-    """A pin in the hand."""
+class _PinDrag:
+    """A pin that is being dragged."""
 
     page: int
-    """Number of the page whose hand it is."""
+    """Number of the page that drags it."""
     person: int
     point: str
     camera: int
     pins: Pins
-    """The pins of everybody before the gesture."""
+    """The pins of all people before the gesture."""
     people: tuple[ShownPose, ...]
-    """Everybody before the gesture: where each of its fits starts from, so that only the pin's place decides."""
+    """All people before the gesture. Each fit starts from them, so that it depends on the pin's position only."""
     live: bool
-    """Whether the body follows while the pin moves."""
+    """Whether the body is fitted while the pin moves."""
 
 
 class Pinning:
-    """The pins of the frame that is shown; at most one is in a hand."""
+    """The pins of the shown frame; at most one is dragged."""
 
     def __init__(self, session_state: SessionState, activities: Activities) -> None:
-        """Pin who is on this screen.
+        """Drag no pin yet.
 
         Args:
-            screen: holds the state.
+            session_state: holds the state.
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities
-        self._held: _Held | None = None
+        self._drag: _PinDrag | None = None
         activities.add_gesture(self.finish)
 
     def begin(
         self, page: int, frame: int, camera: int, person: int, point: str, position_px: tuple[float, float], live: bool
     ) -> None:
-        """Set a pin, or take hold of the one that the point has in this view.
+        """Set a pin, or grab the one that the point has in this view.
 
         Args:
             page: number of the page.
-            frame: the frame that the hand saw, which a tracker may have left meanwhile.
+            frame: the frame that the user saw, which a tracker may have left.
             camera: index of the view.
             person: index of the person.
             point: name of the point.
-            position_px: where it is seen, undistorted px.
-            live: whether the body follows as the pin is moved.
+            position_px: its position, undistorted px.
+            live: whether the body is fitted while the pin moves.
 
         Raises:
-            TrackerError: the place is outside of the image.
+            TrackerError: the position is outside of the image.
         """
         session = self._session_state.session
         if not (0 <= frame < session.n_frames and 0 <= camera < len(session.cameras)):
@@ -76,7 +77,7 @@ class Pinning:
         ):
             return
         source = session.cameras[camera].camera
-        if _within(position_px, source.size) != position_px:
+        if _clipped(position_px, source.size) != position_px:
             raise TrackerError(
                 f"expected a pin within the {source.width}x{source.height} px of {source.name}, found it at "
                 f"({position_px[0]:.0f}, {position_px[1]:.0f}); set it where the image shows the joint"
@@ -84,56 +85,56 @@ class Pinning:
         with self._activities.editing():
             self._session_state.go_to(frame)
             state = self._session_state.state
-            self._held = _Held(page, person, point, camera, state.pins, state.people, live)
+            self._drag = _PinDrag(page, person, point, camera, state.pins, state.people, live)
             self._session_state.last_save = time.monotonic()
-            pins = _with(state.pins, person, PointObservation(point, camera, position_px))
+            pins = _with_pin(state.pins, person, PointObservation(point, camera, position_px))
             self._session_state.set(person=person, point=point, pins=pins, is_pin_held=True)
 
     def move(self, page: int, position_px: tuple[float, float]) -> None:
-        """Move the pin in the hand, at most to the border of the image; the body follows where that was wanted."""
+        """Move the dragged pin, at most to the border of the image, and fit the body if the pin is live."""
         with self._session_state.lock:
-            held = self._held
-            if held is None or page != held.page:
+            drag = self._drag
+            if drag is None or page != drag.page:
                 return
-            position_px = _within(position_px, self._session_state.session.cameras[held.camera].camera.size)
-            pins = _with(
-                self._session_state.state.pins, held.person, PointObservation(held.point, held.camera, position_px)
+            position_px = _clipped(position_px, self._session_state.session.cameras[drag.camera].camera.size)
+            pins = _with_pin(
+                self._session_state.state.pins, drag.person, PointObservation(drag.point, drag.camera, position_px)
             )
             if pins == self._session_state.state.pins:
                 return  # a click only sets it
-            if held.live:
-                self._show_fit([held.person], held.people, pins)
+            if drag.live:
+                self._show_fit([drag.person], drag.people, pins)
             else:
                 self._session_state.set(pins=pins)
             if time.monotonic() - self._session_state.last_save > _CHECKPOINT_S:
-                self._save(held)
+                self._save(drag)
 
     def end(self, page: int) -> None:
-        """Let go: the gesture is one entry of the history, on disk when this returns."""
+        """Release the pin; the gesture is one entry of the history, on disk when this returns."""
         with self._session_state.lock:
-            if self._held is not None and page == self._held.page:
+            if self._drag is not None and page == self._drag.page:
                 self.finish()
 
     def cancel(self, page: int) -> None:
-        """Let go and put pins and body back where they were."""
+        """Release the pin and restore pins and body before the gesture."""
         with self._session_state.lock:
-            held = self._held
-            if held is None or page != held.page:
+            drag = self._drag
+            if drag is None or page != drag.page:
                 return
-            self._held = None
-            self._session_state.revert(held)
+            self._drag = None
+            self._session_state.revert(drag)
 
     def finish(self) -> None:
-        """End the gesture at hand, if there is one, and save it; called under the lock."""
-        held = self._held
-        if held is None:
+        """End the drag of a pin, if there is one, and save it; called under the lock."""
+        drag = self._drag
+        if drag is None:
             return
-        self._save(held)
-        self._held = self._session_state.open_edit_owner = None
+        self._save(drag)
+        self._drag = self._session_state.open_edit_owner = None
         self._session_state.set(is_pin_held=False)
 
     def remove(self, frame: int, person: int, point: str | None = None, camera: int | None = None) -> None:
-        """Take away the pins of a person on a frame: of one point, in one view, or all; one entry of the history."""
+        """Remove pins of a person on a frame: of one point, in one view, or all; one entry of the history."""
         if not (0 <= frame < self._session_state.session.n_frames and 0 <= person < len(self._session_state.models)):
             return
         with self._activities.editing():
@@ -153,12 +154,12 @@ class Pinning:
         """Fit people to pins and edges together.
 
         Args:
-            frame: that the user saw.
-            person: whom to fit, the others as they stand; by default the person worked on and everybody who has been
-                placed or pinned on the frame.
+            frame: the frame that the user saw.
+            person: index of the only person to fit; by default the selected person and all who have a pose or pins on
+                the frame.
 
         Raises:
-            TrackerError: there is nothing to fit to: neither pins nor, yet, edges.
+            TrackerError: the frame has neither pins nor, yet, edges.
         """
         if not 0 <= frame < self._session_state.session.n_frames:
             return
@@ -176,19 +177,24 @@ class Pinning:
                 )
             people = sorted(meant) if views is not None else pinned
             self._show_fit(people, state.people, state.pins)
-            told = " and ".join([*(["pins"] if pinned else []), *(["edges"] if views is not None else [])])
-            self._session_state.save(f"fit to {told}", "fitted")
+            evidence = " and ".join([*(["pins"] if pinned else []), *(["edges"] if views is not None else [])])
+            self._session_state.save(f"fit to {evidence}", "fitted")
 
     def _show_fit(self, fitted: Iterable[int], start: tuple[ShownPose, ...], pins: Pins) -> None:
-        """Fit some people from a start, the others as they stand, and show them."""
+        """Fit some people, with all others fixed, and show them.
+
+        Args:
+            fitted: indices of the people to fit.
+            start: from which the fit starts, all people.
+            pins: of all people.
+        """
         session_state = self._session_state
         fitted = list(fitted)
         views = session_state.frames.cached_evidence(session_state.state.frame)
         cameras = [c.camera for c in session_state.session.cameras]
         free = [session_state.active_dofs(person) for person in range(len(session_state.models))]
         found = fit_frame(
-            session_state.models,
-            [p.values for p in start],
+            [PosedBody(m, p.values) for m, p in zip(session_state.models, start, strict=True)],
             pins,
             cameras,
             views,
@@ -203,26 +209,26 @@ class Pinning:
         costs = session_state.costs(tuple(p.values for p in people))
         session_state.set(people=tuple(people), pins=pins, **costs)
 
-    def _save(self, held: _Held) -> None:
-        """Write what the gesture has done so far."""
-        had = any((p.point, p.camera) == (held.point, held.camera) for p in held.pins[held.person])
-        if held.pins == self._session_state.state.pins and self._session_state.open_edit_owner is not held:
+    def _save(self, drag: _PinDrag) -> None:
+        """Save the gesture so far."""
+        had = any((p.point, p.camera) == (drag.point, drag.camera) for p in drag.pins[drag.person])
+        if drag.pins == self._session_state.state.pins and self._session_state.open_edit_owner is not drag:
             return
-        what = f"{'move' if had else 'set'} pin {display_name(held.point)}{self._in(held.camera)}"
-        self._session_state.save(what, "fitted", held)
+        what = f"{'move' if had else 'set'} pin {display_name(drag.point)}{self._in(drag.camera)}"
+        self._session_state.save(what, "fitted", drag)
 
     def _in(self, camera: int | None) -> str:
         return "" if camera is None else f" in {self._session_state.session.cameras[camera].camera.name}"
 
 
-def _with(pins: Pins, person: int, pin: PointObservation) -> Pins:
-    """The same pins but for one that is set or moved, by point and camera."""
+def _with_pin(pins: Pins, person: int, pin: PointObservation) -> Pins:
+    """Return the pins with one set or moved, by point and camera."""
     others = [p for p in pins[person] if (p.point, p.camera) != (pin.point, pin.camera)]
     own = tuple(sorted([*others, pin], key=lambda p: (p.point, p.camera)))
     return (*pins[:person], own, *pins[person + 1 :])
 
 
-def _within(position_px: tuple[float, float], size: tuple[int, int]) -> tuple[float, float]:
-    """The nearest place within an image."""
+def _clipped(position_px: tuple[float, float], size: tuple[int, int]) -> tuple[float, float]:
+    """Return the nearest position within an image."""
     u, v = np.clip(position_px, -0.5, (size[0] - 0.5, size[1] - 0.5))
     return float(u), float(v)

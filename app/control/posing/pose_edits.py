@@ -1,4 +1,4 @@
-"""Posing without a drag: numbers, steps, and whole poses at a stroke. Each is one entry of the history."""
+"""Change poses without a drag: by values, by steps, or as a whole. Each change is one entry of the history."""
 
 import time
 from collections.abc import Iterator
@@ -13,62 +13,62 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.posing import drag
-from tracker.posing.edits import bent_alike, limb_of, mirrored, taken_over
+from tracker.posing.edits import copy_dofs, copy_joint_angles, limb_of, mirror_pose
 from tracker.posing.orient import orient
 from tracker.posing.retarget import retarget_pose
 
 _SAME_GESTURE_S = 1.0
-"""Changes of one slider, or steps of one joint, within this time of each other are one entry of the history."""
+"""Maximum time between changes of one slider, or steps of one joint, that make one entry of the history."""
 
 _TURNED = 1e-6
-"""A frame whose axes differ by less has not been turned."""
+"""A frame whose axes differ by less is not turned."""
 
 
 class PoseEdits:
-    """Changes the pose of a person on the frame that the user saw; what is locked stays."""
+    """Changes the pose of a person on the frame that the user saw; locked degrees of freedom stay."""
 
     def __init__(self, session_state: SessionState, activities: Activities) -> None:
-        """Pose who is on this screen.
+        """Change nothing yet.
 
         Args:
-            screen: holds the state.
+            session_state: holds the state.
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities
 
     def set_dof(self, person: int, dof: int, value: float, frame: int | None = None) -> None:
-        """Set one degree of freedom, rad or metres; what lies beyond its limits ends there.
+        """Set one degree of freedom, clipped to its limits.
 
-        Of a ball joint it is a component of the rotation vector from the neutral pose.
+        For a ball joint it is a component of the rotation vector from the neutral pose.
 
         Args:
-            person: index of whom.
+            person: index of the person.
             dof: index of the degree of freedom.
             value: rad or metres.
-            frame: the frame that the user saw, which a tracker may have left meanwhile; None for the one shown.
+            frame: the frame that the user saw, which a tracker may have left; None for the shown one.
 
         Raises:
             TrackerError: it is locked.
         """
         with self._on(person, frame) as model:
-            numbers = self._numbers(person)
-            numbers[dof] = value
-            self._set_numbers(person, dof, numbers, f"set {display_name(model.dof_names[dof])}")
+            dof_values = self._dof_values(person)
+            dof_values[dof] = value
+            self._set_dof_values(person, dof, dof_values, f"set {display_name(model.dof_names[dof])}")
 
     def turn(self, person: int, dof: int, by: float, frame: int | None = None) -> None:
         """Change one degree of freedom by a step, rad or metres; see `set_dof`."""
         with self._on(person, frame) as model:
-            numbers = self._numbers(person)
-            numbers[dof] += by
-            self._set_numbers(person, dof, numbers, f"nudge {display_name(model.dof_names[dof])}")
+            dof_values = self._dof_values(person)
+            dof_values[dof] += by
+            self._set_dof_values(person, dof, dof_values, f"nudge {display_name(model.dof_names[dof])}")
 
     def nudge(
         self, person: int, point: str | None, camera: int, right_m: float, up_m: float, frame: int | None = None
     ) -> None:
-        """Move a point parallel to the image of a view; the chain follows as in a drag.
+        """Move a point parallel to the image plane of a view; the chain follows as in a drag.
 
         Args:
-            person: index of whom.
+            person: index of the person.
             point: name of the point; None for the whole body.
             camera: index of the view.
             right_m: to the right as the view shows it, metres.
@@ -76,7 +76,7 @@ class PoseEdits:
             frame: as for `set_dof`.
 
         Raises:
-            TrackerError: the view does not see the point, or whatever moves it is locked.
+            TrackerError: the point is behind the camera, or all degrees of freedom that move it are locked.
         """
         with self._on(person, frame) as model:
             view = self._session_state.session.cameras[camera].camera.pinhole
@@ -91,17 +91,17 @@ class PoseEdits:
                 )
             hand = drag.grab(model, values, view, name, start, self._session_state.active_dofs(person))
             label = f"nudge {display_name(name)}"
-            self._take(person, drag.drag(hand, end, values), label, ("nudge", name, camera))
+            self._apply(person, drag.drag(hand, end, values), label, ("nudge", name, camera))
 
     def place_part(self, person: int, part: int, R_world: Array, position_world: Array | None, gesture: object) -> None:
-        """Turn a part as near to an orientation as its joint allows; the root also goes to a position.
+        """Turn a part to an orientation, as far as its joint allows; the root also moves to a position.
 
         Args:
-            person: index of whom.
+            person: index of the person.
             part: index of the part, and of the joint that moves it.
             R_world: orientation of the part's frame, (3, 3).
-            position_world: where the root is to be, (3,), metres; None leaves it.
-            gesture: what is done with the same one is one entry of the history.
+            position_world: target of the root, (3,), metres; None leaves it.
+            gesture: changes of one gesture make one entry of the history.
         """
         with self._on(person, None) as model:
             values, free = self._session_state.state.poses[person], self._session_state.active_dofs(person)
@@ -112,20 +112,20 @@ class PoseEdits:
                 values = model.retract(values, np.where(free, step, 0.0))
             if np.abs(R_world - T[:3, :3]).max() > _TURNED:
                 values = orient(model, values, part, R_world, free)
-            self._take(person, values, f"place {display_name(model.joints[part].name)}", gesture, lasting=True)
+            self._apply(person, values, f"place {display_name(model.joints[part].name)}", gesture, lasting=True)
 
     def mirror(self, person: int, frame: int | None = None) -> None:
-        """Exchange left and right in the body's own plane of symmetry."""
+        """Mirror the pose in the body's plane of symmetry."""
         with self._on(person, frame) as model:
             values = self._session_state.state.poses[person]
-            self._take(
+            self._apply(
                 person,
-                taken_over(model, values, mirrored(model, values), self._session_state.active_dofs(person)),
+                copy_dofs(model, values, mirror_pose(model, values), self._session_state.active_dofs(person)),
                 "mirror",
             )
 
     def copy_from(self, person: int, other: int, frame: int | None = None) -> None:
-        """Take over the stored pose of another frame.
+        """Copy the stored pose of another frame.
 
         Raises:
             TrackerError: the person has no pose there.
@@ -138,54 +138,64 @@ class PoseEdits:
                     f"expected a pose of {name} on frame {other} to copy, found none; choose another frame"
                 )
             assert stored.revision is not None
-            copied = retarget_pose(stored.values, self._session_state.saver.body(stored.revision), model)
-            values = taken_over(
+            copied = retarget_pose(stored.values, self._session_state.saver.revisions.body(stored.revision), model)
+            values = copy_dofs(
                 model, self._session_state.state.poses[person], copied, self._session_state.active_dofs(person)
             )
-            self._take(person, values, f"copy frame {other}")
+            self._apply(person, values, f"copy frame {other}")
 
     def copy_person(self, person: int, other: int, frame: int | None = None) -> None:
-        """Bend as another person does on the same frame, where they have joints of the same name; place and turn stay.
+        """Copy the joint angles of another person on the same frame, by joint name; the root stays.
 
         Raises:
-            TrackerError: there is nobody else of that index.
+            TrackerError: there is no other person of that index.
         """
         if other == person or not 0 <= other < len(self._session_state.models):
             raise TrackerError(f"expected another person to copy the pose of, found number {other}; choose another")
         with self._on(person, frame) as model:
             values, body = self._session_state.state.poses, self._session_state.models[other]
-            bent = bent_alike(model, values[person], body, values[other], self._session_state.active_dofs(person))
-            self._take(person, bent, f"copy the pose of {self._session_state.session.people[other].name}")
+            bent = copy_joint_angles(
+                model, values[person], body, values[other], self._session_state.active_dofs(person)
+            )
+            self._apply(person, bent, f"copy the pose of {self._session_state.session.people[other].name}")
 
     def reset(self, person: int, point: str | None, frame: int | None = None) -> None:
-        """Put the limb of a point back to the neutral pose; without a point, or with the root's, all but the root."""
+        """Reset the limb of a point to the neutral pose; without a point, or for the root, all but the root."""
         with self._on(person, frame) as model:
             limb, dofs = limb_of(model, point)
             dofs = dofs & self._session_state.active_dofs(person)
-            values = taken_over(model, self._session_state.state.poses[person], model.neutral(), dofs)
-            self._take(person, values, f"reset {limb_display_name(limb)}")
+            values = copy_dofs(model, self._session_state.state.poses[person], model.neutral(), dofs)
+            self._apply(person, values, f"reset {limb_display_name(limb)}")
 
     @contextmanager
     def _on(self, person: int, frame: int | None) -> Iterator[BodyModel]:
-        """Work on the frame that the user saw; gives the person's model."""
+        """Edit the frame that the user saw; yields the person's model."""
         with self._activities.editing():
             self._session_state.go_to(frame)
             yield self._session_state.models[person]
 
-    def _numbers(self, person: int) -> Array:
-        """The pose as one number for each degree of freedom, (n_dofs,), rad or metres."""
+    def _dof_values(self, person: int) -> Array:
+        """Return the pose as one value for each degree of freedom, (n_dofs,), rad or metres."""
         model = self._session_state.models[person]
         return model.difference(self._session_state.state.poses[person], model.neutral())
 
-    def _set_numbers(self, person: int, dof: int, numbers: Array, label: str) -> None:
+    def _set_dof_values(self, person: int, dof: int, dof_values: Array, label: str) -> None:
         model, before = self._session_state.models[person], self._session_state.state.poses[person]
         if dof in self._session_state.state.locked[person]:
             raise TrackerError(f"{display_name(model.dof_names[dof])} is locked; unlock it to change it")
-        changed = model.clip(model.retract(model.neutral(), numbers))
-        self._take(person, taken_over(model, before, changed, np.arange(model.n_dofs) == dof), label, ("dof", dof))
+        changed = model.clip(model.retract(model.neutral(), dof_values))
+        self._apply(person, copy_dofs(model, before, changed, np.arange(model.n_dofs) == dof), label, ("dof", dof))
 
-    def _take(self, person: int, values: Array, label: str, gesture: object = None, lasting: bool = False) -> None:
-        """Show and save a pose; steps of one gesture in quick succession, or of a lasting one, are one entry."""
+    def _apply(self, person: int, values: Array, label: str, gesture: object = None, lasting: bool = False) -> None:
+        """Show and save a pose.
+
+        Args:
+            person: index of the person.
+            values: pose, (n_values,).
+            label: of the entry of the history.
+            gesture: changes of one gesture in quick succession make one entry; None always makes a new one.
+            lasting: whether the changes of the gesture make one entry even after a pause.
+        """
         session_state = self._session_state
         session_state.show_pose(person, values)
         gesture = (label, person, session_state.state.frame, gesture) if gesture is not None else object()

@@ -1,4 +1,4 @@
-"""The cost over the range of one degree of freedom, the others held: how steep, how wide, how many valleys."""
+"""Sample the cost over the range of one degree of freedom, with all others fixed."""
 
 import threading
 from collections.abc import Sequence
@@ -19,41 +19,46 @@ from tracker.tracking.chamfer.settings import TrackSettings, pose_cost
 
 SAMPLES = 121
 _REACH_M, _REACH_RAD = 0.5, float(np.pi)
-"""How far a degree of freedom without limits is followed to either side, metres and rad."""
+"""Sampled range to either side for a degree of freedom without limits, metres and rad."""
 _REST_S = 0.08
-"""Least time between two landscapes: the pose may change much faster."""
+"""Minimum time between two landscapes; the pose may change faster."""
 
 
 class CostLandscapes:
-    """Works out the landscape in the background while a page looks at it; the newest pose wins."""
+    """Computes the landscape of the newest pose in the background while a page displays it."""
 
     def __init__(self, session_state: SessionState, activities: Activities) -> None:
-        """Follow the screen; nothing is worked out until a page looks.
+        """Subscribe to the state; nothing is computed until a page displays the landscape.
 
         Args:
-            screen: holds the state.
+            session_state: holds the state.
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities
         self._pages: set[int] = set()
         self._pages_lock = threading.Lock()
         self._dof: str | None = None
-        self._worked_out: tuple[object, ...] = ()
-        self._latest = LatestWinsWorker(self._work_out, "landscape", _REST_S)
+        self._computed: tuple[object, ...] = ()
+        self._latest = LatestWinsWorker(self._compute, "landscape", _REST_S)
         session_state.subscribe(self._changed)
 
     def watch(self, page: int, looks: bool) -> None:
-        """Note whether a page looks at the landscape."""
+        """Note whether a page displays the landscape.
+
+        Args:
+            page: number of the page.
+            looks: whether it displays it.
+        """
         with self._pages_lock:
             (self._pages.add if looks else self._pages.discard)(page)
         if looks:
             self._latest.offer(self._session_state.state)
 
     def choose(self, dof: str) -> None:
-        """Look at another degree of freedom of the person worked on, by its name.
+        """Choose another degree of freedom of the selected person, by its name.
 
         Raises:
-            TrackerError: the person has none of that name.
+            TrackerError: the body has no degree of freedom of that name.
         """
         model = self._session_state.models[self._session_state.state.person]
         if dof not in model.dof_names:
@@ -64,10 +69,10 @@ class CostLandscapes:
         self._latest.offer(self._session_state.state)
 
     def set_value(self, person: int, dof: int, value: float) -> None:
-        """Put a degree of freedom where the landscape was clicked, rad or metres: one edit.
+        """Set a degree of freedom to the clicked value, rad or metres; one entry of the history.
 
         Raises:
-            TrackerError: there is no such person or degree of freedom, it is locked, or the value is no number.
+            TrackerError: the person or degree of freedom is unknown or locked, or the value is not finite.
         """
         models = self._session_state.models
         if not (0 <= person < len(models) and 0 <= dof < models[person].n_dofs and np.isfinite(value)):
@@ -93,20 +98,20 @@ class CostLandscapes:
         if self._pages and not state.search.running:
             self._latest.offer(state)
 
-    def _work_out(self, state: State) -> None:
+    def _compute(self, state: State) -> None:
         views = self._session_state.frames.cached_evidence(state.frame)
         person, poses = state.person, state.poses
         model = state.models[person]
         dof = self._dof_of(model, state)
         key = (state.frame, person, dof, state.settings, *map(id, poses))
-        if views is None or not self._pages or key == self._worked_out:
+        if views is None or not self._pages or key == self._computed:
             return
         found = landscape(views, state.models, poses, state.settings, person, dof)
-        self._worked_out = key
+        self._computed = key
         self._session_state.set(landscape=found)
 
     def _dof_of(self, model: BodyModel, state: State) -> int:
-        """The degree of freedom chosen; else one of the joint touched last, else one of a limb."""
+        """Return the chosen degree of freedom, else one of the selected joint, else one of a limb."""
         if self._dof in model.dof_names:
             return model.dof_names.index(self._dof)
         of_point = [d for d, name in enumerate(model.dof_names) if name.partition(".")[0] == state.point]
@@ -122,15 +127,15 @@ def landscape(
     person: int,
     dof: int,
 ) -> CostLandscape:
-    """Score a person at many values of one degree of freedom within its limits, everything else as it is.
+    """Score a person at many values of one degree of freedom within its limits, with all others fixed.
 
     Args:
         views: evidence of the frame.
         models: the body of each person.
         poses: pose of each person, (n_values,) each.
-        settings: outlier distance and how outliers count.
-        person: whose.
-        dof: which.
+        settings: outlier distance and treatment of outliers.
+        person: index of the person.
+        dof: index of the degree of freedom.
     """
     model = models[person]
     current = current_value(model, poses[person], dof)
@@ -144,17 +149,17 @@ def landscape(
 
 
 def current_value(model: BodyModel, pose: Array, dof: int) -> float:
-    """Value of a degree of freedom, rad or metres; of a ball joint 0, as it is followed from where it stands."""
+    """Return the value of a degree of freedom, rad or metres; 0 for a ball joint, which turns from its present pose."""
     return float(pose[model.dof_value[dof]]) if _is_plain(model, dof) else 0.0
 
 
 def along(model: BodyModel, pose: Array, dof: int, values: Array) -> Array:
-    """A pose with one degree of freedom at each of some values, (N,) rad or metres; (N, n_values)."""
+    """Return poses, (N, n_values), with one degree of freedom at each of some values, (N,), rad or metres."""
     steps = np.zeros((len(values), model.n_dofs))
     steps[:, dof] = values - current_value(model, pose, dof)
     return model.retract(pose, steps)
 
 
 def _is_plain(model: BodyModel, dof: int) -> bool:
-    """Whether a degree of freedom is a value of the pose itself, not a turn of a ball joint."""
+    """Return whether a degree of freedom is a value of the pose, not an axis of a ball joint."""
     return model.value_names[model.dof_value[dof]] == model.dof_names[dof]

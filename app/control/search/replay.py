@@ -1,4 +1,4 @@
-"""Looking back at searches: their steps one by one, their candidates, their results beside one another."""
+"""Replay recorded searches: show their steps and candidates, compare and take over their results."""
 
 from dataclasses import replace
 
@@ -15,35 +15,37 @@ from tracker.geometry.arrays import Array
 
 
 class Replay:
-    """What is looked at of the recorded runs. Looking changes no stored pose; taking one over is an edit."""
+    """Views of recorded runs. They change no stored pose; taking over a result is an edit."""
 
     def __init__(self, session_state: SessionState, runs: SearchRuns, activities: Activities) -> None:
-        """Look at nothing yet.
+        """Replay nothing yet.
 
         Args:
-            screen: holds the state.
-            runs: what has been recorded.
+            session_state: holds the state.
+            runs: the recorded searches.
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._runs, self._activities = session_state, runs, activities
         activities.add_gesture(self.leave)
 
     def runs(self) -> list[SearchRun]:
-        """The runs of the shown frame, the oldest first; hold the screen's lock to read them."""
+        """Return the runs of the shown frame, oldest first; the caller holds the session's lock."""
         return self._runs.of_frame(self._session_state.state.frame)
 
     def show(self, number: int, step: int) -> None:
-        """Show a recorded step in place of the true poses; before the first it is the start, beyond the last the last.
+        """Show a recorded step in place of the stored poses.
+
+        Args:
+            number: of the run.
+            step: index of the step; negative for the start of the run, the last step if it is too large.
 
         Raises:
-            TrackerError: the run is kept no more, or is still at work.
+            TrackerError: the run is discarded, or a search is running.
         """
         with self._session_state.lock:
             run = self._run(number)
             if self._session_state.state.search.running:
-                raise TrackerError(
-                    "expected a search that is over or stands to replay, found one at work; stop it first (Esc)"
-                )
+                raise TrackerError("expected no running search during a replay, found one; stop it first (Esc)")
             at = min(max(-1, step), len(run.steps) - 1)
             if at < 0:
                 costs: tuple[float | None, ...] = ()
@@ -52,37 +54,37 @@ class Replay:
                     finite_or_none(run.start_px), costs, 0,
                 )  # fmt: skip
             else:
-                kept = run.steps[at]
+                recorded = run.steps[at]
                 shown = ReplayState(
-                    number, at, len(run.steps), run.poses_of(kept.candidate), run.poses_of(kept.best),
-                    run.stages[kept.stage].name, kept.candidate_px, kept.best_px,
-                    tuple(finite_or_none(float(c)) for c in kept.best_views_px), kept.evaluations,
+                    number, at, len(run.steps), run.poses_of(recorded.candidate), run.poses_of(recorded.best),
+                    run.stages[recorded.stage].name, recorded.candidate_px, recorded.best_px,
+                    tuple(finite_or_none(float(c)) for c in recorded.best_view_costs_px), recorded.evaluations,
                 )  # fmt: skip
             self._set_view(replace(self._view, replay=shown, preview=None))
 
     def leave(self) -> None:
-        """Show the true poses again; called before anything else happens to the frame."""
+        """Show the stored poses again; called before any change of the frame."""
         with self._session_state.lock:
             if self._view.replay is not None or self._view.preview is not None:
                 self._set_view(replace(self._view, replay=None, preview=None))
 
     def forget(self) -> None:
-        """Compare no more either: another frame is shown."""
+        """End replay, preview and comparison, because another frame is shown."""
         with self._session_state.lock:
             self._set_view(SearchView(speed=self._view.speed))
 
     def compare(self, number: int | None) -> None:
-        """Draw the result of a run over the views; None for no more.
+        """Draw the result of a run over the views; None ends this.
 
         Raises:
-            TrackerError: the run is kept no more.
+            TrackerError: the run is discarded.
         """
         with self._session_state.lock:
             compared = None if number is None else self._run(number).best
             self._set_view(replace(self._view, compared=compared, compared_run=number))
 
     def preview(self, number: int, candidate: int | None) -> None:
-        """Draw a candidate of a run over the views; None for no more, and for one that is no candidate any more."""
+        """Draw a candidate of a run over the views; None, or an outdated index, draws none."""
         with self._session_state.lock:
             run = self._runs.find(number)
             poses = None
@@ -91,10 +93,10 @@ class Replay:
             self._set_view(replace(self._view, preview=poses))
 
     def take(self, number: int, candidate: int | None) -> None:
-        """Take over a candidate of a run, or its result where that is None: one edit, which can be undone.
+        """Take over a candidate of a run, or its result if the candidate is None; one entry of the history.
 
         Raises:
-            TrackerError: the run or the candidate is kept no more.
+            TrackerError: the run or the candidate is discarded.
         """
         with self._session_state.lock:
             run = self._run(number)

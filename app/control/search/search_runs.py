@@ -1,4 +1,4 @@
-"""Searches as they went: every step of the last few runs, kept so that they can be replayed and compared."""
+"""Record every step of the last searches, so that they can be replayed and compared."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -11,44 +11,44 @@ from tracker.geometry.arrays import Array, FloatArray
 from tracker.search.best_first import SearchStep, Stage, stages
 from tracker.tracking.chamfer.settings import TrackSettings
 
-KEPT_STEPS = 10_000
-"""Steps of a run that are kept at most; beyond, every other one that found nothing better is dropped."""
-_KEPT_RUNS = 6
-"""Runs of a frame that are kept."""
-_KEPT_FRAMES = 8
-"""Frames whose runs are kept."""
-_MOST_CANDIDATES = 8
-"""Poses in the list of the best candidates."""
+MAX_STEPS = 10_000
+"""Maximum number of recorded steps of a run; beyond, every other step without improvement is discarded."""
+_MAX_RUNS = 6
+"""Maximum number of recorded runs of a frame."""
+_MAX_FRAMES = 8
+"""Maximum number of frames with recorded runs."""
+_MAX_CANDIDATES = 8
+"""Length of the list of the best candidates."""
 _DISTINCT_M = 0.03
-"""Poses count as one unless a point lies this far apart, metres."""
+"""Poses are distinct if a point differs by this distance, metres."""
 
 
 class RecordedStep(NamedTuple):
-    """One expansion, small enough to be kept by the thousand."""
+    """One expansion, in compact form: thousands are recorded."""
 
     stage: int
     """Index among the run's stages."""
     evaluations: int
     """Poses scored since the run began."""
     candidate_px: float
-    """Cost of the cheapest pose just scored, px."""
+    """Cost of the best pose of this expansion, px."""
     best_px: float
-    """Least cost so far, px."""
-    best_views_px: FloatArray
-    """The same in each view, (V,), px; NaN for views without edges."""
+    """Lowest cost so far, px."""
+    best_view_costs_px: FloatArray
+    """That cost in each view, (V,), px; NaN for views without edges."""
     candidate: FloatArray
-    """Values of all people, one after the other, with the cheapest pose just scored."""
+    """Values of all people, concatenated, for the best pose of this expansion."""
     best: FloatArray
-    """The same with the best poses so far."""
+    """Values of all people, concatenated, for the best poses so far."""
     matters: bool
-    """Whether it found something better or ended its stage: such steps are never thinned out."""
+    """Whether the step lowered the cost or ended its stage; such steps are never discarded."""
 
 
 class Candidate(NamedTuple):
-    """A good pose that a search came by."""
+    """One of the best poses of a search."""
 
     px: float
-    """Its cost, px."""
+    """Cost, px."""
     poses: tuple[Array, ...]
     """Pose of each person, (n_values,) each."""
     points_world: Array
@@ -56,17 +56,17 @@ class Candidate(NamedTuple):
 
 
 class StageCount(NamedTuple):
-    """What a stage has cost and brought so far."""
+    """Work and gain of a stage so far."""
 
     expansions: int
     evaluations: int
     gain_px: float
-    """By how much it lowered the cost, px."""
+    """Decrease of the cost, px."""
     done: bool
 
 
 class SearchRun:
-    """One search of one frame. Not locked by itself: whoever holds it holds the screen's lock."""
+    """One recorded search of one frame. The caller holds the session's lock."""
 
     def __init__(
         self,
@@ -78,31 +78,31 @@ class SearchRun:
         settings: TrackSettings,
         free: Sequence[NDArray[np.bool_]] | None = None,
     ) -> None:
-        """Begin with no step taken.
+        """Begin without steps.
 
         Args:
-            number: of the run, from 1 on, never used again.
-            frame: that is searched.
+            number: of the run, from 1, unique in the session.
+            frame: index of the searched frame.
             models: the body of each person.
             start: pose of each person before the search, (n_values,) each.
-            start_px: their cost, px; NaN where it is not known.
-            settings: what the search is told.
+            start_px: their cost, px; NaN if unknown.
+            settings: of the search.
             free: of each person the degrees of freedom that may move, (n_dofs,); all by default.
         """
         self.number, self.frame, self.start, self.settings = number, frame, start, settings
-        self.stages: list[Stage] = stages(models, settings.search, free=free)
+        self.stages: list[Stage] = stages(models, settings.search, active_dofs=free)
         self.counts = [StageCount(0, 0, 0.0, False) for _ in self.stages]
         self.steps: list[RecordedStep] = []
         self.best, self.best_px = start, start_px
         self.start_px, self.evaluations, self.seconds = start_px, 0, 0.0
         self.over = False
-        """Whether it goes on no more."""
+        """Whether the run has ended."""
         self.thinned = 0
-        """How often steps were thinned out."""
+        """Number of times that steps were discarded."""
         self.candidates: list[Candidate] = []
-        """The best poses that differ, the cheapest first."""
+        """The best distinct poses, lowest cost first."""
         self.version = 0
-        """Rises with every step."""
+        """Increases with every step."""
         self._models = tuple(models)
         self._lengths = [len(p) for p in start]
         self._at = -1
@@ -110,7 +110,12 @@ class SearchRun:
         self._best_row = np.concatenate(start).astype(np.float32)
 
     def add(self, step: SearchStep, seconds: float) -> None:
-        """Take down a step; `seconds` is the time worked since the run began."""
+        """Record a step.
+
+        Args:
+            step: of the search.
+            seconds: time worked since the run began.
+        """
         if step.stage is not self._stage:
             self._stage, self._at = step.stage, self._at + 1
         former_px = step.best_px if np.isnan(self.best_px) else self.best_px
@@ -128,42 +133,42 @@ class SearchRun:
             self.start_px = step.best_px
         self.steps.append(
             RecordedStep(
-                self._at, step.evaluations, step.candidate_px, step.best_px, step.best_views_px.astype(np.float32),
+                self._at, step.evaluations, step.candidate_px, step.best_px, step.best_view_costs_px.astype(np.float32),
                 np.concatenate(step.candidate).astype(np.float32), self._best_row, better or step.stage_done,
             )
         )  # fmt: skip
         self.best, self.best_px = step.best, step.best_px
         self.evaluations, self.seconds, self.version = step.evaluations, seconds, self.version + 1
         self._list(step.candidate_px, step.candidate)
-        if len(self.steps) > KEPT_STEPS:
+        if len(self.steps) > MAX_STEPS:
             self._thin()
 
     def poses_of(self, row: FloatArray) -> tuple[Array, ...]:
-        """Pose of each person from a row of a recorded step."""
+        """Return the pose of each person from the values of a recorded step."""
         return tuple(np.split(row.astype(np.float64), np.cumsum(self._lengths)[:-1]))
 
     def _list(self, px: float, poses: tuple[Array, ...]) -> None:
-        """Put a pose among the best, unless a better one is nearly the same."""
-        if len(self.candidates) == _MOST_CANDIDATES and px >= self.candidates[-1].px:
+        """Add poses to the list of the best, unless a better entry is not distinct from them."""
+        if len(self.candidates) == _MAX_CANDIDATES and px >= self.candidates[-1].px:
             return
         points = np.concatenate([m.points_world(p) for m, p in zip(self._models, poses, strict=True)])
         near = [c for c in self.candidates if np.linalg.norm(c.points_world - points, axis=1).max() < _DISTINCT_M]
         if any(c.px <= px for c in near):
             return
-        kept = [c for c in self.candidates if all(c is not n for n in near)]
-        self.candidates = sorted([*kept, Candidate(px, poses, points)], key=lambda c: c.px)[:_MOST_CANDIDATES]
+        survivors = [c for c in self.candidates if all(c is not n for n in near)]
+        self.candidates = sorted([*survivors, Candidate(px, poses, points)], key=lambda c: c.px)[:_MAX_CANDIDATES]
 
     def _thin(self) -> None:
-        kept = [s for i, s in enumerate(self.steps) if s.matters or i % 2 == 0]
-        self.steps = kept if len(kept) <= 0.9 * KEPT_STEPS else self.steps[1::2]
+        survivors = [s for i, s in enumerate(self.steps) if s.matters or i % 2 == 0]
+        self.steps = survivors if len(survivors) <= 0.9 * MAX_STEPS else self.steps[1::2]
         self.thinned += 1
 
 
 class SearchRuns:
-    """The runs of the frames searched last. Locked as a `SearchRun` is."""
+    """The recorded runs of the frames searched last. The caller holds the session's lock."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Begin without runs."""
         self._runs: dict[int, list[SearchRun]] = {}
         self._number = 0
 
@@ -176,23 +181,23 @@ class SearchRuns:
         settings: TrackSettings,
         free: Sequence[NDArray[np.bool_]] | None = None,
     ) -> SearchRun:
-        """Note that a search begins; the oldest run makes room. See `SearchRun`."""
+        """Add a run, in place of the oldest if there are too many. Arguments as for `SearchRun`."""
         self._number += 1
         run = SearchRun(self._number, frame, models, start, start_px, settings, free)
         of_frame = self._runs.pop(frame, [])
-        self._runs[frame] = [*of_frame, run][-_KEPT_RUNS:]  # this frame now is the newest of the dict
-        while len(self._runs) > _KEPT_FRAMES:
+        self._runs[frame] = [*of_frame, run][-_MAX_RUNS:]  # as the newest frame of the dict
+        while len(self._runs) > _MAX_FRAMES:
             del self._runs[next(iter(self._runs))]
         return run
 
     def clear(self) -> None:
-        """Keep none of them any more."""
+        """Discard all runs."""
         self._runs.clear()
 
     def of_frame(self, frame: int) -> list[SearchRun]:
-        """Runs of a frame, the oldest first."""
+        """Return the runs of a frame, oldest first."""
         return list(self._runs.get(frame, []))
 
     def find(self, number: int) -> SearchRun | None:
-        """The run of a number; None where it is kept no more."""
+        """Return the run of a number; None if it is discarded."""
         return next((r for runs in self._runs.values() for r in runs if r.number == number), None)

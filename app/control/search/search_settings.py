@@ -1,4 +1,4 @@
-"""Settings of the search as the page edits and lists them: by leaf of the decomposition, not by degree of freedom."""
+"""Edit and list the settings of the search by leaf of the decomposition, not by degree of freedom."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,11 +23,11 @@ class Leaf:
     person: int
     """Index of the person."""
     name: str
-    """Of the group."""
+    """Name of the group."""
     dofs: tuple[str, ...]
-    """Names of what is searched; those that are locked are left out."""
+    """Names of its active degrees of freedom."""
     bound_rad: float | None
-    """Largest change of its angles, rad; None where it has none or they differ."""
+    """Largest change of its angles, rad; None if it has none or they differ."""
     step_rad: float | None
     """Spacing along its angles, rad; None likewise."""
     bound_m: float | None
@@ -35,17 +35,17 @@ class Leaf:
     step_m: float | None
     """Spacing along its positions, metres; None likewise."""
     angles: int
-    """How many of its degrees of freedom are angles."""
+    """Number of its degrees of freedom that are angles."""
     lengths: int
-    """How many are positions."""
+    """Number that are positions."""
     own: bool
-    """Whether any of its bounds or steps is not that of all."""
+    """Whether a bound or step differs from the common one."""
 
 
 def leaves(
     models: Sequence[BodyModel], settings: SearchSettings, free: Sequence[NDArray[np.bool_]] | None = None
 ) -> list[Leaf]:
-    """The leaves of the decomposition, in the order of search within one pass.
+    """Return the leaves of the decomposition, in the order of search within one pass.
 
     Args:
         models: the body of each person.
@@ -53,7 +53,7 @@ def leaves(
         free: of each person the degrees of freedom that may move, (n_dofs,); all by default.
     """
     found = []
-    for stage in stages(models, replace(settings, passes=(1.0,)), free=free):
+    for stage in stages(models, replace(settings, passes=(1.0,)), active_dofs=free):
         model = models[stage.person]
         at = [model.dof_names.index(n) for n in stage.group.dofs]
         bounds, steps = settings.lattice(model, at)
@@ -71,17 +71,17 @@ def leaves(
 
 
 def changed(before: TrackSettings, models: Sequence[BodyModel], changes: Mapping[str, Any]) -> TrackSettings:
-    """Settings with what a page has changed; a value of a leaf becomes that of each of its degrees of freedom.
+    """Return settings with the changes of a page; a value of a leaf applies to each of its degrees of freedom.
 
     Args:
-        before: the settings until now.
+        before: the present settings.
         models: the body of each person.
         changes: any of `theta_px` (null for the default), `patience`, `max_expansions`, `passes`, `limbs_apart`,
             `outliers`, `bound_rad`, `bound_m`, `step_rad`, `step_m` (of all), and `leaf`: `{person, name}` with any of
             the latter four for this leaf alone, null to follow the others again.
 
     Raises:
-        TrackerError: a value that no search can work with, or an unknown leaf.
+        TrackerError: a value is invalid, or a leaf is unknown.
         KeyError, TypeError, ValueError: the changes are not understood.
     """
     search, after = before.search, before
@@ -108,7 +108,7 @@ def changed(before: TrackSettings, models: Sequence[BodyModel], changes: Mapping
 
 
 def described(settings: TrackSettings) -> dict[str, str]:
-    """What a search depends on, by label, as people read it."""
+    """Return the settings of a search as text by label."""
     s = settings.search
     found = {
         "theta": "default" if settings.theta_px is None else f"{settings.theta_px:g} px",
@@ -130,33 +130,33 @@ def described(settings: TrackSettings) -> dict[str, str]:
 
 
 def differences(all_settings: Sequence[TrackSettings]) -> list[dict[str, str]]:
-    """Of each of some settings, by label, what is not the same in all of them."""
-    told = [described(s) for s in all_settings]
-    labels = dict.fromkeys(label for one in told for label in one)
-    differing = [label for label in labels if len({one.get(label) for one in told}) > 1]
-    return [{label: one.get(label, "as all") for label in differing} for one in told]
+    """Return for each settings the values, by label, that are not equal in all of them."""
+    texts = [described(s) for s in all_settings]
+    labels = dict.fromkeys(label for one in texts for label in one)
+    differing = [label for label in labels if len({one.get(label) for one in texts}) > 1]
+    return [{label: one.get(label, "as all") for label in differing} for one in texts]
 
 
-def _of_leaf(search: SearchSettings, models: Sequence[BodyModel], told: Mapping[str, Any]) -> dict[str, Any]:
-    """Bounds and steps by degree of freedom after a change of one leaf."""
-    person, name = int(told["person"]), str(told["name"])
+def _of_leaf(search: SearchSettings, models: Sequence[BodyModel], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return bounds and steps by degree of freedom after a change of one leaf."""
+    person, name = int(changes["person"]), str(changes["name"])
     found = next((leaf for leaf in leaves(models, search) if (leaf.person, leaf.name) == (person, name)), None)
     if found is None:
         raise TrackerError(
-            f"expected a group of the search, found '{name}'; it is there no more, look at the list again"
+            f"expected a group of the search, found '{name}'; it no longer exists, so choose one from the present list"
         )
     model, single = models[person], {"bounds": dict(search.bounds), "steps": dict(search.steps)}
-    for key in (k for k in _PLAIN if k in told):
+    for key in (k for k in _PLAIN if k in changes):
         of = single["bounds" if key.startswith("bound") else "steps"]
         for dof in found.dofs:
             if bool(model.dof_is_length[model.dof_names.index(dof)]) == key.endswith("_m"):
-                if told[key] is None or float(told[key]) == getattr(search, key):
+                if changes[key] is None or float(changes[key]) == getattr(search, key):
                     of.pop(dof, None)
                 else:
-                    of[dof] = float(told[key])
+                    of[dof] = float(changes[key])
     return dict(single)
 
 
 def _common(values: np.ndarray) -> float | None:
-    """The value that all have; None where they differ or there is none."""
+    """Return the value that all have; None if they differ or there is none."""
     return float(values[0]) if len(values) and np.allclose(values, values[0]) else None

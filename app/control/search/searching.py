@@ -1,4 +1,4 @@
-"""The search on the shown frame: step by step or to its end, watched, stopped, saved."""
+"""Search the poses of the shown frame, step by step or to the end, and save the best ones."""
 
 import time
 from collections.abc import Callable
@@ -20,11 +20,11 @@ from tracker.tracking.chamfer.settings import TrackSettings, search_frame
 from tracker.tracking.subjects import Subjects
 
 _SAVE_S = 0.5
-"""A running search is on disk at least this often."""
+"""A running search is saved at least this often."""
 
 
 class SearchRunner:
-    """At most one search, which runs or stands on the shown frame."""
+    """The search on the shown frame, running or paused; at most one."""
 
     def __init__(self, session_state: SessionState, runs: SearchRuns, activities: Activities) -> None:
         """Search nothing yet.
@@ -38,11 +38,11 @@ class SearchRunner:
         activities.add_job(self, on_shown_frame=True)
         self._job: Job[SearchStep] | None = None
         self._run: SearchRun | None = None
-        self._person: int | None = None  # who alone is searched; None for everybody
+        self._person: int | None = None  # the only person searched; None for all people
 
     @property
     def running(self) -> bool:
-        """Whether a search is at work."""
+        """Whether a search is running."""
         return self._job is not None and self._job.running
 
     def set_settings(self, settings: TrackSettings) -> None:
@@ -135,16 +135,14 @@ class SearchRunner:
                 job.run(until)
 
     def _paused_job(self, person: int | None, start: tuple[Array, ...] | None = None) -> Job[SearchStep]:
-        """The search that stands, or a new one from given poses, else from those shown."""
+        """Return the paused search of the same people, or a new one from given poses, by default the shown ones."""
         session_state, state = self._session_state, self._session_state.state
         if self._job is None or self._job.ended or self._person != person:
             frame, settings, models = state.frame, state.settings, session_state.models
             poses = state.poses if start is None else session_state.within_locks(start)
             free = [session_state.active_dofs(i) & (person is None or i == person) for i in range(len(models))]
-            if not stages(models, settings.search, free=free):
-                raise TrackerError(
-                    "expected something that a search may move, found everything locked; unlock some of it"
-                )
+            if not stages(models, settings.search, active_dofs=free):
+                raise TrackerError("expected degrees of freedom to search, found all of them locked; unlock some")
             if self._run is not None:
                 self._run.over = True
             start_px = session_state.costs(poses)["cost_px"]
@@ -169,7 +167,7 @@ class SearchRunner:
                 return
             self._run.add(step, seconds)
             people = tuple(
-                p if self._is_left(i) or (p.source is not None and np.array_equal(p.values, best))
+                p if self._is_fixed(i) or (p.source is not None and np.array_equal(p.values, best))
                 else ShownPose(best, "searched")
                 for i, (p, best) in enumerate(zip(session_state.state.people, step.best, strict=True))
             )  # fmt: skip
@@ -179,7 +177,7 @@ class SearchRunner:
                 best_px=step.best_px, candidate=step.candidate, message="",
             )  # fmt: skip
             changed = any(a is not b for a, b in zip(people, session_state.state.people, strict=True))
-            view_costs_px = tuple(finite_or_none(c) for c in step.best_views_px)
+            view_costs_px = tuple(finite_or_none(c) for c in step.best_view_costs_px)
             session_state.set(people=people, search=shown, cost_px=step.best_px, view_costs_px=view_costs_px)
             if changed and time.monotonic() - session_state.last_save > _SAVE_S:
                 session_state.save("search", "searched", job)
@@ -206,8 +204,8 @@ class SearchRunner:
             session_state.set(search=ended, **session_state.costs(session_state.state.poses))
             self._save(job)
 
-    def _is_left(self, person: int) -> bool:
-        """Whether somebody else is searched and this person, who hides and explains, stays as he is: a draft too."""
+    def _is_fixed(self, person: int) -> bool:
+        """Return whether only another person is searched, so that this person's pose stays as it is."""
         return self._person is not None and person != self._person
 
     def _save(self, job: Job[SearchStep]) -> None:

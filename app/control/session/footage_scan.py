@@ -1,4 +1,4 @@
-"""The controller's part that watches how far the footage has been listed, and lets frames be shown once they are."""
+"""Watch the indexing of the footage, and show frames as soon as they are indexed."""
 
 import threading
 
@@ -6,34 +6,34 @@ from app.control.session.session_state import SessionState
 from app.state.progress import FootageState
 from tracker.errors import TrackerError
 
-_LOOK_S = 0.2
+_POLL_S = 0.2
 
 
 class FootageScan:
-    """Watches, in a thread of its own, until all frames of all videos are listed."""
+    """Watches in its own thread until all frames of all videos are indexed."""
 
     def __init__(self, session_state: SessionState) -> None:
-        """Begin to watch."""
+        """Start to watch."""
         self._session_state = session_state
-        self._over = threading.Event()
+        self._closing = threading.Event()
         self._thread: threading.Thread | None = None
-        if self._look():
+        if self._update():
             self._thread = threading.Thread(target=self._watch, name="listing", daemon=True)
             self._thread.start()
 
     def close(self) -> None:
         """Stop watching."""
-        self._over.set()
+        self._closing.set()
         if self._thread:
             self._thread.join()
 
     def _watch(self) -> None:
-        while not self._over.wait(_LOOK_S):
-            if not self._look():
+        while not self._closing.wait(_POLL_S):
+            if not self._update():
                 return
 
-    def _look(self) -> bool:
-        """Bring the state up to date; says whether there is more to come."""
+    def _update(self) -> bool:
+        """Update the state; returns whether frames are missing."""
         session_state = self._session_state
         try:
             share, error = session_state.frames.listed_share, None

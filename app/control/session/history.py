@@ -1,4 +1,4 @@
-"""The history of a session: back and forth along it, by one entry or many; what is not on disk tried again."""
+"""Move along the history of a session, by one entry or many, and retry failed saves."""
 
 from collections.abc import Callable
 
@@ -11,46 +11,46 @@ class History:
     """Moves along the history of one session."""
 
     def __init__(self, session_state: SessionState, activities: Activities, follow: Callable[[], None]) -> None:
-        """Move along the history behind this screen.
+        """Move along the history of this session.
 
         Args:
-            screen: what is shown.
+            session_state: holds the state.
             activities: ends jobs and gestures before an edit.
-            follow: lets what is kept beside the poses follow a move (`BodySizeEditing.follow`).
+            follow: restores body models after a move (`BodySizeEditing.follow`).
         """
         self._session_state, self._activities, self._follow = session_state, activities, follow
 
     def entries(self, limit: int) -> list[HistoryEntry]:
-        """Entries that redo and undo can reach, latest first; at most `limit` of each."""
+        """Return the entries that redo and undo can reach, latest first, at most `limit` of each."""
         with self._session_state.lock:
             return self._session_state.saver.history(limit)
 
     def undo(self) -> None:
-        """Take back the last entry, after stopping what stands on it.
+        """Revert the last entry, after ending the job or gesture that made it.
 
         Raises:
-            TrackerError: something waits to be written and still cannot be.
+            TrackerError: a queued edit still cannot be written.
         """
         self._move(self._session_state.saver.undo)
 
     def redo(self) -> None:
-        """Do again what was taken back last.
+        """Reapply the entry that was reverted last.
 
         Raises:
-            TrackerError: something waits to be written and still cannot be.
+            TrackerError: a queued edit still cannot be written.
         """
         self._move(self._session_state.saver.redo)
 
     def go_to(self, edit: int | None) -> None:
-        """Undo or redo until an entry is the last one that is done; None takes back all.
+        """Undo or redo until an entry is the last applied one; None reverts all.
 
         Raises:
-            TrackerError: the history does not lead there any more, or something still cannot be written.
+            TrackerError: the history no longer contains the entry, or a queued edit still cannot be written.
         """
         self._move(lambda: self._session_state.saver.go_to(edit))
 
     def save(self) -> None:
-        """Try again to write what is not on disk; the state says whether that has worked."""
+        """Try again to write queued edits; the state has the result."""
         with self._session_state.lock:
             self._session_state.saver.retry()
             self._session_state.refresh_saving()

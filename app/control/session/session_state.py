@@ -199,7 +199,7 @@ class SessionState:
     def refresh_saving(self) -> None:
         """Bring what the state says of the history and the disk up to date."""
         undo, redo = self.saver.undo_label(), self.saver.redo_label()
-        self.set(undo=undo, redo=redo, save_error=self.saver.error, timeline_version=self.saver.timeline_version)
+        self.set(undo=undo, redo=redo, save_error=self.saver.error, timeline_version=self.saver.index.version)
 
     def _load(self, frame: int) -> ShownFrame:
         """Return the stored poses of a frame; a person without one is shown in the pose of the nearest frame."""
@@ -211,15 +211,15 @@ class SessionState:
             else:
                 nearest = self.saver.nearest_pose(person, frame)
                 people.append(ShownPose(default if nearest is None else nearest, None))
-        present = tuple(self.saver.revision(person) for person in range(len(people)))
+        present = tuple(self.saver.revisions.current(person) for person in range(len(people)))
         models, revisions = self.bodies(people)
         return {"people": tuple(people), "models": models, "revisions": revisions, "present": present}
 
     def bodies(self, shown: Sequence[ShownPose]) -> tuple[tuple[BodyModel, ...], tuple[int, ...]]:
         """Return the bodies of poses and their model revisions; poses that are not stored have the present body."""
         saver = self.saver
-        revisions = tuple(saver.revision(i) if p.revision is None else p.revision for i, p in enumerate(shown))
-        return tuple(saver.body(r) for r in revisions), revisions
+        revisions = tuple(saver.revisions.current(i) if p.revision is None else p.revision for i, p in enumerate(shown))
+        return tuple(saver.revisions.body(r) for r in revisions), revisions
 
     def _load_pins(self, frame: int) -> tuple[tuple[PointObservation, ...], ...]:
         """Return the pins of all people on a frame."""

@@ -20,7 +20,7 @@ class StoredPoses:
             person: index of one of several people; None summarizes all people.
         """
         with self._session_state.lock:
-            return self._session_state.saver.timeline(since, person)
+            return self._session_state.saver.index.timeline(since, person)
 
     def rows(self, person: int, since: int = 0) -> tuple[list[int], list[FramePose]]:
         """Return the frames on which a person's poses changed after a version of the timeline, and their present rows.
@@ -31,16 +31,16 @@ class StoredPoses:
         """
         saver = self._session_state.saver
         with self._session_state.lock:
-            frames = sorted(saver.timeline(since)) if since > 0 else saver.frames(person)
+            frames = sorted(saver.index.timeline(since)) if since > 0 else saver.index.frames(person)
         return frames, saver.pose_rows(person, frames)
 
     def in_present_body(self, person: int, frames: range) -> dict[int, Array]:
         """Return a person's poses, (n_values,), in the present body by frame; frames without a pose are left out."""
         saver = self._session_state.saver
         with self._session_state.lock:
-            listed = saver.frames_within(person, frames)
+            listed = saver.index.within(person, frames)
         return {
-            row.frame: saver.in_present_body(person, row.values, row.model_revision)
+            row.frame: saver.revisions.in_present_body(person, row.values, row.model_revision)
             for row in saver.pose_rows(person, listed)
-            if saver.fits(person, row.model_revision)
+            if saver.revisions.fits(person, row.model_revision)
         }

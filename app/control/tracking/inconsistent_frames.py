@@ -1,4 +1,4 @@
-"""Keeps the list of frames that disagree with their neighbours up to date, in the background."""
+"""Find the frames whose poses disagree with their neighbours, in the background."""
 
 from collections.abc import Iterable
 
@@ -10,28 +10,28 @@ from app.state.state import State
 from tracker.motion.consistency import inconsistent_frames
 
 _REST_S = 0.3
-"""A tracker writes twice a second: no need to look more often."""
+"""Minimum time between two checks: a tracker writes twice a second."""
 _REACH = 3
-"""A changed pose changes the opinion of frames this far from it."""
-_AT_ONCE = 2000
-"""Frames looked at together."""
+"""A changed pose affects the result of frames up to this distance."""
+_MAX_INTERVAL = 2000
+"""Maximum number of frames checked together."""
 
 
 class InconsistentFrames:
-    """Looks at every frame once, then at what changes. Publishes to the screen's state."""
+    """Checks every frame once, then changed frames. The state holds the result."""
 
     def __init__(self, session_state: SessionState) -> None:
-        """Begin to look."""
+        """Start to check."""
         self._session_state = session_state
         self._found: list[set[int]] = [set() for _ in session_state.models]
-        self._seen = 0  # version of the timeline
-        self._latest: LatestWinsWorker[int] = LatestWinsWorker(self._look, "disagreements", _REST_S)
+        self._seen = 0  # checked version of the timeline
+        self._latest: LatestWinsWorker[int] = LatestWinsWorker(self._check, "disagreements", _REST_S)
         self._offered = 0
         session_state.subscribe(self._changed)
         self._changed(session_state.state)
 
     def close(self) -> None:
-        """Look no more."""
+        """End the thread."""
         self._latest.close()
 
     def _changed(self, state: State) -> None:
@@ -39,29 +39,29 @@ class InconsistentFrames:
             self._offered = state.timeline_version
             self._latest.offer(state.timeline_version)
 
-    def _look(self, version: int) -> None:
+    def _check(self, version: int) -> None:
         session_state = self._session_state
         with session_state.lock:
-            changed = sorted(session_state.saver.timeline(self._seen))
+            changed = sorted(session_state.saver.index.timeline(self._seen))
         self._seen = version
-        for first, last in _stretches(changed):
+        for first, last in _intervals(changed):
             for person in range(len(session_state.models)):
-                self._look_at(person, first, last)
+                self._check_interval(person, first, last)
         found = tuple(sorted(set().union(*self._found)))
         with session_state.lock:
-            if found != session_state.state.disagreeing:
-                session_state.set(disagreeing=found)
+            if found != session_state.state.inconsistent_frames:
+                session_state.set(inconsistent_frames=found)
 
-    def _look_at(self, person: int, first: int, last: int) -> None:
-        """Look anew at a stretch of frames of one person."""
+    def _check_interval(self, person: int, first: int, last: int) -> None:
+        """Check an interval of frames of one person."""
         saver = self._session_state.saver
         around = range(max(0, first - 2 * _REACH), last + 2 * _REACH + 1)
         rows = [
             r
             for r in self._session_state.saver.pose_rows(person, around)
-            if self._session_state.saver.fits(person, r.model_revision)
+            if self._session_state.saver.revisions.fits(person, r.model_revision)
         ]
-        models = [saver.body(r.model_revision) for r in rows]
+        models = [saver.revisions.body(r.model_revision) for r in rows]
         keyframes = {r.frame for r in saver.rows(person, around) if r.keyframe}
         values = np.array([r.values for r in rows])
         off = inconsistent_frames(models, [r.frame for r in rows], values, keyframes, self._session_state.session.fps)
@@ -71,13 +71,13 @@ class InconsistentFrames:
         known |= {f for f in off if f in touched}
 
 
-def _stretches(frames: Iterable[int]) -> Iterable[tuple[int, int]]:
-    """First and last frames of stretches that hold all given frames, ascending; neighbours are looked at together."""
+def _intervals(frames: Iterable[int]) -> Iterable[tuple[int, int]]:
+    """Yield first and last frames of intervals that contain all given frames, ascending, joining near ones."""
     first = last = None
     for frame in frames:
         if first is None or last is None:
             first = last = frame
-        elif frame - last <= 2 * _REACH and frame - first < _AT_ONCE:
+        elif frame - last <= 2 * _REACH and frame - first < _MAX_INTERVAL:
             last = frame
         else:
             yield first, last

@@ -1,4 +1,4 @@
-"""Work on a range of frames: interpolate, clear, mark, track within it; each is one entry of the history."""
+"""Interpolate, clear, mark or track a range of frames; each is one entry of the history."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,35 +17,35 @@ from tracker.motion.interpolation import interpolate_pose
 from tracker.store.records import Change, FrameRow, MarkChange, PoseChange, PoseRecord
 
 Mark = Literal["keyframe", "reviewed", "unreviewed", "none"]
-"""`unreviewed` leaves keyframes, which a person has vouched for; `none` takes that away too."""
+"""`unreviewed` leaves keyframes unchanged; `none` removes the mark of keyframes too."""
 
 _AT_ONCE = 500
-"""Frames written at once; what is not more is done before the call returns."""
+"""Frames written at once; shorter work is done before the call returns."""
 
 
 @dataclass(eq=False)
 class _Run:
-    """One piece of work."""
+    """Work on one range."""
 
     label: str
-    """What the history says."""
+    """Label of the entry of the history."""
     did: str
-    """How its end is told: `interpolated`."""
+    """Verb of the final message: `interpolated`."""
     by_program: bool
-    """Whether keyframes stay as they are."""
+    """Whether keyframes stay unchanged."""
     job: Job[Sequence[Change]] = field(init=False)
     edit: int | None = None
-    """Its entry of the history; None before the first frames are written."""
+    """Entry of the history; None before the first frames are written."""
 
 
 class Ranges:
-    """At most one piece of work on a range of frames. Ranges name their first and last frame."""
+    """Work on a range of frames, at most one at a time. A range is given by its first and last frame."""
 
     def __init__(self, session_state: SessionState, tracking: Tracking, activities: Activities) -> None:
-        """Work on the poses of this screen.
+        """Work on nothing yet.
 
         Args:
-            screen: holds the state.
+            session_state: holds the state.
             tracking: tracks within a range.
             activities: ends jobs and gestures before an edit.
         """
@@ -55,23 +55,23 @@ class Ranges:
 
     @property
     def running(self) -> bool:
-        """Whether a piece of work is under way."""
+        """Whether work is in progress."""
         return self._run is not None and self._run.job.running
 
     def interpolate(self, first: int, last: int, people: Sequence[int] | None = None) -> None:
-        """Fill a range between the poses at its ends and its keyframes, which stay as they are.
+        """Interpolate between the poses at the ends of a range and its keyframes, which stay unchanged.
 
         Args:
             first: first frame of the range.
             last: last frame of the range.
-            people: whose poses; None for everybody.
+            people: indices of the people; None for all.
 
         Raises:
-            TrackerError: nobody has two poses to go between, or no frame lies between them.
+            TrackerError: no person has two poses with frames between them.
         """
         first, last = self._within(first, last)
         with self._activities.editing():
-            gaps = [(i, *gap) for i in self._whose(people) for gap in self._gaps(i, first, last)]
+            gaps = [(i, *gap) for i in self._checked(people) for gap in self._gaps(i, first, last)]
             if not gaps:
                 raise TrackerError(
                     f"expected poses at both ends of frames {first} to {last} and frames between them, found none; "
@@ -82,18 +82,18 @@ class Ranges:
             self._begin(run, "interpolating", total, (c for gap in gaps for c in self._filled(*gap)))
 
     def clear(self, first: int, last: int, people: Sequence[int] | None = None) -> None:
-        """Remove the poses of a range but for keyframes.
+        """Remove the poses of a range, except keyframes.
 
         Raises:
-            TrackerError: there is none to remove.
+            TrackerError: there is no pose to remove.
         """
         first, last = self._within(first, last)
         with self._activities.editing():
             rows = [(i, row) for i, row in self._rows(first, last, people) if not row.keyframe]
             if not rows:
                 raise TrackerError(
-                    f"expected poses in frames {first} to {last} that are no keyframes, found none; take the marks of "
-                    "keyframes away first if they are to go too"
+                    f"expected poses in frames {first} to {last} that are no keyframes, found none; "
+                    "to clear keyframes too, remove their marks first"
                 )
             changes = (PoseChange(self._name(i), row.frame, None) for i, row in rows)
             run = _Run(f"clear frames {first} to {last}", "cleared", by_program=True)
@@ -117,7 +117,7 @@ class Ranges:
             self._begin(run, "marking", len(changes), iter(changes))
 
     def toggle_keyframe(self) -> None:
-        """Vouch for the shown pose of the person worked on, or take that back; a draft is stored by it."""
+        """Make the shown pose of the selected person a keyframe, or remove the mark; a draft is stored."""
         state, saver = self._session_state.state, self._session_state.saver
         rows = saver.rows(state.person, range(state.frame, state.frame + 1))
         if rows:
@@ -127,24 +127,24 @@ class Ranges:
             state = self._session_state.state
             values = state.poses[state.person]
             record = PoseRecord(
-                values, ("manual",) * len(values), saver.revision(state.person), keyframe=True, reviewed=True
+                values, ("manual",) * len(values), saver.revisions.current(state.person), keyframe=True, reviewed=True
             )
             change = PoseChange(self._name(state.person), state.frame, record)
             run = _Run(f"keyframe, frame {state.frame}", "marked", by_program=False)
             self._begin(run, "marking", 1, iter([change]))
 
     def toggle_reviewed(self) -> None:
-        """Say that the shown pose of the person worked on has been looked at, or take that back."""
+        """Mark the shown pose of the selected person as reviewed, or remove the mark."""
         state = self._session_state.state
         rows = self._session_state.saver.rows(state.person, range(state.frame, state.frame + 1))
-        isnt = bool(rows) and rows[0].reviewed
-        self.mark(state.frame, state.frame, "unreviewed" if isnt else "reviewed", [state.person])
+        is_reviewed = bool(rows) and rows[0].reviewed
+        self.mark(state.frame, state.frame, "unreviewed" if is_reviewed else "reviewed", [state.person])
 
     def track(self, first: int, last: int, backward: bool) -> None:
-        """Track from one end of a range to the other; the poses at the end it begins at are where it starts.
+        """Track from one end of a range to the other, starting with the poses at that end.
 
         Raises:
-            TrackerError: nobody has been placed.
+            TrackerError: no person has a pose.
         """
         first, last = self._within(first, last)
         with self._activities.editing():
@@ -213,51 +213,51 @@ class Ranges:
         self._session_state.set(ranges=RangeState(message=did))
 
     def _within(self, first: int, last: int) -> tuple[int, int]:
-        """A range in order and within the recording."""
+        """Return a range in ascending order, clipped to the recording."""
         first, last = sorted((first, last))
         end = self._session_state.session.n_frames - 1
         if last < 0 or first > end:
             raise TrackerError(f"expected frames from 0 to {end}, found {first} to {last}; mark another range")
         return max(0, first), min(last, end)
 
-    def _whose(self, people: Sequence[int] | None) -> Sequence[int]:
-        everybody = range(len(self._session_state.models))
-        if people is not None and not set(people) <= set(everybody):
-            raise TrackerError(f"expected people from 0 to {everybody[-1]}, found {list(people)}; reload the page")
-        return everybody if people is None else people
+    def _checked(self, people: Sequence[int] | None) -> Sequence[int]:
+        indices = range(len(self._session_state.models))
+        if people is not None and not set(people) <= set(indices):
+            raise TrackerError(f"expected people from 0 to {indices[-1]}, found {list(people)}; reload the page")
+        return indices if people is None else people
 
     def _rows(self, first: int, last: int, people: Sequence[int] | None) -> list[tuple[int, FrameRow]]:
         return [
-            (i, row) for i in self._whose(people) for row in self._session_state.saver.rows(i, range(first, last + 1))
+            (i, row) for i in self._checked(people) for row in self._session_state.saver.rows(i, range(first, last + 1))
         ]
 
     def _name(self, person: int) -> str:
         return self._session_state.session.people[person].name
 
     def _gaps(self, person: int, first: int, last: int) -> Iterator[tuple[int, int]]:
-        """Neighbouring frames with poses that stay, with others between them."""
+        """Return pairs of successive fixed frames that have other frames between them."""
         rows = self._session_state.saver.rows(person, range(first, last + 1))
         stay = [row.frame for row in rows if row.keyframe or row.frame in (first, last)]
         return ((a, b) for a, b in pairwise(stay) if b - a > 1)
 
     def _filled(self, person: int, start: int, end: int) -> Iterator[PoseChange]:
-        """Poses for the frames between two that have one."""
+        """Yield interpolated poses for the frames between two frames."""
         saver, name, model = self._session_state.saver, self._name(person), self._session_state.present[person]
         ends = [saver.pose_now(person, frame) for frame in (start, end)]
-        if ends[0] is None or ends[1] is None:  # of a body model of other values
+        if ends[0] is None or ends[1] is None:  # the body has other values
             return
-        revision, sources = saver.revision(person), ("interpolated",) * len(ends[0])
+        revision, sources = saver.revisions.current(person), ("interpolated",) * len(ends[0])
         frames = range(start + 1, end)
         for at in range(0, len(frames), _AT_ONCE):
             piece = frames[at : at + _AT_ONCE]
             shares = (np.array(piece) - start) / (end - start)
             for frame, values in zip(piece, interpolate_pose(model, ends[0], ends[1], shares), strict=True):
-                told = {"method": "interpolate", "between": [start, end]}
-                yield PoseChange(name, frame, PoseRecord(values, sources, revision, settings=told))
+                settings = {"method": "interpolate", "between": [start, end]}
+                yield PoseChange(name, frame, PoseRecord(values, sources, revision, settings=settings))
 
 
 def _marked(name: str, row: FrameRow, mark: Mark) -> MarkChange | None:
-    """The change that gives a frame a mark; None where it has it."""
+    """Return the change that gives a frame a mark; None if it has the mark."""
     keyframe = mark == "keyframe" or (mark != "none" and row.keyframe)
     reviewed = keyframe or mark == "reviewed"
     same = keyframe == row.keyframe and reviewed == row.reviewed
@@ -265,7 +265,7 @@ def _marked(name: str, row: FrameRow, mark: Mark) -> MarkChange | None:
 
 
 def _pieces(changes: Iterator[Change]) -> Iterator[Sequence[Change]]:
-    """Changes in pieces that are written at once."""
+    """Split changes into pieces that are written at once."""
     piece: list[Change] = []
     for change in changes:
         piece.append(change)

@@ -85,7 +85,7 @@ class Tracking:
         with self._activities.editing():
             state, saver = session_state.state, session_state.saver
             models = session_state.present
-            people = tuple(i for i in range(len(models)) if saver.frames(i))
+            people = tuple(i for i in range(len(models)) if saver.index.frames(i))
             if not people:
                 raise TrackerError("expected a person who has been placed, found none; pose the body here first")
             frames = self._frames(backward, until, people)
@@ -99,7 +99,7 @@ class Tracking:
                     session_state.present_poses(),
                     frames,
                 ),
-                [StoredPerson(p.name, saver.revision(i)) for i, p in enumerate(session_state.session.people)],
+                [StoredPerson(p.name, saver.revisions.current(i)) for i, p in enumerate(session_state.session.people)],
                 _SaverSink(session_state),
                 f"track {way} from frame {frames[0]}",
             )

@@ -1,4 +1,4 @@
-"""Setting the floor from three clicked points; kept in session.toml, with the former one to go back to."""
+"""Set the floor from three clicked points; it is stored in session.toml, and the former floor can be restored."""
 
 from dataclasses import replace
 from typing import Any
@@ -17,13 +17,13 @@ _KEY = "former_floor"
 
 
 class FloorEditing:
-    """The floor of the session, and the hand that sets another."""
+    """The floor of the session, and the clicks that set another."""
 
     def __init__(self, session_state: SessionState, activities: Activities) -> None:
         """Show the session's floor.
 
         Args:
-            screen: holds the state.
+            session_state: holds the state.
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities
@@ -32,25 +32,25 @@ class FloorEditing:
         session_state.set(floor=floor)
 
     def begin(self) -> None:
-        """Begin to click points; what was clicked before is forgotten."""
+        """Begin to click points; earlier clicks are discarded."""
         self._pick(Picking())
 
     def cancel(self) -> None:
-        """Click no more points; the floor stays as it is."""
+        """Discard the clicked points; the floor is unchanged."""
         self._pick(None)
 
     def mark(self, camera: int, position_px: tuple[float, float]) -> None:
-        """Mark the point at hand in a view, undistorted px."""
+        """Mark the current point in a view, undistorted px."""
         with self._session_state.lock:
             picking = self._session_state.state.floor.picking
             if picking is not None and 0 <= camera < len(self._cameras):
                 self._pick(with_mark(picking, self._cameras, camera, *position_px))
 
     def next_point(self) -> None:
-        """Go on to the next point.
+        """Begin the next point.
 
         Raises:
-            TrackerError: the point at hand is not known yet.
+            TrackerError: the current point is not triangulated yet.
         """
         with self._session_state.lock:
             picking = self._session_state.state.floor.picking
@@ -61,17 +61,17 @@ class FloorEditing:
             self._pick(with_next(picking))
 
     def take_back(self) -> None:
-        """Take the last mark back."""
+        """Remove the last mark."""
         with self._session_state.lock:
             picking = self._session_state.state.floor.picking
             if picking is not None:
                 self._pick(without_last(picking, self._cameras))
 
     def apply(self) -> None:
-        """Make the plane through the points the session's floor; on disk when this returns.
+        """Set the floor to the plane through the points; it is on disk when this returns.
 
         Raises:
-            TrackerError: there is no plane, or it cannot be written.
+            TrackerError: the points give no plane, or it cannot be written.
         """
         with self._activities.editing():
             picking = self._session_state.state.floor.picking
@@ -82,7 +82,7 @@ class FloorEditing:
             self._change(nearest_axis(picking.plane.normal), picking.plane)
 
     def revert(self) -> None:
-        """Go back to the floor before the last change; done twice, nothing has changed.
+        """Restore the floor before the last change; twice restores the present one.
 
         Raises:
             TrackerError: there is none, or it cannot be written.
@@ -96,7 +96,7 @@ class FloorEditing:
     def _change(self, up: str, plane: GroundPlane | None) -> None:
         before = self._session_state.state.floor
         self._session_state.session = save_floor(self._session_state.session, up, plane)
-        self._session_state.saver.keep_setting(_KEY, _kept(before.up, before.plane))
+        self._session_state.saver.store_setting(_KEY, _plane_setting(before.up, before.plane))
         self._session_state.set_default_poses(up_rotation(up, plane))
         self._session_state.set(floor=FloorState(up, plane, former=True))
 
@@ -112,7 +112,7 @@ class FloorEditing:
         return data["up"], None if normal is None else GroundPlane(np.array(normal), float(data["offset_m"]))
 
 
-def _kept(up: str, plane: GroundPlane | None) -> dict[str, Any]:
+def _plane_setting(up: str, plane: GroundPlane | None) -> dict[str, Any]:
     if plane is None:
         return {"up": up}
     return {"up": up, "normal": plane.normal.tolist(), "offset_m": plane.offset_m}

@@ -1,37 +1,37 @@
-"""What the 3-D view shows, and through which camera it looks; kept with the session."""
+"""Choose what the 3-D view shows and through which camera it looks; stored with the session."""
 
 from dataclasses import replace
 from typing import Any
 
 from app.control.session.session_state import SessionState
-from app.state.view_3d import View3d, kept, restored
+from app.state.view_3d import View3d, restored, stored
 
 _KEY = "view_3d"
 """Setting of the session."""
 
 
 class View3dSettings:
-    """The choices of whoever looks at the 3-D view."""
+    """The settings of the 3-D view."""
 
     def __init__(self, session_state: SessionState) -> None:
-        """Take over what is kept with the session."""
+        """Restore the settings of the session."""
         self._session_state = session_state
-        # Two bodies close together are told apart by their own colours, not by those of their parts.
-        usual = View3d(colors="people" if len(session_state.session.people) > 1 else "parts")
-        session_state.set(view_3d=restored(session_state.saver.setting(_KEY), usual))
+        # Colours by person distinguish two close bodies; colours by part do not.
+        default = View3d(colors="people" if len(session_state.session.people) > 1 else "parts")
+        session_state.set(view_3d=restored(session_state.saver.setting(_KEY), default))
 
     def choose(self, **changes: Any) -> None:
         """Change fields of `View3d`; on disk when this returns.
 
         Raises:
-            TrackerError: the session's settings cannot be written; the view is changed all the same.
+            TrackerError: the session's settings cannot be written; the view changes nevertheless.
         """
         with self._session_state.lock:
             view = replace(self._session_state.state.view_3d, **changes)
             if view == self._session_state.state.view_3d:
                 return
             self._session_state.set(view_3d=view)
-            self._session_state.saver.keep_setting(_KEY, kept(view))
+            self._session_state.saver.store_setting(_KEY, stored(view))
 
     def pause(self, page: int, paused: bool) -> None:
         """Pause the 3-D view and its panels during drags, or no longer, for a page that renders in software.
@@ -45,6 +45,6 @@ class View3dSettings:
             self._session_state.set(pages_pausing_3d=others | {page} if paused else others)
 
     def snap(self, camera: int | None) -> None:
-        """Look through a camera, by index, with its image behind the bodies; None lets the view go."""
+        """Look through a camera, by index, with its image behind the bodies; None frees the view."""
         if camera is None or 0 <= camera < len(self._session_state.session.cameras):
             self._session_state.set(snapped=camera)

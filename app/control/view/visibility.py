@@ -1,4 +1,4 @@
-"""Whom the views show: who is hidden, and whether the others are dimmed. Poses and history know nothing of it."""
+"""Control which people the views show, hide or dim. Poses and history are unaffected."""
 
 from dataclasses import replace
 
@@ -6,20 +6,20 @@ from app.control.session.session_state import SessionState
 
 
 class PeopleVisibility:
-    """The people on the screen."""
+    """The visibility of the people."""
 
     def __init__(self, session_state: SessionState) -> None:
-        """Choose among those who are on this screen."""
+        """Control the views of this session."""
         self._session_state = session_state
 
     def show(self, person: int, shown: bool) -> None:
-        """Show a person, by index, in all views, or nowhere."""
+        """Show or hide a person, by index, in all views."""
         with self._session_state.lock:
             visibility = self._session_state.state.visibility
             hidden = visibility.hidden - {person} if shown else visibility.hidden | {person}
             self._session_state.set(visibility=replace(visibility, hidden=hidden))
 
     def solo(self, solo: bool) -> None:
-        """Dim everybody but the person worked on, or no more."""
+        """Dim all people but the selected one, or show all normally."""
         with self._session_state.lock:
             self._session_state.set(visibility=replace(self._session_state.state.visibility, solo=solo))

@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 
 import pytest
 
-from app.state.view_3d import View3d, kept, restored
+from app.state.view_3d import View3d, restored, stored
 
 OTHER = View3d(
     bodies=False,
@@ -23,7 +23,7 @@ OTHER = View3d(
 
 def test_every_field_comes_back():
     assert all(getattr(OTHER, f.name) != getattr(View3d(), f.name) for f in fields(View3d))
-    assert restored(json.loads(json.dumps(kept(OTHER)))) == OTHER
+    assert restored(json.loads(json.dumps(stored(OTHER)))) == OTHER
 
 
 @pytest.mark.parametrize(
@@ -38,4 +38,4 @@ def test_what_makes_no_sense_is_as_usual(data):
 
 
 def test_one_bad_field_does_not_spoil_the_others():
-    assert restored(kept(OTHER) | {"opacity": -1}) == replace(OTHER, opacity=1.0)
+    assert restored(stored(OTHER) | {"opacity": -1}) == replace(OTHER, opacity=1.0)

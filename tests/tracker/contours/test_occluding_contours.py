@@ -6,7 +6,8 @@ from scipy.spatial import cKDTree
 from staging import at, camera_at, cameras_around, solid
 
 from tracker.body.model import PosedBody
-from tracker.contours.occluding_contours import PIECE_PX, trace
+from tracker.contours.occluding_contours import trace
+from tracker.contours.pieces import PIECE_PX
 from tracker.contours.surfaces import N_SECTORS
 from tracker.contours.visibility import JOINT_MARGIN_M
 from tracker.formats.model_toml import parse_model

@@ -6,14 +6,8 @@ from staging import cameras_around, own_evidence, posed, shaken
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
-from tracker.contours.occluding_contours import (
-    PIECE_PX,
-    contour_room,
-    part_poses,
-    piece_buffer,
-    place_parts,
-    surfaces_of,
-)
+from tracker.contours.occluding_contours import contour_room, part_poses
+from tracker.contours.pieces import PIECE_PX, piece_buffer, place_parts
 from tracker.contours.static_cache import (
     copy_poses,
     is_static_unchanged,
@@ -22,6 +16,7 @@ from tracker.contours.static_cache import (
     trace_moving_parts,
     trace_static,
 )
+from tracker.contours.surfaces import surfaces_of
 from tracker.fitting.contour_residuals import ContourResiduals, MatchSettings
 
 CAMERAS = cameras_around()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tracker.contours.occluding_contours import surfaces_of
+from tracker.contours.surfaces import surfaces_of
 from tracker.contours.visibility import LANES, mark_occluded
 from tracker.formats.model_toml import parse_model
 

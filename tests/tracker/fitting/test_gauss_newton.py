@@ -122,7 +122,7 @@ def test_covariance_against_noisy_targets():
 def test_weighted_mean_by_hand():
     # One point drawn to x = 0 with weight 1 and to x = 1 with weight 2: 1 (x - 0) + 4 (x - 1) = 0.
     blocks = [target(ARM, "shoulder", 0, 0, 0), target(ARM, "shoulder", 1, 0, 0, weight=2.0)]
-    found = solve(ARM, ARM.neutral(), blocks, free=ARM.dof_is_length)
+    found = solve(ARM, ARM.neutral(), blocks, active_dofs=ARM.dof_is_length)
     np.testing.assert_allclose(found.pose[:3], [0.8, 0, 0], atol=1e-6)
     assert found.cost == pytest.approx(0.5 * (0.8**2 + 4 * 0.2**2))
 
@@ -137,19 +137,19 @@ def test_prior_against_a_target_by_hand():
 
 def test_two_bone_arm_by_the_law_of_cosines():
     # Bones of 0.3 and 0.4 m, the hand 0.5 m away: a right angle at the elbow.
-    found = solve(ARM, ARM.neutral(), [target(ARM, "hand", 0.3, 0, -0.4)], free=ROTATIONS)
+    found = solve(ARM, ARM.neutral(), [target(ARM, "hand", 0.3, 0, -0.4)], active_dofs=ROTATIONS)
     np.testing.assert_allclose(hand(found.pose), [0.3, 0, -0.4], atol=1e-6)
     assert found.pose[ARM.dof_value[-1]] == pytest.approx(np.pi / 2, abs=1e-5)
 
 
 def test_out_of_reach_the_arm_is_stretched_towards_the_target():
-    found = solve(ARM, ARM.neutral(), [target(ARM, "hand", 2.0, 0, -2.0)], free=ROTATIONS, max_iterations=200)
+    found = solve(ARM, ARM.neutral(), [target(ARM, "hand", 2.0, 0, -2.0)], active_dofs=ROTATIONS, max_iterations=200)
     np.testing.assert_allclose(hand(found.pose), 0.7 * np.array([1, 0, -1]) / np.sqrt(2), atol=1e-3)
 
 
 def test_free_leaves_the_rest_alone():
     free = np.array(ARM.dof_names) == "elbow.bend"
-    found = solve(ARM, ARM.neutral(), [target(ARM, "hand", 0.4, 0, -0.3)], free=free)
+    found = solve(ARM, ARM.neutral(), [target(ARM, "hand", 0.4, 0, -0.3)], active_dofs=free)
     np.testing.assert_array_equal(np.delete(found.pose, ARM.dof_value[-1]), np.delete(ARM.neutral(), -1))
     assert found.pose[-1] == pytest.approx(np.pi / 2, abs=1e-5)
 
@@ -157,12 +157,12 @@ def test_free_leaves_the_rest_alone():
 def test_limits_hold_and_the_rest_does_what_it_can():
     # The elbow bends forward alone; drawn back it stays straight, and the shoulder turns back in its stead.
     back = target(ARM, "hand", -0.4, 0, -0.3)
-    elbow_only = solve(ARM, ARM.neutral(), [back], free=np.array(ARM.dof_names) == "elbow.bend")
+    elbow_only = solve(ARM, ARM.neutral(), [back], active_dofs=np.array(ARM.dof_names) == "elbow.bend")
     assert elbow_only.pose[-1] == 0
-    whole = solve(ARM, ARM.neutral(), [target(ARM, "hand", -0.7, 0, 0)], free=ROTATIONS, max_iterations=200)
+    whole = solve(ARM, ARM.neutral(), [target(ARM, "hand", -0.7, 0, 0)], active_dofs=ROTATIONS, max_iterations=200)
     np.testing.assert_allclose(hand(whole.pose), [-0.7, 0, 0], atol=1e-3)
     # A ball within its cone of 100 degrees: the hand cannot be raised overhead.
-    above = solve(ARM, whole.pose, [target(ARM, "hand", -0.1, 0, 0.7)], free=ROTATIONS, max_iterations=200)
+    above = solve(ARM, whole.pose, [target(ARM, "hand", -0.1, 0, 0.7)], active_dofs=ROTATIONS, max_iterations=200)
     upper = ARM.kinematics(above.pose).Ts_world_part[0, :3, 2]
     assert np.degrees(np.arccos(upper[2])) <= 100 + 1e-6
     np.testing.assert_allclose(ARM.clip(above.pose), above.pose, atol=1e-9)

@@ -60,13 +60,13 @@ def staged(request):
     return Staged(load_model(request.param), 4)
 
 
-def both(staged, blocks, start=None, free=None, **how):
+def both(staged, blocks, start=None, active_dofs=None, **how):
     """What is found by the compiled version, with no help, and by the readable one."""
     start = staged.start if start is None else start
-    expected = gauss_newton.solve(staged.model, start, blocks, free, **how)
+    expected = gauss_newton.solve(staged.model, start, blocks, active_dofs, **how)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(gauss_newton, "solve", None)
-        return solve_compiled(staged.model, start, blocks, free, **how), expected
+        return solve_compiled(staged.model, start, blocks, active_dofs, **how), expected
 
 
 @pytest.mark.parametrize("n_blocks", [1, 2, 3, 4, 5])
@@ -145,7 +145,7 @@ def test_a_limb_alone(staged):
     limb = next(x for x in limbs(staged.model) if x.name == "left_forearm")
     match, *others = staged.blocks()
     found, expected = both(
-        staged, [match.restricted_to(limb.parts, match.workspace), *others], free=limb.dofs, max_iterations=3
+        staged, [match.restricted_to(limb.parts, match.workspace), *others], active_dofs=limb.dofs, max_iterations=3
     )
     assert_same(found, expected)
     np.testing.assert_array_equal(found.pose[~limb.dofs], staged.start[~limb.dofs])

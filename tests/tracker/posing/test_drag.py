@@ -40,7 +40,7 @@ def test_a_dragged_joint_stays_under_the_pointer(gavrila, pose, point, seed):
     hold = np.array([2.0, -1.0])  # the handle was not hit in its middle
     start = SIDE.project(place(gavrila, pose, point)) + hold
     hand = grab(gavrila, pose, SIDE, point, start)
-    other = gavrila.clip(gavrila.retract(pose, np.where(hand.free, rng.normal(0, 0.25, gavrila.n_dofs), 0)))
+    other = gavrila.clip(gavrila.retract(pose, np.where(hand.active_dofs, rng.normal(0, 0.25, gavrila.n_dofs), 0)))
     goal = SIDE.project(place(gavrila, other, point)) + hold
     values = pose
     for part in (0.25, 0.5, 0.75, 1.0):
@@ -214,7 +214,7 @@ def test_what_a_hand_hardly_needs(gavrila):
 )
 def test_minor_joints_are_bent_by_dragging_their_neighbours(point, bent):
     model = load_model("gavrila34")
-    free = grab(model, model.neutral(), SIDE, point, np.zeros(2)).free
+    free = grab(model, model.neutral(), SIDE, point, np.zeros(2)).active_dofs
     assert bent in minor_points(model)
     assert {n for n, f in zip(model.dof_names, free, strict=True) if f} >= {
         n for n in model.dof_names if n.startswith(f"{bent}.")
@@ -233,7 +233,7 @@ def test_a_head_nods_where_the_neck_bends_and_else_turns_the_body(gavrila):
 
 
 def held_place(hand, values):
-    return SIDE.project(hand.place_world(values))
+    return SIDE.project(hand.point_world(values))
 
 
 @pytest.mark.parametrize("part", ["left_forearm", "left_upper_arm", "right_thigh", "right_calf"])

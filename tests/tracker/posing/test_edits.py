@@ -7,7 +7,7 @@ from staging import shaken
 from tracker.body.parts import Axis
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
-from tracker.posing.edits import bent_alike, joint_of, limb_of, mirrored, taken_over
+from tracker.posing.edits import copy_dofs, copy_joint_angles, joint_of, limb_of, mirror_pose
 from tracker.posing.orient import orient
 
 M = np.diag([1.0, -1.0, 1.0])
@@ -56,7 +56,7 @@ def any_pose(model, seed):
 @pytest.mark.parametrize("seed", range(4))
 def test_joints_are_mirror_images_in_the_frame_of_the_root(model, seed):
     values = any_pose(model, seed)
-    result = mirrored(model, values)
+    result = mirror_pose(model, values)
     T = model.kinematics(values).Ts_world_part[0]
     np.testing.assert_allclose(model.kinematics(result).Ts_world_part[0], T, atol=1e-12)
     before, after = (rigid.apply(rigid.inverse(T), model.points_world(v)) for v in (values, result))
@@ -69,7 +69,7 @@ def test_joints_are_mirror_images_in_the_frame_of_the_root(model, seed):
 @pytest.mark.parametrize("seed", range(4))
 def test_mirrored_twice_is_the_same_pose(model, seed):
     values = any_pose(model, seed)
-    twice = mirrored(model, mirrored(model, values))
+    twice = mirror_pose(model, mirror_pose(model, values))
     np.testing.assert_allclose(model.points_world(twice), model.points_world(values), atol=1e-5)
     np.testing.assert_allclose(np.abs(model.difference(twice, values)).max(), 0, atol=1e-4)
 
@@ -77,7 +77,7 @@ def test_mirrored_twice_is_the_same_pose(model, seed):
 def test_what_is_taken_over_is_exact_and_the_rest_untouched(model):
     a, b = any_pose(model, 1), any_pose(model, 2)
     dofs = np.isin(model.dof_joint, [0, len(model.joints) // 2])
-    result = taken_over(model, a, b, dofs)
+    result = copy_dofs(model, a, b, dofs)
     np.testing.assert_array_equal(np.abs(model.difference(result, a))[~dofs], 0)
     np.testing.assert_allclose(np.abs(model.difference(result, b))[dofs], 0, atol=1e-12)
 
@@ -86,16 +86,16 @@ def test_joints_that_turn_in_another_order_are_bent_alike_all_the_same():
     """The hips of the two bodies have other angles for one rotation; all that both have is bent alike."""
     paper, ours = load_model("gavrila22"), load_model("gavrila34")
     theirs = posed_legs(paper)
-    bent = bent_alike(ours, ours.neutral(), paper, theirs, np.ones(ours.n_dofs, dtype=bool))
+    bent = copy_joint_angles(ours, ours.neutral(), paper, theirs, np.ones(ours.n_dofs, dtype=bool))
     for name in ("left_thigh", "left_calf", "right_thigh", "right_forearm"):
         R = [b.kinematics(v).Ts_world_part[b.part_index[name], :3, :3] for b, v in ((paper, theirs), (ours, bent))]
         np.testing.assert_allclose(*R, atol=1e-5, err_msg=name)
     # Going back they are the angles that they were, and what is locked stays.
     np.testing.assert_allclose(
-        bent_alike(paper, paper.neutral(), ours, bent, np.ones(paper.n_dofs, dtype=bool)), theirs, atol=1e-5
+        copy_joint_angles(paper, paper.neutral(), ours, bent, np.ones(paper.n_dofs, dtype=bool)), theirs, atol=1e-5
     )
     free = np.array([not n.startswith("left_hip.") for n in ours.dof_names])
-    held = bent_alike(ours, ours.neutral(), paper, theirs, free)
+    held = copy_joint_angles(ours, ours.neutral(), paper, theirs, free)
     np.testing.assert_array_equal(held[~free], ours.neutral()[~free])
 
 
@@ -134,7 +134,7 @@ def test_a_joint_of_the_trunk_is_reset_alone():
 def test_a_part_takes_an_orientation_that_its_joint_allows(model, name):
     start, other = any_pose(model, 5), any_pose(model, 6)
     part = [j.name for j in model.joints].index(name)
-    goal = taken_over(model, start, other, (model.dof_joint == part) & ~model.dof_is_length)
+    goal = copy_dofs(model, start, other, (model.dof_joint == part) & ~model.dof_is_length)
     wanted = model.kinematics(goal).Ts_world_part[part, :3, :3]
     result = orient(model, start, part, wanted)
     np.testing.assert_allclose(model.kinematics(result).Ts_world_part[part, :3, :3], wanted, atol=1e-5)

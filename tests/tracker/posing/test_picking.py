@@ -5,7 +5,7 @@ from staging import camera_at, in_posture
 
 from tracker.body.model import PosedBody
 from tracker.geometry import rigid
-from tracker.posing.picking import part_hulls, place_on_part
+from tracker.posing.picking import part_hulls, point_on_part
 
 SIDE = camera_at("side", (3.0, 2.5, 1.0))
 
@@ -41,7 +41,7 @@ def test_the_place_touched_is_on_the_surface_and_under_the_pointer(body, part):
     T = body.model.kinematics(body.values).Ts_world_part[part]
     for toward in (0.0, 0.5, 0.9):
         pointer = outline.polygon_px.mean(axis=0) * (1 - toward) + toward * outline.polygon_px[0]
-        place = place_on_part(body, SIDE, part, pointer)
+        place = point_on_part(body, SIDE, part, pointer)
         np.testing.assert_allclose(SIDE.project(rigid.apply(T, place)), pointer, atol=0.05)
         shape, center = body.model.shapes[part], body.model.centers_part[part]
         assert float(shape.inside_outside(place - center)) == pytest.approx(1, abs=0.1)
@@ -56,5 +56,5 @@ def test_a_pointer_that_just_misses_takes_the_outline(body):
     middle = outline.polygon_px.mean(axis=0)
     outside = middle + 1.02 * (outline.polygon_px[3] - middle)
     T = body.model.kinematics(body.values).Ts_world_part[0]
-    place = place_on_part(body, SIDE, 0, outside)
+    place = point_on_part(body, SIDE, 0, outside)
     assert np.linalg.norm(SIDE.project(rigid.apply(T, place)) - outside) < 6

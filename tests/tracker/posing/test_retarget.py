@@ -48,7 +48,7 @@ def test_what_is_locked_stays(bodies):
     was, becomes = bodies
     values = posed(was, 1)
     free = np.array([not name.startswith("left_elbow") for name in was.dof_names])
-    found = retarget_pose(values, was, becomes, free=free)
+    found = retarget_pose(values, was, becomes, active_dofs=free)
     still = was.dof_value[~free]
     np.testing.assert_array_equal(found[still], values[still])
     assert not np.array_equal(found, values)

@@ -5,6 +5,7 @@ import pytest
 from staging import at, camera_at, own_evidence, solid
 
 from tracker.contours import occluding_contours
+from tracker.contours.surfaces import surfaces_of
 from tracker.evidence.view_evidence import Silhouette, with_segments
 from tracker.images.edge_segments import Segments, sample_segments
 from tracker.images.silhouette_contour import SilhouetteContour
@@ -48,7 +49,7 @@ def mean_distances(segments, pieces, reach_px):
 def own_segments(view, bodies, person):
     """Which segments the simple version leaves a person, (S,), and how far from the bounds the decision is, (S,)."""
     contour, theta = occluding_contours.trace(bodies, view.camera), view.theta_px
-    owners = occluding_contours.surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
+    owners = surfaces_of(tuple(b.model for b in bodies)).people[contour.parts]
     own, others = (
         mean_distances(view.segments, contour.pieces_px[~contour.occluded & of], 2 * theta)
         for of in (owners == person, owners != person)

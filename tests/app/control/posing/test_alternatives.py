@@ -46,7 +46,7 @@ def ambiguous(controller, person=None):
 def test_frames_with_another_pose_are_marked_and_show_it(tracked):
     controller, *_ = tracked
     assert [ambiguous(controller, p) for p in (None, ANN, BOB)] == [[0, 1], [0], [0, 1]]
-    assert [len(p.others) for p in controller.state.people] == [1, 2]
+    assert [len(p.alternatives) for p in controller.state.people] == [1, 2]
     assert ghosts(controller) == {ANN, BOB}
     controller.visibility.show(ANN, False)
     assert ghosts(controller) == {BOB}
@@ -60,7 +60,7 @@ def test_the_other_pose_is_taken_vouched_for_and_left_again(tracked):
     controller.alternatives.take_alternative(ANN)  # who has none: bob is meant
     np.testing.assert_array_equal(controller.state.poses[BOB], lifted)
     assert (controller.state.people[BOB].source, controller.state.people[ANN].source) == ("manual", "tracked")
-    assert controller.state.undo == "take the other pose of bob, frame 1"
+    assert controller.state.undo == "take alternative pose of bob, frame 1"
     assert controller.stored_poses.timeline(0, BOB)[1]["keyframe"]
     assert (ambiguous(controller, BOB), ghosts(controller)) == ([0], set())
     controller.alternatives.take_alternative(BOB)
@@ -93,5 +93,5 @@ def test_who_vouches_for_a_pose_has_chosen(tracked):
 def test_without_another_pose_there_is_nothing_to_take(tracked):
     controller, *_ = tracked
     controller.navigation.seek(2)
-    with pytest.raises(TrackerError, match="expected another pose to take on frame 2, found none"):
+    with pytest.raises(TrackerError, match="expected an alternative pose on frame 2, found none"):
         controller.alternatives.take_alternative(ANN)

@@ -85,7 +85,7 @@ def test_a_tracking_run_is_told_what_is_locked(placed, tracker):
 def test_with_all_locked_a_search_says_so(opened):
     controller = opened()
     controller.dof_locks.set(0, range(controller.models[0].n_dofs), True)
-    with pytest.raises(TrackerError, match="everything locked"):
+    with pytest.raises(TrackerError, match="found all of them locked"):
         controller.search.run()
     assert controller.state.search.kind is None
 

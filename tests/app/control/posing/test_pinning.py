@@ -5,7 +5,7 @@ import pytest
 from gestures import FRONT, PAGE, drag, pixel_of, wait_for
 
 from tracker.errors import TrackerError
-from tracker.fitting.gauss_newton_compiled import solve
+from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.posing import pinned_fit
 from tracker.store.annotation_store import AnnotationStore
 
@@ -253,11 +253,11 @@ def test_a_live_pin_costs_a_few_steps_of_the_solver_a_move(opened, monkeypatch):
     drag(controller, "torso", (4.0, 0.0))
 
     def counted(*arguments):
-        fit = solve(*arguments)
+        fit = solve_compiled(*arguments)
         iterations[-1].append(fit.iterations)
         return fit
 
-    monkeypatch.setattr(pinned_fit, "solve", counted)
+    monkeypatch.setattr(pinned_fit, "solve_compiled", counted)
     start = pixel_of(controller, "left_wrist")
     controller.pinning.begin(PAGE, 0, FRONT, 0, "left_wrist", tuple(start), True)
     for i in range(12):

@@ -24,7 +24,7 @@ def begun():
 
 
 def test_long_searches_are_thinned_and_keep_what_matters(monkeypatch):
-    monkeypatch.setattr(search_runs, "KEPT_STEPS", 100)
+    monkeypatch.setattr(search_runs, "MAX_STEPS", 100)
     run, best = begun(), 9.0
     for i in range(1000):
         best -= 0.01 if i % 50 == 0 else 0.0

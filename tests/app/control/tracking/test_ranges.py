@@ -173,10 +173,10 @@ def test_long_work_is_watched_and_stopped_as_one_entry(two_keys, monkeypatch):
 
 def test_a_frame_that_jumps_is_named_and_no_longer_once_it_is_mended(two_keys):
     two_keys.ranges.interpolate(2, 12)
-    assert two_keys.state.disagreeing == ()
+    assert two_keys.state.inconsistent_frames == ()
     two_keys.navigation.seek(7)
     drag(two_keys, "torso", (120.0, 0.0))
-    wait_for(lambda: two_keys.state.disagreeing)
-    assert set(two_keys.state.disagreeing) <= {6, 7, 8}
+    wait_for(lambda: two_keys.state.inconsistent_frames)
+    assert set(two_keys.state.inconsistent_frames) <= {6, 7, 8}
     two_keys.history.undo()
-    wait_for(lambda: not two_keys.state.disagreeing)
+    wait_for(lambda: not two_keys.state.inconsistent_frames)

@@ -1,0 +1,242 @@
+"""Kernels of the chamfer cost: trace the contours of poses and measure them against the edges of all views."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tracker.body.kinematics import Tree, forward_kinematics
+from tracker.compute.numba_options import FAST_MATH
+from tracker.contours.occluding_contours import trace_pieces
+from tracker.contours.pieces import PIECE_PX, Pieces, place_parts
+from tracker.contours.surfaces import Surfaces
+from tracker.geometry.arrays import Array, FloatArray
+from tracker.geometry.segment_distance import Segments, nearest_segment
+from tracker.images.distance_transform import bilinear
+
+_ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)  # Python floats would promote to float64
+_JOINED = 10
+"""Largest number of consecutive pieces on one straight edge that are joined to one segment: longer segments would reach
+too many points."""
+
+
+class ViewArrays(NamedTuple):
+    """The evidence of all views as arrays; lengths in working px."""
+
+    P: Array
+    """Projection matrices, (V, 3, 4)."""
+    eyes: Array
+    """Camera centres in the world, (V, 3), metres."""
+    sizes: NDArray[np.int64]
+    """Image widths and heights, (V, 2), px."""
+    distances: FloatArray
+    """Distance images, one after the other, row by row."""
+    points: FloatArray
+    """u and v of the edge points near the prediction, (2, N), one view (see `segment_distance.RowSortedPoints`) after
+    the other."""
+    rows: NDArray[np.int64]
+    """Index of the first point of each strip and row within its view, (V, strips, largest height + 1)."""
+    firsts: NDArray[np.int64]
+    """Index of the first edge point of each view, then the number of all, (V + 1,)."""
+    counts: NDArray[np.int64]
+    """Number of edge points of each view, (V,)."""
+    thetas: Array
+    """Outlier distances, (V,), px."""
+
+
+class Scratch(NamedTuple):
+    """Buffers of the kernels, used by one thread at a time."""
+
+    pieces: Pieces
+    segments: Segments
+    """Visible pieces, joined where they are straight."""
+    visible: FloatArray
+    """u and v of the middle of each visible piece, px, and its squared length, px^2, (3, room)."""
+    lengths: FloatArray
+    """Length of each visible piece, (room,), px."""
+    distances: FloatArray
+    """Distances of pieces or of edge points, (room,), px."""
+    ones: FloatArray
+    """Weights of edge points, (room,)."""
+
+
+class TracedContours(NamedTuple):
+    """Contours of predicted bodies in all views, one view after the other; empty where poses are to be traced."""
+
+    ends: FloatArray
+    """u0, v0, u1, v1 of each piece, (4, N), undistorted working px."""
+    occluded: NDArray[np.bool_]
+    """Whether another part occludes the piece, (N,)."""
+    edges: NDArray[np.int32]
+    """Index of the straight edge that each piece is cut from, (N,)."""
+    firsts: NDArray[np.int64]
+    """Index of the first piece of each view, then the number of all, (V + 1,); (0,) without contours."""
+
+
+@njit(**FAST_MATH)
+def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool) -> float:
+    """Return the mean of n distances with weights w and outliers as in `ChamferCost`; theta without any."""
+    total, weight = 0.0, 0.0
+    if not paper:
+        for i in range(n):
+            total += w[i] * (d[i] if d[i] < theta else theta)
+            weight += w[i]
+        return total / weight if weight > 0 else theta
+    everything, squares = 0.0, 0.0
+    for i in range(n):
+        everything += w[i]
+        if d[i] <= theta:
+            total += w[i] * d[i]
+            squares += w[i] * d[i] * d[i]
+            weight += w[i]
+    if weight <= 0.0:
+        return theta
+    mean = total / weight
+    bound = min(theta, mean + 2.0 * np.sqrt(max(0.0, squares / weight - mean * mean)))
+    total, weight = 0.0, 0.0
+    for i in range(n):
+        if d[i] <= bound:
+            total += w[i] * d[i]
+            weight += w[i]
+    return total / weight if weight >= 0.5 * everything else theta
+
+
+@njit(**FAST_MATH)
+def _distance(image: FloatArray, width: int, height: int, u: np.float32, v: np.float32) -> np.float32:
+    """Return the distance at a pixel; outside the image, that of the nearest border pixel plus the distance to it."""
+    inside = bilinear(image, width, height, u, v)[0]
+    half_u, half_v = _HALF * np.float32(width - 1), _HALF * np.float32(height - 1)
+    off_u, off_v = abs(u - half_u) - half_u, abs(v - half_v) - half_v
+    off_u, off_v = off_u if off_u > _ZERO else _ZERO, off_v if off_v > _ZERO else _ZERO
+    return inside + np.sqrt(off_u * off_u + off_v * off_v)
+
+
+@njit(**FAST_MATH)
+def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, visible: FloatArray) -> float:
+    """Return the mean distance of n visible pieces, see `Scratch`, cut off at theta; theta if none is visible.
+
+    The loop stores nothing, so that it is vectorized.
+    """
+    limit = np.float32(theta)
+    spared = weight = 0.0
+    for i in range(np.uint64(n)):
+        d = _distance(image, width, height, visible[0, i], visible[1, i])
+        length = np.sqrt(visible[2, i])
+        spared += float(length * (limit - d if d < limit else _ZERO))
+        weight += float(length)
+    return theta - spared / weight if weight > 0.0 else theta
+
+
+@njit(**FAST_MATH)
+def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: float, scratch: Scratch) -> float:
+    """Return the same by the paper's robust mean."""
+    visible, lengths, d = scratch.visible, scratch.lengths, scratch.distances
+    for i in range(n):
+        d[i] = _distance(image, width, height, visible[0, i], visible[1, i])
+        lengths[i] = np.sqrt(visible[2, i])
+    return _robust_mean(d, lengths, n, theta, True)
+
+
+@njit(**FAST_MATH)
+def _take_visible(n: int, pieces: Pieces, visible: FloatArray, segments: Segments) -> tuple[int, int]:
+    """Pack the visible ones of n pieces and join them to segments; return both numbers."""
+    ends, occluded, edges = pieces.ends, pieces.occluded, pieces.edges
+    su, sv, du, dv = segments.u, segments.v, segments.du, segments.dv
+    joined, edge, k, m = 0, -1, np.uint64(0), np.uint64(0)
+    for i in range(np.uint64(n)):
+        if occluded[i]:
+            edge = -1
+            continue
+        x0, y0, x1, y1 = ends[0, i], ends[1, i], ends[2, i], ends[3, i]
+        if edges[i] != edge or joined == _JOINED:
+            edge, joined = edges[i], 0
+            su[k], sv[k] = x0, y0
+            k += np.uint64(1)
+        joined += 1
+        last = k - np.uint64(1)
+        du[last], dv[last] = x1 - su[last], y1 - sv[last]
+        visible[0, m], visible[1, m] = _HALF * (x0 + x1), _HALF * (y0 + y1)
+        visible[2, m] = (x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0)
+        m += np.uint64(1)
+    return int(m), int(k)
+
+
+@njit(nogil=True, cache=True)
+def trace_views(
+    P: Array, eyes: Array, Ts: Array, surfaces: Surfaces, pieces: Pieces,
+    out: TracedContours,
+) -> int:  # fmt: skip
+    """Fill the contours of posed parts in all views; return their number."""
+    place_parts(Ts, surfaces, pieces)
+    at = 0
+    for view in range(P.shape[0]):
+        n = trace_pieces(P[view], eyes[view], surfaces, PIECE_PX, pieces)
+        out.firsts[view] = at
+        out.ends[:, at : at + n] = pieces.ends[:, :n]
+        out.occluded[at : at + n] = pieces.occluded[:n]
+        out.edges[at : at + n] = pieces.edges[:n]
+        at += n
+    out.firsts[P.shape[0]] = at
+    return at
+
+
+@njit(**FAST_MATH)
+def _take_traced(view: int, contours: TracedContours, pieces: Pieces) -> int:
+    """Copy the traced pieces of a view; return their number."""
+    first, last = contours.firsts[view], contours.firsts[view + 1]
+    n = last - first
+    for i in range(n):
+        for k in range(4):
+            pieces.ends[k, i] = contours.ends[k, first + i]
+        pieces.occluded[i], pieces.edges[i] = contours.occluded[first + i], contours.edges[first + i]
+    return n
+
+
+@njit(**FAST_MATH)
+def _score(
+    Ts: Array,
+    surfaces: Surfaces,
+    views: ViewArrays,
+    paper: bool,
+    contours: TracedContours,
+    scratch: Scratch,
+    directed: Array,
+) -> None:
+    """Fill the directed costs of one pose, (V, 2): model to image and image to model, working px."""
+    d, pixel = scratch.distances, 0
+    traced = contours.firsts.shape[0] > 0
+    if not traced:
+        place_parts(Ts, surfaces, scratch.pieces)
+    for view in range(views.P.shape[0]):
+        width, height, theta = views.sizes[view, 0], views.sizes[view, 1], views.thetas[view]
+        if traced:
+            n = _take_traced(view, contours, scratch.pieces)
+        else:
+            n = trace_pieces(views.P[view], views.eyes[view], surfaces, PIECE_PX, scratch.pieces)
+        n_visible, n_segments = _take_visible(n, scratch.pieces, scratch.visible, scratch.segments)
+        image = views.distances[pixel : pixel + width * height]
+        if paper:
+            directed[view, 0] = _forward_paper(n_visible, image, width, height, theta, scratch)
+        else:
+            directed[view, 0] = _forward(n_visible, image, width, height, theta, scratch.visible)
+        first, last = views.firsts[view], views.firsts[view + 1]
+        u, v = views.points[0][first:last], views.points[1][first:last]
+        nearest_segment(u, v, views.rows[view], scratch.segments, n_segments, theta, d)
+        directed[view, 1] = _robust_mean(d, scratch.ones, views.counts[view], theta, paper)
+        pixel += width * height
+
+
+@njit(nogil=True, cache=True)
+def score_candidates(
+    candidates: Array, first: int, n_dofs: int, tree: Tree, Ts: Array,
+    surfaces: Surfaces, views: ViewArrays, paper: bool, contours: TracedContours, scratch: Scratch,
+    directed: Array,
+) -> None:  # fmt: skip
+    """Run `_score` for many poses of the person whose parts begin at `first`; directed is (C, V, 2)."""
+    last = first + tree.parents.shape[0]
+    own = Ts.copy()
+    axes, origins = np.empty((n_dofs, 3)), np.empty((n_dofs, 3))
+    for c in range(candidates.shape[0]):
+        forward_kinematics(candidates[c], tree, own[first:last], axes, origins)
+        _score(own, surfaces, views, paper, contours, scratch, directed[c])
