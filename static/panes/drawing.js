@@ -1,5 +1,7 @@
 /** Draw a pane: pictures, and vectors over them. All sizes on the screen are CSS pixels. */
 
+import { displayName } from "../widgets/text.js";
+
 /**
  * @typedef {import("../model/protocol.js").Overlay} Overlay
  * @typedef {import("../model/protocol.js").Handle} Handle
@@ -229,7 +231,7 @@ export function drawHandle(context, { handle, x, y }, color, emphasis) {
  * @param {number} paneWidth
  */
 export function drawName(context, { handle, x, y }, paneWidth) {
-  const text = handle.point.replaceAll("_", " ") + (handle.visible ? "" : " (hidden)");
+  const text = displayName(handle.point) + (handle.visible ? "" : " (hidden)");
   context.font = "500 12px system-ui, sans-serif";
   context.textBaseline = "middle";
   const width = context.measureText(text).width + 12;

@@ -1,6 +1,6 @@
 /** Labels in the corners of a pane: camera, visibility of the selected joint, cost, scale and tools. */
 
-import { px } from "../widgets/text.js";
+import { displayName, px } from "../widgets/text.js";
 
 const SCALE_FROM_PX = 230;
 
@@ -114,7 +114,7 @@ export class PaneCorner {
     this.#joint.dataset.is = `${joint} ${visibility}`;
     this.#mark.textContent = MARKS[visibility];
     this.#word.textContent = visibility;
-    this.#joint.title = `The ${joint.replaceAll("_", " ")} ${MEANINGS[visibility]}`;
+    this.#joint.title = `The ${displayName(joint)} ${MEANINGS[visibility]}`;
   }
 
   /**

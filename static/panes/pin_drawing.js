@@ -1,5 +1,7 @@
 /** Draw the pins of a view, their distance to the model, and their triangulated point. All sizes are CSS pixels. */
 
+import { displayName } from "../widgets/text.js";
+
 /**
  * @typedef {import("../model/protocol.js").PinMark} PinMark
  * @typedef {{pin: PinMark, x: number, y: number, headX: number, headY: number}} PlacedPin
@@ -83,7 +85,7 @@ export function drawPins(context, view, facts, camera, paneWidth) {
 /** @param {PinMark} pin */
 function describe({ point, u, v, model_u, model_v }) {
   const off = model_u === null || model_v === null ? "" : `, model ${Math.hypot(model_u - u, model_v - v).toFixed(1)} px off`;
-  return `Pin ${point.replaceAll("_", " ")}${off}`;
+  return `Pin ${displayName(point)}${off}`;
 }
 
 /**

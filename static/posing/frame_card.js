@@ -1,7 +1,7 @@
 /** Card with the status of the current frame, which opens to the cost of each body part. */
 
 import { button, byId } from "../widgets/elements.js";
-import { px } from "../widgets/text.js";
+import { displayName, px } from "../widgets/text.js";
 
 const STORED_OPEN = "quadrille.parts-open";
 /** Cost of a full bar; higher costs look the same. */
@@ -74,7 +74,7 @@ function gap() {
  */
 function row(name, cost) {
   const label = document.createElement("span");
-  label.textContent = name.replaceAll("_", " ");
+  label.textContent = displayName(name);
   const bar = document.createElement("i");
   bar.style.setProperty("--filled", `${Math.min(100, (100 * (cost ?? 0)) / FULL_PX)}%`);
   const value = document.createElement("output");

@@ -1,6 +1,7 @@
 /** Pins of the selected joint: their number, error and actions. */
 
 import { button, byId } from "../widgets/elements.js";
+import { displayName } from "../widgets/text.js";
 
 export class PinBar {
   #store;
@@ -32,7 +33,7 @@ export class PinBar {
 
   #show() {
     const { state, connected, overlay, pinning, livePins, session, scope } = this.#store.facts;
-    const joint = state?.point?.replaceAll("_", " ") ?? null;
+    const joint = state?.point ? displayName(state.point) : null;
     const pins = overlay?.pins ?? [];
     const ofPerson = pins.filter(({ person }) => person === state?.person).length;
     this.#mode.disabled = this.#fit.disabled = this.#live.disabled = !connected || !state;

@@ -5,6 +5,7 @@ import { prepare } from "../panes/drawing.js";
 import { byId } from "../widgets/elements.js";
 import { Plot } from "../widgets/plot.js";
 import { makeButton } from "./search_widgets.js";
+import { displayName } from "../widgets/text.js";
 
 /** @typedef {import("../model/search_runs.js").Landscape} Landscape */
 
@@ -98,8 +99,8 @@ export class CostLandscape {
     if (found && found.names.join() !== this.#listed) {
       this.#listed = found.names.join();
       const groups = new Map(found.names.map((name) => [name.split(".")[0], document.createElement("optgroup")]));
-      for (const [joint, group] of groups) group.label = joint.replaceAll("_", " ");
-      for (const name of found.names) groups.get(name.split(".")[0])?.append(new Option(name.replaceAll("_", " ").replace(".", " "), name));
+      for (const [joint, group] of groups) group.label = displayName(joint);
+      for (const name of found.names) groups.get(name.split(".")[0])?.append(new Option(displayName(name).replace(".", " "), name));
       this.#choice.replaceChildren(...groups.values());
     }
     if (found) {

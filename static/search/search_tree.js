@@ -6,7 +6,7 @@
 import { byId } from "../widgets/elements.js";
 import { selectedRun } from "../model/search_runs.js";
 import { makeNumber } from "./search_widgets.js";
-import { count } from "../widgets/text.js";
+import { count, displayName } from "../widgets/text.js";
 
 /** @typedef {import("../model/protocol.js").SearchLeaf} SearchLeaf */
 
@@ -125,7 +125,7 @@ export class SearchTree {
    */
   #row(setup, leaf, isLast) {
     const { person, name, dofs } = leaf;
-    const list = dofs.map((dof) => dof.replaceAll("_", " ").replace(".", " ")).join(", ");
+    const list = dofs.map((dof) => displayName(dof).replace(".", " ")).join(", ");
     const label = cell(`tree-name is-leaf${isLast ? " is-last" : ""}`, name, `${name}: ${list}`);
     label.dataset.leaf = `${person} ${name}`;
     const fields = FIELDS.map(({ key, has, unit, title }) => {

@@ -2,7 +2,7 @@
 
 import { hasSearch, hasTrack } from "../model/selectors.js";
 import { button, byId } from "../widgets/elements.js";
-import { count, px } from "../widgets/text.js";
+import { count, displayName, px } from "../widgets/text.js";
 
 export class TopBar {
   #store;
@@ -64,7 +64,7 @@ export class TopBar {
   #showJob(job) {
     const isActive = job.running || job.kind !== null;
     const at = isActive && job.stage !== null ? job.stages.indexOf(job.stage) : -1;
-    const stage = (job.stage ?? "starting").replaceAll("_", " ");
+    const stage = displayName(job.stage ?? "starting");
     this.#stage.textContent = isActive ? `${stage} · ${count(job.evaluations)} poses` : job.message;
     this.#stage.title = this.#stage.textContent;
     this.#figures.textContent = isActive ? `best ${px(job.best_px)} · ${count(job.per_second)}/s` : "";

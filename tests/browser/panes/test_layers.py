@@ -1,4 +1,4 @@
-"""Layers, looks and the grid against `fake_endpoint`: what is on the canvases, what the program is asked for."""
+"""Layers, image tones and the grid against `fake_endpoint`: what is on the canvases, what the program is asked for."""
 
 import itertools
 

@@ -228,8 +228,9 @@ def test_a_limb_off_the_evidence_costs(real_frame, outliers):
             assert cost([model.retract(values, step)]).total_px > here + 0.05, (dof, angle)
 
 
-def test_fast_cost_against_the_oracle(real_frame):
-    """200 poses around the fitted one: each within 1% or 0.1 px of the slow, obvious cost.
+@pytest.mark.parametrize("n_poses", [30, pytest.param(200, marks=pytest.mark.slow)])
+def test_fast_cost_against_the_oracle(real_frame, n_poses):
+    """Poses around the fitted one: each within 1% or 0.1 px of the slow, obvious cost.
 
     The two share no code but the shapes. The contour of the fast one runs inside the surface by up to 0.2 px (the
     chords of its grid, see test_contours), samples the distance image every 4 px rather than every 1.5, and decides on
@@ -242,7 +243,7 @@ def test_fast_cost_against_the_oracle(real_frame):
     theta = default_theta_px(views[0].camera)
     scene = [near_contour(v, oracle.visible_contour(model, values, v.camera)[0], theta) for v in views]
     rng = np.random.default_rng(25)
-    poses = [shaken(model, values, rng, np.radians(20), 0.08) for _ in range(200)]
+    poses = [shaken(model, values, rng, np.radians(20), 0.08) for _ in range(n_poses)]
     fast = np.array([cost([p]).total_px for p in poses])
     slow = np.array([oracle.cost(model, p, views, scene, theta)[0] for p in poses])
     off = np.abs(fast - slow)

@@ -154,6 +154,7 @@ def test_a_seed_changes_what_is_done(performances):
         assert not np.allclose(first[:40], second[:40], atol=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", VARIED)
 def test_any_seed_can_be_performed_for_long(scene, true_model):
     for seed in (101, 102, 103):
