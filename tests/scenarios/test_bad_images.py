@@ -1,4 +1,4 @@
-"""Tracking goes on whatever the images are: black, damaged, empty, without the person, without a background."""
+"""Tracking continues with any images: black, damaged, empty, without the person, without a background."""
 
 from dataclasses import replace
 from typing import NamedTuple, get_args
@@ -21,7 +21,7 @@ N = 6
 BAD = 3
 """The frame at which something happens."""
 NEAR_MM = 40.0
-"""What a body may be off on average where three good views are left; in the whole recording it is off by 10 mm."""
+"""Largest mean error of the body with three good views; in the whole recording it is 10 mm."""
 
 
 class Filmed(NamedTuple):
@@ -33,7 +33,7 @@ class Filmed(NamedTuple):
 
 
 class Shown:
-    """Stands for a recording: images as given; None is a damaged one."""
+    """A recording of given images; None is a damaged one."""
 
     def __init__(self, frames):
         self.frames = frames
@@ -53,7 +53,7 @@ def filmed(tmp_path_factory):
 
 
 def follow(filmed, frames=None, cameras=None, recording=None, **options):
-    """Track all frames from the true pose; estimates, and mean distance of the body's points from the truth, mm."""
+    """Track all frames from the true pose; return the estimates and the mean error of the body's points, mm."""
     model, cameras = filmed.session.people[0].model, cameras or filmed.session.cameras
     observer = Observer(cameras, recording or Shown(frames or filmed.frames))
     found = list(track(observer, [model], [filmed.truth[0]], range(N), TrackSettings(**options)))
@@ -106,7 +106,7 @@ def test_a_frame_of_one_view_fails(filmed, change):
 
 
 def test_a_file_that_cannot_be_decoded(filmed, tmp_path):
-    """The footage of one camera as a folder of images, of which one is cut short on the disk."""
+    """The footage of one camera is a folder of images, of which one is truncated."""
     folder = tmp_path / "images"
     folder.mkdir()
     for k, images in enumerate(filmed.frames):
@@ -123,7 +123,7 @@ def test_a_file_that_cannot_be_decoded(filmed, tmp_path):
 
 @pytest.mark.parametrize("change", [black, damaged, gray])
 def test_a_frame_of_all_views_fails(filmed, change):
-    """Nothing is seen: the body is where it was expected, marked, and found again on the next frame."""
+    """Nothing is visible: the body has its predicted pose, is marked, and is found again on the next frame."""
     found, off = follow(filmed, edited(filmed, [BAD], range(4), change))
     assert found[BAD].statuses[0] != "good"
     model = filmed.session.people[0].model
@@ -142,7 +142,7 @@ def test_a_view_never_shows_anything(filmed, change):
 
 def test_one_view_alone_is_left(filmed):
     found, off = follow(filmed, edited(filmed, range(N), [0, 2, 3], damaged))
-    assert off.max() < 300  # how far away it is, a single view hardly tells
+    assert off.max() < 300  # a single view hardly observes depth
     assert all(np.isfinite(f.view_costs_px).tolist() == [False, True, False, False] for f in found)
 
 

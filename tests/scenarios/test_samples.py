@@ -1,4 +1,4 @@
-"""The bundled samples: small, complete, movable, and what their recipes make."""
+"""The bundled samples: small, complete, movable, and equal to what their recipes make."""
 
 import re
 import tomllib
@@ -33,7 +33,7 @@ def session(request):
 
 
 def truth_of(session, person):
-    """Stem of the files that hold what is true of a person."""
+    """Stem of the files with the ground truth of a person."""
     alone = len(session.people) == 1
     return "truth" if alone else f"truth_{session.people[person].name}"
 
@@ -95,6 +95,6 @@ def test_the_first_poses_of_the_tango_are_of_a_careful_hand():
         truth = read_trc(session.folder / f"truth_{person.name}.trc")
         at = dict(zip(person.model.point_names, person.model.points_world(values), strict=True))
         errors = [np.linalg.norm(at[n] - truth.points[0, truth.names.index(n)]) for n in LIMB_JOINTS]
-        # Near, and set by nobody who knew the truth: fitted to it the preset's bones are 15 mm off.
+        # Near, but not fitted to the truth: bones of the preset fitted to it are 15 mm off.
         assert 0.03 < np.mean(errors) < 0.07
         assert max(errors) < 0.25

@@ -20,7 +20,7 @@ APART_M = 1.0
 
 
 def crowd(model, n):
-    """Poses of n people at the corners of a square, each a little otherwise, walking 2 cm a frame, (n, frames, ...)."""
+    """Poses of n people at the corners of a square, each slightly different, walking 2 cm a frame, (n, frames, ...)."""
     out = []
     for i, (x, y) in enumerate([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)][:n]):
         start = posed(model, 10 + i)
@@ -56,7 +56,7 @@ def estimator_of(model, views, expected, settings):
 
 @pytest.mark.parametrize(("off_m", "solves"), [(0.0, 2), (0.05, 4)])
 def test_people_are_refined_again_only_where_others_moved(monkeypatch, off_m, solves):
-    """Two at rest, each refined once; where the second is found 5 cm off, both once more with it where it stands."""
+    """Two people at rest are refined once each. If the second is found 5 cm off, both are refined once more."""
     ball, cameras, done = solid((0.15, 0.15, 0.3)), cameras_around(4), []
     values = np.zeros((2, 6))
     values[:, 1] = -0.3, 0.3
@@ -73,8 +73,8 @@ def test_people_are_refined_again_only_where_others_moved(monkeypatch, off_m, so
 
 
 def test_nothing_depends_on_who_is_done_first(gavrila, monkeypatch):
-    """Two people, each with an arm that is expected elsewhere and is searched: in threads, and one by one from the last
-    to the first."""
+    """Two people, each with an arm that is predicted elsewhere and is searched: in threads, and one by one from the
+    last to the first."""
     truth = crowd(gavrila, 2)[:, 0]
     views, expected = own_evidence([PosedBody(gavrila, v) for v in truth], cameras_around(4)), truth.copy()
     for values, side in zip(expected, ("left", "right"), strict=True):

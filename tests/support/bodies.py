@@ -1,4 +1,4 @@
-"""Bodies of every kind of joint, for tests that must not hold for people alone."""
+"""Bodies with every kind of joint, for tests that must hold for more than people."""
 
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 

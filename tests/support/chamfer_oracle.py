@@ -1,8 +1,8 @@
-"""The chamfer cost the slow, obvious way, with numpy, OpenCV and SciPy: the judge of the fast one.
+"""The chamfer cost in the slow, obvious way, with numpy, OpenCV and SciPy: the oracle of the fast one.
 
-Nothing is shared with `tracker.contours.occluding_contours` and `tracker.search.chamfer_cost` but the shapes' surface
-and implicit function. A part is convex, so its outline is the convex hull of a dense mesh; whether another part hides
-a point of it is found by walking along the line of sight.
+It shares only the shapes' surface and implicit function with `tracker.contours.occluding_contours` and
+`tracker.search.chamfer_cost`. A part is convex, so its outline is the convex hull of a dense mesh. Occlusion of a point
+by another part is found by walking along the line of sight.
 """
 
 from functools import lru_cache
@@ -17,7 +17,8 @@ STEP_M = 0.004
 
 
 def visible_contour(model, values, camera):
-    """Points of the visible contour in undistorted px, (n, 2), spaced by about SAMPLE_PX, and the part of each."""
+    """Return points of the visible contour in undistorted px, (n, 2), spaced by about SAMPLE_PX, and the part of
+    each."""
     Ts = model.kinematics(values).Ts_world_part
     outlines = [_outline(model, part, T, camera) for part, T in enumerate(Ts)]
     points, parts = [], []
@@ -63,7 +64,8 @@ def _surface(model, part):
 
 
 def _meets(model, part, T, eye, points, margin_m):
-    """Whether the lines of sight to points meet a part before the point, or less than the margin behind it, (n,)."""
+    """Return whether the lines of sight to points meet a part before the point, or less than the margin behind it,
+    (n,)."""
     to_points = points - eye
     distances = np.linalg.norm(to_points, axis=1)[:, None]
     center = T[:3, 3] + T[:3, :3] @ model.centers_part[part]

@@ -1,4 +1,4 @@
-"""Small videos and image folders whose every frame tells its number."""
+"""Small videos and image folders in which every frame encodes its number."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ SIZE = (64, 48)
 
 
 def picture(i):
-    """A frame whose grey centre tells its number, with texture that moves."""
+    """A frame with a grey centre that encodes its number, and moving texture."""
     y, x = np.mgrid[: SIZE[1], : SIZE[0]]
     image = np.stack([0 * x, (x * 7 + y * 3 + i * 11) % 256, (x * y + i * 5) % 256], axis=-1)
     image[8:40, 8:56] = i * 4

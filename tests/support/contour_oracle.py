@@ -1,7 +1,8 @@
-"""The matching of contours and edges with plain numpy: the oracle of `tracker.fitting.contour_residuals`.
+"""Matching of contours and edges with plain numpy: the oracle of `tracker.fitting.contour_residuals`.
 
-Matches are made once, at one pose. At another pose the matched surface points have moved with their parts, and nothing
-else has changed: a cost that can be differentiated numerically. Only the contours' pieces are taken from the tracker.
+Matches are made once, at one pose. At another pose the matched surface points have moved with their parts, and
+everything else is the same, so that the cost can be differentiated numerically. Only the pieces of contour come from
+the tracker.
 """
 
 from dataclasses import replace
@@ -22,7 +23,7 @@ class Matches(NamedTuple):
     points_part: np.ndarray
     """Surface point in the frame of its part, (N, 3)."""
     at_px: np.ndarray
-    """What of the piece is matched, (N, 2): its middle, or the point nearest to an edge point."""
+    """Matched point of the piece, (N, 2): its middle, or the point nearest to an edge point."""
     before_px: np.ndarray
     """Image of the surface point, (N, 2)."""
     normals: np.ndarray
@@ -36,7 +37,7 @@ class Matches(NamedTuple):
 
 
 def without_ties(views, bodies, settings, theta_px):
-    """The views without the edge points of which rounding decides what piece they belong to."""
+    """Return the views without the edge points whose nearest piece depends on rounding."""
     out = []
     for view in views:
         seen = occluding_contours.trace(bodies, view.camera)
@@ -87,12 +88,12 @@ class MatchOracle:
 
             middles = ends.mean(axis=1)
             inside = own & np.all((middles >= 0) & (middles <= np.array(view.camera.size) - 1), axis=1)
-            told = settings.information_per_px
+            information = settings.information_per_px
             if settings.model_to_image:
-                w = told * settings.model_to_image * lengths[inside]
+                w = information * settings.model_to_image * lengths[inside]
                 frozen(np.flatnonzero(inside), middles[inside], None, np.zeros(len(w)), w)
             if settings.image_to_model:
-                w = told * settings.image_to_model * SCENE_SPACING_PX
+                w = information * settings.image_to_model * SCENE_SPACING_PX
                 squared, feet, turns = squared_distances(view, seen.pieces_px, settings, theta_px)
                 u = view.points_px.astype(float)
                 k, i = squared.argmin(axis=1), np.arange(len(u))
@@ -103,7 +104,7 @@ class MatchOracle:
                 frozen(k, feet[i, k], u[i], turns[i, k], np.full(len(k), w))
 
     def cost(self, values):
-        """What the matches cost at a pose."""
+        """Return the cost of the matches at a pose."""
         total = self.flat
         for m in self.matches:
             squared = np.minimum(self._distances(m, values) ** 2 + m.turns, self.theta**2)
@@ -127,7 +128,7 @@ class MatchOracle:
         return np.concatenate(residuals), np.concatenate(J)
 
     def _at(self, m, values):
-        """Where the matched places of the pieces are at another pose, (N, 2), px."""
+        """Return the matched points of the pieces at another pose, (N, 2), px."""
         T = self.model.kinematics(values).Ts_world_part[m.parts]
         world = np.einsum("nij,nj->ni", T[:, :3, :3], m.points_part) + T[:, :3, 3]
         moved = m.view.camera.project(world) - m.before_px
@@ -148,7 +149,7 @@ class MatchOracle:
 
 
 def bilinear(image, at):
-    """Value (N,) and slope (N, 2) of an image at places u, v; KRH08 Sect. 5.3, mended."""
+    """Return value (N,) and slope (N, 2) of an image at points u, v; KRH08 Sect. 5.3, corrected."""
     c = np.minimum(at.astype(int), np.array(image.shape[::-1]) - 2)
     (a, b), (u, v) = (at - c).T, c.T
     d00, d01, d10, d11 = (image[v + j, u + i].astype(float) for j in (0, 1) for i in (0, 1))

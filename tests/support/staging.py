@@ -1,4 +1,4 @@
-"""Staged scenes of which the answer is known: cameras around a place, simple bodies, edges drawn from contours."""
+"""Staged scenes with known truth: cameras around a point, simple bodies, edges drawn from contours."""
 
 from dataclasses import replace
 
@@ -103,12 +103,12 @@ def _across(view, bodies):
 
 
 def painted(bodies, camera, colors, background=(40, 90, 60)):
-    """A picture of bodies in flat colours, (H, W, 3) RGB: far parts first, each the hull of its mesh.
+    """Return an image of bodies in flat colours, (H, W, 3) RGB: far parts first, each the hull of its mesh.
 
     Args:
-        bodies: everybody.
+        bodies: all bodies.
         camera: the view.
-        colors: RGB of each part by its name, `left_` and `right_` left out.
+        colors: RGB of each part by its name, without `left_` and `right_`.
         background: RGB of the rest.
     """
     image = np.full((camera.height, camera.width, 3), background, np.uint8)
@@ -137,11 +137,11 @@ SUIT = {
     "collar": (200, 40, 40), "upper_arm": (250, 250, 240), "forearm": (220, 160, 130), "thigh": (30, 40, 140),
     "calf": (20, 20, 25),
 }  # fmt: skip
-"""Colours by which all kinds of parts can be told."""
+"""Colours that distinguish all kinds of parts."""
 
 
 class Film:
-    """Stands for a recording: pictures of figures in their clothes before a plain wall."""
+    """A recording of figures in their clothes before a plain wall."""
 
     def __init__(self, moments, cameras):
         self.frames = [[painted(bodies, c, SUIT) for c in cameras] for bodies in moments]
@@ -171,7 +171,7 @@ POSTURE_DEG = {
 
 
 def in_posture(model):
-    """A body in the posture, as far as it has such joints."""
+    """A body in the posture, as far as it has these joints."""
     values = model.neutral()
     for name, degrees in POSTURE_DEG.items():
         if name in model.dof_names:
@@ -180,12 +180,12 @@ def in_posture(model):
 
 
 def posed(model, seed):
-    """A body in the posture, a little otherwise for each seed; models without such joints are just shaken."""
+    """A body in the posture, slightly different for each seed; models without these joints are only shaken."""
     return shaken(model, in_posture(model), np.random.default_rng(seed), 0.1, 0.05)
 
 
 class Shown:
-    """Stands for the observer of a recording: the evidence of each frame as given, and which frames were asked for."""
+    """An observer with given evidence for each frame; it records which frames are requested."""
 
     def __init__(self, views):
         self.views, self.asked = views, []
@@ -201,7 +201,7 @@ class Shown:
 
 
 def seen(model, values, names, cameras, noise_px=0.0, seed=0):
-    """Pins of points in all views, as a hand with some noise sets them."""
+    """Pins of points in all views, with the noise of a user's hand."""
     rng = np.random.default_rng(seed)
     places = dict(zip(model.point_names, model.points_world(values), strict=True))
     return [

@@ -1,4 +1,4 @@
-"""The look at a limb against a plain one that asks each sample of each pose of all parts, one at a time."""
+"""The score of a limb against a plain version that tests each sample of each pose against all parts."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def plain_samples(views, bodies, person, values, limb, away=()):
 
 
 def plain_look(views, bodies, person, values, limb, ratios, away=()):
-    """What `LimbScorer` says of one pose, by its definition."""
+    """Score of one pose by the definition of `LimbScorer`."""
     nats = 0.0
     for view, part, hidden, behind, pixels in plain_samples(views, bodies, person, values, limb, away):
         for i, (u, v) in enumerate(pixels):
@@ -71,7 +71,7 @@ def plain_look(views, bodies, person, values, limb, ratios, away=()):
 
 @pytest.fixture(scope="module")
 def couple(gavrila):
-    """Two figures close together, the second one is looked at; views of them in their clothes."""
+    """Two figures close together, of which the second is scored, and views of them in their clothes."""
     bodies = [PosedBody(gavrila, gavrila.retract(posed(gavrila, s), np.pad(move, (0, gavrila.n_dofs - 3))))
               for s, move in ((1, [0.3, 0.1, 0.0]), (2, [-0.1, -0.1, 0.0]))]  # fmt: skip
     views = dressed(bodies, cameras_around(3), SUIT)
@@ -86,7 +86,7 @@ def moved(model, values, limb, n, seed=0):
 
 @pytest.mark.parametrize("name", ["left_forearm", "right_calf"])
 def test_a_look_is_what_its_definition_says(gavrila, couple, name):
-    """All but a sample here and there at the border of what hides it, where cells of the image are coarser."""
+    """All but a few samples at the border of an occluder, where the cells of the image are coarser."""
     views, bodies, known = couple
     limb = next(x for x in limbs(gavrila) if x.name == name)
     poses = moved(gavrila, bodies[1].values, limb, 25)
@@ -101,7 +101,7 @@ def test_a_look_is_what_its_definition_says(gavrila, couple, name):
 
 
 def test_a_limb_in_the_open(gavrila, couple):
-    """An arm held out, where nothing hides it: the same but for a pixel; of no known colours the edges alone speak."""
+    """A free arm, not occluded: the same but for a pixel. Without learnt colours only edges count."""
     views, _, known = couple
     pose = np.array(gavrila.neutral())
     pose[gavrila.dof_names.index("left_shoulder.abduction")] = np.pi / 2
@@ -115,7 +115,7 @@ def test_a_limb_in_the_open(gavrila, couple):
 
 @pytest.mark.parametrize("way", [1, -1])
 def test_what_hides_a_limb_beside_the_image_is_known_too(way):
-    """A ball behind a wall says nothing, also where the image ends; beside the wall there it says a little against."""
+    """A ball behind a wall scores 0, also outside the image; beside the wall it scores slightly negative there."""
     ball, wall = solid((0.1, 0.1, 0.2)), solid((0.1, 0.4, 1.0))
     camera = camera_at("front", (4.0, 0.0, 0.0))
     # 320 px of 520 px at 3 m are 1.85 m: the wall begins beyond them.
@@ -129,7 +129,7 @@ def test_what_hides_a_limb_beside_the_image_is_known_too(way):
 
 @pytest.mark.parametrize("distance", [0.05, 0.3, 0.9])
 def test_a_limb_and_others_that_reach_the_cameras_plane(gavrila, distance):
-    """Nothing has a bounded image there; what is said is still what the definition says, of samples that are seen."""
+    """Such parts have no bounded image; the score of the visible samples is still that of the definition."""
     stand = gavrila.neutral()
     bodies = [PosedBody(gavrila, stand)]
     arm = next(x for x in limbs(gavrila) if x.name == "left_forearm")

@@ -30,7 +30,7 @@ def stand(gavrila):
 
 @pytest.fixture(scope="module")
 def seen(gavrila, stand):
-    """The colours of a figure that stands, and what is learnt from them."""
+    """The colours of an upright figure, and the colours learnt from them."""
     found = colors_of(gavrila, stand)
     return found, found.learn()
 
@@ -59,7 +59,7 @@ def test_arms_for_legs_score_worse(gavrila, stand, seen):
 
 
 def test_other_clothes_score_worse(gavrila, stand, seen):
-    """Sleeves and trousers of each other's colours: each of these parts notices, and no other."""
+    """Sleeves and trousers with exchanged colours: each of these parts scores worse, and no other."""
     _, known = seen
     swapped = SUIT | {"upper_arm": SUIT["thigh"], "thigh": SUIT["upper_arm"]}
     changed = colors_of(gavrila, stand, swapped).score(stand, known).parts - known.usual
@@ -117,7 +117,7 @@ def test_samples_in_the_open_and_behind_others():
 
 
 def test_parts_hidden_by_the_body_give_no_samples(gavrila):
-    """From the left the hanging right arm is behind the trunk."""
+    """From the left the trunk occludes the hanging right arm."""
     stand = gavrila.neutral()
     left, right = (camera_at(n, (0.0, y, 0.2)) for n, y in (("left", 4.0), ("right", -4.0)))
     arms = parts(gavrila, "left_upper_arm", "right_upper_arm")
@@ -127,7 +127,7 @@ def test_parts_hidden_by_the_body_give_no_samples(gavrila):
 
 
 def test_left_and_right_share(gavrila):
-    """What one arm showed is known of the other one, which nobody has seen; else each goes by its own."""
+    """The colours of one arm are used for the other one while it is unseen; later each has its own."""
     stand, names = gavrila.neutral(), gavrila.part_index
     cameras = [camera_at("left", (0.0, 4.0, 0.2)), camera_at("right", (0.0, -4.0, 0.2))]
     arms = parts(gavrila, "left_upper_arm", "right_upper_arm")
@@ -167,7 +167,7 @@ def darker(views, share=0.6):
 
 
 def test_colours_follow_the_light(gavrila, stand, seen):
-    """The light goes down step by step: learnt along the way, the clothes stay known; learnt once, they do not."""
+    """The light fades step by step: colours learnt along the way still match, colours learnt once do not."""
     colors, first = seen
     bodies = [PosedBody(gavrila, stand)]
     views, known = dressed(bodies, CAMERAS, SUIT), first
@@ -180,7 +180,7 @@ def test_colours_follow_the_light(gavrila, stand, seen):
 
 
 def test_a_part_that_is_not_there_is_not_learnt(gavrila, stand, seen):
-    """Both arms beside the picture's arms lie on the wall: what was known of arms stays known."""
+    """Both arms beside the arms of the image lie on the wall: the learnt colours of arms stay."""
     _, first = seen
     wrong = np.array(stand)
     for side in ("left", "right"):
@@ -194,7 +194,7 @@ def test_a_part_that_is_not_there_is_not_learnt(gavrila, stand, seen):
 
 
 def test_each_view_has_its_say(gavrila, stand):
-    """One view shows an arm in another colour: the mean hides it, the view does not."""
+    """One view shows an arm in another colour: the mean does not show it, the score of the view does."""
     bodies, other = [PosedBody(gavrila, stand)], SUIT | {"forearm": (250, 250, 0)}
     right, wrong = dressed(bodies, CAMERAS, SUIT), dressed(bodies, CAMERAS[:1], other)
     known = Colors(right, bodies).learn()
@@ -208,7 +208,8 @@ def test_each_view_has_its_say(gavrila, stand):
 
 
 def test_a_look_tells_where_a_limb_is(gavrila, stand):
-    """Where it is, it looks best. Before the trunk it shows what shows without it, and that says nothing for it."""
+    """The score is highest at the limb. Before the trunk the limb shows what would be visible without it, which is no
+    evidence."""
     colors = colors_of(gavrila, stand, SUIT | dict.fromkeys(("upper_arm", "forearm", "torso"), (200, 40, 40)))
     arm, known = np.array(parts(gavrila, "left_upper_arm", "left_forearm")), colors.learn()
     before_trunk = np.array(stand)
@@ -223,7 +224,7 @@ def test_a_look_tells_where_a_limb_is(gavrila, stand):
 
 
 def test_a_limb_that_is_away_hides_nothing(gavrila):
-    """The left arm lies behind the right one as the body seems to stand; taken away, that says nothing against it."""
+    """The right arm occludes the left one; if it is removed, it does not count against the left one."""
     stand = gavrila.neutral()
     bodies = [PosedBody(gavrila, stand)]
     view = dressed(bodies, [camera_at("right", (0.0, -4.0, 0.2))], SUIT)

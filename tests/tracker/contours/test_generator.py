@@ -1,4 +1,4 @@
-"""Outlines of single parts against the convex hulls of dense meshes, which share nothing with how they are traced."""
+"""Outlines of single parts against the convex hulls of dense meshes, which are independent of how they are traced."""
 
 import cv2
 import numpy as np
@@ -44,7 +44,7 @@ FRONT = camera_at("front", (4.0, 0.0, 0.0))
 
 
 def hull_of_mesh(body, camera):
-    """Outline of a convex solid: the hull of a mesh so dense that its corners hardly stray, points 0.25 px apart."""
+    """Outline of a convex solid: the hull of a mesh so dense that its corners hardly deviate, points 0.25 px apart."""
     T = body.model.kinematics(body.values).Ts_world_part[0]
     points = body.model.shapes[0].grid(160, 240)[0].reshape(-1, 3) @ T[:3, :3].T + T[:3, 3]
     hull = cv2.convexHull(camera.project(points).astype(np.float32))[:, 0]

@@ -1,4 +1,4 @@
-"""Part masks against rays that meet spheres, and against the traced contours."""
+"""Label images against rays that meet spheres, and against traced contours."""
 
 import cv2
 import numpy as np

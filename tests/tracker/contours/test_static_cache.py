@@ -25,7 +25,7 @@ N_PEOPLE = 2
 
 
 def couple(gavrila, seed=0):
-    """Two people who stand close together, facing each other."""
+    """Two people close together, facing each other."""
     near, far = posed(gavrila, seed), posed(gavrila, seed + 50)
     step = np.zeros(gavrila.n_dofs)
     step[:2] = far[:2] - near[:2]
@@ -40,7 +40,8 @@ def with_limb_shaken(body, limb, rng, sigma_rad=0.6):
 
 
 def traced_with_kept(bodies, then, moves):
-    """The contours of some people as those are traced that move, the others static from another pose; view by view."""
+    """Contours of some people in each view: moving parts are traced, static parts come from the cache of another
+    pose."""
     surfaces = surfaces_of(tuple(b.model for b in bodies))
     room = contour_room(CAMERAS[0], len(bodies))
     out, static = piece_buffer(surfaces, room), static_contours_buffer(len(CAMERAS), room, 1, moves)
@@ -59,7 +60,8 @@ def traced_with_kept(bodies, then, moves):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_pieces_of_a_limb_that_moves_among_kept_ones_are_those_of_a_trace_of_everybody(gavrila, seed):
-    """A limb swings through its own body and another's: what it covered is seen again, what it covers is occluded."""
+    """A limb swings through its own body and another one: what it covered is visible again, what it covers is
+    occluded."""
     bodies, rng, changed = couple(gavrila, seed), np.random.default_rng(seed), 0
     for limb in limbs(gavrila):
         then = [with_limb_shaken(bodies[0], limb, rng), bodies[1]]

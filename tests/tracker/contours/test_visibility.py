@@ -1,4 +1,4 @@
-"""Which lines of sight a solid blocks, against walking along them."""
+"""Lines of sight that a solid blocks, against walking along them."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def one_part(text):
 
 
 def blocked(model, points, eye, margin=0.0):
-    """What `mark_occluded` says of points in the part's frame."""
+    """Result of `mark_occluded` for points in the part's frame."""
     surfaces = surfaces_of((model,))
     axes = surfaces.half_axes[0]
     Q = np.column_stack([np.diag(1 / axes), np.zeros(3), eye / axes]).astype(np.float32)

@@ -20,7 +20,7 @@ from tracker.session.session import load_session
 
 
 class Frames:
-    """Stands for a recording: the same pictures at every frame; None is a damaged one."""
+    """A recording with the same images at every frame; None is a damaged one."""
 
     def __init__(self, *images):
         self.images = images
@@ -33,7 +33,7 @@ class Frames:
 
 
 class FailingFrames:
-    """A recording that knows only frame 0."""
+    """A recording of frame 0 only."""
 
     def __init__(self, image):
         self.image, self.reads = image, []
@@ -55,7 +55,8 @@ def observe(camera, image, k=0, **side_files):
 
 
 def square_picture(camera, half_m=0.5):
-    """A white square of the plane x = 0 on black as the camera films it, lens and all, and its outline in the world."""
+    """A white square in the plane x = 0 on black as the camera films it, with lens distortion, and its outline in the
+    world."""
     u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
     rays = camera.rays(np.stack([u, v], axis=-1))
     hits = camera.center_world - camera.center_world[0] * rays / rays[..., :1]
@@ -139,7 +140,7 @@ def edge_share(views, masks_px):
 
 
 def person_boxes(real_frame, cameras, margin_px=60):
-    """The part of each image where the person is: the box around the fitted body's joints, generously."""
+    """The part of each image with the person: a generous box around the fitted body's joints."""
     boxes = []
     for camera in cameras:
         px = camera.pinhole.project(real_frame.model.points_world(real_frame.values))
@@ -297,7 +298,7 @@ def test_what_is_looked_at_ahead_is_what_would_be_found_later(sample, real_frame
     assert len(linked) == 4
     same_evidence(observer.evidence(25, boxes, predicted, static_edges), expected)
     assert len(linked) == 4
-    # Told other regions, or not that something stands still, it does the work again.
+    # With other regions, or without static edges, the features are computed again.
     look_ahead([None, *boxes[1:]], not background)
     same_evidence(observer.evidence(25, boxes, predicted, static_edges), expected)
     assert len(linked) == 4 + 4 + 1

@@ -32,7 +32,7 @@ def normal(match, body):
 
 
 def staged(model, seed=0, off_deg=4.0, off_m=0.02):
-    """A body beside its own evidence: the views, and the body as it stands before them."""
+    """A displaced body with evidence of its true pose: the views, the body, the true pose."""
     values = posed(model, seed)
     views = own_evidence([PosedBody(model, values)], cameras_around())
     start = shaken(model, values, np.random.default_rng(seed + 100), np.radians(off_deg), off_m)
@@ -128,7 +128,7 @@ def test_the_others_hide_and_draw_edges(gavrila, person, match):
 
 
 def test_an_edge_of_somebody_elses_does_not_pull():
-    """Two balls whose outlines nearly touch: all edges are the left one's, and draw the left one alone."""
+    """Two balls whose outlines nearly touch: all edges belong to the left one, and attract only that one."""
     left, right = at(BALL.model, 0, -0.32, 0), at(BALL.model, 0, 0.32, 0)
     views = own_evidence([left], [FRONT])
     bodies = [at(BALL.model, 0, -0.30, 0), right]
@@ -196,7 +196,7 @@ def test_an_edge_at_right_angles_draws_less():
 
 
 def test_an_edge_goes_to_the_contour_that_runs_its_way():
-    """Between an upright board and one that lies: which of them an edge point belongs to is told by its direction."""
+    """Between an upright board and a lying one: the direction of an edge point decides which of them it belongs to."""
     upright, lying = at(solid((0.05, 0.05, 0.5), (0.1, 1)), 0, 0, 0.5), at(solid((0.1, 0.5, 0.05)), 0, 0, 0)
     # Beside the upright one by 8 px and above the lying one by as much, or 3 px nearer to either.
     u, v = FRONT.project(np.array([[0.0, 0.05, 0.05]]))[0]
@@ -216,7 +216,7 @@ def test_a_silhouette_pulls_as_far_as_it_is_trusted(trust):
     body, a = at(BALL.model, 0, 0.03, 0.02), np.linspace(0, 2 * np.pi, 40)
     out = np.stack([np.cos(a), np.sin(a)], axis=1)
     edges, contour = CENTER + RADIUS_PX * out[:15], CENTER + (RADIUS_PX + 4) * out[15:]
-    told = Silhouette(None, contour.astype(np.float32), out[15:].astype(np.float32), trust, None, THETA)
+    contour_evidence = Silhouette(None, contour.astype(np.float32), out[15:].astype(np.float32), trust, None, THETA)
 
     def found(view, weight=0.5):
         match = replace(BACKWARD, silhouette=weight)
@@ -225,7 +225,7 @@ def test_a_silhouette_pulls_as_far_as_it_is_trusted(trust):
     alone = found(seen(edges, out[:15], 30.0))
     both = found(seen(np.concatenate([edges, contour]), out, 30.0))
     for weight in (0.5, 0.2):
-        mixed = found(replace(seen(edges, out[:15], 30.0), silhouette=told), weight)
+        mixed = found(replace(seen(edges, out[:15], 30.0), silhouette=contour_evidence), weight)
         for m, e, b in zip(mixed, alone, both, strict=True):
             np.testing.assert_allclose(m - e, weight * trust * (b - e), atol=1e-5 * np.abs(b).max())
 
@@ -250,7 +250,7 @@ def test_views_without_edges_have_no_say(gavrila):
 
 
 def test_what_lies_outside_the_image_has_no_say():
-    """The ball is cut off by the right border: only what is inside counts, and it says nothing of the rest."""
+    """The ball is cut off by the right border: only the part inside the image counts."""
     # 0.3 m of 520 px at 4 m: the border is at y = 2.46 m.
     ball = at(BALL.model, 0, 2.46, 0)
     view = seen((0, 0), (0, 1), 5.0)
@@ -370,10 +370,10 @@ def test_parts_by_hand():
     assert parts.forward_px.item() == pytest.approx(7.0, rel=1e-5)
     assert parts.points.item() == 3
     # Half of the weight each way; GD96's Eq. 3 in Geman-McClure's robust form.
-    told, s2 = 0.5 * 0.0125, (0.4 * THETA) ** 2
+    information, s2 = 0.5 * 0.0125, (0.4 * THETA) ** 2
     bent = np.array([7.0, 3.0, 0.0, 4.0, THETA]) ** 2
     bent = 0.5 * s2 * bent / (s2 + bent)
-    expected = told * (parts.length_px.item() * bent[0] + SCENE_SPACING_PX * bent[1:].sum())
+    expected = information * (parts.length_px.item() * bent[0] + SCENE_SPACING_PX * bent[1:].sum())
     assert match.costs(BALL.values[None])[0] == pytest.approx(expected, rel=0.01)
     # Beyond the outlier distance a piece costs no more.
     off = ContourResiduals([seen(points, across, 35.0)], [BALL], 0, FORWARD, THETA)

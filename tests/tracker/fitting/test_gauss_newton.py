@@ -88,7 +88,7 @@ def test_without_iterations_a_pose_is_only_looked_at():
 
 
 def test_covariance_by_hand():
-    """Two blocks know where a ball is, to 1/2 and 1/3 m; nobody knows how it is turned."""
+    """Two blocks know where a ball is, to 1/2 and 1/3 m; its rotation is unobserved."""
     ball = solid((0.1, 0.1, 0.1))
     place, start = target(ball, "root", 1, 2, 3, weight=2.0), at(ball, 0, 0, 0).values
     prior = PosePrior(start, np.array([3.0, 0, 0, 0, 0, 0]))
@@ -194,7 +194,7 @@ def test_the_cost_never_rises():
 
 
 class Rough:
-    """A prior whose cost is rough at its bottom, as that of image residuals is; it counts how often it is asked."""
+    """A prior with a cost that is rough near its minimum, like that of image residuals; it counts its calls."""
 
     def __init__(self, near, roughness):
         self.prior, self.roughness, self.asked = PosePrior(near, np.full(GAVRILA.n_dofs, 10.0)), roughness, 0
@@ -207,7 +207,7 @@ class Rough:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_what_gains_too_little_ends_the_descent(seed):
-    """On a rough bottom steps are refused again and again, each time shorter; who says what is enough is spared it."""
+    """Near a rough minimum steps are refused repeatedly, each shorter than the last; a smallest decrease ends this."""
     near, rng = posed(GAVRILA, seed), np.random.default_rng(seed)
     start = shaken(GAVRILA, near, rng, 0.3, 0.1)
     patient, content = Rough(near, 0.05), Rough(near, 0.05)
@@ -254,7 +254,7 @@ def test_other_sizes_are_fitted_as_well_as_they_can():
 
 
 def test_a_longer_trunk_is_not_bent_to_be_shorter():
-    """Shoulders 4 cm below where this body has them: to buckle in the trunk brings it nearer, but nobody stands so."""
+    """Shoulders 4 cm below those of this body: buckling the trunk would bring it nearer, but is unnatural."""
     model = load_model("gavrila34")
     targets = points_of(model, model.neutral())
     for name in targets:

@@ -23,7 +23,7 @@ INTO_THE_TRUNK = {
 
 
 class Staged:
-    """Two who reach into each other, one with an arm in the own trunk, and evidence of where they truly stand."""
+    """Two people who reach into each other, one with an arm in the own trunk, and evidence of their true poses."""
 
     def __init__(self, model, seed):
         rng, self.model = np.random.default_rng(seed), model
@@ -48,7 +48,7 @@ class Staged:
 
 
 def assert_same(found, expected):
-    """As sums of residuals of single precision are that are added up in another order."""
+    """Compare fits up to the rounding of single-precision sums in another order."""
     np.testing.assert_allclose(found.pose, expected.pose, atol=1e-6)
     assert found.cost == pytest.approx(expected.cost, rel=1e-6)
     assert found.iterations == expected.iterations
@@ -61,7 +61,7 @@ def staged(request):
 
 
 def both(staged, blocks, start=None, active_dofs=None, **how):
-    """What is found by the compiled version, with no help, and by the readable one."""
+    """The fits of the compiled solver, without its fallback, and of the readable one."""
     start = staged.start if start is None else start
     expected = gauss_newton.solve(staged.model, start, blocks, active_dofs, **how)
     with pytest.MonkeyPatch.context() as patched:
@@ -81,7 +81,7 @@ def test_every_kind_of_block_counts(staged, n_blocks):
 
 @pytest.mark.parametrize("how", [{}, {"tolerance": 0.02}, {"gain": 5.0}])
 def test_every_step_is_that_of_the_readable_version(staged, how):
-    """One by one: costs of images are rough, and after a dozen steps a last digit may lead elsewhere."""
+    """Step by step: costs of images are rough, so after a dozen steps rounding may lead elsewhere."""
     values, costs = staged.start, []
     for _ in range(8):
         found, expected = both(staged, staged.blocks(), values, max_iterations=1, **how)
@@ -99,7 +99,7 @@ def test_a_descent_ends_as_that_of_the_readable_version(staged, how):
 
 
 class Asked:
-    """A block that says nothing, and counts how often it is asked."""
+    """A block without residuals that counts its calls."""
 
     def __init__(self):
         self.times = 0
@@ -128,7 +128,7 @@ def test_whole_descents_without_images_are_the_same(staged, seed, how):
 
 
 def test_limits_hold_and_what_may_not_move_stays(staged):
-    """What is drawn beyond limits, down and up, ends at them; what is outside and may not move stays there."""
+    """Degrees of freedom drawn beyond their limits end at them; inactive ones outside their limits stay there."""
     start, wanted, model = staged.start.copy(), staged.expected.copy(), staged.model
     low, high, fixed = (model.dof_names.index(f"{n}.extension") for n in ("right_knee", "right_elbow", "left_knee"))
     start[low], wanted[low] = model.limits[low, 0], model.limits[low, 0] - 2
@@ -152,7 +152,7 @@ def test_a_limb_alone(staged):
 
 
 def test_what_nothing_holds(staged):
-    """Views that see nothing: no step is worth taking, and no matrix is definite."""
+    """Views without evidence: no step is worth taking, and no matrix is definite."""
     blank = [replace(v, points_px=v.points_px[:0], normals=v.normals[:0]) for v in staged.views]
     found, expected = both(staged, [ContourResiduals(blank, staged.bodies)])
     assert_same(found, expected)

@@ -21,7 +21,7 @@ def numeric_gradient(block, body, step=1e-6):
 
 
 def embraced(gavrila, seed):
-    """Two people whose limbs and trunks are within each other here and there."""
+    """Two people with limbs and trunks partly within each other."""
     one, two = posed(gavrila, seed), posed(gavrila, seed + 1)
     two[:2] += 0.12, 0.05
     return [PosedBody(gavrila, one), PosedBody(gavrila, two)]
@@ -67,7 +67,7 @@ def test_the_weight_is_that_of_the_cost():
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("person", [0, 1])
 def test_derivative_between_bodies(gavrila, seed, person):
-    """Contacts move with the surface of the other part, whose curvature is left out: right up to a small share."""
+    """The curvature of the other part's surface is neglected, so derivatives are right up to a small share."""
     bodies = embraced(gavrila, seed)
     block = BodyPenetration(bodies, person, 1.0)
     found, wanted = normal(block, bodies[person]), numeric_gradient(block, bodies[person])
@@ -84,7 +84,7 @@ def test_a_third_body_counts_too():
 
 
 def test_limbs_leave_the_trunk_and_stay_elsewhere(gavrila):
-    """Arms pressed into the trunk come out; a body at ease costs nothing."""
+    """Arms pressed into the trunk come out; a body in its neutral pose costs nothing."""
     at_ease = gavrila.neutral()
     assert normal(SelfPenetration(), PosedBody(gavrila, at_ease)).cost == 0
     rng, worse = np.random.default_rng(2), 0

@@ -25,9 +25,11 @@ def table(points, normal=ACROSS):
 def shown(edges, outline, turned=0.0, trust=1.0):
     """A view of an upright edge and of a silhouette's contour, turned by an angle, rad."""
     points, normals = table(outline, (np.cos(turned), np.sin(turned)))
-    told = Silhouette(np.zeros((480, 640), bool), points, normals, trust, SilhouetteContour(points, normals), 40.0)
+    silhouette = Silhouette(
+        np.zeros((480, 640), bool), points, normals, trust, SilhouetteContour(points, normals), 40.0
+    )
     return ViewEvidence(FRONT, 1.0, table(edges)[0], np.zeros((480, 640), np.float32), normals=table(edges)[1],
-                        silhouette=told)  # fmt: skip
+                        silhouette=silhouette)  # fmt: skip
 
 
 def found(*args, reach=np.inf, **kwargs):
@@ -73,10 +75,10 @@ def test_joined_points_weigh_what_they_did_apart():
     points = view.points_px[::2] + view.normals[::2]
     inside = np.all((points >= 0) & (points < view.camera.size), axis=1)
     points, normals = points[inside], view.normals[::2][inside]
-    told = Silhouette(
+    silhouette = Silhouette(
         np.zeros(view.distance.shape, bool), points, normals, 1.0, SilhouetteContour(points, normals), 40.0
     )
-    joined = points_to_match(replace(view, silhouette=told), None, np.inf, EDGES, SILHOUETTE)
+    joined = points_to_match(replace(view, silhouette=silhouette), None, np.inf, EDGES, SILHOUETTE)
     assert joined.shape == (len(view.points_px), N_COLUMNS)  # all found their edges
     np.testing.assert_allclose(
         joined[:, 4:].sum(axis=0),

@@ -14,13 +14,13 @@ from tracker.images.background_subtraction import (
 
 
 def room(seed=0, noise=0.0):
-    """A textured room, (80, 100, 3), with the noise of one picture."""
+    """A textured room, (80, 100, 3), with the noise of one image."""
     texture = np.random.default_rng(0).integers(60, 190, (80, 100, 3)).astype(float)
     return np.clip(texture + np.random.default_rng(seed).normal(0, noise, texture.shape), 0, 255).astype(np.uint8)
 
 
 def changed(image, background):
-    """Silhouette of an image before a background, both as filmed, with the threshold that they call for."""
+    """Silhouette of an image before a background, both as filmed, with the threshold that follows from them."""
     pair = smooth_image(image), smooth_image(background)
     differences = np.abs(np.subtract(*pair, dtype=np.float32)).max(axis=-1)
     return subtract_background(*pair, change_threshold(differences.ravel())).inside
@@ -107,11 +107,11 @@ def test_exposure_is_found_although_a_person_stands_there():
     seen = empty * (1.2, 1.1, 0.9)
     seen[:300] = rng.uniform(0, 255, (300, 3))
     np.testing.assert_allclose(exposure_gain(seen.astype(np.float32), empty), (1.2, 1.1, 0.9), atol=0.03)
-    # Where everything is black, or white, nothing can be told.
+    # Black or white images do not measure exposure.
     empty[:500], empty[500:960] = 5, 250
-    told = has_usable_exposure(empty)
-    assert told.sum() == 40
-    np.testing.assert_array_equal(exposure_gain(seen[told].astype(np.float32), empty[told]), 1)
+    usable = has_usable_exposure(empty)
+    assert usable.sum() == 40
+    np.testing.assert_array_equal(exposure_gain(seen[usable].astype(np.float32), empty[usable]), 1)
 
 
 def test_a_background_follows_the_exposure():

@@ -49,7 +49,7 @@ def test_distance_image():
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (7, 5), (3, 200), (200, 3), (120, 173)])
 @pytest.mark.parametrize(("share", "limit_px"), [(0.3, 20.0), (0.01, 38.4), (0.001, 150.0)])
 def test_distance_images_are_those_of_opencv(size, share, limit_px):
-    """Of few edges and many, in images narrower than a step, with limits beyond them."""
+    """With few edges and many, in images narrower than a step, with limits larger than the image."""
     rng = np.random.default_rng(size[0] + size[1])
     edges = rng.random(size) < share
     edges[rng.integers(size[0]), rng.integers(size[1])] = True

@@ -10,7 +10,7 @@ COLUMN = 30
 
 
 def found(image, foreground=None):
-    """Edges of a whole image, (H, W) bool, with the thresholds that it calls for itself."""
+    """Edges of a whole image, (H, W) bool, with the thresholds that follow from it."""
     strengths = SampleGrid(image.shape[1::-1], 1.0).measure(image).strengths
     edges = detect_edges(smooth_image(image), levels(strengths, restricted=foreground is not None), foreground)
     assert edges.found.dtype == np.uint8

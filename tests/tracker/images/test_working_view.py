@@ -34,7 +34,7 @@ def test_regions_are_parts_of_the_whole(size, lens):
 def test_matched_pixels_show_what_the_matched_camera_sees(size):
     source = replace(camera_at("c", (2.5, 0.7, 0.3), size=size, focal=0.8 * size[0]), distortion=LENS)
     view = WorkingView(source)
-    # The colour of a pixel of the footage tells where it lies.
+    # The colour of a pixel of the footage encodes its position.
     u, v = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
     frame = np.stack([255 * u / size[0], 255 * v / size[1], 0 * u], axis=-1).astype(np.uint8)
     seen = view.image(frame, view.whole)

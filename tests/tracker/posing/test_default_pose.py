@@ -15,7 +15,7 @@ def place(model, values, point):
 
 @pytest.mark.parametrize("up", list(UP_ROTATIONS))
 def test_standing_pose(gavrila, up):
-    """Upright along the axis said to be up, where the cameras look, whatever the axes of the world."""
+    """The default pose is upright along the up axis, where the cameras look, for any axes of the world."""
     R, center = UP_ROTATIONS[up], np.array([1.0, 2.0, 3.0])
     T = rigid.transform(R, center)
     cameras = [

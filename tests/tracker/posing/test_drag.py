@@ -35,7 +35,7 @@ def pose(gavrila):
 @pytest.mark.parametrize("point", ["left_wrist", "right_wrist", "left_elbow", "left_ankle", "right_ankle", "left_knee"])
 @pytest.mark.parametrize("seed", range(4))
 def test_a_dragged_joint_stays_under_the_pointer(gavrila, pose, point, seed):
-    """The pointer goes where the chain can follow: to where another pose of the limb would show the point."""
+    """The pointer goes where the chain can follow: to the image of the point in another pose of the limb."""
     rng = np.random.default_rng(seed)
     hold = np.array([2.0, -1.0])  # the handle was not hit in its middle
     start = SIDE.project(place(gavrila, pose, point)) + hold
@@ -121,7 +121,7 @@ def test_the_way_back_restores_the_pose(gavrila, pose, point):
     values = pose
     for way in [(10, 0), (15, 10), (5, 20), (-5, 5), (0, 0)]:
         values = drag(hand, start + way, values)
-    # Within a tenth of a degree and a millimetre: nobody sees it.
+    # Within a tenth of a degree and a millimetre, which is not visible.
     assert np.abs(gavrila.difference(values, pose)).max() < 0.002
 
 

@@ -22,7 +22,7 @@ def with_balls(model):
 
 
 def with_odd_axes(model):
-    """The same body whose right shoulder turns about other axes, in another order, than the left one, but as far."""
+    """The same body with a right shoulder that turns about other axes, in another order, with the same range."""
     axes = {
         "left_shoulder": tuple(
             replace(a, limits=(-2.8, 2.8)) for j in model.joints if j.name == "left_shoulder" for a in j.axes
@@ -49,7 +49,7 @@ def model(request):
 
 
 def any_pose(model, seed):
-    """Somebody in the middle of a movement, somewhere, turned somehow."""
+    """A pose in the middle of a movement, anywhere, with any rotation."""
     return shaken(model, model.neutral(), np.random.default_rng(seed), 0.5, 1.0)
 
 
@@ -83,7 +83,7 @@ def test_what_is_taken_over_is_exact_and_the_rest_untouched(model):
 
 
 def test_joints_that_turn_in_another_order_are_bent_alike_all_the_same():
-    """The hips of the two bodies have other angles for one rotation; all that both have is bent alike."""
+    """The hips of the two bodies have other angles for one rotation; all common joints are copied."""
     paper, ours = load_model("gavrila22"), load_model("gavrila34")
     theirs = posed_legs(paper)
     bent = copy_joint_angles(ours, ours.neutral(), paper, theirs, np.ones(ours.n_dofs, dtype=bool))

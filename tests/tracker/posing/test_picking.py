@@ -16,7 +16,7 @@ def body(gavrila):
 
 
 def test_outlines_hold_the_images_of_their_parts(body):
-    """Against meshes finer than the outlines are made of: none stands out by more than half a pixel."""
+    """Against meshes finer than those of the hulls: no point is more than half a pixel outside."""
     Ts = body.model.kinematics(body.values).Ts_world_part
     found = part_hulls([body], [SIDE])[0]
     assert [o.part for o in found] == list(range(len(body.model.parts)))

@@ -121,7 +121,7 @@ def test_a_ball_joint_is_pinned_with_all_of_its_quaternion():
 
 
 def test_pins_and_edges_of_real_footage_come_below_45_mm(sample_folder):
-    """Joints some 100 mm off, four of them pinned in two views by a hand 3 px off; the bones are not the true ones."""
+    """Joints some 100 mm off, four of them pinned in two views with 3 px of noise; the bones are not the true ones."""
     session = load_session(sample_folder)
     joints = read_joints(sample_folder / "truth.trc", session.fps)
     model, cameras = session.people[0].model, [c.camera for c in session.cameras]

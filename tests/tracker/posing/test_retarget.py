@@ -1,4 +1,4 @@
-"""Poses taken over into bodies of other sizes."""
+"""Poses retargeted to bodies of other sizes."""
 
 import numpy as np
 import pytest

@@ -13,7 +13,7 @@ COARSE = SearchSettings(passes=(1.0,))
 
 
 class Counted:
-    """A cost that counts the poses it is asked about."""
+    """A cost that counts the poses it scores."""
 
     def __init__(self, cost):
         self.cost, self.models, self.asked = cost, cost.models, 0
@@ -116,7 +116,7 @@ def test_only_the_stages_own_dofs_move_and_within_bounds(gavrila, start, steps):
 
 
 def test_limits_hold(gavrila, views, truth):
-    """Elbows and knees as straight as they can be: the lattice's nodes beyond are put back."""
+    """Elbows and knees are straight: lattice nodes beyond their limits are clipped."""
     straight = np.where([n.endswith("extension") for n in gavrila.value_names], 0.02, truth)
     seen = set()
     for step in search(ChamferCost(views, [PosedBody(gavrila, straight)]), [straight], COARSE):
@@ -230,7 +230,7 @@ def test_people_one_after_the_other(gavrila, truth):
             np.testing.assert_allclose(step.best[0], truths[0], atol=1e-9)
             np.testing.assert_array_equal(step.candidate[0], step.best[0])
     np.testing.assert_allclose(step.best[1], truths[1], atol=1e-9)
-    # Pass by pass: everybody coarsely before anybody finely (GD96 Fig. 2).
+    # Pass by pass: all people coarsely, then all people finely (GD96 Fig. 2).
     finer = stages(cost.models, SearchSettings(passes=(1.0, 0.5)))
     assert [(s.factor, s.person) for s in finer[::3]] == [(1.0, 0), (1.0, 1), (0.5, 0), (0.5, 1)]
 
@@ -261,7 +261,7 @@ def test_the_papers_settings(gavrila, views, truth, start):
 
 
 def test_limbs_apart(gavrila):
-    """What moves two limbs stays together, each limb is alone, and nothing is lost."""
+    """Degrees of freedom that move two limbs stay together, each limb is separate, and none is lost."""
     leaves = stages([gavrila], SearchSettings(passes=(1.0,), limbs_apart=True))
     assert [(s.name, len(s.group.dofs)) for s in leaves] == [
         ("torso and head", 5), ("arms: torso", 1), ("arms: left_shoulder", 4), ("arms: right_shoulder", 4),
@@ -281,7 +281,7 @@ def test_limbs_apart(gavrila):
 
 
 def test_a_refinement_makes_up_for_a_short_search(gavrila, views, truth):
-    """From 8 degrees and 5 cm off in every degree of freedom, where a refinement alone goes astray."""
+    """From 8 degrees and 5 cm off in every degree of freedom, where a refinement alone fails."""
 
     def found(start, settings):
         *_, last = search(ChamferCost(views, [PosedBody(gavrila, start)]), [start], settings)

@@ -249,7 +249,7 @@ def test_fast_cost_against_the_oracle(real_frame, n_poses):
     off = np.abs(fast - slow)
     assert np.ptp(slow) > 3  # the poses are good and bad
     assert np.all(off < np.maximum(0.1, 0.01 * slow)), (off.max(), (off / slow).max())
-    # What a search asks is which of two poses is better: it must be told the same.
+    # A search compares poses: the order of their costs must be the same.
     assert np.argmin(fast) == np.argmin(slow)
 
 
