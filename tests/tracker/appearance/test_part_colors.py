@@ -224,7 +224,7 @@ def test_a_look_tells_where_a_limb_is(gavrila, stand):
 
 
 def test_a_limb_that_is_away_hides_nothing(gavrila):
-    """The right arm occludes the left one; if it is removed, it does not count against the left one."""
+    """The right arm and the trunk occlude the left arm; without them the left arm has a score."""
     stand = gavrila.neutral()
     bodies = [PosedBody(gavrila, stand)]
     view = dressed(bodies, [camera_at("right", (0.0, -4.0, 0.2))], SUIT)
