@@ -74,11 +74,35 @@ class _Backdrop(NamedTuple):
     """Pixel at the middle of the first cell, u and v, (2,)."""
 
 
+class _Limb(NamedTuple):
+    """The limb in all poses, for the kernels."""
+
+    Ts: Array
+    """Poses of its parts, (C, n, 4, 4), metres."""
+    shapes: Array
+    """Ellipsoids of its parts, (n, 6), metres."""
+    parts: IntArray
+    """Indices of its parts in the body, (n,)."""
+    log_ratios: Array
+    """Log ratios of the colours of all parts of the body, (n_parts, BINS^3), nats; see `PartColors`."""
+
+
+class _Scratch(NamedTuple):
+    """Buffers of the kernels."""
+
+    own_parts: IntArray
+    """0 to n - 1, (n,)."""
+    rays: Array
+    """See `ray_transform`, (n, 13)."""
+    axis: Array
+    """See `project_axis`, (4, 3)."""
+
+
 class LimbScorer:
     """Scores one limb of an otherwise static body in many poses."""
 
     def __init__(
-        self, views: Sequence[ColorView], model: BodyModel, rest: Kinematics, limb: IntArray, standing: StaticParts,
+        self, views: Sequence[ColorView], model: BodyModel, rest: Kinematics, limb: IntArray, static: StaticParts,
         shapes: Array, log_ratios: Array | None,
     ) -> None:  # fmt: skip
         """Draw the static parts.
@@ -98,7 +122,7 @@ class LimbScorer:
         reach = _reach(model, limb, self._shapes)
         root = rest.Ts_world_part[limb[0], :3, 3]
         # Sequential: the work is too small for threads.
-        self._backdrops = [_backdrop(view, standing, root, reach) for view in self._views]
+        self._backdrops = [_backdrop(view, static, root, reach) for view in self._views]
 
     def __call__(self, poses: Array) -> Array:
         """Return the score of the limb in many poses, (C, n_values), that differ in the limb only, (C,), nats.
@@ -108,10 +132,11 @@ class LimbScorer:
         calling thread; several threads may call at a time.
         """
         Ts = chain_poses(self._model.tree, self._rest, self._limb, poses)
-        room = np.arange(len(self._limb)), np.empty((len(self._limb), 13)), np.empty((4, 3))
+        limb = _Limb(Ts, self._shapes, self._limb, self._ratios)
+        scratch = _Scratch(np.arange(len(self._limb)), np.empty((len(self._limb), 13)), np.empty((4, 3)))
         total, nats = np.zeros(len(poses)), np.zeros(len(poses))
         for view, backdrop in zip(self._views, self._backdrops, strict=True):
-            _look_along(*view, *backdrop, Ts, self._shapes, self._limb, self._ratios, *room, nats)
+            _score_view(view, backdrop, limb, scratch, nats)
             total += nats
         return total
 
@@ -123,7 +148,7 @@ def _reach(model: BodyModel, limb: IntArray, shapes: Array) -> float:
     return float((np.cumsum(lengths) + np.linalg.norm(shapes[:, :3], axis=1) + shapes[:, 5]).max())
 
 
-def _backdrop(view: ColorView, standing: StaticParts, root: Array, reach: float) -> _Backdrop:
+def _backdrop(view: ColorView, static: StaticParts, root: Array, reach: float) -> _Backdrop:
     """Draw the static parts within reach, metres, of a position, (3,)."""
     bounds, ball = np.empty(4), np.diag([reach, reach, reach, 1.0])
     ball[:3, 3] = root
@@ -134,10 +159,10 @@ def _backdrop(view: ColorView, standing: StaticParts, root: Array, reach: float)
     high = np.clip(np.ceil(bounds[2:] + _BESIDE_PX), -size, 2 * size).astype(np.int64)
     columns, rows = np.maximum(0, (high - low) // _STEP_PX + 1)
     depths, owners = np.full((rows, columns), np.inf, np.float32), np.full((rows, columns), _OPEN, np.int16)
-    Ts_unit_world = np.linalg.inv(standing.Ts_world_unit)
+    Ts_unit_world = np.linalg.inv(static.Ts_world_unit)
     rays = Ts_unit_world[:, :3, :3] @ np.linalg.inv(view.P[:, :3])
     eyes = Ts_unit_world[:, :3] @ np.append(view.eye, 1.0)
-    _draw(view.P @ standing.Ts_world_unit, rays, eyes, standing.owners, low, depths, owners, bounds)
+    _draw(view.P @ static.Ts_world_unit, rays, eyes, static.owners, low, depths, owners, bounds)
     return _Backdrop(depths, owners, low)
 
 
@@ -191,62 +216,51 @@ def _bounds(to_px: Array, bounds: Array) -> None:
         to_px: from the coordinates in which it is the unit ball to homogeneous pixels, (3, 4).
         bounds: filled.
     """
-    ww = _touch(to_px, 2, 2)
+    ww = _dual_conic(to_px, 2, 2)
     for i in range(2):
         if ww >= 0.0:
             bounds[i], bounds[i + 2] = -np.inf, np.inf
         elif to_px[2, 3] <= 0.0:
             bounds[i], bounds[i + 2] = np.inf, -np.inf
         else:
-            uw = _touch(to_px, i, 2)
-            root = np.sqrt(max(0.0, uw * uw - _touch(to_px, i, i) * ww))
+            uw = _dual_conic(to_px, i, 2)
+            root = np.sqrt(max(0.0, uw * uw - _dual_conic(to_px, i, i) * ww))
             bounds[i], bounds[i + 2] = (uw + root) / ww, (uw - root) / ww
 
 
 @njit(**NO_REFCOUNT)
-def _touch(to_px: Array, i: int, j: int) -> float:
-    """An entry of the dual conic of a ball's outline: a line l touches it where l^T C l = 0."""
+def _dual_conic(to_px: Array, i: int, j: int) -> float:
+    """Return an entry of the dual conic C of a ball's image: a line l is tangent where l^T C l = 0."""
     near = to_px[i, 0] * to_px[j, 0] + to_px[i, 1] * to_px[j, 1] + to_px[i, 2] * to_px[j, 2]
     return float(near - to_px[i, 3] * to_px[j, 3])
 
 
 @njit(**NO_REFCOUNT)
-def _look_along(
-    P: Array, eye: Array, image: Image, distance: FloatArray, theta_px: float,
-    depths: NDArray[np.float32], owners: NDArray[np.int16], corner: IntArray,
-    Ts: Array, shapes: Array, limb: IntArray, ratios: Array, all_parts: IntArray, rays: Array,
-    axis: Array, nats: Array,
-) -> None:  # fmt: skip
-    """Fill what one view says of the limb in each pose, (C,).
+def _score_view(view: ColorView, backdrop: _Backdrop, limb: _Limb, scratch: _Scratch, nats: Array) -> None:
+    """Fill the score of the limb in one view in each pose, (C,), nats.
 
     Args:
-        P: the view, as the following four see `ColorView`.
-        eye: of the view.
-        image: of the view.
-        distance: of the view.
-        theta_px: of the view.
-        depths: what stands there, as the following two see `_Backdrop`.
-        owners: of what stands.
-        corner: of what stands.
-        Ts: poses of the limb's parts, (C, n, 4, 4), metres.
-        shapes: their ellipsoids, (n, 6), metres.
-        limb: their indices, (n,).
-        ratios: log ratios of all parts of the body.
-        all_parts: 0 to n - 1, (n,).
-        rays: room, (n, 13).
-        axis: room, (4, 3).
-        nats: what is filled.
+        view: the view.
+        backdrop: static parts in the view.
+        limb: the limb in all poses.
+        scratch: buffers.
+        nats: filled.
     """
+    P, eye, image, distance, theta_px = view
+    depths, owners, corner = backdrop
+    Ts, shapes, parts, log_ratios = limb
+    own_parts, rays, axis = scratch
+    n_parts = parts.shape[0]
     for c in range(Ts.shape[0]):
-        for i in range(limb.shape[0]):
+        for i in range(n_parts):
             ray_transform(eye, Ts[c, i], shapes[i], rays[i])
         total = 0.0
-        for i in range(limb.shape[0]):
+        for i in range(n_parts):
             project_axis(P, eye, Ts[c, i], shapes[i], axis)
             for sample in range(ALONG):
                 z = axis_sample(shapes[i], sample)
                 depth = axis[1, 2] + z * axis[2, 2]
-                if depth < NEAR_PLANE_M or is_occluded(Ts[c, i], axis, z, i, rays, all_parts, limb.shape[0]):
+                if depth < NEAR_PLANE_M or is_occluded(Ts[c, i], axis, z, i, rays, own_parts, n_parts):
                     continue
                 behind = _OPEN
                 u, v, du, dv = pixel_on_axis(axis, z)
@@ -257,13 +271,15 @@ def _look_along(
                         continue
                     behind = owners[row, column]
                 step = 0.5 * shapes[i, 3]
-                total += _sample_nats(u, v, du * step, dv * step, image, distance, theta_px, ratios, limb[i], behind)
+                total += _sample_nats(
+                    u, v, du * step, dv * step, image, distance, theta_px, log_ratios, parts[i], behind
+                )
         nats[c] = total
 
 
 @njit(**NO_REFCOUNT)
 def _sample_nats(
-    u: float, v: float, du: float, dv: float, image: Image, distance: FloatArray, theta_px: float, ratios: Array,
+    u: float, v: float, du: float, dv: float, image: Image, distance: FloatArray, theta_px: float, log_ratios: Array,
     part: int, behind: int,
 ) -> float:  # fmt: skip
     """Return the score of the pixels across a part, two steps to either side of a sample on its axis.
@@ -288,7 +304,7 @@ def _sample_nats(
             nats += _EDGE_NATS * (_EDGE_EVEN - min(distance[y, x] * per_theta, 1.0))
         else:
             color = bin_of(image, y, x)
-            nats += ratios[part, color]
+            nats += log_ratios[part, color]
             if behind >= 0:  # Matching the colour behind the limb is no evidence for it.
-                nats -= ratios[behind, color]
+                nats -= log_ratios[behind, color]
     return nats

@@ -28,19 +28,19 @@ from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.contours.occluding_contours import part_poses
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.arrays import Array, Image
+from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M
 from tracker.images.color_histogram import BINS, bin_of
 
 _SMOOTHING_BINS = 0.7
 _ACROSS = 3
 """Samples across each part."""
-_MOST_NATS = 3.0
-"""One pixel says at most this much."""
+_MAX_NATS = 3.0
+"""Largest score of one pixel."""
 _DOUBT = 0.02
 """Share of arbitrary pixels under a part: a colour that was never seen there is not impossible."""
-_LEAST_SEEN = 6
-"""In a view that shows fewer samples of a part, its colour there says nothing."""
+_MIN_VIEW_SAMPLES = 6
+"""Smallest number of samples of a part in a view for a score of its own there."""
 _TWIN_SHARE = 0.2
 """Share of the colours of a part's counterpart on the other side in its own: sleeves are mostly alike."""
 _SAME = 0.25
@@ -71,6 +71,21 @@ class ColorScore(NamedTuple):
     """Visible samples of each part, (n_parts,)."""
     views: Array
     """Mean log ratio under each part in each view, (V, n_parts), nats; NaN where little of it is visible."""
+
+
+class _Samples(NamedTuple):
+    """Buffers for the visible samples of one view."""
+
+    found: IntArray
+    """Part, colour and view of each sample, (room, 3)."""
+    rays: Array
+    """See `ray_transform`, (P, 13)."""
+    cones: Array
+    """See `_cone`, (P, 4)."""
+    near: IntArray
+    """Indices of possible occluders, (P,)."""
+    axis: Array
+    """See `project_axis`, (4, 3)."""
 
 
 class Colors:
@@ -104,7 +119,7 @@ class Colors:
         """
         model = self._bodies[self._person].model
         parts, colors, _ = self._samples(self._bodies[self._person].values)
-        twins = _twins(model)
+        counterparts = _counterparts(model)
         seen = np.zeros((len(model.parts), BINS**3))
         np.add.at(seen, (parts, colors), 1.0)
         seen = np.array([_share(s) for s in seen])
@@ -119,23 +134,23 @@ class Colors:
         # Half of the alternative to a part's colours is the rest of the body, however small it is in the image.
         other = 0.5 * _smoothed(around) + 0.5 * _share(_smoothed(seen.sum(axis=0)))
         blank = seen.sum(axis=1, keepdims=True) == 0
-        own = np.where(blank, seen[twins], (1 - _TWIN_SHARE) * seen + _TWIN_SHARE * seen[twins])
+        own = np.where(blank, seen[counterparts], (1 - _TWIN_SHARE) * seen + _TWIN_SHARE * seen[counterparts])
         own = _smoothed(np.array([_share(s) for s in own]))
         ratios = np.log(((1 - _DOUBT) * own + _DOUBT * other + 1e-7) / (other + 1e-7))
         ratios[own.sum(axis=1) == 0] = 0.0
-        ratios = np.clip(ratios, -_MOST_NATS, _MOST_NATS)
+        ratios = np.clip(ratios, -_MAX_NATS, _MAX_NATS)
         if usual is None:
             usual = _mean_by_part(ratios[parts, colors], parts, len(model.parts))[0]
         return PartColors(ratios, usual, seen, around)
 
-    def score(self, values: Array, known: PartColors) -> ColorScore:
+    def score(self, pose: Array, known: PartColors) -> ColorScore:
         """Return how well the colours under the person in a pose, (n_values,), match the learnt colours of its
         parts."""
         n_parts = known.log_ratios.shape[0]
-        parts, colors, views = self._samples(values)
+        parts, colors, views = self._samples(pose)
         nats = known.log_ratios[parts, colors]
         means, samples = _mean_by_part(nats, views * n_parts + parts, len(self._views) * n_parts)
-        by_view = np.where(samples < _LEAST_SEEN, np.nan, means).reshape(-1, n_parts)
+        by_view = np.where(samples < _MIN_VIEW_SAMPLES, np.nan, means).reshape(-1, n_parts)
         return ColorScore(float(nats.sum()), *_mean_by_part(nats, parts, n_parts), by_view)
 
     def nats(self, poses: Array, known: PartColors) -> Array:
@@ -143,13 +158,13 @@ class Colors:
         model = self._bodies[self._person].model
         Ts, first, ratios = self._Ts_world_part.copy(), self._own.start, known.log_ratios
         placed = chain_poses(model.tree, model.kinematics(poses[0]), np.arange(len(model.parts)), poses)
-        found, room, nats = np.empty((self._most_samples, 3), np.int64), self._room(), np.zeros(len(poses))
+        samples, nats = self._buffers(self._max_samples), np.zeros(len(poses))
         for v in self._views:
-            _add_nats(v.P, v.eye, v.image, Ts, placed, first, self._shapes, ratios, found, *room, nats)
+            _add_nats(v, Ts, placed, first, self._shapes, ratios, samples, nats)
         return nats
 
     def limb_scorer(
-        self, values: Array, limb: NDArray[np.int64], known: PartColors | None, away: Sequence[int] = ()
+        self, pose: Array, limb: NDArray[np.int64], known: PartColors | None, away: Sequence[int] = ()
     ) -> LimbScorer:
         """Return a scorer of one limb in many poses.
 
@@ -160,13 +175,13 @@ class Colors:
             away: indices of parts that are removed and occlude nothing.
         """
         model = self._bodies[self._person].model
-        rest = model.kinematics(values)
+        rest = model.kinematics(pose)
         owners = np.full(len(self._shapes), -1)
         owners[self._own] = np.arange(len(model.parts))
-        standing = ~np.isin(owners, [*limb, *away])
+        is_static = ~np.isin(owners, [*limb, *away])
         return LimbScorer(
             self._views, model, rest, limb,
-            StaticParts(self._Ts(rest)[standing] @ unit_balls(self._shapes[standing]), owners[standing]),
+            StaticParts(self._Ts(rest)[is_static] @ unit_balls(self._shapes[is_static]), owners[is_static]),
             self._shapes[self._own], None if known is None else known.log_ratios,
         )  # fmt: skip
 
@@ -180,27 +195,30 @@ class Colors:
     def _Ts_world_part(self) -> Array:
         return part_poses(self._bodies)
 
-    def _samples(self, values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    def _samples(self, pose: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
         """Return part, colour and view of each visible sample, (n,) each."""
         model = self._bodies[self._person].model
-        Ts = self._Ts(model.kinematics(values))
-        out, room = np.empty((self._most_samples * len(self._views), 3), np.int64), self._room()
+        Ts = self._Ts(model.kinematics(pose))
+        samples = self._buffers(self._max_samples * len(self._views))
         n, first, last = 0, self._own.start, self._own.stop
         for i, view in enumerate(self._views):
-            end = n + _look(view.P, view.eye, Ts, self._shapes, first, last, view.image, out[n:], *room)
-            out[n:end, 2] = i
+            end = n + _list_samples(view, Ts, self._shapes, first, last, samples._replace(found=samples.found[n:]))
+            samples.found[n:end, 2] = i
             n = end
-        return out[:n, 0], out[:n, 1], out[:n, 2]
+        return samples.found[:n, 0], samples.found[:n, 1], samples.found[:n, 2]
 
     @property
-    def _most_samples(self) -> int:
-        """In a view."""
+    def _max_samples(self) -> int:
+        """Largest number of samples in a view."""
         return len(self._bodies[self._person].model.parts) * ALONG * _ACROSS
 
-    def _room(self) -> tuple[Array, Array, NDArray[np.int64], Array]:
-        """For `_look`: its last four arguments."""
+    def _buffers(self, n_samples: int) -> _Samples:
+        """Return buffers for a number of samples."""
         n = len(self._shapes)
-        return np.empty((n, 13)), np.empty((n, 4)), np.empty(n, np.int64), np.empty((4, 3))
+        return _Samples(
+            np.empty((n_samples, 3), np.int64), np.empty((n, 13)), np.empty((n, 4)), np.empty(n, np.int64),
+            np.empty((4, 3)),
+        )  # fmt: skip
 
 
 def _smoothed(counts: Array) -> Array:
@@ -219,8 +237,8 @@ def _mean_by_part(nats: Array, parts: NDArray[np.int64], n_parts: int) -> tuple[
     return np.bincount(parts, weights=nats, minlength=n_parts) / np.maximum(samples, 1), samples.astype(np.float64)
 
 
-def _twins(model: BodyModel) -> NDArray[np.int64]:
-    """Index of each part's twin on the other side; of itself where there is none."""
+def _counterparts(model: BodyModel) -> NDArray[np.int64]:
+    """Return the index of each part's counterpart on the other side, or of itself without one."""
     names = [p.name for p in model.parts]
     swapped = [n.replace("left", "?").replace("right", "left").replace("?", "right") for n in names]
     return np.array([names.index(n) if n in names else i for i, n in enumerate(swapped)])
@@ -228,8 +246,8 @@ def _twins(model: BodyModel) -> NDArray[np.int64]:
 
 @njit(**NO_REFCOUNT)
 def _add_nats(
-    P: Array, eye: Array, image: Image, Ts: Array, placed: Array, first: int, shapes: Array, log_ratios: Array,
-    found: NDArray[np.int64], rays: Array, cones: Array, near: NDArray[np.int64], axis: Array, nats: Array,
+    view: ColorView, Ts: Array, placed: Array, first: int, shapes: Array, log_ratios: Array, samples: _Samples,
+    nats: Array,
 ) -> None:  # fmt: skip
     """Add the score of one view to each of many poses, (C,).
 
@@ -243,37 +261,30 @@ def _add_nats(
         samples: buffers.
         nats: added to.
     """
-    last = first + placed.shape[1]
+    last, found = first + placed.shape[1], samples.found
     for c in range(placed.shape[0]):
         for part in range(placed.shape[1]):
             for i in range(3):
                 for k in range(4):
                     Ts[first + part, i, k] = placed[c, part, i, k]
-        for i in range(_look(P, eye, Ts, shapes, first, last, image, found, rays, cones, near, axis)):
+        for i in range(_list_samples(view, Ts, shapes, first, last, samples)):
             nats[c] += log_ratios[found[i, 0], found[i, 1]]
 
 
 @njit(**NO_REFCOUNT)
-def _look(
-    P: Array, eye: Array, Ts: Array, shapes: Array, first: int, last: int, image: Image, out: NDArray[np.int64],
-    rays: Array, cones: Array, near: NDArray[np.int64], axis: Array,
-) -> int:  # fmt: skip
-    """List part and colour of the visible samples of the parts from first to last in one view; their number.
+def _list_samples(view: ColorView, Ts: Array, shapes: Array, first: int, last: int, samples: _Samples) -> int:
+    """List part and colour of the visible samples of some parts in one view; return their number.
 
     Args:
-        P: projection matrix, (3, 4).
-        eye: centre of the camera, (3,), metres.
+        view: the view.
         Ts: poses of all parts, (P, 4, 4), metres.
         shapes: their ellipsoids, (P, 6), metres.
-        first: index of the first part that is looked at.
+        first: index of the first listed part.
         last: index after the last.
-        image: colours, (H, W, 3).
-        out: part and colour of each sample, (room, 3); its last column is left alone.
-        rays: room, (P, 13).
-        cones: room, (P, 4).
-        near: room, (P,).
-        axis: room, (4, 3).
+        samples: buffers; the first two columns of `found` are filled.
     """
+    P, eye, image, _, _ = view
+    found, rays, cones, near, axis = samples
     height, width = image.shape[0], image.shape[1]
     for p in range(Ts.shape[0]):
         ray_transform(eye, Ts[p], shapes[p], rays[p])
@@ -292,7 +303,7 @@ def _look(
                 aside = radius * (s - (_ACROSS - 1) / 2)
                 x, y = int(np.floor(u + aside * du + 0.5)), int(np.floor(v + aside * dv + 0.5))
                 if 0 <= x < width and 0 <= y < height:
-                    out[n, 0], out[n, 1] = part - first, bin_of(image, y, x)
+                    found[n, 0], found[n, 1] = part - first, bin_of(image, y, x)
                     n += 1
     return n
 

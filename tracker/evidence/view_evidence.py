@@ -18,7 +18,7 @@ from tracker.geometry.cameras import Camera, Region
 from tracker.images.background_subtraction import Mask
 from tracker.images.color_histogram import BINS, count_colors
 from tracker.images.distance_transform import distance_image
-from tracker.images.edge_segments import Samples, Segments, accept_segments, sample_segments
+from tracker.images.edge_segments import EdgeSegments, Samples, accept_segments, sample_segments
 from tracker.images.edges import Edges
 from tracker.images.silhouette_contour import SilhouetteContour, contour_trust, trace_silhouette
 from tracker.images.static_edges import StaticEdgeModel
@@ -76,7 +76,7 @@ class ViewEvidence:
     """Unit gradient at each of `points_px`, from dark to light, (N, 2); zero where the direction is unknown."""
     colors: Image | None = None
     """Smoothed image of the region, (H, W, 3) RGB; None if the frame is damaged or the image was not kept."""
-    segments: Segments | None = None
+    segments: EdgeSegments | None = None
     """All edges, linked, in px of the region; None if their directions are unknown."""
     samples: Samples | None = None
     """Samples of the segments, for distances to contours; None without segments."""
@@ -137,7 +137,7 @@ class RegionFeatures(NamedTuple):
     image_size: tuple[int, int] | None
     found: NDArray[np.uint8]
     """Edges are not 0, (H, W)."""
-    segments: Segments | None = None
+    segments: EdgeSegments | None = None
     samples: Samples | None = None
     """Samples of the segments; None if not yet taken."""
     colors: Image | None = None
@@ -191,7 +191,7 @@ def with_all_segments(view: ViewEvidence) -> ViewEvidence:
     return replace(seen, accepted=None) if view.is_static is None else seen
 
 
-def foreground_segments(segments: Segments, is_static: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+def foreground_segments(segments: EdgeSegments, is_static: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
     """Return which segments may belong to a person, (S,): all that are not static, (S,)."""
     return np.ones(len(segments.firsts) - 1, np.bool_) if is_static is None else ~is_static
 
@@ -205,7 +205,7 @@ def with_segments(view: ViewEvidence, chosen: NDArray[np.bool_]) -> ViewEvidence
 
 
 def _matched_edges(
-    segments: Segments | None, chosen: NDArray[np.bool_] | None, found: NDArray[np.uint8]
+    segments: EdgeSegments | None, chosen: NDArray[np.bool_] | None, found: NDArray[np.uint8]
 ) -> tuple[FloatArray, FloatArray, NDArray[np.uint8]]:
     """Return the thinned points (N, 2) and normals (N, 2) of chosen segments, and the map of all their pixels, (H,
     W)."""
@@ -222,7 +222,7 @@ def _matched_edges(
 
 
 def _edges_of(
-    segments: Segments, chosen: NDArray[np.bool_], shape: tuple[int, ...]
+    segments: EdgeSegments, chosen: NDArray[np.bool_], shape: tuple[int, ...]
 ) -> tuple[FloatArray, FloatArray, NDArray[np.uint8]]:
     """Return the same for chosen segments, (S,), in an image of a height and width."""
     found = np.zeros(shape, np.uint8)

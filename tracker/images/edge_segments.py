@@ -31,7 +31,7 @@ _SHORT2 = np.float32(1e-6)
 """Smallest squared length of a piece, px^2."""
 
 
-class Segments(NamedTuple):
+class EdgeSegments(NamedTuple):
     """Edge pixels in linked order."""
 
     points_px: FloatArray
@@ -42,7 +42,7 @@ class Segments(NamedTuple):
     """Index of the first pixel of each segment, then N, (S + 1,)."""
 
 
-def link_edges(found: NDArray[np.uint8], gradients: NDArray[np.int16]) -> Segments:
+def link_edges(found: NDArray[np.uint8], gradients: NDArray[np.int16]) -> EdgeSegments:
     """Link the pixels of edges into segments of constant curvature.
 
     Args:
@@ -54,11 +54,11 @@ def link_edges(found: NDArray[np.uint8], gradients: NDArray[np.int16]) -> Segmen
     points, normals = np.empty((n, 2), np.float32), np.empty((n, 2), np.float32)
     firsts = np.zeros(n + 1, np.int64)
     if pixels is None:
-        return Segments(points, normals, firsts)
+        return EdgeSegments(points, normals, firsts)
     begins = np.zeros(n, np.bool_)
     _chain(found, np.asarray(pixels, np.int32).reshape(-1, 2), gradients, points, normals, begins)
     count = _cut(points, normals, begins, firsts)
-    return Segments(points, normals, firsts[: count + 1].copy())
+    return EdgeSegments(points, normals, firsts[: count + 1].copy())
 
 
 def accept_segments(samples: "Samples", pieces_px: FloatArray, threshold_px: float) -> NDArray[np.bool_]:
@@ -102,7 +102,7 @@ class Samples(NamedTuple):
         return sums / self.counts
 
 
-def sample_segments(segments: Segments) -> Samples:
+def sample_segments(segments: EdgeSegments) -> Samples:
     """Sample segments, beginning with the first pixel of each."""
     counts = -(-np.diff(segments.firsts) // _STRIDE)
     points = np.empty((counts.sum(), 5), np.float32)

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import FloatArray
-from tracker.images.edge_segments import Segments
+from tracker.images.edge_segments import EdgeSegments
 
 _MEMORY = 4
 """Length of the running mean, frames. A new edge is known at once; one where none was before, after three frames."""
@@ -32,7 +32,7 @@ class StaticEdgeModel:
         self._gradients = np.zeros((height, width, 2), np.float32)
         self._frames = np.zeros((height, width), np.uint8)
 
-    def contains(self, segments: Segments, corner_px: tuple[int, int]) -> NDArray[np.bool_]:
+    def contains(self, segments: EdgeSegments, corner_px: tuple[int, int]) -> NDArray[np.bool_]:
         """Return which segments are static, (S,).
 
         Args:
@@ -46,7 +46,7 @@ class StaticEdgeModel:
 
     def update(
         self,
-        segments: Segments,
+        segments: EdgeSegments,
         corner_px: tuple[int, int],
         size: tuple[int, int],
         pieces_px: FloatArray,
@@ -67,7 +67,7 @@ class StaticEdgeModel:
 
 
 @njit(nogil=True, cache=True)
-def _mark_known(segments: Segments, gradients: FloatArray, known: NDArray[np.bool_]) -> None:
+def _mark_known(segments: EdgeSegments, gradients: FloatArray, known: NDArray[np.bool_]) -> None:
     """Mark the known segments, (S,); the mean gradients, (h, w, 2), begin at the region's corner."""
     points, normals, firsts = segments.points_px, segments.normals, segments.firsts
     for s in range(known.shape[0]):
@@ -81,7 +81,7 @@ def _mark_known(segments: Segments, gradients: FloatArray, known: NDArray[np.boo
 
 @njit(nogil=True, cache=True)
 def _update_means(
-    segments: Segments, pieces: FloatArray, reach: int, gradients: FloatArray, frames: NDArray[np.uint8]
+    segments: EdgeSegments, pieces: FloatArray, reach: int, gradients: FloatArray, frames: NDArray[np.uint8]
 ) -> None:
     """Update the mean gradients, (H, W, 2), of pixels away from all pieces, and their frame counts, (H, W).
 

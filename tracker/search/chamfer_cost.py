@@ -29,7 +29,7 @@ from tracker.geometry.segment_distance import (
     stack_rows,
     within_reach,
 )
-from tracker.search.chamfer_kernels import Scratch, TracedContours, ViewArrays, score_candidates, trace_views
+from tracker.search.chamfer_kernels import ScoreBuffers, ScoredViews, TracedContours, score_candidates, trace_views
 
 Outliers = Literal["truncated", "paper"]
 
@@ -90,7 +90,7 @@ class ChamferCost:
             _near(v, *pieces, theta) for v, pieces, theta in zip(views, self._pieces_by_view(), thetas, strict=True)
         ]
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
-        self._arrays = ViewArrays(
+        self._arrays = ScoredViews(
             np.stack([v.camera.projection for v in views]),
             np.stack([v.camera.center_world for v in views]),
             np.array([v.camera.size for v in views], dtype=np.int64),
@@ -198,12 +198,12 @@ class ChamferCost:
     def _part_poses(self, poses: Sequence[Array]) -> Array:
         return occluding_contours.part_poses([PosedBody(m, p) for m, p in zip(self.models, poses, strict=True)])
 
-    def _scratch(self) -> Scratch:
+    def _scratch(self) -> ScoreBuffers:
         """Return the scratch of the calling thread."""
-        scratch: Scratch | None = getattr(self._own, "scratch", None)
+        scratch: ScoreBuffers | None = getattr(self._own, "scratch", None)
         if scratch is None:
             room = self._room
-            scratch = self._own.scratch = Scratch(
+            scratch = self._own.scratch = ScoreBuffers(
                 piece_buffer(self._surfaces, room),
                 segment_buffer(room), np.empty((3, room), np.float32),
                 np.empty(room, np.float32), np.empty(room, np.float32), np.ones(room, np.float32),

@@ -21,7 +21,7 @@ _JOINED = 10
 too many points."""
 
 
-class ViewArrays(NamedTuple):
+class ScoredViews(NamedTuple):
     """The evidence of all views as arrays; lengths in working px."""
 
     P: Array
@@ -45,7 +45,7 @@ class ViewArrays(NamedTuple):
     """Outlier distances, (V,), px."""
 
 
-class Scratch(NamedTuple):
+class ScoreBuffers(NamedTuple):
     """Buffers of the kernels, used by one thread at a time."""
 
     pieces: Pieces
@@ -114,7 +114,7 @@ def _distance(image: FloatArray, width: int, height: int, u: np.float32, v: np.f
 
 @njit(**FAST_MATH)
 def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, visible: FloatArray) -> float:
-    """Return the mean distance of n visible pieces, see `Scratch`, cut off at theta; theta if none is visible.
+    """Return the mean distance of n visible pieces, see `ScoreBuffers`, cut off at theta; theta if none is visible.
 
     The loop stores nothing, so that it is vectorized.
     """
@@ -129,7 +129,7 @@ def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, v
 
 
 @njit(**FAST_MATH)
-def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: float, scratch: Scratch) -> float:
+def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: float, scratch: ScoreBuffers) -> float:
     """Return the same by the paper's robust mean."""
     visible, lengths, d = scratch.visible, scratch.lengths, scratch.distances
     for i in range(n):
@@ -197,10 +197,10 @@ def _take_traced(view: int, contours: TracedContours, pieces: Pieces) -> int:
 def _score(
     Ts: Array,
     surfaces: Surfaces,
-    views: ViewArrays,
+    views: ScoredViews,
     paper: bool,
     contours: TracedContours,
-    scratch: Scratch,
+    scratch: ScoreBuffers,
     directed: Array,
 ) -> None:
     """Fill the directed costs of one pose, (V, 2): model to image and image to model, working px."""
@@ -230,7 +230,7 @@ def _score(
 @njit(nogil=True, cache=True)
 def score_candidates(
     candidates: Array, first: int, n_dofs: int, tree: Tree, Ts: Array,
-    surfaces: Surfaces, views: ViewArrays, paper: bool, contours: TracedContours, scratch: Scratch,
+    surfaces: Surfaces, views: ScoredViews, paper: bool, contours: TracedContours, scratch: ScoreBuffers,
     directed: Array,
 ) -> None:  # fmt: skip
     """Run `_score` for many poses of the person whose parts begin at `first`; directed is (C, V, 2)."""

@@ -28,7 +28,7 @@ from tracker.evidence.view_evidence import (
     with_segments,
 )
 from tracker.geometry.arrays import Array, FloatArray
-from tracker.images.edge_segments import MAX_ANGLE_RAD, Samples, Segments, nearest_parallel_segment, sample_segments
+from tracker.images.edge_segments import MAX_ANGLE_RAD, EdgeSegments, Samples, nearest_parallel_segment, sample_segments
 
 _OWNERSHIP_RATIO = 0.5
 """Evidence is foreign to a body if its distance to another one is below this share of that to the body."""
@@ -150,13 +150,15 @@ def _samples_of(view: ViewEvidence) -> tuple[Samples | None, Samples | None]:
     if silhouette is None or not len(silhouette.points_px):
         return edges, None
     points = silhouette.points_px
-    return edges, sample_segments(Segments(points, silhouette.normals, np.arange(len(points) + 1)))
+    return edges, sample_segments(EdgeSegments(points, silhouette.normals, np.arange(len(points) + 1)))
 
 
 @lru_cache(maxsize=1)  # not made by the import, which would load a kernel
 def _no_samples() -> Samples:
     """Return samples of no segments."""
-    return sample_segments(Segments(np.empty((0, 2), np.float32), np.empty((0, 2), np.float32), np.zeros(1, np.int64)))
+    return sample_segments(
+        EdgeSegments(np.empty((0, 2), np.float32), np.empty((0, 2), np.float32), np.zeros(1, np.int64))
+    )
 
 
 # One call for each view: each call would release the interpreter lock and wait for it again.

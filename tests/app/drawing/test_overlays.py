@@ -12,7 +12,7 @@ from app.state.people import ShownPose
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.images.edge_segments import Segments, sample_segments
+from tracker.images.edge_segments import EdgeSegments, sample_segments
 
 
 def kinds_of(paths, kind, camera=0):
@@ -62,7 +62,7 @@ def test_segments_lie_in_undistorted_pixels_of_the_whole_image(controller):
     """A region at half size: its pixel (u, v) covers pixels 2 (u + corner) and the next."""
     points = np.array([[4, 6], [5, 6], [6, 6], [7, 6], [20, 30], [20, 31]], np.float32)
     normals = np.tile(np.float32([0, 1]), (6, 1))
-    segments = Segments(points, normals, np.array([0, 4, 6]))
+    segments = EdgeSegments(points, normals, np.array([0, 4, 6]))
     camera = controller.session.cameras[0].camera.pinhole.scaled(0.5).cropped((10, 20, 60, 70))
     view = ViewEvidence(
         camera,

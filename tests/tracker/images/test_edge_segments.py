@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from tracker.images.background_subtraction import smooth_image
-from tracker.images.edge_segments import MAX_LENGTH, Segments, accept_segments, link_edges, sample_segments
+from tracker.images.edge_segments import MAX_LENGTH, EdgeSegments, accept_segments, link_edges, sample_segments
 from tracker.images.edges import Levels, detect_edges
 
 
@@ -24,7 +24,7 @@ def disc_picture(radius=40.0):
 
 
 def of_points(points, normals, firsts):
-    return Segments(np.array(points, np.float32), np.array(normals, np.float32), np.array(firsts, np.int64))
+    return EdgeSegments(np.array(points, np.float32), np.array(normals, np.float32), np.array(firsts, np.int64))
 
 
 def test_every_edge_pixel_is_in_one_segment():

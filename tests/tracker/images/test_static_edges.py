@@ -4,7 +4,7 @@ from staging import view_evidence
 
 from tracker.evidence.view_evidence import with_all_segments
 from tracker.geometry.cameras import Camera
-from tracker.images.edge_segments import Segments
+from tracker.images.edge_segments import EdgeSegments
 from tracker.images.static_edges import StaticEdgeModel
 
 SIZE = (80, 60)
@@ -15,16 +15,16 @@ def line(u, low=10, high=40, direction=(1.0, 0.0)):
     """One upright edge, dark on its left."""
     points = np.column_stack([np.full(high - low, u), np.arange(low, high)]).astype(np.float32)
     normals = np.tile(np.array(direction, np.float32), (len(points), 1))
-    return Segments(points, normals, np.array([0, len(points)]))
+    return EdgeSegments(points, normals, np.array([0, len(points)]))
 
 
 def several(*segments):
     counts = [len(s.points_px) for s in segments]
     points, normals = (np.concatenate([getattr(s, x) for s in segments]) for x in ("points_px", "normals"))
-    return Segments(points, normals, np.cumsum([0, *counts]))
+    return EdgeSegments(points, normals, np.cumsum([0, *counts]))
 
 
-NOTHING = Segments(np.empty((0, 2), np.float32), np.empty((0, 2), np.float32), np.zeros(1, np.int64))
+NOTHING = EdgeSegments(np.empty((0, 2), np.float32), np.empty((0, 2), np.float32), np.zeros(1, np.int64))
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from staging import at, camera_at, own_evidence, solid
 from tracker.contours import occluding_contours
 from tracker.contours.surfaces import surfaces_of
 from tracker.evidence.view_evidence import Silhouette, with_segments
-from tracker.images.edge_segments import Segments, sample_segments
+from tracker.images.edge_segments import EdgeSegments, sample_segments
 from tracker.images.silhouette_contour import SilhouetteContour
 from tracker.tracking.evidence_assignment import EvidenceAssignment, EvidencePool, _assign
 
@@ -18,7 +18,7 @@ FRONT = camera_at("front", (4.0, 0.0, 0.0))
 def seen(bodies, camera=FRONT):
     """The contours of bodies as edges whose segments are single pixels, and as the contour of a silhouette."""
     (view,) = own_evidence(bodies, [camera])
-    each = Segments(view.points_px, view.normals, np.arange(len(view.points_px) + 1))
+    each = EdgeSegments(view.points_px, view.normals, np.arange(len(view.points_px) + 1))
     inside = np.zeros((camera.height, camera.width), bool)
     outline = Silhouette(
         inside, view.points_px, view.normals, 1.0, SilhouetteContour(view.points_px, view.normals), 40.0
@@ -67,7 +67,7 @@ def test_the_shares_of_three_are_those_of_the_simple_version(person):
     turns = rng.uniform(0, 2 * np.pi, 1500)
     normals = np.stack([np.cos(turns), np.sin(turns)], axis=1).astype(np.float32)
     near = np.repeat(points[::3], 3, axis=0) + np.tile([[0, 0], [1, 1], [2, 1]], (500, 1)).astype(np.float32)
-    segments = Segments(near, normals, np.arange(0, 1501, 3))
+    segments = EdgeSegments(near, normals, np.arange(0, 1501, 3))
     view = seen(bodies)
     outline = replace(view.silhouette, points_px=points, normals=normals)
     view = replace(view, segments=segments, samples=sample_segments(segments), silhouette=outline)
@@ -75,7 +75,7 @@ def test_the_shares_of_three_are_those_of_the_simple_version(person):
     kept, clear = own_segments(view, bodies, person)
     assert 5 < np.count_nonzero(~kept) < 250
     np.testing.assert_array_equal(own.accepted[clear > 1e-3], kept[clear > 1e-3])
-    segments = Segments(points, normals, np.arange(1501))
+    segments = EdgeSegments(points, normals, np.arange(1501))
     each = replace(view, segments=segments, samples=sample_segments(segments))
     kept, clear = own_segments(each, bodies, person)
     assert clear.min() > 1e-6
