@@ -7,7 +7,7 @@
 /** @type {Record<import("../model/protocol.js").DragMode, string>} */
 const HINTS = {
   move: "Shift or Alt: turn · Ctrl: depth",
-  turn: "Turn about the line of sight",
+  turn: "Turning about the line of sight",
   push: "Depth: drag up to move away",
 };
 
