@@ -108,7 +108,7 @@ async def visited(browser, address, size=(1280, 720), viser=False):
 
 
 async def visit_again(page, address):
-    """Open the page anew in a tab of `visited`, with nothing of what the page had stored."""
+    """Open the page in a tab of `visited`, without what the page had stored."""
     await page.goto(address + "static/icon.svg")
     await page.mouse.up()
     for key in ("Shift", "Control"):
