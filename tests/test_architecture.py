@@ -60,3 +60,11 @@ def test_no_folder_is_crowded():
     folders = {p.parent for p in [*FILES.values(), *STATIC.rglob("*.js"), *STATIC.rglob("*.css")]}
     crowded = {f.relative_to(ROOT).as_posix(): len([p for p in f.iterdir() if p.is_file()]) for f in folders}
     assert {name: n for name, n in crowded.items() if n > (5 if name in ("tracker", "app") else 22)} == {}
+
+
+def test_the_page_mounts_rooms():
+    """main.js puts rooms together and knows no widget of theirs."""
+    imported_by_main = page_imports("main.js")
+    others = {s for s in imported_by_main if not s.endswith("/index.js") and not s.startswith("model/")}
+    assert others == {"shell/test_hook.js"}
+    assert {"panes/index.js", "shell/index.js", "timeline/index.js"} <= imported_by_main

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import os
 import sys
+from collections.abc import AsyncIterator
 from pathlib import Path
 
 from page_driver import shows
@@ -65,22 +66,53 @@ AT_REST = """async () => {
 draws, it may keep the page from doing anything else for seconds."""
 
 
+WITHOUT_3D = """Object.defineProperty(HTMLIFrameElement.prototype, "src", { set() {}, get: () => "about:blank" })"""
+"""Leaves the 3-D view empty: it takes much of a machine without a graphics card. (A route would turn the cache off.)"""
+
+READY = "window.quadrille?.state.overlay && quadrille.state.state?.cost_px !== null"
+"""That a page shows its first cost, for `shows`."""
+
+
+@contextlib.asynccontextmanager
+async def started(session: Path, *options: str) -> AsyncIterator[Program]:
+    """A running program, killed in the end."""
+    program = Program(session, *options)
+    try:
+        await program.start()
+        yield program
+    finally:
+        await program.kill()
+
+
 @contextlib.asynccontextmanager
 async def visited(browser, address, size=(1280, 720), viser=False):
-    """The page of a program with its first cost on the screen; fails where the page reports an error.
+    """The page of a program with its first cost on the screen, and an empty 3-D view unless it is wanted.
 
-    Without viser the 3-D view is an empty page: it takes much of a machine without a graphics card.
+    Fails where the page reports an error.
     """
     context = await browser.new_context(viewport={"width": size[0], "height": size[1]}, color_scheme="dark")
-    page = await context.new_page()
-    errors = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    if not viser:
-        await page.route("**/viser/**", lambda route: route.fulfill(body="<!doctype html>", content_type="text/html"))
-    await page.goto(address, timeout=120_000)
-    await shows(page, "window.quadrille?.state.overlay && quadrille.state.state?.cost_px !== null", 180)
-    if viser:
-        await page.evaluate(AT_REST)
-    yield page
-    await context.close()
-    assert errors == []
+    try:
+        page = await context.new_page()
+        page.errors = []
+        page.on("pageerror", lambda error: page.errors.append(str(error)))
+        if not viser:
+            await page.add_init_script(WITHOUT_3D)
+        await page.goto(address, timeout=120_000)
+        await shows(page, READY, 180)
+        if viser:
+            await page.evaluate(AT_REST)
+        yield page
+    finally:
+        await context.close()
+    assert page.errors == []
+
+
+async def visit_again(page, address):
+    """Open the page in a tab of `visited`, without what the page had stored."""
+    await page.goto(address + "static/icon.svg")
+    await page.mouse.up()
+    for key in ("Shift", "Control"):
+        await page.keyboard.up(key)
+    await page.evaluate("localStorage.clear(), sessionStorage.clear()")
+    await page.goto(address)
+    await shows(page, READY, 180)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from page_driver import drags_of, handle_of, shows, state_of, to_client, until
-from program import Program
+from program import started
 
 from tracker.evaluation.references import read_joints
 from tracker.fitting.gauss_newton import fit_to_points
@@ -45,10 +45,8 @@ def balance(data_folder, tmp_path_factory):
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def program(balance):
-    running = Program(balance[0])
-    await running.start()
-    yield running
-    await running.kill()
+    async with started(balance[0]) as running:
+        yield running
 
 
 async def visit(browser, address):
@@ -110,6 +108,7 @@ async def place(page, sent, targets):
                 await drag(page, sent, view, name, targets[view][name])
 
 
+@pytest.mark.slow
 async def test_the_main_job(browser, balance, program, tmp_path):
     targets = balance[1]
     page, sent = await visit(browser, program.address)

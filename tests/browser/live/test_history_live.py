@@ -8,25 +8,22 @@ import pytest
 import pytest_asyncio
 from page_driver import dragging, handle_of, state_of, to_client
 from page_driver import shows as shows_within
-from program import ROOT, Program
+from program import ROOT, WITHOUT_3D, started
 
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 
 
 @pytest_asyncio.fixture(loop_scope="session", scope="module")
 async def program(tmp_path_factory):
-    running = Program(shutil.copytree(SAMPLE, tmp_path_factory.mktemp("history") / "session"))
-    await running.start()
-    yield running
-    await running.kill()
+    async with started(shutil.copytree(SAMPLE, tmp_path_factory.mktemp("history") / "session")) as running:
+        yield running
 
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def tabs(browser, program):
     """Two tabs on one session."""
     context = await browser.new_context(viewport={"width": 1280, "height": 720})
-    # The 3-D view has no part in this, and takes much of a machine without a graphics card.
-    await context.route("**/viser/**", lambda route: route.fulfill(body="<!doctype html>", content_type="text/html"))
+    await context.add_init_script(WITHOUT_3D)
     both = []
     for _ in range(2):
         page = await context.new_page()

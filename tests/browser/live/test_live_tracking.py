@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest_asyncio
 from page_driver import handle_of, shows, state_of
-from program import ROOT, Program, visited
+from program import ROOT, started, visited
 
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
@@ -19,10 +19,10 @@ START = 8
 """The arms are on their way up."""
 
 
-@pytest_asyncio.fixture(loop_scope="session")
-async def program(tmp_path):
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
+async def program(tmp_path_factory):
     """The program on a copy of the sample whose body a person has put in place on one frame."""
-    folder = shutil.copytree(SAMPLE, tmp_path / "session")
+    folder = shutil.copytree(SAMPLE, tmp_path_factory.mktemp("tracking") / "session")
     session = load_session(folder)
     model = session.people[0].model
     truth = read_pose_table(folder / "truth.csv")
@@ -31,15 +31,13 @@ async def program(tmp_path):
     pose = PoseRecord(truth.values[START], ("manual",) * len(model.value_names), revision, keyframe=True)
     store.commit("place", [PoseChange("person", START, pose)])
     store.close()
-    running = Program(folder)
-    await running.start()
-    yield running
-    await running.kill()
+    async with started(folder) as running:
+        yield running
 
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def live(browser, program):
-    async with visited(browser, program.address, (1440, 900), viser=True) as page:
+    async with visited(browser, program.address, (1440, 900)) as page:
         await go_to(page, START)
         yield page
 

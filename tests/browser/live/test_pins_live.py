@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from page_driver import handle_of, shows, state_of, to_client
-from program import ROOT, Program, visited
+from program import ROOT, started, visited
 
 from tracker.evaluation.references import read_joints
 from tracker.formats.model_toml import format_model
@@ -48,11 +48,8 @@ async def opened(browser, tmp_path_factory):
     pose = PoseRecord(model.clip(values), ("manual",) * len(values), revision, keyframe=True)
     store.commit("place", [PoseChange("person", FRAME, pose)])
     store.close()
-    program = Program(folder)
-    await program.start()
-    async with visited(browser, program.address, viser=True) as page:
+    async with started(folder) as program, visited(browser, program.address) as page:
         yield page, Truth(session)
-    await program.kill()
 
 
 @pytest_asyncio.fixture(loop_scope="session")

@@ -7,26 +7,31 @@ import pytest
 import pytest_asyncio
 from page_driver import handle_of, state_of, to_client
 from page_driver import shows as shows_within
-from program import ROOT, Program, visited
+from program import ROOT, started, visit_again, visited
 
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 
 
 @pytest_asyncio.fixture(loop_scope="session", scope="module")
 async def program(tmp_path_factory):
-    running = Program(shutil.copytree(SAMPLE, tmp_path_factory.mktemp("dragging") / "session"))
-    await running.start()
-    yield running
-    await running.kill()
+    async with started(shutil.copytree(SAMPLE, tmp_path_factory.mktemp("dragging") / "session")) as running:
+        yield running
+
+
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
+async def tab(browser, program):
+    async with visited(browser, program.address) as page:
+        yield page
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def live(browser, program):
-    async with visited(browser, program.address) as page:
-        # In a view that fills the grid a pixel of the screen is less than one of the image.
-        await page.keyboard.press("1")
-        await shows(page, "quadrille.state.filled === 0")
-        yield page
+async def live(tab, program):
+    await visit_again(tab, program.address)
+    # In a view that fills the grid a pixel of the screen is less than one of the image.
+    await tab.keyboard.press("1")
+    await shows(tab, "quadrille.state.filled === 0")
+    yield tab
+    assert tab.errors == []
 
 
 async def shows(page, expression, timeout_s=30.0):

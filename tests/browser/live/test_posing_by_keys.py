@@ -7,23 +7,28 @@ import pytest
 import pytest_asyncio
 from page_driver import handle_of, state_of
 from page_driver import shows as shows_within
-from program import ROOT, Program, visited
+from program import ROOT, started, visit_again, visited
 
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 
 
 @pytest_asyncio.fixture(loop_scope="session", scope="module")
 async def program(tmp_path_factory):
-    running = Program(shutil.copytree(SAMPLE, tmp_path_factory.mktemp("posing") / "session"))
-    await running.start()
-    yield running
-    await running.kill()
+    async with started(shutil.copytree(SAMPLE, tmp_path_factory.mktemp("posing") / "session")) as running:
+        yield running
+
+
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
+async def tab(browser, program):
+    async with visited(browser, program.address) as page:
+        yield page
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def live(browser, program):
-    async with visited(browser, program.address) as page:
-        yield page
+async def live(tab, program):
+    await visit_again(tab, program.address)
+    yield tab
+    assert tab.errors == []
 
 
 async def shows(page, expression, timeout_s=30.0):

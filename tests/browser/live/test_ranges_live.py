@@ -4,7 +4,7 @@ import shutil
 
 import pytest_asyncio
 from page_driver import dragging, shows, state_of
-from program import ROOT, Program
+from program import ROOT, started, visited
 
 from tracker.store.annotation_store import AnnotationStore
 
@@ -12,14 +12,8 @@ from tracker.store.annotation_store import AnnotationStore
 @pytest_asyncio.fixture(loop_scope="session")
 async def live(browser, tmp_path):
     folder = shutil.copytree(ROOT / "sample_sessions" / "elbow_rotation", tmp_path / "session")
-    program = Program(folder)
-    await program.start()
-    page = await browser.new_page(viewport={"width": 1280, "height": 720})
-    await page.goto(program.address)
-    await shows(page, "window.quadrille?.state.overlay && quadrille.state.state.cost_px !== null", 120)
-    yield page, folder
-    await page.close()
-    await program.stop()
+    async with started(folder) as program, visited(browser, program.address) as page:
+        yield page, folder
 
 
 async def go_to(page, frame):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from page_driver import shows, state_of, to_client
-from program import Program
+from program import started
 
 from tracker.body.model import PosedBody
 from tracker.contours.occluding_contours import part_poses
@@ -89,25 +89,23 @@ def folder(tmp_path_factory):
 
 @pytest_asyncio.fixture(loop_scope="session", scope="module")
 async def live(browser, folder):
-    program = Program(folder)
-    await program.start()
-    context = await browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark")
-    page = await context.new_page()
-    await page.goto(program.address, timeout=120_000)
-    await shows(page, "window.quadrille?.state.overlay && quadrille.state.state.cost_px !== null", 120)
-    panel = page.frame_locator("#scene")
-    for name in ("View", "Trails"):
-        await panel.get_by_text(name, exact=True).click()
-    # What viser draws over its canvas is no matter here; it can be used all the same.
-    await panel.locator("body").evaluate(
-        """(body) => body.append(Object.assign(document.createElement("style"), {
-          textContent: "body * { visibility: hidden } body canvas { visibility: visible }" }))"""
-    )
-    await switch(page, "floor")
-    await switch(page, "gizmos")
-    yield page
-    await context.close()
-    await program.kill()
+    async with started(folder) as program:
+        context = await browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark")
+        page = await context.new_page()
+        await page.goto(program.address, timeout=120_000)
+        await shows(page, "window.quadrille?.state.overlay && quadrille.state.state.cost_px !== null", 120)
+        panel = page.frame_locator("#scene")
+        for name in ("View", "Trails"):
+            await panel.get_by_text(name, exact=True).click()
+        # What viser draws over its canvas is no matter here; it can be used all the same.
+        await panel.locator("body").evaluate(
+            """(body) => body.append(Object.assign(document.createElement("style"), {
+              textContent: "body * { visibility: hidden } body canvas { visibility: visible }" }))"""
+        )
+        await switch(page, "floor")
+        await switch(page, "gizmos")
+        yield page
+        await context.close()
 
 
 async def switch(page, name):

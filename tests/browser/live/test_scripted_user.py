@@ -9,11 +9,12 @@ import shutil
 from contextlib import closing
 
 import numpy as np
+import pytest
 import pytest_asyncio
 from first_poses import true_body, views_of
 from page_driver import handle_of, state_of, to_client
 from page_driver import shows as shows_within
-from program import ROOT, Program, visited
+from program import ROOT, started, visited
 from scripted_user import TRUNK, ScriptedUser
 
 from tracker.evidence.observer import Observer
@@ -58,11 +59,8 @@ def user_of(session, frame):
 
 @pytest_asyncio.fixture(loop_scope="session", scope="module")
 async def live(browser, folder):
-    program = Program(folder)
-    await program.start()
-    async with visited(browser, program.address, (1440, 900)) as page:
+    async with started(folder) as program, visited(browser, program.address, (1440, 900)) as page:
         yield page
-    await program.kill()
 
 
 async def shows(page, expression, timeout_s=30.0):
@@ -160,6 +158,7 @@ async def test_a_body_is_placed_by_drags(live, folder, record_property):
     assert fitted_mm < 45
 
 
+@pytest.mark.slow
 async def test_a_body_is_placed_by_torso_drags_and_sliders(live, folder, record_property):
     session = load_session(folder)
     model = session.people[0].model
@@ -217,11 +216,8 @@ async def test_a_body_is_placed_by_torso_drags_and_sliders(live, folder, record_
 async def tango(browser, tmp_path):
     """The page on the tango, where nobody has been placed, and its folder."""
     folder = shutil.copytree(TANGO, tmp_path / "session")
-    program = Program(folder)
-    await program.start()
-    async with visited(browser, program.address, (1440, 900)) as page:
+    async with started(folder) as program, visited(browser, program.address, (1440, 900)) as page:
         yield page, folder
-    await program.kill()
 
 
 def by_hand_px(session):
@@ -257,6 +253,7 @@ async def place(hands, user, views):
                 await hands.drag(camera, name, user.aim_px(name, camera))
 
 
+@pytest.mark.slow
 async def test_two_people_in_a_close_hold_are_placed_and_searched_together(tango, record_property):
     page, folder = tango
     session = load_session(folder)

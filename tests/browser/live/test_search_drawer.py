@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from page_driver import shows, state_of
-from program import ROOT, Program
+from program import ROOT, started, visit_again, visited
 
 RUNS = "quadrille.state.searchRuns?.runs"
 OVER = f"{RUNS}?.at(-1)?.state === 'over'"
@@ -19,22 +19,21 @@ async def address(tmp_path_factory):
     shutil.copytree(ROOT / "sample_sessions" / "elbow_rotation", folder)
     for path in (folder, *folder.rglob("*")):
         path.chmod(path.stat().st_mode | 0o200)
-    program = Program(folder)
-    await program.start()
-    yield program.address
-    await program.stop()
+    async with started(folder) as program:
+        yield program.address
+
+
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
+async def tab(browser, address):
+    async with visited(browser, address) as page:
+        yield page
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def page(browser, address, request):
+async def page(tab, address, request):
     """The page with the search tab open, on a frame of the test's own; the 3-D view is left out."""
-    context = await browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark")
-    page = await context.new_page()
-    errors = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    await page.route("**/viser/**", lambda route: route.fulfill(body="<body>", content_type="text/html"))
-    await page.goto(address)
-    await shows(page, "window.quadrille?.state.overlay", 120)
+    page = tab
+    await visit_again(page, address)
     frame = 2 * 1 + 3 * list(request.session.items).index(request.node) % 47
     await page.locator("#frame").fill(str(frame))
     await page.keyboard.press("Enter")
@@ -42,8 +41,7 @@ async def page(browser, address, request):
     await page.keyboard.press("b")
     await shows(page, f"quadrille.state.searchSetup && {RUNS}", 20)
     yield page
-    await context.close()
-    assert not errors
+    assert page.errors == []
 
 
 async def searched(page):

@@ -1,0 +1,57 @@
+"""The commands of README.md run as they stand, on a recording laid out as it describes."""
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
+CAMERAS = {"FRONT": "cam1", "RIGHT": "cam2", "BACK": "cam3"}
+COMMAND = re.compile(r"^ {4}quadrille (new|track|evaluate)\b((?:[^\\\n]|\\\n)*)", re.MULTILINE)
+FRAMES = "0:3"
+"""In place of README's longer range: the sample has 50 frames."""
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """Three cameras, their calibration, the empty scene and reference joints, named as in README."""
+    (tmp_path / "empty").mkdir()
+    calibration = (SAMPLE / "calibration.toml").read_text("utf-8")
+    for old, new in CAMERAS.items():
+        shutil.copy(SAMPLE / f"{old}.mp4", tmp_path / f"{new}.mp4")
+        shutil.copy(SAMPLE / "background" / f"{old}.png", tmp_path / "empty" / f"{new}.png")
+        calibration = calibration.replace(f"[{old}]", f"[{new}]").replace(f'"{old}"', f'"{new}"')
+    sections = [section for section in re.split(r"^(?=\[)", calibration, flags=re.MULTILINE) if "LEFT" not in section]
+    (tmp_path / "calibration.toml").write_text("".join(sections), "utf-8")
+    shutil.copy(SAMPLE / "truth.trc", tmp_path / "joints.trc")
+    return tmp_path
+
+
+def quadrille(folder, *words):
+    program = [
+        sys.executable,
+        "-c",
+        f"import sys; sys.path.insert(0, {str(ROOT)!r}); from app.__main__ import main; main()",
+    ]
+    done = subprocess.run([*program, *words], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_readme_takes_a_recording_from_videos_to_an_error(recording):
+    written = {
+        command: shlex.split(rest.replace("\\\n", " "))
+        for command, rest in COMMAND.findall((ROOT / "README.md").read_text("utf-8"))
+    }
+    assert written.keys() == {"new", "track", "evaluate"}
+    quadrille(recording, "new", *written["new"])
+    # In place of the hand in the page.
+    quadrille(recording, "init", "my_session", "--method", "joints", "--joints", "joints.trc")
+    quadrille(recording, "track", *(FRAMES if re.fullmatch(r"\d+:\d+", w) else w for w in written["track"]))
+    shown = quadrille(recording, "evaluate", *written["evaluate"])
+    assert "person: 3 frames, 0 missing, 0 lost" in shown
