@@ -1,8 +1,8 @@
-"""Compiles the kernels that are not in the cache: `python -m app.bench.compile_kernels`.
+"""Compile the kernels that are not in the cache: `python -m app.bench.compile_kernels`.
 
-Numba compiles a kernel when it is first called, and keeps the interpreter to itself meanwhile: after an installation a
-first Track would wait for a minute, and the page with it. This program calls them all at the lowest priority and leaves
-them in the cache, where another program finds those that it has not needed yet.
+Numba compiles a kernel on its first call and holds the interpreter lock meanwhile. The first tracking run after an
+installation would wait for a minute, and the page with it. This program calls all kernels at the lowest priority; other
+programs then load them from the cache.
 """
 
 import os
@@ -26,15 +26,17 @@ from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
 _FRAMES = 3
-"""Frames that are tracked: from the second there is a motion, and what was lost."""
+"""Number of tracked frames: motion and lost limbs exist from the second on."""
 _WAIT_S = 0.5
 
 
 def main() -> None:
-    """Compile what is not compiled yet; waits while another program does."""
+    """Compile the missing kernels. While another program compiles them, wait for it."""
     if hasattr(os, "nice"):
         os.nice(19)
     mark = compiled_mark()
+    if mark.exists():
+        mark.touch()  # the versions used last stay in the cache
     while not mark.exists():
         try:
             with SessionLock(mark.parent):
@@ -46,7 +48,10 @@ def main() -> None:
 
 
 def _call_kernels() -> None:
-    """Search and track on a few frames of the bundled tango: two people, one by the paper, one without a background."""
+    """Search and track on a few frames of the bundled tango: two people, one as in GD96, one without a background.
+
+    Kernels that tracking does not need follow: labels of the parts, hidden points, the simulator.
+    """
     crowd = read_crowd(bundled("tango"), FRAME)
     cameras, settings = crowd.session.cameras, TrackSettings()
     _track(cameras, settings, crowd.models, crowd.values)

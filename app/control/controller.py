@@ -25,7 +25,7 @@ from app.control.search.searching import SearchRunner
 from app.control.session.activities import Activities
 from app.control.session.footage_scan import FootageScan
 from app.control.session.history import History
-from app.control.session.kernel_warmup import Compiling
+from app.control.session.kernel_warmup import KernelWarmup
 from app.control.session.session_state import SessionState
 from app.control.session.stored_poses import StoredPoses
 from app.control.tracking.inconsistent_frames import InconsistentFrames
@@ -94,7 +94,7 @@ class Controller:
         """Chooses what the 3-D view shows."""
         self._inconsistent_frames = InconsistentFrames(session_state)
         self._footage_scan = FootageScan(session_state)
-        self._compiling: Compiling | None = None
+        self._compiling: KernelWarmup | None = None
 
     @property
     def state(self) -> State:
@@ -131,7 +131,7 @@ class Controller:
 
     def compile_kernels(self) -> None:
         """Start to compile missing kernels in the background."""
-        self._compiling = Compiling(self._session_state)
+        self._compiling = KernelWarmup(self._session_state)
 
     def close(self) -> None:
         """Stop all work and save; the controller must not be used afterwards."""

@@ -21,14 +21,15 @@ from tracker.compute.kernel_keys import KernelKeys, UnknownSourceError
 _PACKAGE = Path(__file__).resolve().parents[1]
 _MARK, _KEYS = "compiled-", "keys-"
 _N_STATES = 12
-"""States of the kernels' text (clones, branches) whose compiled kernels stay in the cache."""
+"""Number of versions of the kernels, such as branches, that stay in the cache."""
 _N_KEY_FILES = 60
+"""Number of versions of the sources whose kernel keys stay in the cache."""
 _PRUNE_AGE_S = 86400.0
-"""Kernels compiled more recently are left alone: their program may not have recorded its state yet."""
+"""Minimum age of a kernel that is deleted: a younger one may belong to a version that is still being compiled."""
 
 
 class KernelLocator:
-    """Tells numba where a kernel of this package is cached; the interface of `numba.core.caching._CacheLocator`."""
+    """Locate the cached files of one kernel; implements numba's `_CacheLocator` (`numba.core.caching`)."""
 
     def __init__(self, py_file: str, key: str) -> None:
         self._py_file = py_file  # numba reads it for warnings
@@ -57,19 +58,19 @@ class KernelLocator:
         return str(_folder())
 
     def get_source_stamp(self) -> str:
-        """Return what a cached kernel must have been compiled from to be used."""
+        """Return the key; a cached kernel with another key is not used."""
         return self._key
 
     def get_disambiguator(self) -> str:
-        """Return what distinguishes kernels of the same name in the names of their files."""
+        """Return the part of the file names that distinguishes kernels of equal names."""
         return self._key
 
 
 def use_kernel_cache() -> None:
-    """Have numba cache this package's kernels by their keys, in the user's cache folder or in NUMBA_CACHE_DIR.
+    """Register the cache with numba, in the user's cache folder or in NUMBA_CACHE_DIR.
 
-    Must run before the first kernel is decorated. Where numba offers no such hook, or the folder cannot be written, its
-    ordinary cache is used.
+    Must run before the first kernel is decorated. If numba offers no such hook, or the folder is not writable, numba's
+    ordinary cache remains in use.
     """
     if not numba.config.CACHE_DIR:
         folder = user_cache_path("quadrille", appauthor=False) / "kernels"
@@ -92,7 +93,8 @@ def use_kernel_cache() -> None:
 def kernel_keys() -> dict[str, str]:
     """Return the key of each kernel of the package by its dotted name.
 
-    They are stored beside the kernels, because parsing the sources takes half a second.
+    They are stored beside the kernels, because parsing the sources takes 0.5 s. A kernel whose source cannot be
+    followed has no key.
     """
     config = numba.config
     environment = repr((numba.__version__, config.OPT, config.BOUNDSCHECK, config.DEBUGINFO_DEFAULT))
@@ -123,13 +125,13 @@ def _computed_keys(environment: str) -> dict[str, str]:
 
 
 def compiled_mark() -> Path:
-    """Return the file that exists once all kernels are compiled, by this numba for this Python."""
+    """Return the file that exists once this numba has compiled all kernels for this Python."""
     state = hashlib.sha256(repr(sorted(kernel_keys().items())).encode()).hexdigest()[:20]
     return _folder() / f"{_MARK}{state}-{numba.__version__}-{sys.implementation.cache_tag}"
 
 
 def record_compiled() -> None:
-    """Mark that all kernels are compiled, and delete kernels of states that have not been used for long."""
+    """Mark that all kernels are compiled, and delete those of old versions."""
     compiled_mark().write_text("\n".join(kernel_keys().values()), "utf-8")
     for old in _newest_first(f"{_KEYS}*.json")[_N_KEY_FILES:]:
         old.unlink(missing_ok=True)
@@ -145,7 +147,7 @@ def record_compiled() -> None:
 
 
 def _folder() -> Path:
-    """Folder of the cache; where no other can be written, that of this package's own compiled Python."""
+    """Return the folder of the cache; without a writable one, the package's `__pycache__`."""
     return Path(numba.config.CACHE_DIR or _PACKAGE / "__pycache__")
 
 
@@ -167,7 +169,7 @@ def _text(path: Path) -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    """Write a file in one step; without it the keys are computed again."""
+    """Write a file atomically. A failure is ignored: the keys are then computed again."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, delete=False) as file:

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 _DEFINES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 _REST = "<statements>"
-"""Stands for the module-level statements that are no plain definition."""
+"""Name of the module-level statements that are not plain definitions."""
 _WHOLE = "*"
-"""Stands for all names of a module."""
+"""Name of a whole module."""
 
 
 class UnknownSourceError(Exception):
@@ -21,33 +21,33 @@ class _Module(NamedTuple):
     """The module-level names of a source file."""
 
     definitions: dict[str, list[ast.stmt]]
-    """Statements that give a name its value, without docstrings; the rest of the module is under `_REST`."""
+    """Statements that define each name, without docstrings. Other statements are under `_REST`."""
     imports: dict[str, tuple[str, str]]
-    """Module and name (`_WHOLE` for a module) that an imported name stands for."""
+    """Module and name of each imported name; the name of a module is `_WHOLE`."""
     kernels: tuple[str, ...]
     """Names of the functions with an `njit` decorator."""
 
 
 class KernelKeys:
-    """Keys of the kernels of one package.
+    """Compute the keys of the kernels of one package.
 
-    The key of a kernel is a hash of its own text and of the text of all that it names, directly or through others:
-    functions, constants, compiler options, NamedTuples of its arguments. Comments, docstrings and layout are left out.
-    Numba itself compares only a kernel's own file, although kernels of other files are compiled into it.
+    The key of a kernel is a hash of its definition and of all definitions that it reaches: functions, constants,
+    compiler options, NamedTuples of its arguments. Comments, docstrings and layout do not change it. Numba itself
+    compares only a kernel's own file, although it compiles kernels of other files into it.
     """
 
     def __init__(self, package: Path, environment: str = "") -> None:
-        """Read nothing yet.
+        """Set up for a package; no file is read yet.
 
         Args:
-            package: folder of the package; its name is the package's.
-            environment: what else compiled code depends on, as versions and options.
+            package: folder of the package, named like it.
+            environment: versions and options that compiled code depends on.
         """
         self._package, self._environment = package, environment
         self._modules: dict[str, _Module] = {}
 
     def key(self, module: str, name: str) -> str:
-        """Return the key of the kernel `name` in the module of the dotted name `module`.
+        """Return the key of the kernel `name` of the module with the dotted name `module`.
 
         Raises:
             UnknownSourceError: the source cannot be followed (star imports, syntax errors, missing names).
@@ -68,7 +68,7 @@ class KernelKeys:
                 yield from ((module, name) for name in self._module(module).kernels)
 
     def _reached(self, module: str, name: str) -> dict[tuple[str, str], tuple[str, ...]]:
-        """Dumps of the definitions that a name leads to, by their module and name."""
+        """Return dumps of the definitions that a name reaches, by module and name."""
         reached: dict[tuple[str, str], tuple[str, ...]] = {}
         left = [(module, name)]
         while left:
@@ -96,7 +96,7 @@ class KernelKeys:
         return reached
 
     def _named_in(self, statements: Iterable[ast.stmt], module: str, source: _Module) -> Iterator[tuple[str, str]]:
-        """Yield module and name of all module-level names in some statements, and of local names that equal them."""
+        """Yield module and name of all module-level names in statements, and of local names equal to one."""
         for node in (n for s in statements for n in ast.walk(s)):
             if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
                 target, what = source.imports.get(node.value.id, ("", ""))
@@ -123,13 +123,13 @@ class KernelKeys:
                 raise UnknownSourceError(name)
             try:
                 tree = ast.parse(path.read_bytes())
+                _Plain().visit(tree)
             except (SyntaxError, ValueError, OSError) as problem:
                 raise UnknownSourceError(name) from problem
             self._modules[name] = self._read(tree, name)
         return self._modules[name]
 
     def _read(self, tree: ast.Module, name: str) -> _Module:
-        _Plain().visit(tree)
         kernels = tuple(s.name for s in tree.body if isinstance(s, ast.FunctionDef) and _is_kernel(s))
         module = _Module({_REST: []}, {}, kernels)
         for statement in tree.body:
@@ -168,7 +168,7 @@ def _is_kernel(function: ast.FunctionDef) -> bool:
 
 
 def _assigned(statement: ast.stmt) -> list[str]:
-    """Names that a module-level statement defines; none if it does anything else besides."""
+    """Return the names that a module-level statement defines; none if it is not a plain definition."""
     if isinstance(statement, _DEFINES):
         return [statement.name]
     targets: list[ast.expr] = []
@@ -181,7 +181,7 @@ def _assigned(statement: ast.stmt) -> list[str]:
 
 
 class _Plain(ast.NodeTransformer):
-    """Leave out what has no effect on compiled code, and make expressions of quoted annotations."""
+    """Remove docstrings and turn quoted annotations into expressions."""
 
     def visit(self, node: ast.AST) -> ast.AST:
         super().visit(node)

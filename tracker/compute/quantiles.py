@@ -1,4 +1,4 @@
-"""Quantiles of some thousand numbers: numpy's own spend ten times as long on all that they could be asked."""
+"""Quantiles of small arrays, without the argument handling that dominates `numpy.quantile`."""
 
 from collections.abc import Sequence
 
@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 
 def quantiles(values: NDArray[np.floating], shares: Sequence[float]) -> NDArray[np.float64]:
-    """Quantiles along the first axis, interpolated as `numpy.quantile` does.
+    """Compute quantiles along the first axis, interpolated like those of `numpy.quantile`.
 
     Args:
         values: (n, ...), n > 0.
-        shares: which quantiles, from 0 to 1, (q,).
+        shares: the quantiles, from 0 to 1, (q,).
 
     Returns:
-        They, (q, ...).
+        Their values, (q, ...).
     """
     ordered, last = np.sort(values, axis=0), len(values) - 1
     places = [share * last for share in shares]
@@ -28,5 +28,5 @@ def quantiles(values: NDArray[np.floating], shares: Sequence[float]) -> NDArray[
 
 
 def median(values: NDArray[np.floating]) -> NDArray[np.float64]:
-    """The median along the first axis, (n, ...) to (...)."""
+    """Compute the median along the first axis, (n, ...) to (...)."""
     return np.asarray(quantiles(values, (0.5,))[0])

@@ -11,7 +11,7 @@ import pytest
 from gestures import wait_for
 
 from app.bench import compile_kernels
-from app.control.session.kernel_warmup import Compiling
+from app.control.session.kernel_warmup import KernelWarmup
 from app.control.session.session_state import SessionState
 from tracker.compute.kernel_cache import compiled_mark
 
@@ -35,7 +35,7 @@ def screen(opened) -> SessionState:
 
 def test_the_page_is_told_until_all_is_compiled(screen, empty_cache):
     touches = f"import pathlib, time; time.sleep(0.5); pathlib.Path({str(compiled_mark())!r}).touch()"
-    compiling = Compiling(screen, (sys.executable, "-c", touches))
+    compiling = KernelWarmup(screen, (sys.executable, "-c", touches))
     assert screen.state.compiling
     wait_for(lambda: not screen.state.compiling)
     assert compiled_mark().exists()
@@ -45,7 +45,7 @@ def test_the_page_is_told_until_all_is_compiled(screen, empty_cache):
 def test_nothing_is_started_where_all_is_compiled(screen, empty_cache, monkeypatch):
     compiled_mark().touch()
     monkeypatch.setattr(subprocess, "Popen", pytest.fail)
-    Compiling(screen).close()
+    KernelWarmup(screen).close()
     assert not screen.state.compiling
 
 
@@ -54,7 +54,7 @@ def test_the_program_waits_for_the_first_cost(screen, empty_cache, monkeypatch):
     monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: started.set())
     with screen.lock:
         screen.set(cost_px=None)
-    compiling = Compiling(screen, WAITS)
+    compiling = KernelWarmup(screen, WAITS)
     assert screen.state.compiling
     assert not started.wait(0.5)
     compiling.close()
@@ -64,7 +64,7 @@ def test_closing_ends_the_program(screen, empty_cache, caplog, monkeypatch):
     started = []
     real = subprocess.Popen
     monkeypatch.setattr(subprocess, "Popen", lambda *a, **k: started.append(real(*a, **k)) or started[0])
-    compiling = Compiling(screen, WAITS)
+    compiling = KernelWarmup(screen, WAITS)
     wait_for(lambda: started)
     compiling.close()
     assert started[0].returncode == -signal.SIGTERM
@@ -73,9 +73,9 @@ def test_closing_ends_the_program(screen, empty_cache, caplog, monkeypatch):
 
 
 def test_a_program_that_fails_is_reported_and_the_page_goes_on(screen, empty_cache, caplog):
-    Compiling(screen, FAILS)
+    KernelWarmup(screen, FAILS)
     wait_for(lambda: not screen.state.compiling)
-    assert "could not be compiled beside the page" in caplog.text
+    assert "could not be compiled in the background" in caplog.text
     assert not compiled_mark().exists()
 
 
