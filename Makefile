@@ -7,13 +7,13 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 PYTHON_FILES := app tracker tests
-PARALLEL := $(MAKE) --jobs 4 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
+PARALLEL := $(MAKE) --jobs 3 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
 # The library's rooms that need neither kernels nor sessions.
 QUICK := $(wildcard tests/test_*.py) $(addprefix tests/,tracker/compute tracker/geometry tracker/body tracker/motion \
 	tracker/formats tracker/session tracker/store tracker/evaluation tracker/images tracker/contours tracker/fitting \
 	app/runtime app/state app/drawing)
 
-.PHONY: install run test test-all test-quick test-library test-page test-live test-slow kernels bench check lint types \
+.PHONY: install run test test-all test-quick test-library test-page test-slow kernels bench check lint types \
 	page-types format clean
 
 install: $(VENV)/.installed
@@ -24,7 +24,7 @@ run: install
 # What must hold on every change: at most five minutes on two cores. The steps run beside one another. Tests of the page
 # wait a lot: those of the library, at a lower priority, take what they leave of the processor.
 test: $(VENV)/.tested $(VENV)/.typescript
-	$(PARALLEL) check test-page test-library test-live
+	$(PARALLEL) check test-page test-library
 
 # And what is long and rarely broken.
 test-all: test
@@ -37,13 +37,9 @@ test-quick: $(VENV)/.tested
 test-library: $(VENV)/.tested kernels
 	nice -n 19 $(PYTEST) -m "not slow" --ignore tests/browser
 
-# The page against an endpoint that is a stand-in for the program: needs no kernels.
+# Starts at once: only the files of tests/browser/live, which come last, wait for the kernels.
 test-page: $(VENV)/.tested
-	$(PYTEST) -m "not slow" tests/browser --ignore tests/browser/live
-
-# The page against the program.
-test-live: $(VENV)/.tested kernels
-	$(PYTEST) -m "not slow" tests/browser/live
+	$(PYTEST) --no-loadscope-reorder -m "not slow" tests/browser
 
 test-slow: $(VENV)/.tested kernels
 	$(PYTEST) -m slow

@@ -12,14 +12,20 @@ from dataclasses import replace
 
 from app.bench.sample_frames import FRAME, read_crowd
 from app.session.samples import bundled
-from tracker.body.model import BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.kernel_cache import compiled_mark, record_compiled
+from tracker.contours.label_image import part_labels
+from tracker.contours.part_edges import points_occluded
 from tracker.errors import SessionError
 from tracker.evidence.observer import Observer
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array
 from tracker.session.lock import SessionLock
+from tracker.simulate.people.model_figure import ModelFigure
+from tracker.simulate.stage.camera_rig import make_cameras
+from tracker.simulate.stage.film import film, freeze
+from tracker.simulate.stage.room import see_room
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.subjects import Subjects
@@ -57,6 +63,10 @@ def _call_kernels() -> None:
     _track(cameras, settings, crowd.models, crowd.values)
     _track(cameras, replace(settings, estimate="search"), crowd.models[:1], crowd.values[:1])
     _track([replace(c, background=None) for c in cameras], settings, crowd.models[:1], crowd.values[:1])
+    bodies = [PosedBody(m, v) for m, v in zip(crowd.models, crowd.values, strict=True)]
+    part_labels(bodies, cameras[0].camera.pinhole)
+    points_occluded(bodies, [cameras[0].camera.pinhole], bodies[0].points_world)
+    film(see_room(make_cameras(1, (32, 32), 0)[0], 0), freeze([ModelFigure(crowd.models[0])], crowd.values[:1]))
 
 
 def _track(

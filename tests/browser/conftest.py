@@ -13,6 +13,7 @@ from app.server.access import Access
 from app.server.server import create_app, static_folder
 
 BLANK = "<!doctype html><title>3-D</title><link rel=icon href='data:,'><body tabindex=0>"
+LIVE = Path(__file__).parent / "live"
 VIEWPORT = {"width": 1440, "height": 900}
 
 
@@ -22,6 +23,7 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.browser)
             # One event loop for all: the browser is started once, and the server under test runs beside the test.
             item.add_marker(pytest.mark.asyncio(loop_scope="session"), append=False)
+    items.sort(key=lambda item: LIVE in item.path.parents)  # kernels may be compiled meanwhile
 
 
 @pytest_asyncio.fixture(loop_scope="session", scope="session")
