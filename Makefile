@@ -21,8 +21,8 @@ install: $(VENV)/.installed
 run: install
 	$(BIN)/quadrille
 
-# What must hold on every change: at most five minutes on two cores. The steps run beside one another. Tests of the page
-# wait a lot: those of the library, at a lower priority, take what they leave of the processor.
+# What must hold on every change: at most five minutes on two cores. The steps run beside one another. The kernels, for
+# which others wait, have the highest priority. Tests of the page wait a lot: those of the library take what they leave.
 test: $(VENV)/.tested $(VENV)/.typescript
 	$(PARALLEL) check test-page test-library
 
@@ -39,7 +39,7 @@ test-library: $(VENV)/.tested kernels
 
 # Starts at once: only the files of tests/browser/live, which come last, wait for the kernels.
 test-page: $(VENV)/.tested
-	$(PYTEST) --no-loadscope-reorder -m "not slow" tests/browser
+	nice -n 5 $(PYTEST) --no-loadscope-reorder -m "not slow" tests/browser
 
 test-slow: $(VENV)/.tested kernels
 	$(PYTEST) -m slow

@@ -1,11 +1,12 @@
-"""Compile the kernels that are not in the cache: `python -m app.bench.compile_kernels`.
+"""Compile the kernels that are not in the cache: `python -m app.bench.compile_kernels [--background]`.
 
 Numba compiles a kernel on its first call and holds the interpreter lock meanwhile. The first tracking run after an
-installation would wait for a minute, and the page with it. This program calls all kernels at the lowest priority; other
-programs then load them from the cache.
+installation would wait for a minute, and the page with it. This program calls all kernels; other programs then load
+them from the cache.
 """
 
 import os
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -36,9 +37,13 @@ _FRAMES = 3
 _WAIT_S = 0.5
 
 
-def main() -> None:
-    """Compile the missing kernels. While another program compiles them, wait for it."""
-    if hasattr(os, "nice"):
+def main(background: bool = False) -> None:
+    """Compile the missing kernels. While another program compiles them, wait for it.
+
+    Args:
+        background: work at the lowest priority.
+    """
+    if background and hasattr(os, "nice"):
         os.nice(19)
     mark = compiled_mark()
     if mark.exists():
@@ -80,4 +85,4 @@ def _track(
 
 
 if __name__ == "__main__":
-    main()
+    main("--background" in sys.argv[1:])

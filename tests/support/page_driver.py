@@ -35,7 +35,7 @@ async def shows(page, expression, timeout_s=20.0):
     try:
         async with asyncio.timeout(timeout_s):
             while not await page.evaluate(drawn):
-                await asyncio.sleep(0.01)
+                await asyncio.sleep(0.02)
     except TimeoutError:
         raise AssertionError(f"after {timeout_s} s the page still does not show: {expression}") from None
 
@@ -44,7 +44,7 @@ async def until(condition, timeout_s=20.0):
     """Wait until a condition of the fake endpoint holds."""
     async with asyncio.timeout(timeout_s):
         while not condition():
-            await asyncio.sleep(0.01)
+            await asyncio.sleep(0.02)
 
 
 async def handle_of(page, camera, point, person=0):

@@ -12,7 +12,7 @@ from tracker.compute.kernel_cache import compiled_mark
 _LOG = logging.getLogger(__name__)
 _POLL_S = 0.2
 
-COMMAND = (sys.executable, "-m", "app.bench.compile_kernels")
+COMMAND = (sys.executable, "-m", "app.bench.compile_kernels", "--background")
 
 
 class KernelWarmup:

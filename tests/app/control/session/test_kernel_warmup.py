@@ -83,7 +83,6 @@ def test_one_program_compiles_at_a_time(empty_cache, monkeypatch):
     """The second finds all compiled once the first gives its lock back."""
     calls = []
     monkeypatch.setattr(compile_kernels, "_call_kernels", lambda: calls.append(1))
-    monkeypatch.setattr("os.nice", lambda _: None)
     with compile_kernels.SessionLock(empty_cache):
         monkeypatch.setattr(time, "sleep", lambda _: compiled_mark().touch())
         compile_kernels.main()
@@ -92,12 +91,13 @@ def test_one_program_compiles_at_a_time(empty_cache, monkeypatch):
 
 def test_the_program_calls_the_kernels_and_marks_them_compiled(empty_cache, monkeypatch):
     """All of them, by tracking: those that two people need, the paper's search, and a room without a background."""
-    tracked = []
-    monkeypatch.setattr("os.nice", lambda _: None)
+    tracked, priorities = [], []
+    monkeypatch.setattr("os.nice", priorities.append)
     monkeypatch.setattr(
         compile_kernels, "_track", lambda cameras, settings, models, start: tracked.append((cameras, settings, models))
     )
-    compile_kernels.main()
+    compile_kernels.main(background=True)
+    assert priorities == [19]
     assert [(s.estimate, len(m), c[0].background is None) for c, s, m in tracked] == [
         ("refine", 2, False), ("search", 1, False), ("refine", 1, True)
     ]  # fmt: skip
