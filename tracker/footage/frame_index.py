@@ -24,6 +24,27 @@ class Index(NamedTuple):
     """Presentation time stamps of the frames at which decoding can start, ascending."""
 
 
+class Identity(NamedTuple):
+    """A version of a file: other contents have another identity."""
+
+    device: int
+    inode: int
+    size: int
+    """Bytes."""
+    changed_ns: int
+    """Time of the last change, ns."""
+
+
+def identity_of(path: Path) -> Identity:
+    """Return the present version of a file.
+
+    Raises:
+        OSError: it is missing.
+    """
+    stat = path.stat()
+    return Identity(stat.st_dev, stat.st_ino, stat.st_size, stat.st_mtime_ns)
+
+
 def stamp_of(path: Path) -> str:
     """Return a text that identifies a version of a file: its path, size and time of change."""
     stat = path.stat()
