@@ -86,8 +86,9 @@ def explain(error: msgspec.ValidationError, value: Any, declaration: Any) -> tup
     if missing := re.fullmatch(r"Object missing required field `(.*)`", what):
         return f"the key '{missing[1]}'{_of(' in', at.key)}", "none"
     if unknown := re.fullmatch(r"Object contains unknown field `(.*)`", what, re.DOTALL):
-        known = ", ".join(f.encode_name for f in getattr(at.declared, "fields", ()))
-        return f"only {known} as keys{_of(' in', at.key)}", quoted(unknown[1])
+        tag = [at.declared.tag_field] if at.declared.tag_field else []
+        known = [*tag, *(f.encode_name for f in at.declared.fields)]
+        return f"only {', '.join(known)} as keys{_of(' in', at.key)}", quoted(unknown[1])
     if what.startswith("expected "):
         expected, _, found = what.removeprefix("expected ").partition(", found ")
         return expected + _of(" in", at.key), found
