@@ -1,12 +1,13 @@
 """Write text files atomically; read TOML files with errors that name the line."""
 
+import contextlib
 import os
 import secrets
 import tomllib
 from pathlib import Path
 from typing import Any
 
-from tracker.errors import TrackerError
+from tracker.errors import SessionError, TrackerError
 
 
 def write_text_atomic(path: Path, text: str) -> None:
@@ -25,6 +26,37 @@ def write_text_atomic(path: Path, text: str) -> None:
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+def refuse_links(folder: Path, *names: str) -> None:
+    """Refuse to write files of a session through symbolic links, which may lead out of its folder.
+
+    Args:
+        folder: of the session; may be reached through links itself.
+        names: paths within it of what is to be written; the folders on the way are checked too.
+
+    Raises:
+        SessionError: one of them is a link.
+    """
+    for name in names:
+        path = folder
+        for part in Path(name).parts:
+            path = path / part
+            if path.is_symlink():
+                raise SessionError(
+                    f"{path} is a symbolic link, and nothing is written through links inside a session; "
+                    "put the file or folder itself there"
+                )
+
+
+def sync_folder(folder: Path) -> None:
+    """Bring the names of new and renamed files of a folder to the disk, where the system can."""
+    with contextlib.suppress(OSError):  # Windows cannot open folders
+        number = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(number)
+        finally:
+            os.close(number)
 
 
 def read_toml(path: Path, what: str, error_type: type[TrackerError]) -> dict[str, Any]:

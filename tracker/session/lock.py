@@ -18,6 +18,7 @@ from types import TracebackType
 from typing import NamedTuple
 
 from tracker.errors import SessionError
+from tracker.files import refuse_links
 
 LOCK_FILE = "lock.json"
 
@@ -61,6 +62,7 @@ class SessionLock:
         Raises:
             SessionError: another program holds it, or the folder cannot be written.
         """
+        refuse_links(self._path.parent, LOCK_FILE)
         me = Holder(
             socket.gethostname(),
             os.getpid(),

@@ -24,7 +24,7 @@ import tomli_w
 
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
-from tracker.files import read_toml, write_text_atomic
+from tracker.files import read_toml, refuse_links, write_text_atomic
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
 from tracker.formats.anipose import read_calibration, write_calibration
@@ -250,6 +250,7 @@ def save_model(session: Session, person: int, model: BodyModel) -> Session:
     people = [replace(p, model=model) if i == person else p for i, p in enumerate(session.people)]
     changed = replace(session, people=tuple(people))
     path = session.folder / "models" / f"{people[person].name}.toml"
+    refuse_links(session.folder, SESSION_FILE, f"models/{path.name}")
     try:
         path.parent.mkdir(exist_ok=True)
         write_text_atomic(path, format_model(model))
@@ -275,6 +276,7 @@ def _load_floor(row: dict[str, Any] | None, where: str) -> GroundPlane | None:
 
 def _write(session: Session, into: Path) -> None:
     """Write the files of a session into a folder that is, or will become, `session.folder`."""
+    refuse_links(into, CALIBRATION_FILE, *(f"models/{p.name}.toml" for p in session.people))
     (into / "models").mkdir(exist_ok=True)
     write_calibration(into / CALIBRATION_FILE, [c.camera for c in session.cameras])
     for person in session.people:
@@ -283,6 +285,7 @@ def _write(session: Session, into: Path) -> None:
 
 
 def _write_session(session: Session, into: Path) -> None:
+    refuse_links(into, SESSION_FILE)
     cameras = []
     for c in session.cameras:
         row: dict[str, Any] = {"name": c.camera.name, "footage": _relative(c.footage, session.folder)}
