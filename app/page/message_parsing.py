@@ -5,7 +5,8 @@ from typing import Any, get_args
 
 import msgspec
 
-from app.page.client_messages import CLIENT_MESSAGES, ClientMessage, Message
+from app.page.client_messages import CLIENT_MESSAGES, ClientMessage
+from app.page.message_types import Command
 from tracker.errors import TrackerError
 from tracker.validation import explain, quoted
 
@@ -52,7 +53,7 @@ def _decoder_for(head: _Head) -> msgspec.json.Decoder[Any]:
     return decoder
 
 
-def _cases(kind: type[Message]) -> Iterator[str | None]:
+def _cases(kind: type[Command]) -> Iterator[str | None]:
     """Yield the actions that a type of message stands for; None if it is alone with its `type`."""
     action = kind.__annotations__.get("action")
     alone = sum(other.__struct_config__.tag == kind.__struct_config__.tag for other in CLIENT_MESSAGES) == 1

@@ -15,10 +15,11 @@ import tomli_w
 from msgspec import Meta
 
 from tracker.errors import CalibrationError
-from tracker.files import TextKind, read_toml, write_text_atomic
+from tracker.files import write_text_atomic
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import DISTORTION_COUNTS, Camera
+from tracker.text_files import TextKind, read_toml
 from tracker.validation import MAX_SIDE_PX, FileStem, Number, Vector, check
 
 Units = Literal["m", "mm"]

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import msgspec
 
 from tracker.errors import FormatError
-from tracker.files import TextKind, read_toml
 from tracker.formats.trc import MarkerTable
+from tracker.text_files import TextKind, read_toml
 from tracker.validation import Name, check
 
 LIMB_JOINTS = tuple(

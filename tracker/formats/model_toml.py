@@ -20,7 +20,7 @@ from msgspec import Meta
 from tracker.body.model import BodyModel
 from tracker.body.parts import Axis, Joint, Landmark, Part, SearchGroup
 from tracker.errors import ModelError
-from tracker.files import TextKind, parse_toml, read_text
+from tracker.text_files import TextKind, parse_toml, read_text
 from tracker.validation import Color, Name, Vector, check, check_version
 
 VERSION = 1

@@ -25,9 +25,10 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
 from tracker.errors import FormatError
-from tracker.files import TextKind, read_lines, write_text_atomic
+from tracker.files import write_text_atomic
 from tracker.formats.number_rows import NumberRows
 from tracker.geometry.arrays import Array
+from tracker.text_files import TextKind, read_lines
 from tracker.validation import Name, check_version, quoted
 
 VERSION = 1

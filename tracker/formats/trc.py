@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import FormatError
-from tracker.files import TextKind, read_lines, write_text_atomic
+from tracker.files import write_text_atomic
 from tracker.formats.number_rows import NumberRows
 from tracker.geometry.arrays import Array
+from tracker.text_files import TextKind, read_lines
 from tracker.validation import FrameRate, check, quoted
 
 _METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "cm": 0.01, "mm": 0.001, "millimeters": 0.001}

@@ -21,7 +21,8 @@ import msgspec
 from msgspec import Meta
 
 from tracker.errors import SessionError
-from tracker.files import TextKind, read_json
+from tracker.files import refuse_links
+from tracker.text_files import TextKind, read_json
 from tracker.validation import check
 
 LOCK_FILE = "lock.json"
@@ -67,6 +68,7 @@ class SessionLock:
         Raises:
             SessionError: another program holds it, or the folder cannot be written.
         """
+        refuse_links(self._path.parent, LOCK_FILE)
         me = Holder(
             socket.gethostname(),
             os.getpid(),

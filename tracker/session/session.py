@@ -23,7 +23,7 @@ import tomli_w
 
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
-from tracker.files import write_text_atomic
+from tracker.files import refuse_links, write_text_atomic
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
 from tracker.formats.anipose import read_calibration, write_calibration
@@ -111,7 +111,7 @@ def create_session(
     if n_frames is None:
         n_frames = min((open_footage(c.footage, c.camera.name).n_frames - c.offset for c in sources), default=0)
     session = Session(folder, name or folder.name, float(fps), n_frames, sources, tuple(people), up)
-    _content(session)
+    _checked_content(session)
     temporary = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.tmp")
     try:
         temporary.mkdir(parents=True)
@@ -132,7 +132,7 @@ def save_session(session: Session) -> None:
     Raises:
         SessionError: a name or axis is not allowed, or the folder cannot be written.
     """
-    _content(session)
+    _checked_content(session)
     try:
         session.folder.mkdir(parents=True, exist_ok=True)
         _write(replace(session, cameras=tuple(_absolute(c) for c in session.cameras)), session.folder)
@@ -203,7 +203,7 @@ def save_floor(session: Session, up: str, floor: GroundPlane | None) -> Session:
         SessionError: the folder cannot be written.
     """
     changed = replace(session, up=up, floor=floor)
-    _content(changed)
+    _checked_content(changed)
     try:
         _write_session(changed, session.folder)
     except OSError as error:
@@ -225,6 +225,7 @@ def save_model(session: Session, person: int, model: BodyModel) -> Session:
     people = [replace(p, model=model) if i == person else p for i, p in enumerate(session.people)]
     changed = replace(session, people=tuple(people))
     path = session.folder / "models" / f"{people[person].name}.toml"
+    refuse_links(session.folder, SESSION_FILE, f"models/{path.name}")
     try:
         path.parent.mkdir(exist_ok=True)
         write_text_atomic(path, format_model(model))
@@ -243,6 +244,7 @@ def _load_floor(row: FloorRow | None) -> GroundPlane | None:
 
 def _write(session: Session, into: Path) -> None:
     """Write the files of a session into a folder that is, or will become, `session.folder`."""
+    refuse_links(into, CALIBRATION_FILE, *(f"models/{p.name}.toml" for p in session.people))
     (into / "models").mkdir(exist_ok=True)
     write_calibration(into / CALIBRATION_FILE, [c.camera for c in session.cameras])
     for person in session.people:
@@ -251,10 +253,11 @@ def _write(session: Session, into: Path) -> None:
 
 
 def _write_session(session: Session, into: Path) -> None:
-    write_text_atomic(into / SESSION_FILE, tomli_w.dumps(_content(session)))
+    refuse_links(into, SESSION_FILE)
+    write_text_atomic(into / SESSION_FILE, tomli_w.dumps(_checked_content(session)))
 
 
-def _content(session: Session) -> dict[str, Any]:
+def _checked_content(session: Session) -> dict[str, Any]:
     """Return the content of session.toml, checked as if it were read.
 
     Raises:

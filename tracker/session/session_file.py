@@ -9,7 +9,7 @@ import numpy as np
 from msgspec import Meta
 
 from tracker.errors import SessionError
-from tracker.files import TextKind, read_toml
+from tracker.text_files import TextKind, read_toml
 from tracker.validation import (
     MAX_FRAMES,
     Color,

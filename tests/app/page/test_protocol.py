@@ -2,9 +2,10 @@
 
 from typing import get_args
 
+import msgspec
 import pytest
 
-from app.page import client_messages, protocol_docs, socket
+from app.page import client_messages, pose_messages, protocol_docs, socket
 from app.page.client_messages import CLIENT_MESSAGES
 from app.page.commands import COMMANDS
 from app.page.message_parsing import MessageError, parse
@@ -30,7 +31,7 @@ def test_every_message_is_carried_out():
 
 def test_messages_of_one_type_differ_by_action():
     message = parse('{"type":"pose","action":"copy","frame":2,"person":1,"from":3}')
-    assert message == client_messages.CopyFrame(frame=2, person=1, action="copy", source=3)
+    assert message == pose_messages.CopyFrame(frame=2, person=1, action="copy", source=3)
     assert parse('{"type":"track","action":"pause"}') == client_messages.ControlTracking("pause")
     for action in get_args(client_messages.RangeAction):
         assert parse(f'{{"type":"range","action":"{action}","first":1,"last":2}}').action == action
@@ -39,7 +40,7 @@ def test_messages_of_one_type_differ_by_action():
 def test_settings_left_out_are_not_changed():
     changes = parse('{"type":"search_settings","changes":{"theta_px":null}}').changes
     assert changes.theta_px is None
-    assert changes.patience is client_messages.UNSET
+    assert changes.patience is msgspec.UNSET
 
 
 @pytest.mark.parametrize(
