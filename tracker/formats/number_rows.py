@@ -49,7 +49,10 @@ class NumberRows:
             except ValueError:  # blank fields are rare
                 row = [float(f) if f and not f.isspace() else np.nan for f in fields]
         except ValueError as error:
-            raise FormatError(f"{self._where}, line {line}: expected numbers, found {error}; correct it") from error
+            wrong = next(f for f in fields if not _is_number(f))
+            raise FormatError(
+                f"{self._where}, line {line}: expected numbers, found {quoted(wrong)}; correct it"
+            ) from error
         if not (row[0].is_integer() and abs(row[0]) <= MAX_FRAMES):
             raise FormatError(
                 f"{self._where}, line {line}: expected a whole frame number of at most {MAX_FRAMES} first, "
@@ -88,3 +91,11 @@ class NumberRows:
                     f"found {column[row]:g}; correct it"
                 )
         return frames, values
+
+
+def _is_number(field: str) -> bool:
+    try:
+        float(field or "nan")
+    except ValueError:
+        return field.isspace()
+    return True
