@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel
 from tracker.errors import FormatError
 from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
+from tracker.formats.number_rows import MAX_VALUES
 from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
@@ -199,11 +200,20 @@ def at_rate(table: MarkerTable, fps: float) -> MarkerTable:
     """Resample a file to the frames of a session, linearly by time, if its rate differs.
 
     A position is missing if it is missing in either of the two rows around it.
+
+    Raises:
+        FormatError: the resampled table would be too large.
     """
     if abs(table.rate / fps - 1) < _RATE_TOLERANCE:
         return table
     rows = table.frames * (fps / table.rate)  # fractional frame of the session of each row
-    frames = np.arange(int(np.floor(rows[-1] + 1e-6)) + 1)
+    n_frames = int(np.floor(rows[-1] + 1e-6)) + 1
+    if n_frames * table.points[0].size > MAX_VALUES:
+        raise FormatError(
+            f"expected at most {MAX_VALUES} values at {fps:g} frames per second, found {n_frames} frames of "
+            f"{len(table.names)} points; correct the file's DataRate, or cut it to the frames to compare"
+        )
+    frames = np.arange(n_frames)
     after = np.clip(np.searchsorted(rows, frames - 1e-6), 1, len(rows) - 1) if len(rows) > 1 else np.zeros_like(frames)
     before = np.maximum(after - 1, 0)
     span = np.maximum(rows[after] - rows[before], 1e-12)
