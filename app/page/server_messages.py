@@ -238,7 +238,9 @@ class StateMessage(Message, frozen=True, tag="state"):
     redo: str | None
     """Label of the entry that redo would redo."""
     saved: bool
+    """Whether every pose and pin shown so far is on disk, also those of frames that a running tracker has left."""
     save_error: str | None
+    """Why an edit could not be written; null if none waits."""
 
 
 # --- other text messages -------------------------------------------------------------------------------------------

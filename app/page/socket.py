@@ -199,7 +199,8 @@ class PageConnection:
         sent, now = self._sent_text, self._loop.time()
         is_busy = state.is_dragging or (state.search.running and sent is not None and sent.job.running)
         due = self._sent_text_at + _READABLE_S
-        if sent is None or not is_busy or now >= due:
+        # Before poses that are not on disk: no page may show them beside "saved".
+        if sent is None or not is_busy or now >= due or sent.saved != state.saved:
             self._sent_text_at = now
             return True
         if self._reminder is None:
