@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 PYTHON_FILES := app tracker tests
-PARALLEL := $(MAKE) --jobs 3 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
+PARALLEL := $(MAKE) --jobs 4 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
 # The library's rooms that need neither kernels nor sessions.
 QUICK := $(wildcard tests/test_*.py) $(addprefix tests/,tracker/compute tracker/geometry tracker/body tracker/motion \
 	tracker/formats tracker/session tracker/store tracker/evaluation tracker/images tracker/contours tracker/fitting \
@@ -24,7 +24,7 @@ run: install
 # What must hold on every change: at most five minutes on two cores. The steps run beside one another. The kernels, for
 # which others wait, have the highest priority. Tests of the page wait a lot: those of the library take what they leave.
 test: $(VENV)/.tested $(VENV)/.typescript
-	$(PARALLEL) check test-page test-library
+	$(PARALLEL) kernels test-page test-library check
 
 # And what is long and rarely broken.
 test-all: test
@@ -32,10 +32,11 @@ test-all: test
 
 # The inner loop: under a minute.
 test-quick: $(VENV)/.tested
-	$(PYTEST) -m "not slow" $(QUICK)
+	nice -n 19 $(PYTEST) -m "not slow" $(QUICK)
 
-test-library: $(VENV)/.tested kernels
-	nice -n 19 $(PYTEST) -m "not slow" --ignore tests/browser
+# The rooms that need no kernels come first, while the kernels are compiled.
+test-library: test-quick kernels
+	nice -n 19 $(PYTEST) -m "not slow" $(addprefix --ignore=,tests/browser $(QUICK)) tests
 
 # Starts at once: only the files of tests/browser/live, which come last, wait for the kernels.
 test-page: $(VENV)/.tested

@@ -25,5 +25,9 @@ class SessionError(TrackerError):
     """A session folder is malformed, newer than this program, or in use."""
 
 
+class DamagedStoreError(SessionError):
+    """A store of annotations is not as it was written."""
+
+
 class FormatError(TrackerError):
     """A foreign file (TRC, CSV, ...) is malformed."""

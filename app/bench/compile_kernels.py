@@ -5,6 +5,7 @@ installation would wait for a minute, and the page with it. This program calls a
 them from the cache.
 """
 
+import gc
 import os
 import sys
 import time
@@ -35,6 +36,8 @@ from tracker.tracking.tracker import TrackingRun
 _FRAMES = 3
 """Number of tracked frames: motion and lost limbs exist from the second on."""
 _WAIT_S = 0.5
+_GC_THRESHOLDS = 50_000, 20, 50
+"""Thresholds of the garbage collector: numba makes so many objects that the usual ones cost a sixth of the time."""
 
 
 def main(background: bool = False) -> None:
@@ -45,6 +48,7 @@ def main(background: bool = False) -> None:
     """
     if background and hasattr(os, "nice"):
         os.nice(19)
+    gc.set_threshold(*_GC_THRESHOLDS)
     mark = compiled_mark()
     if mark.exists():
         mark.touch()  # the versions used last stay in the cache

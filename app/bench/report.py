@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import cv2
+import msgspec
 from rich.console import Console
 from rich.table import Table
 
@@ -24,11 +25,21 @@ from app.session.samples import sample_copy
 from tracker.errors import TrackerError
 from tracker.files import write_text_atomic
 from tracker.simulate import Simulation, simulate
+from tracker.text_files import TextKind, read_json
+from tracker.validation import Number, check
 
 BASELINE = Path(__file__).with_name("baseline.json")
 N_ROWS = 19
 """Number of rows that `measure` yields if `cma` is installed."""
+_KIND = TextKind("baseline", 1_000_000, TrackerError, "make one with --save")
 _PACKAGES = ("numpy", "opencv-python-headless", "numba", "scipy", "av", "cma")
+
+
+class _Baseline(msgspec.Struct):
+    """Ratios to the yardstick that rows had."""
+
+    tolerance: Number
+    ratios: dict[str, Number]
 
 
 def measure() -> Iterator[Row]:
@@ -65,13 +76,8 @@ def read_baseline(path: Path = BASELINE) -> dict[str, Any]:
     Raises:
         TrackerError: the file is not a baseline.
     """
-    try:
-        found = json.loads(path.read_text("utf-8"))
-        return {"tolerance": float(found["tolerance"]), "ratios": {k: float(v) for k, v in found["ratios"].items()}}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise TrackerError(
-            f"expected a baseline with tolerance and ratios in {path}, found {error!r}; make one with --save"
-        ) from error
+    baseline: _Baseline = check(read_json(path, _KIND), _Baseline, f"baseline {path}", TrackerError)
+    return msgspec.structs.asdict(baseline)
 
 
 def save_baseline(rows: list[Row], path: Path, tolerance: float) -> None:

@@ -1,5 +1,6 @@
 """`quadrille init`: set a first pose, from known joints or from a table of poses."""
 
+import sys
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -158,6 +159,8 @@ def _store_keyframe(session: "Session", person: "Person", frame: int, values: "A
     from tracker.store.records import PoseChange, PoseRecord
 
     with closing(AnnotationStore(session.annotations_path)) as store:
+        if store.backup_error is not None:
+            print(store.backup_error, file=sys.stderr)
         revision = store.add_model_revision(person.name, format_model(person.model))
         sources = ("imported",) * len(values)
         record = PoseRecord(values, sources, revision, keyframe=True, settings={"method": method})

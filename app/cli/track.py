@@ -117,6 +117,8 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
         Recording(session.cameras) as recording,
         stored_run(session, store, Observer(session.cameras, recording), TrackTask(frames, at.people, settings)) as run,
     ):
+        if store.backup_error is not None:
+            progress.say(store.backup_error)
         if not compiled_mark().exists():
             progress.say("kernels that are not compiled yet are compiled first, once: it may take a minute or two")
         try:

@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias, Union, get_args
 from app.drawing.curves import CurveGroup
 from app.drawing.overlays import Handle, PathKind
 from app.drawing.pin_marks import PinMark, PinTriangulation
-from app.page.server_messages import Message, Part, Status
+from app.page.message_types import Message, Part, Status
 from app.state.page_view import PictureLayer
 
 

@@ -5,7 +5,9 @@ from typing import Any
 
 from app.control.controller import Controller
 from app.page import client_messages as wire
+from app.page import pose_messages as pose_wire
 from app.page.message_parsing import MessageError
+from app.page.message_types import Command
 from app.page.pose_commands import POSE_COMMANDS
 from app.page.search_commands import SEARCH_COMMANDS
 
@@ -38,7 +40,7 @@ def check_indices(controller: Controller, message: wire.ClientMessage) -> None:
             raise MessageError(f"an index below {count} as '{name}'", str(index))
 
 
-def _drag(controller: Controller, page: int, message: wire.Drag) -> None:
+def _drag(controller: Controller, page: int, message: pose_wire.Drag) -> None:
     dragging, pointer_px = controller.dragging, (message.u, message.v)
     if message.phase == "start":
         dragging.begin(
@@ -52,7 +54,7 @@ def _drag(controller: Controller, page: int, message: wire.Drag) -> None:
         dragging.end(page)
 
 
-def _pin(controller: Controller, page: int, message: wire.DragPin) -> None:
+def _pin(controller: Controller, page: int, message: pose_wire.DragPin) -> None:
     pinning, position_px = controller.pinning, (message.u, message.v)
     if message.phase == "start":
         pinning.begin(
@@ -66,7 +68,7 @@ def _pin(controller: Controller, page: int, message: wire.DragPin) -> None:
         pinning.end(page)
 
 
-def _unpin(controller: Controller, _: int, message: wire.RemovePins) -> None:
+def _unpin(controller: Controller, _: int, message: pose_wire.RemovePins) -> None:
     controller.pinning.remove(message.frame, message.person, message.point, message.camera)
 
 
@@ -111,17 +113,17 @@ def _floor(controller: Controller, _: int, message: wire.EditFloor) -> None:
     actions[message.action]()
 
 
-COMMANDS: dict[type[wire.Message], Callable[[Controller, int, Any], None]] = {
+COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.Seek: lambda controller, _, m: controller.navigation.seek(m.frame),
     wire.Select: lambda controller, _, m: controller.navigation.select(m.person, m.point),
     wire.ShowPerson: lambda controller, _, m: controller.visibility.show(m.person, m.shown),
     wire.Solo: lambda controller, _, m: controller.visibility.solo(m.on),
     wire.LookThrough: lambda controller, _, m: controller.view_3d.snap(m.camera),
     wire.Pause3d: lambda controller, page, m: controller.view_3d.pause(page, m.pause),
-    wire.Drag: _drag,
-    wire.DragPin: _pin,
-    wire.RemovePins: _unpin,
-    wire.FitPose: lambda controller, _, m: controller.pinning.fit(m.frame, m.person),
+    pose_wire.Drag: _drag,
+    pose_wire.DragPin: _pin,
+    pose_wire.RemovePins: _unpin,
+    pose_wire.FitPose: lambda controller, _, m: controller.pinning.fit(m.frame, m.person),
     wire.StartTracking: lambda controller, _, m: controller.tracking.start(m.action == "backward", m.until),
     wire.ControlTracking: _control_tracking,
     wire.EditRange: _range,

@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from app.page.server_messages import Message
+from app.page.message_types import Message
 
 
 def encode_text(message: Message) -> str:

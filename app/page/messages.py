@@ -95,7 +95,7 @@ def state(session: Session, state: State) -> wire.StateMessage:
         compiling=state.compiling,
         undo=state.undo,
         redo=state.redo,
-        saved=state.save_error is None,
+        saved=state.saved,
         save_error=state.save_error,
     )
 

@@ -5,8 +5,9 @@ from typing import Any
 
 from app.control.controller import Controller
 from app.drawing import dof_labels
-from app.page import client_messages as wire
+from app.page import pose_messages as wire
 from app.page.message_parsing import MessageError
+from app.page.message_types import Command
 
 
 def _set(controller: Controller, _: int, message: wire.SetDof) -> None:
@@ -42,7 +43,7 @@ def _lock(controller: Controller, _: int, message: wire.LockDofs) -> None:
     controller.dof_locks.set(message.person, message.dofs, message.locked)
 
 
-POSE_COMMANDS: dict[type[wire.Message], Callable[[Controller, int, Any], None]] = {
+POSE_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.SetDof: _set,
     wire.TurnDof: _turn,
     wire.Nudge: _nudge,

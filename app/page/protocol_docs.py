@@ -13,9 +13,10 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 
 import msgspec
 
-from app.page import binary_headers, client_messages, server_messages
+from app.page import binary_headers, client_messages, message_types, pose_messages, search_messages, server_messages
 from app.page.binary_headers import BINARY_HEADERS
-from app.page.client_messages import CLIENT_MESSAGES, PoseEdit
+from app.page.client_messages import CLIENT_MESSAGES
+from app.page.pose_messages import PoseEdit
 from app.page.server_messages import TEXT_MESSAGES
 
 TYPES = Path("static/model/protocol.js")
@@ -159,7 +160,7 @@ def _names() -> dict[Any, str]:
 
 
 def _named(name: str) -> Any:
-    modules = (client_messages, server_messages, binary_headers)
+    modules = (message_types, client_messages, pose_messages, search_messages, server_messages, binary_headers)
     return next(getattr(module, name) for module in modules if hasattr(module, name))
 
 

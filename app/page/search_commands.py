@@ -7,7 +7,8 @@ import msgspec
 
 from app.control.controller import Controller
 from app.control.search import search_settings
-from app.page import client_messages as wire
+from app.page import search_messages as wire
+from app.page.message_types import Command
 
 
 def _search(controller: Controller, _: int, message: wire.RunSearch) -> None:
@@ -36,7 +37,7 @@ def _replay(controller: Controller, _: int, message: wire.ReplayStep) -> None:
         controller.replay.show(message.run, message.step)
 
 
-SEARCH_COMMANDS: dict[type[wire.Message], Callable[[Controller, int, Any], None]] = {
+SEARCH_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.RunSearch: _search,
     wire.RepeatSearch: lambda controller, _, m: controller.search.run_again(m.run, m.person),
     wire.SetSearchSpeed: lambda controller, _, m: controller.search.set_speed(m.per_second),

@@ -7,10 +7,11 @@ import numpy as np
 from app.control.controller import Controller
 from app.control.search import search_settings
 from app.control.search.search_runs import SearchRun
-from app.page import server_messages as wire
+from app.page import search_messages as wire
 from app.page.binary_headers import LandscapeHeader, SearchCandidatesHeader, SearchStepsHeader
 from app.page.client_messages import Tab
 from app.page.encoding import encode_binary
+from app.page.message_types import Message
 from app.state.identity import Identity
 from app.state.search import CostLandscape, ReplayState
 from app.state.state import State, finite_or_none
@@ -36,7 +37,7 @@ class SearchFeed:
         self._candidates: dict[int, tuple[Identity, ...]] = {}
         self._landscape: CostLandscape | None = None
 
-    def updates(self, controller: Controller, with_figures: bool = True) -> list[wire.Message | bytes]:
+    def updates(self, controller: Controller, with_figures: bool = True) -> list[Message | bytes]:
         """Return the messages that bring the page up to date; binary ones are encoded.
 
         Args:
@@ -51,7 +52,7 @@ class SearchFeed:
             return [landscape(controller.session, shown)]
         if self._tab != "search":
             return []
-        out: list[wire.Message | bytes] = []
+        out: list[Message | bytes] = []
         with controller.lock:  # runs and state of the same moment
             found, state = controller.replay.runs(), controller.state
             listed = runs(found, state) if with_figures or self._runs is None else self._runs

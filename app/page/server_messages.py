@@ -1,24 +1,13 @@
 """Text messages from the program to the page: the one declaration of their types and fields.
 
-`messages` and `search_feed` make them, `protocol_docs` writes the page's types and docs/protocol.md from them.
-Positions are in undistorted pixels, frames count from 0, cameras and people are indices into the session's lists.
+Those about searches are in `search_messages`. `messages` and `search_feed` make them, `protocol_docs` writes the
+page's types and docs/protocol.md from them.
 """
 
 from typing import Literal, TypeAlias, Union, get_args
 
-import msgspec
-
-Status: TypeAlias = Literal["", "good", "doubtful", "lost"]
-RunState: TypeAlias = Literal["running", "paused", "over"]
-
-
-class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A part of a message."""
-
-
-class Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
-    """A message to a page, or the header of a binary one."""
-
+from app.page.message_types import Message, Part, Status
+from app.page.search_messages import SearchRunsMessage, SearchSetupMessage
 
 # --- session -------------------------------------------------------------------------------------------------------
 
@@ -249,7 +238,9 @@ class StateMessage(Message, frozen=True, tag="state"):
     redo: str | None
     """Label of the entry that redo would redo."""
     saved: bool
+    """Whether every pose and pin shown so far is on disk, also those of frames that a running tracker has left."""
     save_error: str | None
+    """Why an edit could not be written; null if none waits."""
 
 
 # --- other text messages -------------------------------------------------------------------------------------------
@@ -313,102 +304,6 @@ class InconsistentMessage(Message, frozen=True, tag="inconsistent"):
 
     frames: tuple[int, ...]
     """All of them, ascending."""
-
-
-class SearchLeaf(Part, frozen=True):
-    """A group of degrees of freedom that is searched together.
-
-    A bound or step is null if it does not apply to the group, or differs within it.
-    """
-
-    person: int
-    name: str
-    dofs: tuple[str, ...]
-    bound_rad: float | None
-    step_rad: float | None
-    bound_m: float | None
-    step_m: float | None
-    angles: int
-    """Number of angles among its degrees of freedom."""
-    lengths: int
-    """Number of lengths among them."""
-    own: bool
-    """Whether any bound or step differs from that of all groups."""
-
-
-class SearchSetupMessage(Message, frozen=True, tag="search_setup"):
-    """Settings of the search and its decomposition, in the order of search; only for pages that watch searches."""
-
-    theta_px: float | None
-    outliers: Literal["truncated", "paper"]
-    passes: tuple[float, ...]
-    patience: int
-    max_expansions: int
-    limbs_apart: bool
-    bound_rad: float
-    bound_m: float
-    step_rad: float
-    step_m: float
-    speed: float | None
-    """Expansions per second; null for no limit."""
-    leaves: tuple[SearchLeaf, ...]
-
-
-class SearchStage(Part, frozen=True):
-    """A stage of a run."""
-
-    person: int
-    name: str
-    factor: float
-    """Factor on the steps."""
-    evaluations: int
-    gain_px: float
-    """Decrease of the cost."""
-    done: bool
-    running: bool
-
-
-class SearchRun(Part, frozen=True):
-    """A search of the shown frame."""
-
-    number: int
-    state: RunState
-    start_px: float | None
-    """Cost at the start."""
-    best_px: float | None
-    """Least cost."""
-    evaluations: int
-    seconds: float
-    """Time of work."""
-    steps: int
-    """Recorded steps."""
-    thinned: int
-    """How often recorded steps were thinned, to stay below 10,000."""
-    differs: dict[str, str]
-    """Settings that are not the same in all runs, by label."""
-    stages: tuple[SearchStage, ...]
-
-
-class Replay(Part, frozen=True):
-    """The recorded step that is shown."""
-
-    run: int
-    step: int
-    stage: str | None
-    candidate_px: float | None
-    """Cost of the candidate."""
-    best_px: float | None
-    """Least cost until then."""
-    evaluations: int
-
-
-class SearchRunsMessage(Message, frozen=True, tag="search_runs"):
-    """Runs of the shown frame, oldest first; only for pages that watch searches."""
-
-    runs: tuple[SearchRun, ...]
-    replay: Replay | None
-    compared: int | None
-    """Number of the run whose result is drawn."""
 
 
 TextMessage: TypeAlias = Union[  # noqa: UP007

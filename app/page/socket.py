@@ -16,9 +16,10 @@ from app.page import client_messages as wire
 from app.page import commands, messages, picture_sets
 from app.page.encoding import encode_text
 from app.page.message_parsing import MessageError, parse
+from app.page.message_types import Message
 from app.page.search_feed import SearchFeed
+from app.page.search_messages import PreviewCandidate, ReplayStep, SetSearchSpeed
 from app.page.server_messages import HistoryMessage, InconsistentMessage, NoticeMessage, StateMessage
-from app.page.server_messages import Message as ServerMessage
 from app.state import page_view
 from app.state.identity import Identity
 from app.state.page_view import View
@@ -35,7 +36,7 @@ _MAX_HISTORY = 2000
 """Largest number of history entries, in each direction, that a page may request."""
 _EDGES = ("accepted", "rejected")
 """Layers of lines that are drawn from the evidence."""
-_COALESCED = (wire.Seek, wire.SetView, wire.ReplayStep, wire.PreviewCandidate, wire.SetSearchSpeed)
+_COALESCED = (wire.Seek, wire.SetView, ReplayStep, PreviewCandidate, SetSearchSpeed)
 """Messages of which only the newest in the queue is carried out."""
 
 
@@ -200,7 +201,8 @@ class PageConnection:
         sent, now = self._sent_text, self._loop.time()
         is_busy = state.is_dragging or (state.search.running and sent is not None and sent.job.running)
         due = self._sent_text_at + _READABLE_S
-        if sent is None or not is_busy or now >= due:
+        # Before poses that are not on disk: no page may show them beside "saved".
+        if sent is None or not is_busy or now >= due or sent.saved != state.saved:
             self._sent_text_at = now
             return True
         if self._reminder is None:
@@ -289,7 +291,7 @@ class PageConnection:
     async def _notice(self, text: str) -> None:
         await self._send(NoticeMessage("error", text))
 
-    async def _send(self, message: ServerMessage | bytes) -> None:
+    async def _send(self, message: Message | bytes) -> None:
         """Send a text message, or a binary one that is encoded already."""
         if isinstance(message, bytes):
             await self._socket.send_bytes(message)

@@ -57,6 +57,8 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
     static = static_folder()
     with SessionLock(session.folder), Recording(session.cameras, indices=_indices(), in_background=True) as recording:
         store = AnnotationStore(session.annotations_path)
+        if store.backup_error is not None:
+            say(store.backup_error)
         frames = FrameCache(Observer(session.cameras, recording), proxies.proxies(session))
         controller = Controller(session, Saver(session, store, _author()), frames)
         viser = PrivateViser()

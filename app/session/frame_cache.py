@@ -28,7 +28,7 @@ _SIZES = 64
 """Number of picture sizes whose resampling maps are cached."""
 _EVIDENCE_BYTES = 96 * 2**20
 _REST_S = 0.2
-"""Time a frame is shown before its evidence is computed: pictures are sent first, and scrubbing needs no evidence."""
+"""Usual time a frame is shown before its evidence is computed: pictures come first, and scrubbing needs no evidence."""
 _WAIT_S = 1.0
 """Maximum time that evidence waits for pictures in the making."""
 
@@ -36,15 +36,16 @@ _WAIT_S = 1.0
 class FrameCache:
     """Images, pictures and evidence of a recording. Safe to use from several threads."""
 
-    def __init__(self, observer: Observer, proxies: Sequence[Proxy | None] = ()) -> None:
+    def __init__(self, observer: Observer, proxies: Sequence[Proxy | None] = (), rest_s: float = _REST_S) -> None:
         """Wrap an observer; nothing is read yet.
 
         Args:
             observer: gives images and evidence.
             proxies: of each camera's footage, or None. Images to look at come from the proxies, evidence comes from the
                 footage.
+            rest_s: time a frame is shown before its evidence is computed.
         """
-        self.observer, self._proxies = observer, list(proxies)
+        self.observer, self._proxies, self._rest_s = observer, list(proxies), rest_s
         self._images = ByteBoundedCache(self._undistorted, _IMAGE_BYTES)
         self._pictures = ByteBoundedCache(self._picture, _PICTURE_BYTES)
         self._resamplers = lru_cache(_SIZES)(self._resampler)
@@ -140,8 +141,8 @@ class FrameCache:
         self._wanted, asked = frame, time.monotonic()
 
         def work() -> None:
-            while self._wanted == frame and time.monotonic() < asked + _REST_S:
-                time.sleep(_REST_S / 8)
+            while self._wanted == frame and time.monotonic() < asked + self._rest_s:
+                time.sleep(self._rest_s / 8)
             with self._idle:
                 self._idle.wait_for(lambda: not self._n_pictures, _WAIT_S)
             try:

@@ -4,6 +4,7 @@ from contextlib import closing
 from typing import Any
 
 from app.runtime.progress import Reporter
+from tracker.files import refuse_links
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_folder import ImageFolder
 from tracker.footage.proxy import FOLDER, Proxy
@@ -25,7 +26,9 @@ def index(session: Session, progress: Reporter) -> dict[str, Any]:
         SessionError: another program is making them.
     """
     folder = session.folder / FOLDER
+    refuse_links(session.folder, FOLDER)
     folder.mkdir(exist_ok=True)
+    refuse_links(folder, *(path.name for path in folder.iterdir()))
     made: dict[str, int] = {}
     stopped = False
     with SessionLock(folder):

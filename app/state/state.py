@@ -76,8 +76,10 @@ class State:
     undo: str | None = None
     """Label of the edit that undo would revert."""
     redo: str | None = None
+    saved: bool = True
+    """Whether every pose and pin that has been shown as set is on disk; drafts are not."""
     save_error: str | None = None
-    """Why the last edit is not on disk; None if all is saved."""
+    """Why the last edit is not on disk; None if none has failed."""
     timeline_version: int = 0
     """Increases with every change of the stored poses."""
 
@@ -172,6 +174,7 @@ class StateChanges(TypedDict, total=False):
     settings: TrackSettings
     undo: str | None
     redo: str | None
+    saved: bool
     save_error: str | None
     timeline_version: int
 

@@ -1,8 +1,8 @@
 """Read and write the annotations of an open session: poses, pins, settings, history."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -29,6 +29,8 @@ from tracker.store.records import (
     PoseChange,
     PoseRecord,
 )
+
+T = TypeVar("T")
 
 _BY_HAND = ("manual", "pinned", "fitted")
 """Sources of edits by a person, which make a frame a keyframe; a fit that a person starts is one of them."""
@@ -163,7 +165,7 @@ class Saver:
         """
         changes: list[Change] = self._pin_changes(state)
         for person, (shown, revision) in enumerate(zip(state.people, state.revisions, strict=True)):
-            stored = self.record(person, state.frame)
+            stored = self._readable(self.record, person, state.frame, None)
             if shown.source is None or (stored is not None and _is_same(stored, shown, revision)):
                 continue
             sources = shown.sources or (source,) * len(shown.values)
@@ -257,12 +259,24 @@ class Saver:
         entry = self._next_redo()
         return None if entry is None else entry.label
 
+    def _readable(self, read: Callable[[int, int], T], person: int, frame: int, otherwise: T) -> T:
+        """Read what is stored of a frame, to write what differs; `otherwise` if the store cannot be read.
+
+        Then too much is written rather than nothing: the edit waits in the queue until its drive is back.
+        """
+        try:
+            return read(person, frame)
+        except SessionError:
+            return otherwise
+
     def _pin_changes(self, state: State) -> list[Change]:
         """Return the changes that make the stored pins of the frame those of the state."""
         changes: list[Change] = []
         for person, shown in enumerate(state.pins):
             name = self._session.people[person].name
-            before = {(p.point, p.camera): p.position_px for p in self.pins(person, state.frame)}
+            none: tuple[PointObservation, ...] = ()
+            pins = self._readable(self.pins, person, state.frame, none)
+            before = {(p.point, p.camera): p.position_px for p in pins}
             after = {(p.point, p.camera): p.position_px for p in shown}
             for point, index in sorted({*before, *after}):
                 camera = self._session.cameras[index].camera

@@ -59,7 +59,8 @@ def opened(session):
         loaded = load_session(session)
         recording = Recording(loaded.cameras)
         store = AnnotationStore(loaded.annotations_path)
-        controller = Controller(loaded, Saver(loaded, store), FrameCache(Observer(loaded.cameras, recording)))
+        frames = FrameCache(Observer(loaded.cameras, recording), rest_s=0)  # no page waits for pictures
+        controller = Controller(loaded, Saver(loaded, store), frames)
         open_now.append((controller, recording, store))
         wait_for(lambda: controller.state.cost_px is not None)
         return controller

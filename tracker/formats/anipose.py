@@ -7,16 +7,20 @@ One section per camera: `name`, `size` (width, height), `matrix` (3x3), `distort
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
+import msgspec
 import numpy as np
 import tomli_w
+from msgspec import Meta
 
 from tracker.errors import CalibrationError
-from tracker.files import read_toml, write_text_atomic
+from tracker.files import write_text_atomic
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import DISTORTION_COUNTS, Camera
+from tracker.text_files import TextKind, read_toml
+from tracker.validation import MAX_SIDE_PX, FileStem, Number, Vector, check
 
 Units = Literal["m", "mm"]
 
@@ -25,6 +29,44 @@ MAX_STUDIO_M = 100.0
 MIN_STUDIO_M = 0.05
 """Cameras read as millimetres that are all nearer to the origin than this have translations in metres."""
 _ROTATION_TOLERANCE = 1e-3  # a rotation matrix printed with four digits still passes
+_KIND = TextKind("calibration", 500_000, CalibrationError)
+"""A camera takes about 1 kB."""
+
+_Pixels: TypeAlias = Annotated[float, Meta(ge=1, le=MAX_SIDE_PX, multiple_of=1)]
+_Focal: TypeAlias = Annotated[float, Meta(ge=1, le=1e9)]
+_Zero: TypeAlias = Annotated[float, Meta(ge=0, le=0)]
+_One: TypeAlias = Annotated[float, Meta(ge=1, le=1)]
+_Rodrigues: TypeAlias = Annotated[
+    tuple[Number, Number, Number], Meta(description="a Rodrigues vector of 3 values or a 3x3 matrix")
+]
+_RotationMatrix: TypeAlias = Annotated[
+    tuple[Vector, Vector, Vector], Meta(description="a Rodrigues vector of 3 values or a 3x3 matrix")
+]
+
+
+class _CameraSection(msgspec.Struct):
+    """The section of one camera; it may have other keys besides."""
+
+    size: Annotated[tuple[_Pixels, _Pixels], Meta(description="width and height in whole pixels, from 1 to 32767,")]
+    matrix: Annotated[
+        tuple[tuple[_Focal, Number, Number], tuple[_Zero, _Focal, Number], tuple[_Zero, _Zero, _One]],
+        Meta(description="[[fx, skew, cx], [0, fy, cy], [0, 0, 1]] with positive fx and fy"),
+    ]
+    rotation: list[Any]
+    """`_Rodrigues` or `_RotationMatrix`."""
+    translation: Vector
+    distortions: list[Number] = []
+    name: FileStem | None = None
+    fisheye: bool = False
+
+    def __post_init__(self) -> None:
+        if self.fisheye:
+            raise ValueError(
+                "expected OpenCV's lens model with 4, 5 or 8 coefficients, found a fisheye lens, which is not "
+                "supported; undistort the footage first and calibrate it without fisheye"
+            )
+        if len(self.distortions) not in DISTORTION_COUNTS:
+            raise ValueError(f"expected 0, 4, 5 or 8 values as 'distortions', found {len(self.distortions)}")
 
 
 def read_calibration(path: str | Path, units: Units = "m") -> tuple[Camera, ...]:
@@ -40,7 +82,7 @@ def read_calibration(path: str | Path, units: Units = "m") -> tuple[Camera, ...]
     path = Path(path)
     if units not in ("m", "mm"):
         raise CalibrationError(f"expected units m or mm, found '{units}'; correct --units")
-    data = read_toml(path, "calibration", CalibrationError)
+    data = read_toml(path, _KIND)
     sections = {name: section for name, section in data.items() if name.lower() != "metadata"}
     if not sections:
         raise CalibrationError(
@@ -79,68 +121,23 @@ def _camera(section: str, data: Any, path: Path, metres_per_unit: float) -> Came
         raise CalibrationError(
             f"calibration {path}: expected sections of cameras, found the lone key '{section}'; remove it"
         )
-    name = str(data.get("name", section))
-    missing = [key for key in ("size", "matrix", "rotation", "translation") if key not in data]
-    if missing:
-        raise CalibrationError(f"{where}: missing {', '.join(missing)}; add what is missing or remove the section")
-    if data.get("fisheye", False):
-        raise CalibrationError(
-            f"{where}: a fisheye lens is not supported, only OpenCV's model with 4, 5 or 8 coefficients; "
-            "undistort the footage first and calibrate it without fisheye"
-        )
-    distortion = _numbers(data.get("distortions", []), where, "distortions")
-    if distortion.ndim != 1 or distortion.size not in DISTORTION_COUNTS:
-        raise CalibrationError(
-            f"{where}: expected 0, 4, 5 or 8 values in 'distortions', found {distortion.size}; "
-            "calibrate with OpenCV's standard or rational model"
-        )
-    translation = _numbers(data["translation"], where, "translation")
-    if translation.shape != (3,):
-        raise CalibrationError(f"{where}: expected 3 values in 'translation', found {translation.size}; correct it")
-    T_camera_world = rigid.transform(_rotation(data["rotation"], where), translation * metres_per_unit)
-    return Camera(
-        name, _size(data["size"], where), _matrix(data["matrix"], where), distortion, rigid.inverse(T_camera_world)
-    )
+    row: _CameraSection = check(data, _CameraSection, where, CalibrationError)
+    name = check(section, FileStem, where, CalibrationError) if row.name is None else row.name
+    translation = np.array(row.translation) * metres_per_unit
+    T_camera_world = rigid.transform(_rotation(row.rotation, where), translation)
+    width, height = map(int, row.size)
+    K, distortion = np.array(row.matrix), np.array(row.distortions, dtype=np.float64)
+    return Camera(name, (width, height), K, distortion, rigid.inverse(T_camera_world))
 
 
-def _numbers(value: Any, where: str, key: str) -> Array:
-    try:
-        numbers = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise CalibrationError(f"{where}: expected numbers in '{key}', found {value}; correct it") from error
-    if not np.all(np.isfinite(numbers)):
-        raise CalibrationError(f"{where}: expected finite numbers in '{key}', found {value}; calibrate again")
-    return numbers
-
-
-def _size(value: Any, where: str) -> tuple[int, int]:
-    size = _numbers(value, where, "size")
-    if size.shape != (2,) or np.any(size < 1) or np.any(size != np.round(size)):
-        raise CalibrationError(
-            f"{where}: expected width and height in whole pixels in 'size', found {value}; correct it"
-        )
-    return int(size[0]), int(size[1])
-
-
-def _matrix(value: Any, where: str) -> Array:
-    K = _numbers(value, where, "matrix")
-    if K.shape != (3, 3) or K[0, 0] <= 0 or K[1, 1] <= 0 or K[1, 0] != 0 or np.any(K[2] != (0.0, 0.0, 1.0)):
-        raise CalibrationError(
-            f"{where}: expected [[fx, skew, cx], [0, fy, cy], [0, 0, 1]] with positive fx and fy in 'matrix', "
-            f"found {value}; correct it"
-        )
-    return K
-
-
-def _rotation(value: Any, where: str) -> Array:
+def _rotation(value: list[Any], where: str) -> Array:
     """Convert a Rodrigues vector, or a matrix that is a rotation within rounding, to a rotation matrix (3, 3)."""
-    rotation = _numbers(value, where, "rotation")
+    is_matrix = any(isinstance(row, list) for row in value)
+    rotation = np.array(
+        check(value, _RotationMatrix if is_matrix else _Rodrigues, f"{where}, rotation", CalibrationError)
+    )
     if rotation.shape == (3,):
         return rigid.so3_exp(rotation)
-    if rotation.shape != (3, 3):
-        raise CalibrationError(
-            f"{where}: expected a Rodrigues vector of 3 values or a 3x3 matrix in 'rotation', found {value}; correct it"
-        )
     error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
     determinant = float(np.linalg.det(rotation))
     if error > _ROTATION_TOLERANCE or determinant < 0:

@@ -8,15 +8,24 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
+
 from tracker.errors import FormatError
-from tracker.files import read_toml
 from tracker.formats.trc import MarkerTable
+from tracker.text_files import TextKind, read_toml
+from tracker.validation import Name, check
 
 LIMB_JOINTS = tuple(
     f"{side}_{j}" for side in ("left", "right") for j in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
 )
 """The joints over which errors are averaged."""
 JOINTS = (*LIMB_JOINTS, "neck", "head")
+
+_KIND = TextKind("joint map", 100_000, FormatError)
+_JointMapFile = msgspec.defstruct(
+    "_JointMapFile", [(joint, Name | None, None) for joint in JOINTS], forbid_unknown_fields=True
+)
+"""A joint map file: the name of a marker for each joint that the file has."""
 
 
 class JointMap(NamedTuple):
@@ -96,17 +105,14 @@ def read_joint_map(path: str | Path) -> JointMap:
     Raises:
         FormatError: the file is missing or malformed, or names an unknown joint.
     """
-    data = read_toml(Path(path), "joint map", FormatError)
-    unknown = [j for j in data if j not in JOINTS]
-    if unknown or not data:
+    found = check(read_toml(Path(path), _KIND), _JointMapFile, f"joint map {path}", FormatError)
+    markers = {j: m for j, m in msgspec.to_builtins(found).items() if m is not None}
+    if not markers:
         raise FormatError(
-            f'joint map {path}: expected lines such as left_shoulder = "LSHO" for {", ".join(JOINTS)}, '
-            f"found {unknown[0] if unknown else 'none'}; correct it"
+            f'joint map {path}: expected lines such as left_shoulder = "LSHO" for {", ".join(JOINTS)}, found none; '
+            "add them"
         )
-    wrong = [j for j, marker in data.items() if not isinstance(marker, str)]
-    if wrong:
-        raise FormatError(f"joint map {path}: expected the name of a marker for '{wrong[0]}', found {data[wrong[0]]!r}")
-    return JointMap(Path(path).name, data)
+    return JointMap(Path(path).name, markers)
 
 
 def joints_of(table: MarkerTable, source: str, joint_map: JointMap | None = None) -> MarkerTable:

@@ -4,24 +4,125 @@ Positions and sizes are fractions of body height, angles are in degrees. A fitte
 none. See `tracker/body/models/gavrila22.toml` for an example.
 """
 
-from fnmatch import fnmatchcase
+import fnmatch
+import os
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, TypeAlias
 
+import msgspec
 import numpy as np
 import tomli_w
+from msgspec import Meta
 
 from tracker.body.model import BodyModel
 from tracker.body.parts import Axis, Joint, Landmark, Part, SearchGroup
 from tracker.errors import ModelError
-from tracker.files import parse_toml
+from tracker.text_files import TextKind, parse_toml, read_text
+from tracker.validation import Color, Name, Vector, check, check_version
 
 VERSION = 1
 DEFAULT_HEIGHT_M = 1.75
 PRESETS = tuple(
     sorted(f.name[:-5] for f in (resources.files("tracker") / "body" / "models").iterdir() if f.name.endswith(".toml"))
 )
+
+
+_KIND = TextKind("body model", 500_000, ModelError)
+"""A model of 20 parts takes 10 kB."""
+
+_Height: TypeAlias = Annotated[float, Meta(ge=0.3, le=3.0, description="a height of 0.3 to 3 metres")]
+_Fraction: TypeAlias = Annotated[float, Meta(ge=-10, le=10)]
+_Position: TypeAlias = Annotated[
+    tuple[_Fraction, _Fraction, _Fraction], Meta(description="3 finite numbers, fractions of the height,")
+]
+_HalfAxis: TypeAlias = Annotated[float, Meta(ge=1e-4, le=10)]
+_Exponent: TypeAlias = Annotated[float, Meta(ge=0.05, le=1)]
+_Taper: TypeAlias = Annotated[float, Meta(gt=-0.9, lt=0.9, description="a taper within 0.9")]
+_TAPERS: dict[str, Any] = {
+    "superquadric": Annotated[tuple[_Taper, _Taper], Meta(description="2 tapers within 0.9")],
+    "cone": _Taper,
+    "ellipsoid": Annotated[None, Meta(description="no taper of an ellipsoid")],
+}
+"""Type of the taper by shape. A union would be one declaration, but msgspec 0.22 crashes on it."""
+_Turn: TypeAlias = Annotated[float, Meta(ge=0, le=180, description="an angle of 0 to 180 degrees")]
+
+
+class _Row(msgspec.Struct, forbid_unknown_fields=True):
+    """A table of a model file."""
+
+
+class _AxisRow(_Row):
+    name: Name
+    axis: Vector
+    limits_deg: Annotated[
+        tuple[Annotated[float, Meta(le=0)], Annotated[float, Meta(ge=0)]],
+        Meta(description="a lower limit up to 0 and an upper one from 0"),
+    ] = (-np.inf, np.inf)
+    spread_deg: Annotated[float, Meta(gt=0, description="a number above 0")] = np.inf
+
+    def __post_init__(self) -> None:
+        if np.linalg.norm(self.axis) < 1e-9:
+            raise ValueError(f"expected a direction other than 0 as 'axis', found {list(self.axis)}")
+
+
+class _JointRow(_Row):
+    name: Name
+    child: Name
+    parent: str = ""
+    position: _Position = (0.0, 0.0, 0.0)
+    kind: Literal["revolute", "ball"] = "revolute"
+    axes: Annotated[list[_AxisRow], Meta(max_length=6, description="at most 6 axes")] = []
+    free: bool = False
+    cone_deg: _Turn = 180.0
+    twist_deg: _Turn = 180.0
+
+    def __post_init__(self) -> None:
+        if self.kind == "ball" and self.axes:
+            raise ValueError(f"expected no axes of a ball joint, found {len(self.axes)}")
+
+
+class _PartRow(_Row):
+    name: Name
+    half_axes: Annotated[
+        tuple[_HalfAxis, _HalfAxis, _HalfAxis], Meta(description="3 half-axes above 0, fractions of the height,")
+    ]
+    shape: Literal["superquadric", "cone", "ellipsoid"] = "superquadric"
+    exponents: Annotated[tuple[_Exponent, _Exponent], Meta(description="2 exponents of 0.05 to 1")] | None = None
+    taper: Any = None
+    """One of `_TAPERS`; 0 by default."""
+    center: _Position = (0.0, 0.0, 0.0)
+    color: Color = "#b0b0b0"
+
+    def __post_init__(self) -> None:
+        if self.exponents is not None and self.shape != "superquadric":
+            raise ValueError(f"expected no exponents of the shape {self.shape}, found some; leave them out")
+
+
+class _LandmarkRow(_Row):
+    name: Name
+    part: Name
+    position: _Position
+
+
+class _GroupRow(_Row):
+    name: Name
+    dofs: Annotated[list[Name], Meta(min_length=1, max_length=256, description="1 to 256 names")]
+
+
+class _ModelFile(_Row):
+    """A body model file."""
+
+    name: Name
+    joints: Annotated[list[_JointRow], Meta(min_length=1, max_length=128, description="1 to 128 joints")]
+    parts: Annotated[list[_PartRow], Meta(min_length=1, max_length=128, description="1 to 128 parts")]
+    version: int = VERSION
+    height_m: _Height = DEFAULT_HEIGHT_M
+    landmarks: Annotated[list[_LandmarkRow], Meta(max_length=256, description="at most 256 landmarks")] = []
+    search: Annotated[list[_GroupRow], Meta(max_length=32, description="at most 32 search groups")] = []
 
 
 def load_model(name_or_path: str | Path, height_m: float | None = None) -> BodyModel:
@@ -38,12 +139,12 @@ def load_model(name_or_path: str | Path, height_m: float | None = None) -> BodyM
         text = (resources.files("tracker") / "body" / "models" / f"{name_or_path}.toml").read_text("utf-8")
     else:
         path = Path(name_or_path)
-        if path.suffix != ".toml" or not path.is_file():
+        if path.suffix != ".toml" or not os.path.isfile(path):  # unlike pathlib's, for any name
             raise ModelError(
                 f"body model '{name_or_path}' not found: expected one of {', '.join(PRESETS)} "
                 "or the path of a .toml file"
             )
-        text = path.read_text("utf-8")
+        text = read_text(path, _KIND)
     return parse_model(text, str(name_or_path), height_m)
 
 
@@ -53,41 +154,26 @@ def parse_model(text: str, source: str, height_m: float | None = None) -> BodyMo
     Raises:
         ModelError: syntax, an unknown or missing key, a loop, a missing parent, impossible numbers.
     """
-    data = parse_toml(text, f"body model {source}", ModelError)
-    if int(data.get("version", 0)) > VERSION:
-        raise ModelError(
-            f"body model {source} has version {data['version']}, this program reads up to {VERSION}; upgrade quadrille"
-        )
-    try:
-        height = float(height_m if height_m is not None else data.get("height_m", DEFAULT_HEIGHT_M))
-        listed = tuple(_joint(j, source) for j in data["joints"])
-        parts = {p["name"]: _part(p, source) for p in data["parts"]}
-        landmarks = tuple(
-            Landmark(m["name"], m["part"], _numbers(m["position"], 3, source, m["name"]))
-            for m in data.get("landmarks", [])
-        )
-        groups = [(g["name"], list(g["dofs"])) for g in data.get("search", [])]
-        name = str(data["name"])
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
-        what = f"the key {error} is missing" if isinstance(error, KeyError) else str(error)
-        raise ModelError(
-            f"body model {source} is malformed: {what}; compare it with tracker/body/models/gavrila22.toml"
-        ) from error
-    if not 0.3 <= height <= 3.0:
-        raise ModelError(f"body model {source}: expected a height of 0.3 to 3 metres, found {height:g}")
-    listed_children = [j.child for j in listed]
-    if sorted(listed_children) != sorted(parts):
-        odd = sorted(set(listed_children) ^ set(parts)) or sorted(
-            {c for c in listed_children if listed_children.count(c) > 1}
-        )
-        raise ModelError(f"body model {source}: expected exactly one joint for each part, but see: {', '.join(odd)}")
-    joints = _order(listed, source)
-    children = [j.child for j in joints]
+    where = f"body model {source}"
+    data = parse_toml(text, source, _KIND)
+    check_version(data, VERSION, where, ModelError)
+    row: _ModelFile = check(data, _ModelFile, where, ModelError)
+    height = check(row.height_m if height_m is None else height_m, _Height, where, ModelError)
+    parts = {p.name: _part(p, where) for p in row.parts}
+    children = [j.child for j in row.joints]
+    if sorted(children) != sorted(p.name for p in row.parts):
+        odd = set(children) ^ set(parts) or _doubles(children) | _doubles(p.name for p in row.parts)
+        raise ModelError(f"{where}: expected exactly one joint for each part, but see: {', '.join(sorted(odd))}")
+    joints = _order([_joint(j) for j in row.joints], source)
+    landmarks = tuple(Landmark(m.name, m.part, m.position) for m in row.landmarks)
     for m in landmarks:
         if m.part not in parts:
-            raise ModelError(f"body model {source}: landmark '{m.name}' is on a missing part '{m.part}'")
-    model = BodyModel(name, height, joints, tuple(parts[c] for c in children), landmarks, ())
-    return BodyModel(name, height, joints, model.parts, landmarks, _search_groups(model, groups, source))
+            raise ModelError(f"{where}: landmark '{m.name}' is on a missing part '{m.part}'")
+    model = BodyModel(row.name, height, joints, tuple(parts[j.child] for j in joints), landmarks, ())
+    for what, names in (("joint and landmark", model.point_names), ("degree of freedom", model.dof_names)):
+        if doubles := _doubles(names):
+            raise ModelError(f"{where}: expected each {what} once, found '{min(doubles)}' twice; rename one")
+    return replace(model, search_groups=_search_groups(model, row.search, where))
 
 
 def format_model(model: BodyModel) -> str:
@@ -141,75 +227,29 @@ def _part_row(p: Part) -> dict[str, Any]:
     return row | {"center": list(p.center), "color": p.color}
 
 
-def _numbers(value: Any, count: int, source: str, where: str) -> Any:
-    numbers = tuple(float(v) for v in value)
-    if len(numbers) != count or not np.all(np.isfinite(numbers)):
-        raise ModelError(f"body model {source}: '{where}' expected {count} finite numbers, found {value}")
-    return numbers
+def _joint(row: _JointRow) -> Joint:
+    axes = []
+    for a in row.axes:
+        x, y, z = np.array(a.axis) / np.linalg.norm(a.axis)
+        low, high = (float(np.radians(v)) for v in a.limits_deg)
+        axes.append(Axis(a.name, (float(x), float(y), float(z)), (low, high), float(np.radians(a.spread_deg))))
+    cone, twist = float(np.radians(row.cone_deg)), float(np.radians(row.twist_deg))
+    return Joint(row.name, row.parent, row.child, row.position, row.kind, tuple(axes), row.free, cone, twist)
 
 
-def _axis(data: Any, source: str, joint: str) -> Axis:
-    direction = np.array(_numbers(data["axis"], 3, source, f"{joint}.{data['name']}"))
-    low, high = (float(np.radians(float(v))) for v in data.get("limits_deg", (-np.inf, np.inf)))
-    spread = float(np.radians(float(data.get("spread_deg", np.inf))))
-    norm = float(np.linalg.norm(direction))
-    if not spread > 0.0:
-        raise ModelError(
-            f"body model {source}: axis '{joint}.{data['name']}' expected a spread_deg above 0, "
-            f"found {data['spread_deg']}"
-        )
-    if norm < 1e-9 or not low <= 0.0 <= high:
-        raise ModelError(
-            f"body model {source}: axis '{joint}.{data['name']}' expected a direction and limits around 0, "
-            f"found {data['axis']} and {data.get('limits_deg')}"
-        )
-    x, y, z = direction / norm
-    return Axis(str(data["name"]), (float(x), float(y), float(z)), (low, high), spread)
+def _part(row: _PartRow, where: str) -> Part:
+    taper = (0.0, 0.0)
+    if row.taper is not None:
+        taper = check(row.taper, _TAPERS[row.shape], f"{where}, taper of part '{row.name}'", ModelError)
+        taper = (taper, taper) if row.shape == "cone" else taper
+    return Part(row.name, row.half_axes, row.exponents or (1.0, 1.0), taper, row.center, row.color, row.shape)
 
 
-def _joint(data: Any, source: str) -> Joint:
-    name, kind = str(data["name"]), data.get("kind", "revolute")
-    if kind not in ("revolute", "ball"):
-        raise ModelError(f"body model {source}: joint '{name}' expected kind revolute or ball, found '{kind}'")
-    return Joint(
-        name,
-        str(data.get("parent", "")),
-        str(data["child"]),
-        _numbers(data.get("position", (0, 0, 0)), 3, source, name),
-        kind,
-        tuple(_axis(a, source, name) for a in data.get("axes", [])),
-        bool(data.get("free", False)),
-        float(np.radians(data.get("cone_deg", 180.0))),
-        float(np.radians(data.get("twist_deg", 180.0))),
-    )
+def _doubles(names: Iterable[str]) -> set[str]:
+    return {name for name, count in Counter(names).items() if count > 1}
 
 
-def _part(data: Any, source: str) -> Part:
-    name, kind = str(data["name"]), data.get("shape", "superquadric")
-    if kind not in ("superquadric", "cone", "ellipsoid"):
-        raise ModelError(
-            f"body model {source}: part '{name}' expected shape superquadric, cone or ellipsoid, found '{kind}'"
-        )
-    unknown = {"superquadric": set(), "cone": {"exponents"}, "ellipsoid": {"exponents", "taper"}}[kind] & set(data)
-    if unknown:
-        raise ModelError(
-            f"body model {source}: part '{name}' is of shape {kind}, which has no {' and no '.join(sorted(unknown))}; "
-            "leave it out"
-        )
-    half_axes = _numbers(data["half_axes"], 3, source, name)
-    exponents = _numbers(data.get("exponents", (1, 1)), 2, source, name)
-    taper = [data.get("taper", 0)] * 2 if kind == "cone" else data.get("taper", (0, 0))
-    taper = _numbers(taper, 2, source, name)
-    if min(half_axes) <= 0 or not all(0.05 <= e <= 1 for e in exponents) or not all(abs(k) < 0.9 for k in taper):
-        raise ModelError(
-            f"body model {source}: part '{name}' expected half-axes above 0, exponents of 0.05 to 1 and tapers within "
-            f"0.9, found {half_axes}, {exponents}, {taper}"
-        )
-    center = _numbers(data.get("center", (0, 0, 0)), 3, source, name)
-    return Part(name, half_axes, exponents, taper, center, str(data.get("color", "#b0b0b0")), kind)
-
-
-def _order(joints: tuple[Joint, ...], source: str) -> tuple[Joint, ...]:
+def _order(joints: Sequence[Joint], source: str) -> tuple[Joint, ...]:
     """Check that the joints form one tree, and sort them parent first."""
     parts = {j.child for j in joints}
     roots = [j.name for j in joints if not j.parent]
@@ -234,17 +274,19 @@ def _order(joints: tuple[Joint, ...], source: str) -> tuple[Joint, ...]:
     return tuple(placed.values())
 
 
-def _search_groups(model: BodyModel, groups: list[tuple[str, list[str]]], source: str) -> tuple[SearchGroup, ...]:
+def _search_groups(model: BodyModel, groups: Sequence[_GroupRow], where: str) -> tuple[SearchGroup, ...]:
     """Expand `joint.*` patterns; without any group, one group has all degrees of freedom."""
     if not groups:
         return (SearchGroup("whole body", model.dof_names),)
     out = []
-    for name, patterns in groups:
-        dofs = []
-        for pattern in patterns:
-            found = [d for d in model.dof_names if fnmatchcase(d, pattern)]
+    for group in groups:
+        dofs: list[str] = []
+        for pattern in group.dofs:
+            found = [pattern] if pattern in model.dof_names else fnmatch.filter(model.dof_names, pattern)
             if not found:
-                raise ModelError(f"body model {source}: search group '{name}' names an unknown dof '{pattern}'")
+                raise ModelError(f"{where}: search group '{group.name}' names an unknown dof '{pattern}'; correct it")
             dofs += found
-        out.append(SearchGroup(name, tuple(dofs)))
+        if doubles := _doubles(dofs):
+            raise ModelError(f"{where}: search group '{group.name}' names '{min(doubles)}' twice; leave one out")
+        out.append(SearchGroup(group.name, tuple(dofs)))
     return tuple(out)

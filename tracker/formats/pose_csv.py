@@ -11,22 +11,42 @@ have no unit. Frames are 0-based.
 """
 
 import csv
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
+from typing import Annotated
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
 from tracker.errors import FormatError
 from tracker.files import write_text_atomic
+from tracker.formats.number_rows import NumberRows
 from tracker.geometry.arrays import Array
+from tracker.text_files import TextKind, read_lines
+from tracker.validation import Name, check_version, quoted
 
 VERSION = 1
 
 _TITLE = "# quadrille poses, version "
 _DIGITS = 9
+_KIND = TextKind("pose table", 1_000_000_000, FormatError, "export it again")
+_MAX_COLUMNS = 2000
+_MAX_VALUE = 1e9
+_FACTORS = {"_deg": float(np.radians(1.0)), "_m": 1.0, ".qw": 1.0, ".qx": 1.0, ".qy": 1.0, ".qz": 1.0}
+"""Suffixes of the columns, and what their values are multiplied by."""
+
+
+class _Head(msgspec.Struct):
+    """The comments at the start of a table."""
+
+    model: Name
+    height_m: Annotated[float, Meta(gt=0, le=100)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,27 +103,34 @@ def read_pose_table(path: str | Path) -> PoseTable:
     Raises:
         FormatError: the file is missing, newer than this program, or malformed; the message has the line.
     """
-    path = Path(path)
+    where = f"pose table {path}"
+    lines = read_lines(Path(path), _KIND)
+    comments = []
+    for first in lines:
+        if not first.startswith("#"):
+            break
+        comments.append(first)
+    else:
+        first = ""
+    head = _read_head(comments, where)
+    n_head = len(comments)
+    reader = csv.reader(chain([first], lines))
     try:
-        lines = path.read_text("utf-8-sig").splitlines()
-    except FileNotFoundError as error:
-        raise FormatError(f"pose table {path} not found; check the path") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise FormatError(f"pose table {path} cannot be read as text: {error}; export it again") from error
-    n_head = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
-    head = _read_head(lines[:n_head], path)
-    rows = list(csv.reader(lines[n_head:]))
-    if not rows or rows[0][:1] != ["frame"]:
-        raise FormatError(
-            f"pose table {path}, line {n_head + 1}: expected 'frame' as the first column; export it again"
-        )
-    names, factors = _read_columns(rows[0][1:], path, n_head + 1)
-    numbers = [_read_row(row, len(names), path, n_head + 2 + i) for i, row in enumerate(rows[1:]) if row]
-    table = np.array(numbers, dtype=np.float64).reshape(len(numbers), 1 + len(names))
-    frames = table[:, 0].astype(np.int64)
-    if np.any(np.diff(frames) <= 0) or np.any(frames < 0):
-        raise FormatError(f"pose table {path}: expected frames from 0 that rise from row to row; sort the rows")
-    return PoseTable(head["model"], float(head["height_m"]), names, frames, table[:, 1:] * factors)
+        columns = next(reader, [])
+        if columns[:1] != ["frame"]:
+            raise FormatError(f"{where}, line {n_head + 1}: expected 'frame' as the first column; export it again")
+        names, factors = _read_columns(columns[1:], f"{where}, line {n_head + 1}")
+        rows = NumberRows(where, len(columns), n_required=len(columns))
+        for row in reader:
+            if row:
+                rows.add(row, n_head + reader.line_num)
+    except csv.Error as error:
+        raise FormatError(f"{where}, line {n_head + reader.line_num}: {error}; export it again") from error
+    frames, values = rows.table(_MAX_VALUE)
+    if frames[0] < 0:
+        raise FormatError(f"{where}: expected frames from 0, found {frames[0]}; correct it")
+    values *= factors
+    return PoseTable(head.model, head.height_m, names, frames, values)
 
 
 def _units(model: BodyModel) -> list[str]:
@@ -115,53 +142,34 @@ def _units(model: BodyModel) -> list[str]:
     return ["_m" if n in lengths else "" if n in quaternions else "_deg" for n in model.value_names]
 
 
-def _read_head(lines: list[str], path: Path) -> dict[str, str]:
+def _read_head(lines: Sequence[str], where: str) -> _Head:
     version = lines[0].removeprefix(_TITLE).strip() if lines and lines[0].startswith(_TITLE) else ""
-    if not version.isdigit():
-        raise FormatError(f"{path} is not a table of poses: expected '{_TITLE}{VERSION}' as its first line")
-    if int(version) > VERSION:
-        raise FormatError(
-            f"pose table {path} has version {version}, this program reads up to {VERSION}; upgrade quadrille"
-        )
+    if not re.fullmatch("[0-9]{1,9}", version):
+        raise FormatError(f"{where} is not a table of poses: expected '{_TITLE}{VERSION}' as its first line")
+    check_version({"version": int(version)}, VERSION, where, FormatError)
     head = {k.strip(): v.strip() for k, _, v in (line[1:].partition("=") for line in lines[1:])}
     try:
-        if float(head["height_m"]) > 0 and head["model"]:
-            return head
-    except (KeyError, ValueError):
-        pass
-    raise FormatError(
-        f"pose table {path}: expected '# model = NAME' and '# height_m = METRES' below its first line; export it again"
-    )
+        return msgspec.convert(head, _Head, strict=False)
+    except msgspec.ValidationError as error:
+        raise FormatError(
+            f"{where}: expected '# model = NAME' and '# height_m = METRES' below its first line; export it again"
+        ) from error
 
 
-def _read_columns(columns: list[str], path: Path, line: int) -> tuple[tuple[str, ...], list[float]]:
+def _read_columns(columns: Sequence[str], where: str) -> tuple[tuple[str, ...], list[float]]:
     names, factors = [], []
     for column in columns:
-        if column.endswith("_deg"):
-            names.append(column.removesuffix("_deg"))
-            factors.append(float(np.radians(1.0)))
-        elif column.endswith("_m"):
-            names.append(column.removesuffix("_m"))
-            factors.append(1.0)
-        elif column.endswith((".qw", ".qx", ".qy", ".qz")):
-            names.append(column)
-            factors.append(1.0)
-        else:
+        unit = next((u for u in _FACTORS if column.endswith(u)), None)
+        if unit is None:
             raise FormatError(
-                f"pose table {path}, line {line}: column '{column}' has no unit, expected it to end in _deg or _m "
+                f"{where}: column {quoted(column)} has no unit, expected it to end in _deg or _m "
                 "(or .qw, .qx, .qy, .qz); rename it"
             )
-    return tuple(names), factors
-
-
-def _read_row(row: list[str], n_values: int, path: Path, line: int) -> list[float]:
-    try:
-        numbers = [float(x) for x in row]
-    except ValueError as error:
-        raise FormatError(f"pose table {path}, line {line}: expected numbers, found {error}; correct it") from error
-    if len(numbers) != 1 + n_values or not np.all(np.isfinite(numbers)) or numbers[0] != int(numbers[0]):
+        names.append(column.removesuffix(unit) if unit.startswith("_") else column)
+        factors.append(_FACTORS[unit])
+    if not 1 <= len(names) <= _MAX_COLUMNS or len(set(names)) < len(names):
         raise FormatError(
-            f"pose table {path}, line {line}: expected a whole frame number and {n_values} finite values, "
-            f"found {','.join(row)[:60]}; correct it"
+            f"{where}: expected 1 to {_MAX_COLUMNS} columns of values, each once, found {quoted(names)}; "
+            "export it again"
         )
-    return numbers
+    return tuple(names), factors

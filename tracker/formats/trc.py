@@ -7,6 +7,7 @@ fields, spaces or NaN. Some writers leave a blank line below the header; some dr
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
@@ -15,9 +16,16 @@ from numpy.typing import NDArray
 
 from tracker.errors import FormatError
 from tracker.files import write_text_atomic
+from tracker.formats.number_rows import NumberRows
 from tracker.geometry.arrays import Array
+from tracker.text_files import TextKind, read_lines
+from tracker.validation import FrameRate, check, quoted
 
 _METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "cm": 0.01, "mm": 0.001, "millimeters": 0.001}
+_KIND = TextKind("TRC file", 1_000_000_000, FormatError, "export it again")
+_MAX_POINTS = 1000
+_MAX_COORDINATE = 1e9
+"""Largest coordinate and time of a file, in its own units."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,31 +55,30 @@ def read_trc(path: str | Path) -> MarkerTable:
     Raises:
         FormatError: the file is missing or malformed; the message has the line.
     """
-    path = Path(path)
-    try:
-        lines = path.read_text("utf-8-sig").splitlines()
-    except FileNotFoundError as error:
-        raise FormatError(f"TRC file {path} not found; check the path") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise FormatError(f"TRC file {path} cannot be read as text: {error}; export it again") from error
-    if len(lines) < 5 or not lines[0].startswith("PathFileType"):
+    where = f"TRC file {path}"
+    lines = read_lines(Path(path), _KIND)
+    head = list(islice(lines, 5))
+    if len(head) < 5 or not head[0].startswith("PathFileType"):
         raise FormatError(f"{path} is not a TRC file: expected 'PathFileType' at its start; export it as TRC")
-    header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
-    scale = _scale(header, path)
-    names = tuple(n.strip() for n in lines[3].split("\t")[2:] if n.strip())
-    if not names or len(set(names)) != len(names):
-        raise FormatError(f"TRC file {path}, line 4: expected point names, each once, found {list(names)}; rename them")
-    rows = [_row(line, number, len(names), path) for number, line in enumerate(lines[5:], 6) if line.strip()]
-    if not rows:
-        raise FormatError(f"TRC file {path} has no rows of coordinates; export it again")
-    table = np.array(rows)
-    frames = table[:, 0].astype(np.int64)
-    if np.any(np.diff(frames) <= 0):
-        raise FormatError(f"TRC file {path}: expected Frame# to rise from row to row; sort the rows and remove doubles")
-    points = table[:, 2:].reshape(len(rows), len(names), 3) * scale
+    header = dict(zip(head[1].split("\t"), head[2].split("\t"), strict=False))
+    scale = _scale(header, where)
+    rate = check(_number(header.get("DataRate")), FrameRate, f"{where}, line 3, DataRate", FormatError)
+    names = tuple(n.strip() for n in head[3].split("\t")[2:] if n.strip())
+    if not 1 <= len(names) <= _MAX_POINTS or len(set(names)) != len(names):
+        raise FormatError(
+            f"{where}, line 4: expected 1 to {_MAX_POINTS} point names, each once, found {quoted(list(names))}; "
+            "rename them"
+        )
+    rows = NumberRows(where, 2 + 3 * len(names), n_required=2)
+    for number, line in enumerate(lines, 6):
+        if text := line.rstrip():  # some writers end rows with tabs, some drop them
+            rows.add(text.split("\t"), number)
+    frames, values = rows.table(_MAX_COORDINATE)
+    points = values[:, 1:].reshape(len(frames), len(names), 3)
+    points *= scale
     # A point with a missing coordinate is missing.
     points[np.isnan(points).any(axis=-1)] = np.nan
-    return MarkerTable(names, frames - frames[0], table[:, 1], points, _rate(header, path))
+    return MarkerTable(names, frames - frames[0], values[:, 0], points, rate)
 
 
 def write_trc(
@@ -115,41 +122,18 @@ def write_trc(
     write_text_atomic(path, "\n".join(lines) + "\n")
 
 
-def _scale(header: dict[str, str], path: Path) -> float:
+def _scale(header: dict[str, str], where: str) -> float:
     units = header.get("Units", "").strip()
     if units.lower() not in _METRES:
         raise FormatError(
-            f"TRC file {path}, line 3: expected Units to be one of {', '.join(_METRES)}, found '{units}'; correct it"
+            f"{where}, line 3: expected Units to be one of {', '.join(_METRES)}, found {quoted(units)}; correct it"
         )
     return _METRES[units.lower()]
 
 
-def _rate(header: dict[str, str], path: Path) -> float:
+def _number(text: str | None) -> float | str | None:
+    """Return a header's number; its text if it is none."""
     try:
-        rate = float(header["DataRate"])
-    except (KeyError, ValueError):
-        rate = 0.0
-    if not (np.isfinite(rate) and rate > 0):
-        raise FormatError(
-            f"TRC file {path}, line 3: expected a DataRate above 0, found '{header.get('DataRate', '')}'; correct it"
-        )
-    return rate
-
-
-def _row(line: str, number: int, n_points: int, path: Path) -> list[float]:
-    fields = [f.strip() for f in line.split("\t")]
-    while len(fields) > 2 + 3 * n_points and not fields[-1]:
-        fields.pop()
-    fields += [""] * (2 + 3 * n_points - len(fields))
-    if len(fields) > 2 + 3 * n_points:
-        raise FormatError(
-            f"TRC file {path}, line {number}: expected {2 + 3 * n_points} columns for {n_points} points, "
-            f"found {len(fields)}; export it again"
-        )
-    try:
-        row = [float(f) if f else np.nan for f in fields]
-        if not (np.isfinite(row[:2]).all() and row[0] == int(row[0])):
-            raise ValueError(f"no frame and time: {fields[:2]}")
-    except ValueError as error:
-        raise FormatError(f"TRC file {path}, line {number}: expected numbers, found {error}; correct it") from error
-    return row
+        return float(text or "")
+    except ValueError:
+        return text

@@ -129,6 +129,11 @@ class TrackSession:
         self._waiting.clear()
 
     @property
+    def has_unsaved(self) -> bool:
+        """Whether there are tracked frames that are not saved yet."""
+        return bool(self._waiting)
+
+    @property
     def next_frame(self) -> int | None:
         """The first frame that is not tracked yet; None where all are."""
         done = len(self.costs_px)

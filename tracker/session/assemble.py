@@ -13,6 +13,7 @@ from tracker.formats.anipose import Units, read_calibration
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
 from tracker.session.session import PALETTE, Person, Session, create_session
+from tracker.validation import FrameRate, check
 
 DEFAULT_MODEL = "gavrila34"
 
@@ -127,6 +128,7 @@ def _common_rate(footage: Mapping[str, Footage], fps: float | None) -> float:
     wanted = fps if fps is not None else next(iter(rates.values()), None)
     if wanted is None:
         raise RecordingError("folders of images do not say their frame rate; say --fps RATE")
+    check(wanted, FrameRate, "--fps" if fps is not None else "footage", RecordingError)
     if any(abs(rate / wanted - 1) > _RATE_TOLERANCE for rate in rates.values()):
         found = ", ".join(f"'{name}' {rate:.6g}" for name, rate in rates.items())
         asked = "one frame rate for all cameras" if fps is None else f"{fps:.6g} frames per second"

@@ -15,25 +15,35 @@ import time
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple
+from typing import Annotated, TypeAlias
+
+import msgspec
+from msgspec import Meta
 
 from tracker.errors import SessionError
+from tracker.files import refuse_links
+from tracker.text_files import TextKind, read_json
+from tracker.validation import check
 
 LOCK_FILE = "lock.json"
 
+_KIND = TextKind("lock", 10_000, SessionError)
 _WRITING_S = 0.2  # an unreadable lock file may be in the process of being written
 
 
-class Holder(NamedTuple):
+_Word: TypeAlias = Annotated[str, Meta(max_length=300)]
+
+
+class Holder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The holder of a lock."""
 
-    host: str
-    process: int
-    started: str
+    host: _Word
+    process: Annotated[int, Meta(ge=1, le=2**31 - 1, description="the number of a process")]
+    started: _Word
     """Start time of the process according to the system; empty if unknown. Process numbers are reused."""
-    since: str
+    since: _Word
     """Time at which the lock was taken, ISO 8601."""
-    token: str
+    token: _Word
     """Identifies this lock uniquely."""
 
 
@@ -61,6 +71,7 @@ class SessionLock:
         Raises:
             SessionError: another program holds it, or the folder cannot be written.
         """
+        refuse_links(self._path.parent, LOCK_FILE)
         me = Holder(
             socket.gethostname(),
             os.getpid(),
@@ -89,7 +100,7 @@ class SessionLock:
             # Exclusive creation: of two programs at the same time, one fails. Hard links would make the content appear
             # atomically too, but some network drives lack them.
             with self._path.open("x", encoding="utf-8") as file:
-                json.dump(me._asdict(), file)
+                json.dump(msgspec.to_builtins(me), file)
         except FileExistsError:
             return False
         return True
@@ -117,10 +128,12 @@ class SessionLock:
 
 
 def _read(path: Path) -> Holder | None:
+    """Read a lock; None if it is missing, incomplete or damaged."""
     try:
-        return Holder(**json.loads(path.read_text("utf-8")))
-    except (OSError, ValueError, TypeError):
+        holder: Holder = check(read_json(path, _KIND), Holder, f"lock {path}", SessionError)
+    except SessionError:
         return None
+    return holder
 
 
 def _describe(holder: Holder | None, path: Path) -> str:
@@ -153,7 +166,7 @@ def _is_alive(holder: Holder) -> bool:
 def _start_of(process: int) -> str:
     """Return the start time of a process, in ticks since boot; empty if the system does not provide it."""
     try:
-        stat = Path(f"/proc/{process}/stat").read_text("utf-8")
+        stat = Path(f"/proc/{process}/stat").read_text("utf-8", "replace")  # a program may have any name
     except OSError:
         return ""
     # The program's name, in parentheses, may contain spaces. The start time is field 22, the 20th after the name.

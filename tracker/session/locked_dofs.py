@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
+from tracker.errors import SessionError
 from tracker.session.session import Person
+from tracker.validation import check
 
 SETTING = "locked"
 """Key of the session's setting: by name of the person the names of the locked degrees of freedom."""
@@ -19,8 +21,11 @@ def load_locks(people: Sequence[Person], setting: Callable[[str, Any], Any]) -> 
     Args:
         people: of the session.
         setting: returns the session's setting of a name, or a default.
+
+    Raises:
+        SessionError: the setting is not one that `locks_setting` made.
     """
-    stored = setting(SETTING, {})
+    stored = check(setting(SETTING, {}), dict[str, list[str]], f"setting '{SETTING}' of the session", SessionError)
     return tuple(
         frozenset(i for i, name in enumerate(p.model.dof_names) if name in stored.get(p.name, ())) for p in people
     )

@@ -11,7 +11,6 @@ that both can be moved together, and absolute otherwise.
 """
 
 import os
-import re
 import secrets
 import shutil
 from collections.abc import Sequence
@@ -24,27 +23,26 @@ import tomli_w
 
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
-from tracker.files import read_toml, write_text_atomic
+from tracker.files import refuse_links, write_text_atomic
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry.ground_plane import GroundPlane
+from tracker.session.session_file import (
+    VERSION,
+    VERSION_WITHOUT_FLOOR,
+    FloorRow,
+    SessionFile,
+    checked,
+    read_session_file,
+)
+from tracker.validation import quoted
 
-VERSION = 2
-_VERSION_WITHOUT_FLOOR = 1
-"""Version written for a session without a floor, so that older programs can read it."""
 SESSION_FILE = "session.toml"
 CALIBRATION_FILE = "calibration.toml"
 ANNOTATIONS_FILE = "annotations.sqlite"
-UPS = ("x", "-x", "y", "-y", "z", "-z")
 PALETTE = ("#f2a33a", "#4cc3d9", "#c678dd", "#98c379", "#e06c75", "#61afef", "#d19a66", "#56b6c2")
-
-_NAME = re.compile(r"\w[\w .-]*")
-_KEYS = {"version", "name", "fps", "n_frames", "up", "floor", "calibration", "cameras", "people"}
-_FLOOR_KEYS = {"normal", "offset_m"}
-_CAMERA_KEYS = {"name", "footage", "background", "masks", "offset"}
-_PERSON_KEYS = {"name", "model", "color"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +112,7 @@ def create_session(
     if n_frames is None:
         n_frames = min((open_footage(c.footage, c.camera.name).n_frames - c.offset for c in sources), default=0)
     session = Session(folder, name or folder.name, float(fps), n_frames, sources, tuple(people), up)
-    _check(session)
+    _checked_content(session)
     temporary = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.tmp")
     try:
         temporary.mkdir(parents=True)
@@ -135,7 +133,7 @@ def save_session(session: Session) -> None:
     Raises:
         SessionError: a name or axis is not allowed, or the folder cannot be written.
     """
-    _check(session)
+    _checked_content(session)
     try:
         session.folder.mkdir(parents=True, exist_ok=True)
         _write(replace(session, cameras=tuple(_absolute(c) for c in session.cameras)), session.folder)
@@ -155,62 +153,40 @@ def load_session(folder: str | Path) -> Session:
     """
     folder = _tidy(Path(folder))
     path = folder / SESSION_FILE
-    if not path.is_file():
+    if not os.path.isfile(path):  # unlike pathlib's, it is False for a name too long for the system
         raise SessionError(f"{folder} is not a session: expected {SESSION_FILE} in it; make one with 'quadrille new'")
-    data = read_toml(path, "session", SessionError)
-    if not isinstance(data.get("version"), int):
-        raise SessionError(f"session {path}: expected a whole number as 'version', found {data.get('version')!r}")
-    if data["version"] > VERSION:
-        raise SessionError(
-            f"session {path} has version {data['version']}, this program reads up to {VERSION}; upgrade quadrille"
-        )
-    _check_keys(data, _KEYS, str(path))
-    try:
-        session = Session(
-            folder,
-            str(data["name"]),
-            float(data["fps"]),
-            int(data["n_frames"]),
-            _load_cameras(data, folder),
-            tuple(_load_person(p, folder) for p in data["people"]),
-            str(data["up"]),
-            _load_floor(data.get("floor"), str(path)),
-        )
-    except KeyError as error:
-        raise SessionError(f"session {path}: the key {error} is missing; add it or make a new session") from error
-    except (TypeError, ValueError, AttributeError) as error:
-        raise SessionError(f"session {path} is malformed: {error}; correct it or make a new session") from error
-    _check(session)
-    return session
-
-
-def _load_cameras(data: dict[str, Any], folder: Path) -> tuple[CameraSource, ...]:
-    """Join the calibration and the footage of each camera, in the order of session.toml."""
-    where = str(folder / SESSION_FILE)
-    calibrated = {c.name: c for c in read_calibration(folder / data["calibration"])}
-    for row in data["cameras"]:
-        _check_keys(row, _CAMERA_KEYS, where)
-    names = [row["name"] for row in data["cameras"]]
-    if sorted(names) != sorted(calibrated):
-        odd = sorted(set(names) ^ set(calibrated)) or names
-        raise SessionError(
-            f"session {where}: expected each calibrated camera once under [[cameras]], but see: {', '.join(odd)}"
-        )
-    return tuple(
-        CameraSource(
-            calibrated[row["name"]],
-            _resolve(row["footage"], folder),
-            _resolve(row["background"], folder) if "background" in row else None,
-            _resolve(row["masks"], folder) if "masks" in row else None,
-            int(row.get("offset", 0)),
-        )
-        for row in data["cameras"]
+    row = read_session_file(path)
+    return Session(
+        folder,
+        row.name,
+        row.fps,
+        row.n_frames,
+        _load_cameras(row, folder),
+        tuple(Person(p.name, load_model(_resolve(p.model, folder)), p.color) for p in row.people),
+        row.up,
+        _load_floor(row.floor),
     )
 
 
-def _load_person(row: dict[str, Any], folder: Path) -> Person:
-    _check_keys(row, _PERSON_KEYS, str(folder / SESSION_FILE))
-    return Person(str(row["name"]), load_model(_resolve(row["model"], folder)), str(row["color"]))
+def _load_cameras(row: SessionFile, folder: Path) -> tuple[CameraSource, ...]:
+    """Join the calibration and the footage of each camera, in the order of session.toml."""
+    calibrated = {c.name: c for c in read_calibration(folder / row.calibration)}
+    odd = calibrated.keys() ^ {c.name for c in row.cameras}
+    if odd:
+        raise SessionError(
+            f"session {folder / SESSION_FILE}: expected each calibrated camera once under [[cameras]], "
+            f"but see: {', '.join(sorted(odd))}"
+        )
+    return tuple(
+        CameraSource(
+            calibrated[c.name],
+            _resolve(c.footage, folder),
+            _resolve(c.background, folder) if c.background is not None else None,
+            _resolve(c.masks, folder) if c.masks is not None else None,
+            c.offset,
+        )
+        for c in row.cameras
+    )
 
 
 def save_floor(session: Session, up: str, floor: GroundPlane | None) -> Session:
@@ -228,7 +204,7 @@ def save_floor(session: Session, up: str, floor: GroundPlane | None) -> Session:
         SessionError: the folder cannot be written.
     """
     changed = replace(session, up=up, floor=floor)
-    _check(changed)
+    _checked_content(changed)
     try:
         _write_session(changed, session.folder)
     except OSError as error:
@@ -250,6 +226,7 @@ def save_model(session: Session, person: int, model: BodyModel) -> Session:
     people = [replace(p, model=model) if i == person else p for i, p in enumerate(session.people)]
     changed = replace(session, people=tuple(people))
     path = session.folder / "models" / f"{people[person].name}.toml"
+    refuse_links(session.folder, SESSION_FILE, f"models/{path.name}")
     try:
         path.parent.mkdir(exist_ok=True)
         write_text_atomic(path, format_model(model))
@@ -259,22 +236,16 @@ def save_model(session: Session, person: int, model: BodyModel) -> Session:
     return changed
 
 
-def _load_floor(row: dict[str, Any] | None, where: str) -> GroundPlane | None:
+def _load_floor(row: FloorRow | None) -> GroundPlane | None:
     if row is None:
         return None
-    _check_keys(row, _FLOOR_KEYS, where)
-    normal, offset_m = np.array(row["normal"], dtype=np.float64), float(row["offset_m"])
-    length = float(np.linalg.norm(normal))
-    if normal.shape != (3,) or not np.isfinite(length) or length < 1e-6 or not np.isfinite(offset_m):
-        raise SessionError(
-            f"session {where}: expected three numbers as the 'normal' of the floor and one as its 'offset_m', found "
-            f"{row['normal']} and {row['offset_m']}; correct them or take the floor out"
-        )
-    return GroundPlane(normal / length, offset_m)
+    normal = np.array(row.normal)
+    return GroundPlane(normal / np.linalg.norm(normal), row.offset_m)
 
 
 def _write(session: Session, into: Path) -> None:
     """Write the files of a session into a folder that is, or will become, `session.folder`."""
+    refuse_links(into, CALIBRATION_FILE, *(f"models/{p.name}.toml" for p in session.people))
     (into / "models").mkdir(exist_ok=True)
     write_calibration(into / CALIBRATION_FILE, [c.camera for c in session.cameras])
     for person in session.people:
@@ -283,6 +254,16 @@ def _write(session: Session, into: Path) -> None:
 
 
 def _write_session(session: Session, into: Path) -> None:
+    refuse_links(into, SESSION_FILE)
+    write_text_atomic(into / SESSION_FILE, tomli_w.dumps(_checked_content(session)))
+
+
+def _checked_content(session: Session) -> dict[str, Any]:
+    """Return the content of session.toml, checked as if it were read.
+
+    Raises:
+        SessionError: a name, axis, rate, number or path is not allowed.
+    """
     cameras = []
     for c in session.cameras:
         row: dict[str, Any] = {"name": c.camera.name, "footage": _relative(c.footage, session.folder)}
@@ -292,7 +273,7 @@ def _write_session(session: Session, into: Path) -> None:
             row["masks"] = _relative(c.masks, session.folder)
         cameras.append(row | {"offset": c.offset})
     data: dict[str, Any] = {
-        "version": _VERSION_WITHOUT_FLOOR if session.floor is None else VERSION,
+        "version": VERSION_WITHOUT_FLOOR if session.floor is None else VERSION,
         "name": session.name,
         "fps": session.fps,
         "n_frames": session.n_frames,
@@ -302,48 +283,9 @@ def _write_session(session: Session, into: Path) -> None:
         "people": [{"name": p.name, "model": f"models/{p.name}.toml", "color": p.color} for p in session.people],
     }
     if session.floor is not None:
-        data["floor"] = {"normal": session.floor.normal.tolist(), "offset_m": session.floor.offset_m}
-    write_text_atomic(into / SESSION_FILE, tomli_w.dumps(data))
-
-
-def _check(session: Session) -> None:
-    where = f"session {session.folder}"
-    cameras, people = [c.camera.name for c in session.cameras], [p.name for p in session.people]
-    for what, names in (("camera", cameras), ("person", people)):
-        if not names:
-            raise SessionError(f"{where}: expected at least one {what}, found none")
-        twice = sorted({n for n in names if names.count(n) > 1})
-        if twice:
-            raise SessionError(f"{where}: more than one {what} is named '{twice[0]}'; give each its own name")
-    for name in people:
-        # The name becomes the name of a file, so it must not lead out of the folder.
-        if not _NAME.fullmatch(name):
-            raise SessionError(
-                f"{where}: a person cannot be named '{name}'; use letters, digits, spaces, dots, '-' and '_'"
-            )
-    if session.up not in UPS:
-        raise SessionError(
-            f"{where}: expected one of {', '.join(UPS)} as the axis that points up, found '{session.up}'"
-        )
-    if not (session.fps > 0 and session.n_frames > 0):
-        raise SessionError(
-            f"{where}: expected a frame rate and a number of frames above 0, "
-            f"found {session.fps:g} and {session.n_frames}; check the footage and the offsets"
-        )
-    for c in session.cameras:
-        if c.offset < 0:
-            raise SessionError(
-                f"{where}: camera '{c.camera.name}' has the offset {c.offset}, expected 0 or more; "
-                f"give each of the others an offset of {-c.offset} instead"
-            )
-
-
-def _check_keys(data: dict[str, Any], known: set[str], where: str) -> None:
-    unknown = sorted(set(data) - known)
-    if unknown:
-        raise SessionError(
-            f"session {where}: unknown key '{unknown[0]}'; version {VERSION} knows {', '.join(sorted(known))}"
-        )
+        data["floor"] = {"normal": session.floor.normal.tolist(), "offset_m": float(session.floor.offset_m)}
+    checked(data, f"session {session.folder}")
+    return data
 
 
 def _absolute(source: CameraSource) -> CameraSource:
@@ -372,4 +314,12 @@ def _relative(path: Path, folder: Path) -> str:
 
 
 def _resolve(text: str, folder: Path) -> Path:
-    return _tidy(folder / text)
+    path = _tidy(folder / text)
+    try:
+        path.exists()
+    except OSError as error:
+        raise SessionError(
+            f"session {folder}: expected the path of a file or folder, found {quoted(text)}, where the system says: "
+            f"{error.strerror}; correct it"
+        ) from error
+    return path

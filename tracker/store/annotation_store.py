@@ -37,6 +37,7 @@ class AnnotationStore:
 
         Raises:
             SessionError: the file is missing, not a store, or newer than this program.
+            DamagedStoreError: the file is not as it was written; the message names the backup to go back to.
         """
         self._connection = Connection(path, read_only)
         self._edits = edit_tree.EditTree(self._connection)
@@ -45,11 +46,16 @@ class AnnotationStore:
         """Release the file."""
         self._connection.close()
 
+    @property
+    def backup_error(self) -> str | None:
+        """Why there is no backup of the store as it was opened; None if there is one."""
+        return self._connection.backup_error
+
     def pose(self, person: str, frame: int) -> PoseRecord | None:
         """Return the pose of a person in a frame, or None."""
         row = self._connection.one(
             f"SELECT {rows.RECORD_COLUMNS} {rows.CURRENT_POSES} JOIN edits e ON e.id = c.edit "
-            "LEFT JOIN told t ON t.id = c.told WHERE p.person = ? AND p.frame = ?",
+            "LEFT JOIN program_settings t ON t.id = c.program_settings WHERE p.person = ? AND p.frame = ?",
             (person, frame),
         )
         return None if row is None else rows.row_to_record(row)
@@ -160,7 +166,7 @@ class AnnotationStore:
     def set_setting(self, key: str, value: Any) -> None:
         """Store a setting of the session. Settings are not part of the history."""
         with self._connection.transaction() as db:
-            db.execute("INSERT OR REPLACE INTO settings VALUES (?, ?)", (key, json.dumps(value)))
+            db.execute("INSERT OR REPLACE INTO settings (key, value) VALUES (?, ?)", (key, json.dumps(value)))
 
     def _within(self, columns: str, person: str, frames: range) -> list[Any]:
         """Select columns of the poses of a person within a range of frames, ascending."""

@@ -81,8 +81,8 @@ def _set_marks(db: sqlite3.Connection, edit: int, change: MarkChange) -> None:
 def _settings_record(db: sqlite3.Connection, settings: Mapping[str, Any]) -> int:
     """Return the id of the row of some settings. Equal settings share one row."""
     text = json.dumps(dict(settings))
-    db.execute("INSERT OR IGNORE INTO told (settings) VALUES (?)", (text,))
-    return int(db.execute("SELECT id FROM told WHERE settings = ?", (text,)).fetchone()[0])
+    db.execute("INSERT OR IGNORE INTO program_settings (settings) VALUES (?)", (text,))
+    return int(db.execute("SELECT id FROM program_settings WHERE settings = ?", (text,)).fetchone()[0])
 
 
 def _set_pin(db: sqlite3.Connection, edit: int, change: PinChange) -> None:

@@ -1,50 +1,57 @@
-"""The SQLite file of a store: opening, upgrading, transactions, queries."""
+"""The SQLite file of a store: opening with all checks, upgrading, transactions, queries."""
 
+import os
+import secrets
 import sqlite3
 import threading
-from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from tracker.errors import SessionError
-from tracker.store import schema
+from tracker.errors import DamagedStoreError, SessionError
+from tracker.files import refuse_links, sync_folder
+from tracker.store import backups, checksums, schema, verification
+
+_OF_THE_FILE = (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY)
+"""Primary codes of errors after which the file is opened again: its drive or folder may have gone away."""
 
 
 class Connection:
-    """A connection to the file of a store. Safe to use from several threads."""
+    """A connection to the file of a store. Safe to use from several threads.
+
+    If the session's folder goes away and comes back, the file is opened again, and must have the same content.
+    """
 
     def __init__(self, path: str | Path, read_only: bool = False) -> None:
-        """Open the file. Unless read only, create a missing one and upgrade an older one.
+        """Open the file. Unless read only, create a missing one, back it up if it has changed, upgrade an older one.
 
         Raises:
             SessionError: the file is missing, not a store, or newer than this program.
+            DamagedStoreError: the file is not as it was written.
         """
-        self._path = Path(path)
+        self._path, self._read_only = Path(path), read_only
         self._lock = threading.RLock()
-        if read_only and not self._path.is_file():
-            raise SessionError(f"annotations {path} not found; check the session folder")
-        mode = "ro" if read_only else "rwc"
+        self._is_suspect = False  # whether the file is opened again before it is written
+        self.backup_error: str | None = None
+        """Why there is no backup of the store as it was opened; None if there is one."""
         with self._errors():
-            self.db = sqlite3.connect(
-                f"{self._path.absolute().as_uri()}?mode={mode}",
-                uri=True,
-                isolation_level=None,  # transactions are explicit
-                check_same_thread=False,
-                timeout=10.0,
-            )
-            # No write-ahead log: it needs shared memory, which network drives lack. EXTRA syncs the folder's entry
-            # besides what FULL syncs; without it a power cut could restore the journal and lose the last commit.
-            self.db.execute("PRAGMA journal_mode = DELETE")
-            self.db.execute("PRAGMA synchronous = EXTRA")
-            self.db.execute("PRAGMA foreign_keys = ON")
-            version = self._prepare(read_only)
-        if version != schema.VERSION:
-            self.db.close()
-            what = "is not a store of annotations" if version == 0 else f"has version {version}"
-            raise SessionError(
-                f"annotations {path} {what}, this program reads up to version {schema.VERSION}; upgrade quadrille"
-            )
+            if not read_only:
+                name = self._path.name
+                refuse_links(self._path.parent, name, *(f"{name}-{e}" for e in ("journal", "wal", "shm")), "backups")
+                if not self._path.exists():
+                    if backups.backups_of(self._path):
+                        raise self._damaged("expected the poses of the session, found no such file")
+                    _create(self._path)
+            self.db = self._open()
+            try:
+                if not read_only:
+                    self.backup_error = backups.back_up(self.db, self._path)
+                self._prepare()
+            except BaseException:
+                self.db.close()
+                raise
+            self._note()
 
     def close(self) -> None:
         """Release the file."""
@@ -59,43 +66,177 @@ class Connection:
             SessionError: the file cannot be read or written.
         """
         with self._lock, self._errors():
+            self._reopen_moved(for_writing=True)
             self.db.execute("BEGIN IMMEDIATE")
             try:
                 yield self.db
+                contents = checksums.contents(self.db)
                 self.db.execute("COMMIT")
             except BaseException:
                 if self.db.in_transaction:  # a full disk may have ended it already
                     self.db.execute("ROLLBACK")
                 raise
+            self._contents = contents
 
     def one(self, sql: str, parameters: Sequence[Any]) -> Any:
         """Return the first row of a query, or None."""
-        with self._lock, self._errors():
-            return self.db.execute(sql, parameters).fetchone()
+        return self._read(lambda: self.db.execute(sql, parameters).fetchone())
 
     def all(self, sql: str, parameters: Sequence[Any]) -> list[Any]:
         """Return all rows of a query."""
-        with self._lock, self._errors():
-            return self.db.execute(sql, parameters).fetchall()
+        return self._read(lambda: self.db.execute(sql, parameters).fetchall())
 
-    def _prepare(self, read_only: bool) -> int:
-        """Create or upgrade the tables and return the version that the store then has.
+    def _read(self, query: Callable[[], Any]) -> Any:
+        with self._lock, self._errors():
+            self._reopen_moved(for_writing=False)
+            return query()
+
+    def _open(self) -> sqlite3.Connection:
+        """Open the file and check it.
+
+        Raises:
+            SessionError: as for the constructor.
+            sqlite3.Error: it cannot be read.
+            OSError: it cannot be read.
+        """
+        if not self._path.is_file():
+            raise SessionError(f"annotations {self._path} not found; check the session folder")
+        if self._path.stat().st_size == 0:
+            raise self._damaged("expected the poses of the session, found an empty file of 0 bytes")
+        db = _connect(self._path, "ro" if self._read_only else "rw")
+        try:
+            found = verification.damage(db)
+            if found is not None:
+                raise self._damaged(found)
+            version = schema.version(db)
+            if version > schema.VERSION:
+                raise SessionError(
+                    f"annotations {self._path} have version {version}, this program reads up to version "
+                    f"{schema.VERSION}; upgrade quadrille"
+                )
+        except BaseException:
+            db.close()
+            raise
+        return db
+
+    def _prepare(self) -> None:
+        """Upgrade an older store, and keep its checksums up to date from now on.
 
         An older store that is opened read only stays unchanged on the disk and is read as one of today's version.
         """
-        if read_only:
-            return schema.show_as_new(self.db)
-        version = schema.version(self.db)
-        if version < schema.VERSION:
-            with self.transaction() as db:  # all or nothing: a power cut leaves the older file
-                version = schema.upgrade(db)
-        return version
+        if self._read_only:
+            schema.show_as_new(self.db)
+            return
+        if schema.version(self.db) < schema.VERSION:
+            self.db.execute("BEGIN IMMEDIATE")  # all or nothing: a power cut leaves the older file
+            try:
+                schema.upgrade(self.db)
+                self.db.execute("COMMIT")
+            except BaseException:
+                if self.db.in_transaction:
+                    self.db.execute("ROLLBACK")
+                raise
+        checksums.watch(self.db)
+
+    def _note(self) -> None:
+        """Remember which file is open and what it holds."""
+        if not self._read_only:
+            self._file, self._contents = _identity(self._path), checksums.contents(self.db)
+
+    def _reopen_moved(self, for_writing: bool) -> None:
+        """Open the file again if there is another one in its place, as after its drive was away.
+
+        Raises:
+            SessionError: it is to be written and is not there, or has other content than the one that was open.
+        """
+        if self._read_only:
+            return
+        try:
+            is_other = _identity(self._path) != self._file
+        except OSError as error:
+            if not for_writing:
+                return  # what is open can be read for as long as the system lets it
+            raise SessionError(
+                f"annotations {self._path} are not there ({error.strerror}); bring the session's folder back"
+            ) from error
+        if not is_other and not (self._is_suspect and for_writing):
+            return
+        db = self._open()
+        if checksums.contents(db) != self._contents:
+            db.close()
+            if not for_writing:
+                return
+            raise SessionError(
+                f"annotations {self._path} are others than those that were opened; put the session's folder back as it "
+                "was, or open the session again"
+            )
+        self.db.close()
+        self.db = db
+        checksums.watch(db)
+        self._note()
+        self._is_suspect = False
+
+    def _damaged(self, found: str) -> DamagedStoreError:
+        known = backups.backups_of(self._path)
+        advice = (
+            f"run 'quadrille restore {self._path.parent}' to go back to the backup of {backups.time_of(known[0])}, "
+            "which keeps the damaged file"
+            if known
+            else "put a copy of the file in its place, or move it away to begin without poses"
+        )
+        return DamagedStoreError(f"annotations {self._path} are damaged: {found}; {advice}")
 
     @contextmanager
     def _errors(self) -> Generator[None, None, None]:
         try:
             yield
         except sqlite3.Error as error:
+            code = verification.primary_code(error)
+            if code in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB):
+                raise self._damaged(f"SQLite reports: {error}") from error
+            self._is_suspect |= code in _OF_THE_FILE
             raise SessionError(
                 f"annotations {self._path} cannot be read or written: {error}; check the disk and who has the file open"
             ) from error
+        except OSError as error:
+            raise SessionError(
+                f"annotations {self._path} cannot be read or written: {error.strerror}; check the disk and your rights"
+            ) from error
+
+
+def _connect(path: Path, mode: str) -> sqlite3.Connection:
+    """Open a file of SQLite; `mode` is `ro`, `rw` or `rwc`."""
+    db = sqlite3.connect(
+        f"{path.absolute().as_uri()}?mode={mode}",
+        uri=True,
+        isolation_level=None,  # transactions are explicit
+        check_same_thread=False,
+        timeout=10.0,
+    )
+    # No write-ahead log: it needs shared memory, which network drives lack. EXTRA syncs the folder's entry besides what
+    # FULL syncs; without it a power cut could restore the journal and lose the last commit.
+    db.execute("PRAGMA journal_mode = DELETE")
+    db.execute("PRAGMA synchronous = EXTRA")
+    db.execute("PRAGMA foreign_keys = ON")
+    checksums.register(db)
+    return db
+
+
+def _create(path: Path) -> None:
+    """Write an empty store. It appears complete: an empty file in its place was not left by a crash."""
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        with closing(_connect(temporary, "rwc")) as db:
+            db.execute("BEGIN IMMEDIATE")
+            schema.create(db)
+            db.execute("COMMIT")
+        temporary.rename(path)
+        sync_folder(path.parent)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    """Return the device and number of a file."""
+    status = os.stat(path)
+    return status.st_dev, status.st_ino

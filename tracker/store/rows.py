@@ -27,13 +27,29 @@ FRAME_ROW_COLUMNS = (
 FRAME_POSE_COLUMNS = "c.frame, c.numbers, c.cost_px, c.views_px, c.model_revision"
 """Columns that `row_to_frame_pose` reads."""
 WRITTEN_COLUMNS = (
-    "numbers, sources, keyframe, status, cost_px, model_revision, views_px, parts_px, remark, reviewed, told"
+    "numbers, sources, keyframe, status, cost_px, model_revision, views_px, parts_px, remark, reviewed, "
+    "program_settings"
 )
-"""Columns that `record_to_row` fills, and `told`, the id of the row of the settings."""
+"""Columns that `record_to_row` fills, and `program_settings`, the id of the row of the settings."""
 ALTERNATIVE_COLUMNS = "a.numbers, a.model_revision, a.cost_px"
 """Columns that `row_to_alternative` reads; `a` is the alternative."""
-UNMARKED_COLUMNS = "numbers, sources, status, cost_px, model_revision, views_px, parts_px, remark, told, settings"
+UNMARKED_COLUMNS = (
+    "numbers, sources, status, cost_px, model_revision, views_px, parts_px, remark, program_settings, settings"
+)
 """Columns that marking a pose copies unchanged."""
+
+
+def is_readable(numbers: Any, sources: Any) -> bool:
+    """Return whether a pose of a store without checksums can be read: its numbers and their sources, or neither."""
+    if numbers is None:
+        return True
+    return (
+        isinstance(numbers, bytes)
+        and isinstance(sources, bytes)
+        and len(numbers) == 8 * len(sources) > 0
+        and max(sources) < len(SOURCES)
+        and bool(np.isfinite(np.frombuffer(numbers, dtype="<f8")).all())
+    )
 
 
 def row_to_record(row: Sequence[Any]) -> PoseRecord:
@@ -75,7 +91,7 @@ def alternative_to_row(pose: Alternative) -> tuple[Any, ...]:
 
 
 def record_to_row(pose: PoseRecord) -> tuple[Any, ...]:
-    """Convert a pose to values of `WRITTEN_COLUMNS` except `told`."""
+    """Convert a pose to values of `WRITTEN_COLUMNS` except `program_settings`."""
     assert len(pose.sources) == len(pose.values)
     assert np.all(np.isfinite(pose.values))
     assert pose.status in STATUSES, pose.status

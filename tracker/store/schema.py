@@ -1,11 +1,15 @@
 """The tables of the store of annotations, and the upgrade of older versions.
 
-An upgrade adds tables and columns and never rewrites a row, because undo depends on the log of edits.
+An upgrade adds and renames tables and columns, and fills in checksums. It never changes what a row says, because undo
+depends on the log of edits.
 """
 
 import sqlite3
+from collections.abc import Sequence
 
-VERSION = 5
+from tracker.store import checksums
+
+VERSION = 6
 
 _SCHEMA = """
 CREATE TABLE edits (
@@ -24,7 +28,7 @@ CREATE TABLE moves (                                             -- undo and red
 CREATE TABLE model_revisions (
     id INTEGER PRIMARY KEY AUTOINCREMENT, person TEXT NOT NULL, toml TEXT NOT NULL, time TEXT NOT NULL
 );
-CREATE TABLE told (                                              -- settings of programs, shared by poses
+CREATE TABLE program_settings (                                  -- shared by the poses that were made with them
     id INTEGER PRIMARY KEY, settings TEXT NOT NULL UNIQUE
 );
 CREATE TABLE pose_changes (
@@ -35,10 +39,10 @@ CREATE TABLE pose_changes (
     numbers BLOB,                                                -- little-endian float64; NULL: cleared
     sources BLOB, keyframe INTEGER, status TEXT, cost_px REAL,
     model_revision INTEGER REFERENCES model_revisions,
-    settings TEXT,                                               -- of versions 1 and 2; NULL since: see told
+    settings TEXT,                                               -- of versions 1 and 2; NULL since
     views_px BLOB, parts_px BLOB,                                -- little-endian float64, NaN: unknown; NULL: none
     remark TEXT,
-    told INTEGER REFERENCES told,
+    program_settings INTEGER REFERENCES program_settings,
     reviewed INTEGER                                             -- NULL: written before version 4, not reviewed
 );
 CREATE INDEX pose_changes_edit ON pose_changes (edit);
@@ -65,6 +69,7 @@ CREATE TABLE pins (
 ) WITHOUT ROWID;
 CREATE TABLE settings (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 """
+"""The tables without their checksums, which `checksums.ADDED` adds."""
 
 _UPGRADES = {
     1: (
@@ -82,49 +87,62 @@ _UPGRADES = {
         "model_revision INTEGER NOT NULL REFERENCES model_revisions, numbers BLOB NOT NULL, cost_px REAL, "
         "PRIMARY KEY (change, rank)) WITHOUT ROWID",
     ),
+    5: (
+        "ALTER TABLE told RENAME TO program_settings",
+        "ALTER TABLE pose_changes RENAME COLUMN told TO program_settings",
+        *checksums.ADDED,
+    ),
 }
 """Statements that upgrade a store from each older version to the next."""
 _MISSING_COLUMNS = {
-    1: ("views_px", "parts_px", "remark", "told", "reviewed"),
-    2: ("told", "reviewed"),
-    3: ("reviewed",),
-    4: (),
+    1: ("views_px", "parts_px", "remark", "program_settings", "reviewed"),
+    2: ("program_settings", "reviewed"),
+    3: ("told AS program_settings", "reviewed"),
+    4: ("told AS program_settings",),
+    5: ("told AS program_settings",),
 }
-"""Columns of `pose_changes` that each older version lacks. A store opened read only is read through temporary views,
-which hide the tables of the same names."""
+"""Columns of `pose_changes` that each older version lacks or names differently. A store opened read only is read
+through temporary views, which hide the tables of the same names."""
 
 
 def version(db: sqlite3.Connection) -> int:
-    """Return the version of a store; 0 for an empty file."""
+    """Return the version of a store; 0 for another file."""
     return int(db.execute("PRAGMA user_version").fetchone()[0])
 
 
+def create(db: sqlite3.Connection) -> None:
+    """Create the tables of a new store in an empty file, within a transaction of the caller."""
+    _run(db, (*_SCHEMA.split(";\n"), *checksums.ADDED))
+
+
 def upgrade(db: sqlite3.Connection) -> int:
-    """Create the tables of a new store, or upgrade an older one, within a transaction of the caller.
+    """Upgrade an older store, within a transaction of the caller.
 
     Returns:
         The version that the store then has. It is newer than `VERSION` if a newer program has upgraded it meanwhile.
     """
     found = version(db)
-    if found > VERSION:
-        return found
-    statements = _SCHEMA.split(";\n") if found == 0 else [s for v in range(found, VERSION) for s in _UPGRADES[v]]
+    if found < VERSION:
+        _run(db, [s for v in range(found, VERSION) for s in _UPGRADES[v]])
+    return max(found, VERSION)
+
+
+def _run(db: sqlite3.Connection, statements: Sequence[str]) -> None:
     for statement in statements:
         db.execute(statement)
+    checksums.fill_in(db)
     db.execute(f"PRAGMA user_version = {VERSION}")
-    return VERSION
 
 
-def show_as_new(db: sqlite3.Connection) -> int:
-    """Make an older store readable like one of today's without writing to it; returns the version it reads as."""
+def show_as_new(db: sqlite3.Connection) -> None:
+    """Make an older store readable like one of today's without writing to it."""
     found = version(db)
-    if found not in _MISSING_COLUMNS:
-        return found
-    if _MISSING_COLUMNS[found]:
-        nulls = ", ".join(f"NULL AS {column}" for column in _MISSING_COLUMNS[found])
-        db.execute(f"CREATE TEMP VIEW pose_changes AS SELECT *, {nulls} FROM main.pose_changes")
-    nulls = ", ".join(f"NULL AS {column}" for column in ("change", "rank", "model_revision", "numbers", "cost_px"))
-    db.execute(f"CREATE TEMP VIEW alternatives AS SELECT {nulls} WHERE 0")
-    if "told" in _MISSING_COLUMNS[found]:
-        db.execute("CREATE TEMP VIEW told AS SELECT NULL AS id, NULL AS settings WHERE 0")
-    return VERSION
+    if found == VERSION:
+        return
+    added = ", ".join(c if " AS " in c else f"NULL AS {c}" for c in _MISSING_COLUMNS[found])
+    db.execute(f"CREATE TEMP VIEW pose_changes AS SELECT *, {added} FROM main.pose_changes")
+    if found < 5:
+        nulls = ", ".join(f"NULL AS {column}" for column in ("change", "rank", "model_revision", "numbers", "cost_px"))
+        db.execute(f"CREATE TEMP VIEW alternatives AS SELECT {nulls} WHERE 0")
+    programs = "SELECT NULL AS id, NULL AS settings WHERE 0" if found < 3 else "SELECT * FROM main.told"
+    db.execute(f"CREATE TEMP VIEW program_settings AS {programs}")

@@ -47,8 +47,8 @@ class Alternatives:
             whose = f" of {names}" if len(session_state.session.people) > 1 else ""
             label = f"take alternative pose{whose}, frame {session_state.state.frame}"
             session_state.saver.write(label, changes, None, by_program=False)
-            session_state.refresh_saving()
             session_state.show_frame(session_state.state.frame)
+            session_state.refresh_saving()
 
     def _stored(self) -> dict[int, tuple[Alternative, ...]]:
         """Return the alternatives of the frame by person, without people who have none."""

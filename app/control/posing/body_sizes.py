@@ -139,8 +139,8 @@ class BodySizeEditing:
                 saver.store_setting(_KEY, {**saver.setting(_KEY, {}), **change})
             off = f", joints {refitted.off_m * 1000:.0f} mm off on average" if n else ""
             self._runs.clear()
-            session_state.refresh_saving()
             session_state.show_frame(session_state.state.frame, draft=None, sizes_message=f"Applied{outcome}{off}.")
+            session_state.refresh_saving()
 
     def follow(self) -> None:
         """Restore the bodies that belong to the present entry of the history, after a move.

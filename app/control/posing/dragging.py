@@ -149,6 +149,8 @@ class Dragging:
         has_moved = not np.array_equal(grab.pose, session_state.state.poses[drag.person])
         if has_moved or session_state.open_edit_owner is grab:
             session_state.save(f"drag {display_name(drag.point)}", "manual", grab)
+        elif not session_state.is_shown_stored(session_state.state):
+            session_state.show_frame(session_state.state.frame)  # moved back: the pose has its former source
         self._gesture_grab = self._mode_grab = session_state.open_edit_owner = None
         session_state.set(drag=None, **session_state.costs(session_state.state.poses))
 

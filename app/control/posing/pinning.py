@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.control.session.activities import Activities
-from app.control.session.session_state import SessionState
+from app.control.session.session_state import Pins, SessionState
 from app.state.people import ShownPose
 from tracker.body.limbs import display_name
 from tracker.body.model import PosedBody
@@ -17,8 +17,6 @@ from tracker.posing.pinned_fit import fit_frame
 
 _CHECKPOINT_S = 1.0
 """A long drag of a pin is saved at least this often."""
-
-Pins = tuple[tuple[PointObservation, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)

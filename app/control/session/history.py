@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
+from tracker.errors import TrackerError
 from tracker.store.records import HistoryEntry
 
 
@@ -60,9 +61,12 @@ class History:
             here = self._session_state.state.frame
             try:
                 changed = move()
-            finally:
+            except TrackerError:
                 self._session_state.refresh_saving()
+                raise
+            self._session_state.note_moved()
             try:
                 self._follow()
             finally:
                 self._session_state.show_frame(min(changed, key=lambda frame: abs(frame - here), default=here))
+                self._session_state.refresh_saving()

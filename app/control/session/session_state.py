@@ -14,6 +14,7 @@ from app.state.people import ShownPose
 from app.state.state import Costs, ShownFrame, State, StateChanges, finite_or_none
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel
+from tracker.errors import TrackerError
 from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
@@ -24,6 +25,8 @@ from tracker.session.locked_dofs import active_dofs
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import pose_cost
 
+Pins = tuple[tuple[PointObservation, ...], ...]
+"""The pins of each person on a frame."""
 _APART_M = 0.9
 """Distance between people who are not placed yet, metres: each can be seen and dragged by itself."""
 
@@ -43,6 +46,9 @@ class SessionState:
         self.lock = threading.RLock()
         self.set_default_poses(up_rotation(session.up, session.floor))
         self._subscribers: list[Callable[[State], None]] = []
+        self._stored: tuple[tuple[ShownPose, ...], Pins] | None = None  # the shown poses and pins that are on disk
+        self.unwritten: list[Callable[[], bool]] = []
+        """Functions that tell whether a part of the controller holds poses that it has not saved yet."""
         self._edit: int | None = None  # the entry of the history that the current gesture amends
         self.open_edit_owner: object = None
         """The gesture whose next save amends the last entry of the history; None if a save makes a new entry."""
@@ -51,6 +57,7 @@ class SessionState:
         unlocked = (frozenset[int](),) * len(session.people)
         shown = self._load(0)
         self.state = State(frame=0, pins=self._load_pins(0), locked=unlocked, **shown)
+        self.note_stored()
         self.refresh_saving()
         self.frames.request(0, self._evidence_ready)
 
@@ -112,12 +119,16 @@ class SessionState:
         return unsubscribe
 
     def set(self, **changes: Unpack[StateChanges]) -> None:
-        """Change fields of the state and call the views. A new frame brings its pins unless they are given."""
+        """Change fields of the state and call the views. A new frame brings its pins unless they are given.
+
+        Whether all is saved follows from the other fields: no path that edits can forget it.
+        """
         with self.lock:
             frame = changes.get("frame", self.state.frame)
             if frame != self.state.frame and "pins" not in changes:
                 changes["pins"] = self._load_pins(frame)
-            self.state = replace(self.state, **changes)
+            state = replace(self.state, **changes)
+            self.state = replace(state, saved=self._is_saved(state))
             for view in list(self._subscribers):
                 view(self.state)
 
@@ -129,6 +140,7 @@ class SessionState:
         loaded: StateChanges = {"frame": frame, "pins": self._load_pins(frame), **shown, **costs}
         no_gesture: StateChanges = {"drag": None, "is_pin_held": False}
         after: StateChanges = {**loaded, **no_gesture, **changes}
+        self._stored = loaded["people"], loaded["pins"]
         self.set(**after)
         self.request_evidence()
 
@@ -179,8 +191,8 @@ class SessionState:
         """Show the frame as it was before a gesture, and undo what was saved of the gesture."""
         if self.open_edit_owner is gesture:
             self.saver.undo()
-            self.refresh_saving()
         self.show_frame(self.state.frame)
+        self.refresh_saving()
 
     def save(self, label: str, source: str, gesture: object = None) -> None:
         """Save the shown poses.
@@ -194,12 +206,39 @@ class SessionState:
         amend = self._edit if goes_on else None
         self._edit = self.saver.save(self.state, label, source, amend)
         self.open_edit_owner, self.last_save = gesture, time.monotonic()
+        self.note_stored()
         self.refresh_saving()
+
+    def note_stored(self) -> None:
+        """Note that the saver has the shown poses and pins; those that it cannot write wait in its queue."""
+        self._stored = self.state.people, self.state.pins
+
+    def note_moved(self) -> None:
+        """Note that the stored poses of the shown frame may have changed; `show_frame` shows them."""
+        self._stored = None
 
     def refresh_saving(self) -> None:
         """Bring what the state says of the history and the disk up to date."""
-        undo, redo = self.saver.undo_label(), self.saver.redo_label()
-        self.set(undo=undo, redo=redo, save_error=self.saver.error, timeline_version=self.saver.index.version)
+        undo, redo, error = self.state.undo, self.state.redo, self.saver.error
+        try:
+            undo, redo = self.saver.undo_label(), self.saver.redo_label()
+        except TrackerError as unreadable:  # its drive may be gone: edits wait in the queue
+            error = error or str(unreadable)
+        self.set(undo=undo, redo=redo, save_error=error, timeline_version=self.saver.index.version)
+
+    def is_shown_stored(self, state: State) -> bool:
+        """Return whether the saver has the poses and pins that a state shows; drafts need not be stored."""
+        if self._stored is None or state.pins != self._stored[1]:
+            return False
+        pairs = zip(state.people, self._stored[0], strict=True)
+        return all(shown is stored or shown.source is None for shown, stored in pairs)
+
+    def _is_saved(self, state: State) -> bool:
+        return (
+            self.saver.error is None
+            and self.is_shown_stored(state)
+            and not any(is_unwritten() for is_unwritten in self.unwritten)
+        )
 
     def _load(self, frame: int) -> ShownFrame:
         """Return the stored poses of a frame; a person without one is shown in the pose of the nearest frame."""

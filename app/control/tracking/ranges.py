@@ -194,10 +194,12 @@ class Ranges:
                 return
             run.edit = session_state.saver.write(run.label, piece, run.edit, run.by_program)
             done = session_state.state.ranges
-            session_state.set(ranges=replace(done, done=done.done + len(piece)))
-            session_state.refresh_saving()
+            done = replace(done, done=done.done + len(piece))
             if any(c.frame == session_state.state.frame for c in piece):
-                session_state.show_frame(session_state.state.frame)
+                session_state.show_frame(session_state.state.frame, ranges=done)
+            else:
+                session_state.set(ranges=done)
+            session_state.refresh_saving()
 
     def _ended(self, run: _Run, error: Exception | None) -> None:
         with self._session_state.lock:

@@ -45,11 +45,9 @@ class _SaverSink:
         self._session_state = session_state
 
     def write(self, label: str, changes: Sequence[PoseChange], edit: int | None) -> int | None:
-        """See `Sink.write`. If writing fails, the state shows the reason."""
-        found = self._session_state.saver.write(label, changes, edit, by_program=True)
+        """See `Sink.write`. What cannot be written waits in the saver's queue."""
         self._session_state.last_save = time.monotonic()
-        self._session_state.refresh_saving()
-        return found
+        return self._session_state.saver.write(label, changes, edit, by_program=True)
 
 
 class Tracking:
@@ -65,6 +63,7 @@ class Tracking:
         self._session_state, self._activities = session_state, activities
         activities.add_job(self, on_shown_frame=True)
         self._run: _Run | None = None
+        session_state.unwritten.append(lambda: self._run is not None and self._run.session.has_unsaved)
 
     @property
     def running(self) -> bool:
@@ -151,7 +150,7 @@ class Tracking:
         """Save the results of the run, so that every tracked frame can be shown."""
         with self._session_state.lock:
             if self._run is not None:
-                self._run.session.save()
+                self._save(self._run)
 
     def follow(self, follow: bool) -> None:
         """Show each frame as it is tracked, beginning with the last one; or keep the shown frame."""
@@ -183,6 +182,7 @@ class Tracking:
                 run.session.take(step)
                 if isinstance(step, BackwardStep):
                     self._show_improved(run, step, seconds)
+                    self._session_state.refresh_saving()
                 else:
                     self._show_tracked(run, step, seconds)
 
@@ -194,12 +194,14 @@ class Tracking:
             worst = Counter(confidence.worst([f.statuses[i] for i in run.subjects.tracked]) for f in tracked.values())
             track = replace(track, doubtful=worst["doubtful"], lost=worst["lost"])
         steps = len(tracked) + step.done
-        session_state.set(track=replace(
+        track = replace(
             track, running=run.job.running, back=True, done=step.done, total=step.total,
             per_second=steps / max(1e-6, seconds),
-        ))  # fmt: skip
+        )  # fmt: skip
         if session_state.state.frame in {found.frame for found in step.better}:
-            session_state.show_frame(session_state.state.frame, follow=session_state.state.follow)
+            session_state.show_frame(session_state.state.frame, follow=session_state.state.follow, track=track)
+        else:
+            session_state.set(track=track)
 
     def _show_tracked(self, run: _Run, found: PoseEstimate, seconds: float) -> None:
         """Show the progress of the first pass, and the frame if it is shown or followed."""
@@ -218,7 +220,7 @@ class Tracking:
         else:
             session_state.set(track=track)
         if time.monotonic() - session_state.last_save > _SAVE_S:
-            run.session.save()
+            self._save(run)
 
     def _found(self, run: _Run, found: PoseEstimate) -> StateChanges:
         """Return the fields of the state that show a tracked frame."""
@@ -246,7 +248,7 @@ class Tracking:
     def _paused(self, run: _Run) -> None:
         with self._session_state.lock:
             if run is self._run:
-                run.session.save()
+                self._save(run)
                 self._session_state.set(track=replace(self._session_state.state.track, running=False))
                 self._session_state.request_evidence()
 
@@ -262,8 +264,14 @@ class Tracking:
             self._end(run, how, error is not None)
             self._session_state.request_evidence()
 
-    def _end(self, run: _Run, how: str, failed: bool = False) -> None:
+    def _save(self, run: _Run) -> None:
+        """Save the tracked frames; a shown frame of the run is one of them."""
         run.session.save()
+        self._session_state.note_stored()
+        self._session_state.refresh_saving()
+
+    def _end(self, run: _Run, how: str, failed: bool = False) -> None:
+        self._save(run)
         track = self._session_state.state.track
         self._run = None
         self._session_state.set(

@@ -10,7 +10,8 @@ from app.control.session.session_state import SessionState
 from app.state.floor_picking import FloorState, Picking, with_mark, with_next, without_last
 from tracker.errors import TrackerError
 from tracker.geometry.ground_plane import GroundPlane, nearest_axis, up_rotation
-from tracker.session.session import UPS, save_floor
+from tracker.session.session import save_floor
+from tracker.session.session_file import UPS
 
 _KEY = "former_floor"
 """Setting of the session: the floor before the one that is set."""

@@ -104,11 +104,22 @@ def test_the_baseline_knows_every_row():
     assert 0 < kept["tolerance"] < 1
 
 
-@pytest.mark.parametrize("text", ["", "[]", '{"tolerance": 0.3}', '{"tolerance": 0.3, "ratios": {"a": "fast"}}'])
-def test_a_malformed_baseline(tmp_path, text):
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", "not valid JSON"),
+        ("[" * 100_000, "not valid JSON"),
+        ("[]", "a group of keys"),
+        ('{"tolerance": 0.3}', "the key 'ratios'"),
+        ('{"tolerance": 1e300, "ratios": {}}', "as 'tolerance', found 1e"),
+        ('{"tolerance": 0.3, "ratios": {"a": "fast"}}', "as 'ratios'"),
+    ],
+    ids=lambda text: text[:20],
+)
+def test_a_malformed_baseline(tmp_path, text, expected):
     path = tmp_path / "kept.json"
     path.write_text(text)
-    with pytest.raises(TrackerError, match=r"expected a baseline with tolerance and ratios in .*kept\.json"):
+    with pytest.raises(TrackerError, match=rf"baseline .*kept\.json.*{expected}"):
         report.read_baseline(path)
 
 

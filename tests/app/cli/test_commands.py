@@ -68,7 +68,9 @@ def test_new_info_init_track_evaluate(run, tmp_path):
     _, out, _ = run("evaluate", s, "--reference", SAMPLE / "truth.csv")
     assert "MPJPE" in out
     assert "part axes" in out
-    assert sorted(p.name for p in s.iterdir()) == ["annotations.sqlite", "calibration.toml", "models", "session.toml"]
+    assert sorted(p.name for p in s.iterdir()) == [
+        "annotations.sqlite", "backups", "calibration.toml", "models", "session.toml",
+    ]  # fmt: skip
 
 
 def test_tracking_leaves_keyframes_and_can_be_undone(run, session):

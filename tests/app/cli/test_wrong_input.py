@@ -127,7 +127,13 @@ joints = [{ name = "root", child = "trunk", free = true }, { name = "hinge", par
         (["--offset", "left=one"], ["--offset as NAME=VALUE", "'left=one'"]),
         (["--height", "tall"], ["--height", "'tall'"]),
         (["--height", "17.5"], ["0.3 to 3 metres"]),
-        (["--people", "a", "a"], ["more than one person is named 'a'"]),
+        (["--height", "nan"], ["0.3 to 3 metres", "nan"]),
+        (["--offset", "left=" + "9" * 30], ["a whole number of frames", "check the footage and the offsets", "-9999"]),
+        (["--fps", "0"], ["a frame rate above 0"]),
+        (["--fps", "nan"], ["a frame rate above 0"]),
+        (["--model", "ROOM/latin.toml"], ["body model", "latin.toml", "expected UTF-8 text"]),
+        (["--model", "ROOM/large.toml"], ["large.toml", "at most 0.5 MB"]),
+        (["--people", "a", "a"], ["a name of its own for each person, found more than one 'a'"]),
         (["--background", "nowhere"], ["'front'", "nowhere"]),
         (["--model", "gavrila23"], ["gavrila23", "gavrila22"]),
         (["--model", "ROOM/loop.toml"], ["loop"]),
@@ -138,6 +144,8 @@ joints = [{ name = "root", child = "trunk", free = true }, { name = "hinge", par
 def test_wrong_options(run, room, more, expected):
     (room / "loop.toml").write_text(MODEL.replace("PARENT", "arm"))
     (room / "orphan.toml").write_text(MODEL.replace("PARENT", "tail"))
+    (room / "latin.toml").write_bytes(MODEL.replace("odd", "größe").encode("latin-1"))
+    (room / "large.toml").write_text(f"a = [{'0,' * 10_000_000}]")
     before = sorted(room.iterdir())
     assert_refused(run(*new(room, *[w.replace("ROOM", str(room)) for w in more])), expected)
     assert sorted(room.iterdir()) == before

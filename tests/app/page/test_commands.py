@@ -7,9 +7,9 @@ from gestures import PAGE
 
 from app.control.posing import dragging
 from app.control.session import session_state
-from app.page.client_messages import Drag, FitPose, LockDofs, Nudge, SetDof
 from app.page.commands import dispatch
 from app.page.message_parsing import MessageError
+from app.page.pose_messages import Drag, FitPose, LockDofs, Nudge, SetDof
 
 
 def drag_to(u, phase, seq):

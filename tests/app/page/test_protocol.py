@@ -2,9 +2,10 @@
 
 from typing import get_args
 
+import msgspec
 import pytest
 
-from app.page import client_messages, protocol_docs, socket
+from app.page import client_messages, pose_messages, protocol_docs, socket
 from app.page.client_messages import CLIENT_MESSAGES
 from app.page.commands import COMMANDS
 from app.page.message_parsing import MessageError, parse
@@ -30,7 +31,7 @@ def test_every_message_is_carried_out():
 
 def test_messages_of_one_type_differ_by_action():
     message = parse('{"type":"pose","action":"copy","frame":2,"person":1,"from":3}')
-    assert message == client_messages.CopyFrame(frame=2, person=1, action="copy", source=3)
+    assert message == pose_messages.CopyFrame(frame=2, person=1, action="copy", source=3)
     assert parse('{"type":"track","action":"pause"}') == client_messages.ControlTracking("pause")
     for action in get_args(client_messages.RangeAction):
         assert parse(f'{{"type":"range","action":"{action}","first":1,"last":2}}').action == action
@@ -39,36 +40,36 @@ def test_messages_of_one_type_differ_by_action():
 def test_settings_left_out_are_not_changed():
     changes = parse('{"type":"search_settings","changes":{"theta_px":null}}').changes
     assert changes.theta_px is None
-    assert changes.patience is client_messages.UNSET
+    assert changes.patience is msgspec.UNSET
 
 
 @pytest.mark.parametrize(
     ("text", "expected", "found"),
     [
-        ('{"frame":3}', "a field 'type'", "a message without it"),
+        ('{"frame":3}', "the key 'type'", "none"),
         ('{"type":"fly"}', "a type of message", "'fly'"),
-        ("[]", "object", "array"),
+        ("[]", "a group of keys", "[]"),
         ("", "a message in JSON", "0 bytes"),
-        ('{"type":"seek"}', "a field 'frame'", "a message without it"),
-        ('{"type":"seek","frame":-1}', "int >= 0 as 'frame'", "-1"),
-        ('{"type":"seek","frame":2.5}', "int as 'frame'", "2.5"),
-        ('{"type":"seek","frame":"two"}', "int as 'frame'", "'two'"),
-        ('{"type":"seek","frame":1e400}', "a finite number as 'frame'", "one out of range"),
-        ('{"type":"seek","frame":99999999999999999999}', "int <= 2147483648 as 'frame'", "99999999999999999999"),
+        ('{"type":"seek"}', "the key 'frame'", "none"),
+        ('{"type":"seek","frame":-1}', "a whole number >= 0 as 'frame'", "-1"),
+        ('{"type":"seek","frame":2.5}', "a whole number as 'frame'", "2.5"),
+        ('{"type":"seek","frame":"two"}', "a whole number as 'frame'", "'two'"),
+        ('{"type":"seek","frame":1e400}', "a finite number as 'frame'", "a number out of range"),
+        ('{"type":"seek","frame":99999999999999999999}', "a whole number <= 2147483648 as 'frame'", "9999999999999999"),
         ('{"type":"seek","frame":Infinity}', "a message in JSON", "32 bytes"),
         ('{"type":"seek","frame":NaN}', "a message in JSON", "27 bytes"),
-        ('{"type":"seek","frame":1,"then":2}', "no field beyond docs/protocol.md", "'then'"),
-        (DRAG % "1e400", "a finite number as 'u'", "one out of range"),
-        (DRAG % "1e300", "float <= 1000000000.0 as 'u'", "1e+300"),
+        ('{"type":"seek","frame":1,"then":2}', "only type, frame as keys", "'then'"),
+        (DRAG % "1e400", "a finite number as 'u'", "a number out of range"),
+        (DRAG % "1e300", "a number <= 1000000000.0 as 'u'", "1e+300"),
         ('{"type":"pose","action":"fold","frame":2,"person":0}', "'set' or 'turn'", "'fold'"),
         ('{"type":"search"}', "as action of 'search'", "None"),
-        ('{"type":"search","action":[1]}', "str | null as 'action'", "[1]"),
+        ('{"type":"search","action":[1]}', "text or nothing as 'action'", "[1]"),
         ('{"type":"curves","group":"ears"}', "as 'group'", "'ears'"),
-        ('{"type":"search_settings","changes":{"passes":[1,"a"]}}', "float as 'changes.passes[1]'", "'a'"),
-        ('{"type":"select","person":0,"point":"%s"}' % ("x" * 300), "str of length <= 200 as 'point'", "'xxx"),
+        ('{"type":"search_settings","changes":{"passes":[1,"a"]}}', "a number as 'changes.passes[1]'", "'a'"),
+        ('{"type":"select","person":0,"point":"%s"}' % ("x" * 300), "text of length <= 200 as 'point'", "'xxx"),
         (b'{"type":"\xff"}', "a message in JSON", "12 bytes"),
         ('{"type":"\\ud800"}', "a message in JSON", "17 bytes"),
-        ("[" * 100_000, "object", "array"),
+        ("[" * 100_000, "a group of keys", "None"),
         ('{"type":"seek","frame":' + "[" * 100_000, "a message in JSON", "100023 bytes"),
     ],
 )  # fmt: skip

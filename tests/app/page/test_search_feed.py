@@ -27,7 +27,9 @@ async def test_figures_of_a_search_come_at_a_readable_rate_and_its_steps_at_once
         assert len(steps) > 3
         assert sum(m["count"] for m in steps) >= lists[-1]["runs"][0]["steps"] - 1
         if readable_s:
-            assert (len(at_work), len(lists)) == (1, 2)  # that it has begun, and how it ended
+            # That it has begun, with its first steps, and how it ended.
+            assert len(at_work) in (1, 2)
+            assert len(lists) in (2, 3)
         else:
             assert len(at_work) > 3
             assert len(lists) > 3

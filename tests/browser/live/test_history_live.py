@@ -87,7 +87,7 @@ async def test_the_history_is_gone_along_also_after_a_restart(tabs, program):
     row = page.locator("#history-list button", has_text="frame 6")
     await row.click()
     await shows(page, "quadrille.state.state.redo === 'drag left wrist, frame 7'")
-    assert "frame 6" in await page.locator("#history-list [aria-current]").inner_text()
+    await shows(page, "document.querySelector('#history-list [aria-current]')?.innerText.includes('frame 6')")
     port = program.address.rstrip("/").rpartition(":")[2]
     await program.stop()
     await shows(page, "!quadrille.state.connected")

@@ -153,6 +153,13 @@ def test_same_rate_keeps_the_rows():
     assert at_rate(same, 59.95) is same
 
 
+def test_a_tiny_file_with_far_frames_is_not_resampled_to_gigabytes():
+    table = line(2, 0.001)
+    table.frames[1] = 10_000_000
+    with pytest.raises(FormatError, match="found 1000000000001 frames of 1 points; correct the file's DataRate"):
+        at_rate(table, 100.0)
+
+
 def test_missing_values_do_not_spread_over_rows_that_are_there():
     source = line(5, 60)
     source.points[3] = np.nan

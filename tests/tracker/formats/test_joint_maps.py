@@ -76,9 +76,9 @@ def test_joint_map_file(tmp_path):
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ('left_foot = "A"', "found left_foot"),
+        ('left_foot = "A"', "found 'left_foot'"),
         ("", "found none"),
-        ("left_hip = 3", "name of a marker for 'left_hip', found 3"),
+        ("left_hip = 3", "a name .* as 'left_hip', found 3"),
         ("left_hip =", "line 1"),
     ],
 )

@@ -80,11 +80,16 @@ def test_first_frame_is_kept_by_a_blank_row(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "units", "expected"),
     [
-        ("1\t0\t1\t2\t3\t4\t5\t6\t7\n", "m", "line 6: expected 8 columns for 2 points, found 9"),
+        ("1\t0\t1\t2\t3\t4\t5\t6\t7\n", "m", "line 6: expected 8 columns, found 9"),
         ("1\t0\t1\t2\t3\t4\t5\t6\n2\t0.1\tx\n", "m", "line 7: expected numbers.*'x'"),
         ("\t0\t1\t2\t3\t4\t5\t6\n", "m", "line 6"),
         ("1.5\t0\t1\t2\t3\t4\t5\t6\n", "m", "line 6"),
-        ("2\t0\t1\n1\t0\t1\n", "m", "expected Frame# to rise"),
+        ("2\t0\t1\n1\t0\t1\n", "m", "line 7: expected frame numbers that rise"),
+        ("1e300\t0\t1\n", "m", "line 6: expected a whole frame number of at most 10000000 first, found '1e300'"),
+        ("nan\t0\t1\n", "m", "line 6: expected a whole frame number"),
+        ("1\n", "m", "line 6: expected 8 columns, found 1"),
+        ("1\tinf\t1\n", "m", "line 6, column 2: expected a finite number"),
+        ("1\t0\t1\t2\t3\n2\t0\t1\tinf\t3\n", "m", "line 7, column 4: expected a finite number .*found inf"),
         ("", "m", "no rows"),
         ("1\t0\t1\t2\t3\t4\t5\t6\n", "feet", "line 3: expected Units.*'feet'"),
     ],
@@ -97,14 +102,24 @@ def test_malformed(write, rows, units, expected):
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("Heel", "Knee", "line 4: expected point names, each once"),
-        ("50\t50\t2", "fast\t50\t2", "line 3: expected a DataRate above 0, found 'fast'"),
+        ("Heel", "Knee", "line 4: expected 1 to 1000 point names, each once"),
+        ("50\t50\t2", "fast\t50\t2", "line 3, DataRate: expected a frame rate above 0.*found 'fast'"),
+        ("50\t50\t2", "1e-300\t50\t2", "line 3, DataRate"),
+        ("50\t50\t2", "inf\t50\t2", "line 3, DataRate"),
+        ("Knee", "\t\t\t".join(f"p{i}" for i in range(1001)), "line 4: expected 1 to 1000 point names"),
         ("PathFileType", "Path", "not a TRC file"),
     ],
 )
 def test_malformed_header(write, old, new, expected):
     with pytest.raises(FormatError, match=expected):
         read_trc(write("1\t0\t1\t2\t3\t4\t5\t6\n", header=HEADER.replace(old, new, 1)))
+
+
+def test_few_short_rows_of_many_points_are_refused_before_they_fill_the_memory(write, monkeypatch):
+    monkeypatch.setattr("tracker.formats.number_rows.MAX_VALUES", 10_000)
+    names = "\t\t\t".join(f"p{i}" for i in range(1000))
+    with pytest.raises(FormatError, match="line 9: expected at most 10000 values, found more"):
+        read_trc(write("".join(f"{k}\t0\n" for k in range(9)), header=HEADER.replace("Knee\t\t\tHeel", names)))
 
 
 def test_missing(tmp_path):

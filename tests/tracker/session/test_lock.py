@@ -82,8 +82,27 @@ def test_release_leaves_a_lock_that_was_taken_over(tmp_path):
     assert (tmp_path / LOCK_FILE).exists()
 
 
-def test_unreadable_lock(tmp_path):
-    (tmp_path / LOCK_FILE).write_text("{")
+ODD = ["7", 10**30, -1, 0, 2**31, 1.5, float("inf"), True, None, [[7]], {}, "x" * 20_000]
+
+
+@pytest.mark.parametrize("process", ODD, ids=lambda p: str(p)[:9])
+def test_lock_with_an_odd_process(tmp_path, process):
+    """Such a number is never handed to the system, which would signal a group of processes or overflow."""
+    SessionLock(tmp_path).acquire()
+    change(tmp_path, process=process)
+    with pytest.raises(SessionError, match="cannot be read"):
+        SessionLock(tmp_path).acquire()
+
+
+DAMAGED = [
+    *(b"{", b"", b"7", b"null", b"\xff\xfe", b'{"process": 1e400}', bytes(20_000)),
+    *(b"[" * 100_000, b"[" * 9_000, b'{"host":' * 1_200),
+]
+
+
+@pytest.mark.parametrize("data", DAMAGED, ids=lambda d: str(d[:9]))
+def test_unreadable_lock(tmp_path, data):
+    (tmp_path / LOCK_FILE).write_bytes(data)
     with pytest.raises(SessionError, match="cannot be read"):
         SessionLock(tmp_path).acquire()
 
@@ -91,3 +110,17 @@ def test_unreadable_lock(tmp_path):
 def test_missing_folder(tmp_path):
     with pytest.raises(SessionError, match="cannot write"):
         SessionLock(tmp_path / "none").acquire()
+
+
+def test_a_program_with_an_odd_name_has_a_start_time(tmp_path):
+    """The kernel's list of processes has its name in whatever bytes it has."""
+    odd = tmp_path / "sl\udceeep"
+    odd.symlink_to("/bin/sleep")
+    process = subprocess.Popen([os.fsencode(odd), "60"])
+    try:
+        SessionLock(tmp_path).acquire()
+        change(tmp_path, process=process.pid, started="1")
+        SessionLock(tmp_path).acquire()  # the number was used again: its start time was read
+    finally:
+        process.kill()
+        process.wait()

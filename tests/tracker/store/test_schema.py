@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tracker.errors import SessionError
+from tracker.errors import DamagedStoreError, SessionError
 from tracker.store import schema
 from tracker.store.annotation_store import AnnotationStore
+from tracker.store.backups import backups_of
 from tracker.store.records import Alternative, MarkChange, Pin, PoseChange, PoseRecord
 from tracker.store.schema import VERSION
 
@@ -59,6 +60,42 @@ def version_3(path):
 def version_4(version_3):
     """The same store as the program of version 4 has left it, one pose reviewed."""
     return upgraded(version_3, 3, "UPDATE pose_changes SET reviewed = 1 WHERE frame = 3")
+
+
+@pytest.fixture
+def version_5(version_4):
+    """The same store as the program of version 5 has left it, one pose with an alternative."""
+    numbers = np.array([3.5, 2.0]).tobytes().hex()
+    return upgraded(version_4, 4, f"INSERT INTO alternatives VALUES (3, 0, 1, X'{numbers}', 2.0)")
+
+
+@pytest.mark.parametrize("read_only", [False, True])
+def test_in_version_5_there_were_no_checksums(version_5, read_only):
+    before = version_5.read_bytes()
+    store = AnnotationStore(version_5, read_only=read_only)
+    assert xs(store) == {1: store.pose("ann", 1).values[0], 2: 2.0, 3: 3.0}
+    assert (store.pose("ann", 2).settings, store.pose("ann", 3).reviewed) == ({"step_deg": 5}, True)
+    assert [a.cost_px for a in store.alternatives("ann", 3)] == [2.0]
+    store.close()
+    assert (version_5.read_bytes() == before) == read_only
+
+
+def test_a_store_of_version_5_is_backed_up_as_it_was_and_then_checked(version_5):
+    store = AnnotationStore(version_5)
+    (backup,) = backups_of(version_5)
+    with closing(sqlite3.connect(backup)) as db:
+        assert schema.version(db) == 5
+    assert store.undo() == "track"
+    store.close()
+    with closing(sqlite3.connect(version_5)) as db:
+        columns = "SELECT name FROM pragma_table_info('pose_changes')"
+        names = [n for (n,) in db.execute(f"SELECT name FROM sqlite_master UNION {columns}")]
+        assert "program_settings" in names
+        assert "told" not in names
+        db.execute("UPDATE pose_changes SET keyframe = 1 - keyframe WHERE frame = 1")
+        db.commit()
+    with pytest.raises(DamagedStoreError, match="ann, frame 1"):
+        AnnotationStore(version_5)
 
 
 @pytest.mark.parametrize("read_only", [False, True])

@@ -1,0 +1,90 @@
+"""`quadrille restore`: go back to a backup of a damaged store."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from app.cli.arguments import SessionArg
+from app.cli.json_output import format_json
+from tracker.errors import DamagedStoreError, SessionError
+
+if TYPE_CHECKING:
+    from tracker.store.backups import Restored
+
+
+def command(session: SessionArg, /, backup: str | None = None, json: bool = False) -> None:
+    """Go back to a backup of the annotations, if they are damaged.
+
+    Each opening that finds the annotations as they were written keeps a backup of them in the folder `backups` of the
+    session, the last three of them. The damaged file is kept beside the restored one.
+
+    Args:
+        session: session folder.
+        backup: name of a file in `backups`, to go back to it even from annotations that are not damaged; by default
+            the newest one that is not damaged itself.
+        json: print one JSON object.
+    """
+    found = restore(session, backup)
+    print(format_json(found) if json else _format(found))
+
+
+def restore(folder: Path, backup: str | None) -> dict[str, Any]:
+    """Restore what a session has lost.
+
+    Args:
+        folder: of the session.
+        backup: name of the backup to go back to, even if the store is not damaged.
+
+    Returns:
+        A summary. `backup` is the path of the backup that was restored, None if there was no need; `kept` is the path
+        of the file that it replaced; `backups` are the paths of all backups, newest first.
+
+    Raises:
+        SessionError: there is no session, no such backup, or none that is not damaged.
+    """
+    from tracker.session.lock import SessionLock
+    from tracker.session.session import ANNOTATIONS_FILE, SESSION_FILE
+    from tracker.store import backups
+
+    if not (folder / SESSION_FILE).is_file():
+        raise SessionError(f"{folder} is not a session: expected {SESSION_FILE} in it; give the folder of a session")
+    path = folder / ANNOTATIONS_FILE
+    with SessionLock(folder):
+        damage = _damage(path)
+        restored: Restored | None = None
+        if backup is not None:
+            restored = backups.restore(path, path.parent / backups.FOLDER / Path(backup).name)
+        elif damage is not None:
+            restored = backups.restore(path)
+    return {
+        "folder": str(folder),
+        "damage": damage,
+        "backup": None if restored is None else str(restored.backup),
+        "kept": None if restored is None or restored.kept is None else str(restored.kept),
+        "backups": [str(path) for path in backups.backups_of(path)],
+    }
+
+
+def _damage(path: Path) -> str | None:
+    """Return why a store cannot be opened because of damage; None if it can, or is missing."""
+    from tracker.store.annotation_store import AnnotationStore
+
+    if not path.exists():
+        return f"{path} is missing"
+    try:
+        AnnotationStore(path, read_only=True).close()
+    except DamagedStoreError as error:
+        return str(error)
+    return None
+
+
+def _format(found: dict[str, Any]) -> str:
+    lines = []
+    if found["backup"] is None:
+        lines.append(f"{found['folder']}: the annotations are as they were written, nothing to restore")
+    else:
+        lines.append(f"{found['folder']}: restored {found['backup']}")
+    if found["kept"] is not None:
+        lines.append(f"the file that it replaces is kept as {found['kept']}")
+    if found["backups"]:
+        lines.append("backups, newest first: " + ", ".join(Path(b).name for b in found["backups"]))
+    return "\n".join(lines)

@@ -1,0 +1,151 @@
+"""Messages from the page that change poses, as `message_types` explains."""
+
+from typing import Annotated, Literal, TypeAlias, Union
+
+from msgspec import Meta
+
+from app.page.message_types import Command, Frame, GesturePhase, Index, Name, Number
+
+DragMode: TypeAlias = Literal["move", "turn", "push"]
+
+
+class Drag(Command, frozen=True, tag="drag"):
+    """Drag a point, or a part by its surface."""
+
+    phase: GesturePhase
+    frame: Frame
+    """The frame under the pointer; a tracker may have moved on."""
+    camera: Index
+    person: Index
+    point: Name
+    """Name of the point; ignored if `part` is given."""
+    u: Number
+    v: Number
+    seq: Index
+    """Rises by one with every drag message of a page."""
+    part: Index | None = None
+    """Part held by its surface."""
+    mode: DragMode = "move"
+
+
+class _PoseEdit(Command, frozen=True, tag="pose"):
+    """An edit of one pose."""
+
+    frame: Frame
+    person: Index
+
+
+class SetDof(_PoseEdit, frozen=True, tag="pose"):
+    """Set a degree of freedom, clamped to its limits."""
+
+    action: Literal["set"]
+    dof: Index
+    value: Number
+    """Degrees or centimetres."""
+
+
+class TurnDof(_PoseEdit, frozen=True, tag="pose"):
+    """Step a degree of freedom."""
+
+    action: Literal["turn"]
+    dof: Index
+    by: Number
+    """Degrees or centimetres."""
+
+
+class Nudge(_PoseEdit, frozen=True, tag="pose"):
+    """Move a point parallel to the image of a view."""
+
+    action: Literal["nudge"]
+    camera: Index
+    right: Number
+    """Centimetres."""
+    up: Number
+    """Centimetres."""
+    point: Name | None = None
+    """Null moves the body."""
+
+
+class Mirror(_PoseEdit, frozen=True, tag="pose"):
+    """Exchange left and right; the root stays."""
+
+    action: Literal["mirror"]
+
+
+class CopyFrame(_PoseEdit, frozen=True, tag="pose", rename={"source": "from"}):
+    """Copy the stored pose of another frame."""
+
+    action: Literal["copy"]
+    source: Frame
+    """Frame to copy from."""
+
+
+class CopyPerson(_PoseEdit, frozen=True, tag="pose", rename={"source": "from"}):
+    """Copy the joints that another person has by the same names on this frame; position and heading stay."""
+
+    action: Literal["copy_person"]
+    source: Index
+    """Person to copy from."""
+
+
+class TakeAlternative(_PoseEdit, frozen=True, tag="pose"):
+    """Replace a tracked pose by its alternative, as a keyframe; repeated, go back.
+
+    People who may have been confused are exchanged together.
+    """
+
+    action: Literal["alternative"]
+
+
+class ResetLimb(_PoseEdit, frozen=True, tag="pose"):
+    """Reset the limb of a point to the neutral pose."""
+
+    action: Literal["reset"]
+    point: Name | None = None
+    """Null, or the root, resets everything but the root."""
+
+
+class LockDofs(_PoseEdit, frozen=True, tag="pose"):
+    """Lock or unlock degrees of freedom. Locks are stored with the session and are no entry of the history."""
+
+    action: Literal["lock"]
+    dofs: Annotated[list[Index], Meta(max_length=1000)]
+    locked: bool
+
+
+PoseEdit: TypeAlias = Union[  # noqa: UP007
+    SetDof, TurnDof, Nudge, Mirror, CopyFrame, CopyPerson, TakeAlternative, ResetLimb, LockDofs
+]
+
+
+class DragPin(Command, frozen=True, tag="pin"):
+    """Set or drag a pin: the position of a joint in a view."""
+
+    phase: GesturePhase
+    frame: Frame
+    camera: Index
+    person: Index
+    point: Name
+    u: Number
+    v: Number
+    live: bool
+    """Whether the body follows the pin."""
+
+
+class RemovePins(Command, frozen=True, tag="unpin"):
+    """Remove pins of a person on a frame."""
+
+    frame: Frame
+    person: Index
+    point: Name | None
+    """Null for all points."""
+    camera: Index | None
+    """Null for all views."""
+
+
+class FitPose(Command, frozen=True, tag="fit"):
+    """Fit to pins and edges together."""
+
+    frame: Frame
+    person: Index | None = None
+    """Null for the person worked on and everybody who is placed or pinned on the frame."""

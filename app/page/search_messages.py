@@ -1,0 +1,222 @@
+"""Messages about searches, from the page and to it, as `message_types` explains."""
+
+from typing import Annotated, Literal, TypeAlias
+
+import msgspec
+from msgspec import UNSET, Meta, UnsetType
+
+from app.page.message_types import MAX_INT, Command, Index, Message, Name, Number, Part
+
+OutlierMode: TypeAlias = Literal["truncated", "paper"]
+RunState: TypeAlias = Literal["running", "paused", "over"]
+
+
+# --- from the page --------------------------------------------------------------------------------------------------
+
+
+class RunSearch(Command, frozen=True, tag="search"):
+    """Search the shown frame: one expansion, to the end of the stage, or the whole frame; or stop.
+
+    A search of other people than the current one starts from the beginning.
+    """
+
+    action: Literal["step", "stage", "frame", "stop"]
+    person: Index | None = None
+    """The only person to search; null for everybody."""
+
+
+class RepeatSearch(Command, frozen=True, tag="search"):
+    """Search again from the start of a run of this frame, with the present settings."""
+
+    action: Literal["again"]
+    run: Index | None = None
+    """Number of the run; null for the newest."""
+    person: Index | None = None
+    """The only person to search; null for everybody."""
+
+
+class SetSearchSpeed(Command, frozen=True, tag="search_speed"):
+    """Limit the speed of a search that is watched, effective at once."""
+
+    per_second: Number | None
+    """Expansions per second; null for no limit."""
+
+
+class LeafChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Bounds and steps of one group of degrees of freedom; null for those of all groups."""
+
+    person: Index
+    name: Name
+    bound_rad: Number | UnsetType | None = UNSET
+    bound_m: Number | UnsetType | None = UNSET
+    step_rad: Number | UnsetType | None = UNSET
+    step_m: Number | UnsetType | None = UNSET
+
+
+class SearchChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Settings of the search to change; what is left out stays."""
+
+    theta_px: Number | UnsetType | None = UNSET
+    """Null for the default."""
+    outliers: OutlierMode | UnsetType = UNSET
+    passes: Annotated[list[Number], Meta(max_length=100)] | UnsetType = UNSET
+    """Factors on the steps: all stages are searched once per factor."""
+    patience: Index | UnsetType = UNSET
+    """Expansions without improvement after which a stage ends."""
+    max_expansions: Index | UnsetType = UNSET
+    limbs_apart: bool | UnsetType = UNSET
+    """Whether limbs are searched one after the other."""
+    bound_rad: Number | UnsetType = UNSET
+    bound_m: Number | UnsetType = UNSET
+    step_rad: Number | UnsetType = UNSET
+    step_m: Number | UnsetType = UNSET
+    leaf: LeafChanges | UnsetType = UNSET
+
+
+class SetSearchSettings(Command, frozen=True, tag="search_settings"):
+    """Change settings of the search."""
+
+    changes: SearchChanges
+
+
+class ReplayStep(Command, frozen=True, tag="replay"):
+    """Show a recorded step of a search in place of the stored poses."""
+
+    run: Index | None
+    """Number of the run; null shows the stored poses again."""
+    step: Annotated[int, Meta(ge=-1, le=MAX_INT)] = -1
+    """Index of the step; -1 for the start."""
+
+
+class CompareRun(Command, frozen=True, tag="compare"):
+    """Draw the result of a run over the views; null draws none."""
+
+    run: Index | None
+
+
+class PreviewCandidate(Command, frozen=True, tag="preview"):
+    """Draw a candidate of a run over the views; null draws none."""
+
+    run: Index
+    candidate: Index | None
+
+
+class TakeCandidate(Command, frozen=True, tag="take"):
+    """Take over a candidate of a run as an edit; null for the run's result."""
+
+    run: Index
+    candidate: Index | None
+
+
+class ShowLandscape(Command, frozen=True, tag="landscape"):
+    """Choose the degree of freedom of the person worked on whose cost landscape is shown."""
+
+    dof: Name
+
+
+class SetLandscapeDof(Command, frozen=True, tag="landscape_set"):
+    """Set a degree of freedom to a value of its landscape, as an edit."""
+
+    person: Index
+    dof: Index
+    value: Number
+    """Radians or metres."""
+
+
+# --- to the page ----------------------------------------------------------------------------------------------------
+
+
+class SearchLeaf(Part, frozen=True):
+    """A group of degrees of freedom that is searched together.
+
+    A bound or step is null if it does not apply to the group, or differs within it.
+    """
+
+    person: int
+    name: str
+    dofs: tuple[str, ...]
+    bound_rad: float | None
+    step_rad: float | None
+    bound_m: float | None
+    step_m: float | None
+    angles: int
+    """Number of angles among its degrees of freedom."""
+    lengths: int
+    """Number of lengths among them."""
+    own: bool
+    """Whether any bound or step differs from that of all groups."""
+
+
+class SearchSetupMessage(Message, frozen=True, tag="search_setup"):
+    """Settings of the search and its decomposition, in the order of search; only for pages that watch searches."""
+
+    theta_px: float | None
+    outliers: Literal["truncated", "paper"]
+    passes: tuple[float, ...]
+    patience: int
+    max_expansions: int
+    limbs_apart: bool
+    bound_rad: float
+    bound_m: float
+    step_rad: float
+    step_m: float
+    speed: float | None
+    """Expansions per second; null for no limit."""
+    leaves: tuple[SearchLeaf, ...]
+
+
+class SearchStage(Part, frozen=True):
+    """A stage of a run."""
+
+    person: int
+    name: str
+    factor: float
+    """Factor on the steps."""
+    evaluations: int
+    gain_px: float
+    """Decrease of the cost."""
+    done: bool
+    running: bool
+
+
+class SearchRun(Part, frozen=True):
+    """A search of the shown frame."""
+
+    number: int
+    state: RunState
+    start_px: float | None
+    """Cost at the start."""
+    best_px: float | None
+    """Least cost."""
+    evaluations: int
+    seconds: float
+    """Time of work."""
+    steps: int
+    """Recorded steps."""
+    thinned: int
+    """How often recorded steps were thinned, to stay below 10,000."""
+    differs: dict[str, str]
+    """Settings that are not the same in all runs, by label."""
+    stages: tuple[SearchStage, ...]
+
+
+class Replay(Part, frozen=True):
+    """The recorded step that is shown."""
+
+    run: int
+    step: int
+    stage: str | None
+    candidate_px: float | None
+    """Cost of the candidate."""
+    best_px: float | None
+    """Least cost until then."""
+    evaluations: int
+
+
+class SearchRunsMessage(Message, frozen=True, tag="search_runs"):
+    """Runs of the shown frame, oldest first; only for pages that watch searches."""
+
+    runs: tuple[SearchRun, ...]
+    replay: Replay | None
+    compared: int | None
+    """Number of the run whose result is drawn."""

@@ -1,0 +1,101 @@
+"""Rows of numbers from the lines of a table file: a frame number first, the same number of columns in each."""
+
+from array import array
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.errors import FormatError
+from tracker.geometry.arrays import Array
+from tracker.validation import MAX_FRAMES, quoted
+
+MAX_VALUES = 40_000_000
+"""Largest number of values of a table, 320 MB: an hour of 30 points at 120 Hz."""
+
+
+class NumberRows:
+    """Collects the rows of a table; checks each as it comes, so that no small file takes much memory."""
+
+    def __init__(self, where: str, n_columns: int, n_required: int) -> None:
+        """Begin a table.
+
+        Args:
+            where: kind and path of the file, for messages.
+            n_columns: number of columns.
+            n_required: number of columns, from the first, that are not blank in any row. Others may be: NaN.
+        """
+        self._where, self._n_columns, self._n_required = where, n_columns, n_required
+        self._values = array("d")
+        self._lines = array("q")
+
+    def add(self, fields: Sequence[str], line: int) -> None:
+        """Add a row; `line` is its number in the file, from 1.
+
+        Raises:
+            FormatError: the row has another number of columns or is not numbers, or the table is too large.
+        """
+        if len(fields) > self._n_columns or len(fields) < self._n_required:
+            raise FormatError(
+                f"{self._where}, line {line}: expected {self._n_columns} columns, found {len(fields)}; export it again"
+            )
+        if len(self._values) + self._n_columns > MAX_VALUES:
+            raise FormatError(
+                f"{self._where}, line {line}: expected at most {MAX_VALUES} values, found more; cut it in pieces"
+            )
+        try:
+            try:
+                row = [float(f) for f in fields]
+            except ValueError:  # blank fields are rare
+                row = [float(f) if f and not f.isspace() else np.nan for f in fields]
+        except ValueError as error:
+            wrong = next(f for f in fields if not _is_number(f))
+            raise FormatError(
+                f"{self._where}, line {line}: expected numbers, found {quoted(wrong)}; correct it"
+            ) from error
+        if not (row[0].is_integer() and abs(row[0]) <= MAX_FRAMES):
+            raise FormatError(
+                f"{self._where}, line {line}: expected a whole frame number of at most {MAX_FRAMES} first, "
+                f"found {quoted(fields[0])}; correct it"
+            )
+        self._values.extend(row)
+        if len(row) < self._n_columns:
+            self._values.extend([np.nan] * (self._n_columns - len(row)))
+        self._lines.append(line)
+
+    def table(self, limit: float) -> tuple[NDArray[np.int64], Array]:
+        """Return the frame numbers, (n,), and the other columns, (n, n_columns - 1), which the caller may change.
+
+        Raises:
+            FormatError: there is no row, the frames do not rise, or a value is infinite, beyond `limit`, or missing
+                where it is required.
+        """
+        if not self._lines:
+            raise FormatError(f"{self._where} has no rows of numbers; export it again")
+        table = np.frombuffer(self._values).reshape(len(self._lines), self._n_columns)
+        frames, values = table[:, 0].astype(np.int64), table[:, 1:]
+        falls = np.flatnonzero(np.diff(frames) <= 0)
+        if len(falls):
+            raise FormatError(
+                f"{self._where}, line {self._lines[int(falls[0]) + 1]}: expected frame numbers that rise from row to "
+                "row; sort the rows and remove doubles"
+            )
+        for i, column in enumerate(values.T, 2):  # by column: a mask of all would take much memory
+            wrong = ~(np.abs(column) <= limit)
+            if i > self._n_required:
+                wrong &= ~np.isnan(column)
+            if wrong.any():
+                row = int(np.argmax(wrong))
+                raise FormatError(
+                    f"{self._where}, line {self._lines[row]}, column {i}: expected a finite number within {limit:g}, "
+                    f"found {column[row]:g}; correct it"
+                )
+        return frames, values
+
+
+def _is_number(field: str) -> bool:
+    try:
+        float(field or "nan")
+    except ValueError:
+        return field.isspace()
+    return True

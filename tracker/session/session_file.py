@@ -1,0 +1,135 @@
+"""The declaration of session.toml: its keys, types and ranges."""
+
+from collections import Counter
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeAlias, get_args
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from tracker.errors import SessionError
+from tracker.text_files import TextKind, read_toml
+from tracker.validation import (
+    MAX_FRAMES,
+    Color,
+    FilePath,
+    FileStem,
+    FrameRate,
+    Name,
+    Number,
+    Vector,
+    check,
+    check_version,
+)
+
+VERSION = 2
+VERSION_WITHOUT_FLOOR = 1
+"""Version written for a session without a floor, so that older programs can read it."""
+
+Up: TypeAlias = Literal["x", "-x", "y", "-y", "z", "-z"]
+UPS: tuple[str, ...] = get_args(Up)
+
+_KIND = TextKind("session", 500_000, SessionError, "correct it or make a new session")
+"""A camera takes 100 bytes."""
+
+_PersonName: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=r"^\w[\w .-]{0,99}\Z",
+        description="a person's name of at most 100 letters, digits, spaces, dots, '-' and '_'",
+    ),
+]
+"""The name becomes the name of a file, so it must not lead out of the folder."""
+_FrameCount: TypeAlias = Annotated[
+    int,
+    Meta(
+        ge=1,
+        le=MAX_FRAMES,
+        description=f"a whole number of frames from 1 to {MAX_FRAMES} (check the footage and the offsets)",
+    ),
+]
+
+
+class _Row(msgspec.Struct, forbid_unknown_fields=True):
+    """A table of session.toml."""
+
+
+class CameraRow(_Row):
+    """A camera and its footage."""
+
+    name: FileStem
+    footage: FilePath
+    background: FilePath | None = None
+    masks: FilePath | None = None
+    offset: Annotated[
+        int, Meta(ge=-MAX_FRAMES, le=MAX_FRAMES, description=f"a whole number of frames, at most {MAX_FRAMES},")
+    ] = 0
+
+    def __post_init__(self) -> None:
+        if self.offset < 0:
+            raise ValueError(
+                f"expected 0 or more as 'offset', found {self.offset}; "
+                f"give each of the others an offset of {-self.offset} instead"
+            )
+
+
+class PersonRow(_Row):
+    """A person, with the file of the body model."""
+
+    name: _PersonName
+    model: FilePath
+    color: Color
+
+
+class FloorRow(_Row):
+    """The floor: the points x with `normal . x = offset_m`."""
+
+    normal: Vector
+    offset_m: Number
+
+    def __post_init__(self) -> None:
+        if np.linalg.norm(self.normal) < 1e-6:
+            raise ValueError("expected a direction as 'normal', found three numbers that are almost 0")
+
+
+class SessionFile(_Row):
+    """The content of session.toml."""
+
+    version: int
+    name: Name
+    fps: FrameRate
+    n_frames: _FrameCount
+    up: Annotated[Up, Meta(description=f"the axis that points up, one of {', '.join(UPS)},")]
+    calibration: FilePath
+    cameras: Annotated[list[CameraRow], Meta(min_length=1, max_length=256, description="at least one camera")]
+    people: Annotated[list[PersonRow], Meta(min_length=1, max_length=64, description="at least one person")]
+    floor: FloorRow | None = None
+
+    def __post_init__(self) -> None:
+        for what, rows in (("camera", self.cameras), ("person", self.people)):
+            name, count = Counter(row.name for row in rows).most_common(1)[0]
+            if count > 1:
+                raise ValueError(f"expected a name of its own for each {what}, found more than one '{name}'")
+
+
+def read_session_file(path: Path) -> SessionFile:
+    """Read session.toml.
+
+    Raises:
+        SessionError: the file is missing, malformed or newer than this program.
+    """
+    data = read_toml(path, _KIND)
+    where = f"session {path}"
+    check_version(data, VERSION, where, SessionError)
+    return checked(data, where)
+
+
+def checked(data: Any, where: str) -> SessionFile:
+    """Check the content of a session file, which `where` names in messages.
+
+    Raises:
+        SessionError: it does not fit the declaration.
+    """
+    found: SessionFile = check(data, SessionFile, where, SessionError)
+    return found

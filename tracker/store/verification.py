@@ -1,0 +1,63 @@
+"""Check a store when it is opened: sound for SQLite, and as it was written."""
+
+import sqlite3
+
+from tracker.store import checksums, rows, schema
+
+_BROKEN = (
+    sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR, sqlite3.SQLITE_MISMATCH, sqlite3.SQLITE_TOOBIG,
+)  # fmt: skip
+"""Primary codes of errors that show damage while a store is checked; other errors concern the disk or its users."""
+
+
+def damage(db: sqlite3.Connection) -> str | None:
+    """Return what is wrong with a store of this version or an older one; None if it passes.
+
+    Args:
+        db: connection to it, without a transaction.
+
+    Raises:
+        sqlite3.Error: it cannot be read, for example because of its disk or its rights.
+    """
+    checksums.register(db)
+    try:
+        db.execute("BEGIN")  # one state: another program may write meanwhile
+        try:
+            return _damage(db)
+        finally:
+            db.execute("ROLLBACK")
+    except sqlite3.Error as error:
+        if primary_code(error) in _BROKEN:
+            return f"SQLite reports: {error}"
+        raise
+
+
+def primary_code(error: sqlite3.Error) -> int:
+    """Return the primary result code of an error; `SQLITE_ERROR` if it has none."""
+    return getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
+
+
+def _damage(db: sqlite3.Connection) -> str | None:
+    problems = [text for (text,) in db.execute("PRAGMA integrity_check(3)")]
+    if problems != ["ok"]:
+        return f"SQLite reports: {'; '.join(str(p).strip() for p in problems)}"
+    version = schema.version(db)
+    if version > schema.VERSION:
+        return None  # a newer program knows
+    if version == schema.VERSION:
+        return "; ".join(checksums.differences(db)) or None
+    if db.execute("SELECT count(*) FROM sqlite_master WHERE name = 'contents'").fetchone() != (0,):
+        return f"expected version {schema.VERSION}, found {version}"
+    if version == 0:
+        return "expected tables of annotations, found a file without a version"
+    return _unreadable(db)
+
+
+def _unreadable(db: sqlite3.Connection) -> str | None:
+    """Return why a store without checksums cannot be read; None if all of its rows can."""
+    revisions = {revision for (revision,) in db.execute("SELECT id FROM model_revisions")}
+    columns = "person, frame, numbers, sources, model_revision"
+    for person, frame, numbers, sources, revision in db.execute(f"SELECT {columns} FROM pose_changes"):
+        if not rows.is_readable(numbers, sources) or (numbers is not None and revision not in revisions):
+            return f"the pose of {person!r} in frame {frame} cannot be read"
+    return None
