@@ -24,8 +24,8 @@ class Index(NamedTuple):
     """Presentation time stamps of the frames at which decoding can start, ascending."""
 
 
-class Identity(NamedTuple):
-    """A version of a file: other contents have another identity."""
+class FileVersion(NamedTuple):
+    """A version of a file: it changes with the content."""
 
     device: int
     inode: int
@@ -35,14 +35,14 @@ class Identity(NamedTuple):
     """Time of the last change, ns."""
 
 
-def identity_of(path: Path) -> Identity:
+def file_version_of(path: Path) -> FileVersion:
     """Return the present version of a file.
 
     Raises:
         OSError: it is missing.
     """
     stat = path.stat()
-    return Identity(stat.st_dev, stat.st_ino, stat.st_size, stat.st_mtime_ns)
+    return FileVersion(stat.st_dev, stat.st_ino, stat.st_size, stat.st_mtime_ns)
 
 
 def stamp_of(path: Path) -> str:

@@ -16,7 +16,7 @@ from av.video.reformatter import VideoReformatter
 
 from tracker.errors import RecordingError
 from tracker.footage import frame_index, packet_scan
-from tracker.footage.frame_index import Identity, Index
+from tracker.footage.frame_index import FileVersion, Index
 from tracker.footage.image_folder import ImageFolder
 from tracker.footage.packet_scan import PacketScan
 from tracker.footage.video_decoder import VideoDecoder
@@ -67,10 +67,10 @@ class VideoFile:
         self._index = self._listed.frames
         self._decoder: VideoDecoder | None = None
         self._next = 0
-        self._refused: tuple[Identity, str] | None = None  # the last version that could not be opened, and why
+        self._refused: tuple[FileVersion, str] | None = None  # the last version that could not be opened, and why
         if not path.is_file():
             raise RecordingError(f"{self._where} not found; check the path")
-        self._identity = self._identify()
+        self._opened_version = self._present_version()
         try:
             decoder = VideoDecoder(path, self._where)
             declared_rate = float(decoder.stream.average_rate or 0)
@@ -126,7 +126,7 @@ class VideoFile:
             for _ in range(_ATTEMPTS):
                 self._follow_file()
                 image = self._read_once(k)
-                if self._identify() == self._identity:
+                if self._present_version() == self._opened_version:
                     return image
             raise RecordingError(f"{self._where} is being written; wait until it is complete")
 
@@ -161,14 +161,14 @@ class VideoFile:
         if decoder is not None:
             decoder.close()
 
-    def _identify(self) -> Identity:
+    def _present_version(self) -> FileVersion:
         """Return the present version of the file.
 
         Raises:
             RecordingError: it is missing.
         """
         try:
-            return frame_index.identity_of(self.path)
+            return frame_index.file_version_of(self.path)
         except FileNotFoundError:
             self._release()
             raise RecordingError(f"{self._where} is not there any more; put it back") from None
@@ -184,8 +184,8 @@ class VideoFile:
         """
         if self._closed:
             raise RecordingError(f"{self._where} has been closed")
-        found = self._identify()
-        if found == self._identity:
+        found = self._present_version()
+        if found == self._opened_version:
             if self._decoder is None:
                 try:
                     self._open()
@@ -204,7 +204,7 @@ class VideoFile:
                 self._refused = found, str(failure)
             raise failure from error
 
-    def _take_version(self, found: Identity) -> None:
+    def _take_version(self, found: FileVersion) -> None:
         """Open another version of the file, and check that it has the frames that were listed.
 
         Raises:
@@ -230,7 +230,7 @@ class VideoFile:
             decoder.close()
         self._finish(index, declared_rate, decoder.tick_s)
         self._open()
-        self._identity, self._refused, self._index = found, None, index
+        self._opened_version, self._refused, self._index = found, None, index
         self.version += 1
 
     def _unreadable(self, error: av.FFmpegError) -> RecordingError:
@@ -254,7 +254,7 @@ class VideoFile:
             image = None if frame is None else self._to_rgb(frame)
         except av.FFmpegError as error:
             self._release()  # its position is unknown
-            if self._identify() != self._identity:
+            if self._present_version() != self._opened_version:
                 return None  # the next attempt opens the present version
             raise RecordingError(f"{self._where} cannot be read any more: {error.strerror}; check the disk") from error
         if image is not None and image.shape[1::-1] != self.size:
