@@ -7,6 +7,7 @@ docs/tutorial.md shows, as JPEG.
 
 import argparse
 import asyncio
+import contextlib
 import shutil
 import sys
 import tempfile
@@ -21,7 +22,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
 from chromium import FLAGS, chromium_path
 from page_driver import handle_of, shows, to_client
-from playwright.async_api import Browser, Page, async_playwright
+from playwright.async_api import Browser, Page, TimeoutError, async_playwright
 from program import ROOT, Program
 
 from tracker.evaluation.references import read_joints
@@ -248,6 +249,13 @@ async def opened(browser: Browser, folder: Path, screen: Screenshot):
             await program.kill()
 
 
+async def _close_rendering_card(page: Page) -> None:
+    """Close viser's remark that the browser renders in software: few users see it."""
+    button = page.frame_locator("#scene").locator(".mantine-Notification-closeButton")
+    with contextlib.suppress(TimeoutError):
+        await button.click(timeout=20_000)
+
+
 async def take(out: Path, only: str, tutorial: bool) -> None:
     """Take the pictures, one after the other."""
     out.mkdir(parents=True, exist_ok=True)
@@ -261,6 +269,7 @@ async def take(out: Path, only: str, tutorial: bool) -> None:
                 async with opened(browser, sessions[screen.session], screen) as page:
                     if screen.session != "fresh":
                         await page.click("#close-first-steps")
+                    await _close_rendering_card(page)
                     await screen.act(page)
                     await asyncio.sleep(SETTLE_S)
                     await page.screenshot(path=path, timeout=120_000, **({"quality": 80} if tutorial else {}))

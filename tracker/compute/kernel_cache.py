@@ -13,6 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numba
 from platformdirs import user_cache_path
 
@@ -103,8 +104,8 @@ def kernel_keys() -> dict[str, str]:
         texts.update(f"{path.relative_to(_PACKAGE)}\n".encode() + path.read_bytes())
     stored = _folder() / f"{_KEYS}{texts.hexdigest()[:20]}.json"
     try:
-        keys: dict[str, str] = json.loads(stored.read_text("utf-8"))
-    except (OSError, ValueError):
+        keys = msgspec.json.decode(stored.read_bytes(), type=dict[str, str])
+    except (OSError, msgspec.DecodeError, RecursionError):
         keys = _computed_keys(environment)
         _write(stored, json.dumps(keys))
     return keys

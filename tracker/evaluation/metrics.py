@@ -22,6 +22,7 @@ BENT_RAD = float(np.radians(20.0))
 
 Alignment = Literal["none", "rigid-all"]
 
+_BLOCK = 10_000  # frames resampled together; all at once would take several times the memory of the result
 _RATE_TOLERANCE = 1e-3
 
 
@@ -206,21 +207,28 @@ def at_rate(table: MarkerTable, fps: float) -> MarkerTable:
     """
     if abs(table.rate / fps - 1) < _RATE_TOLERANCE:
         return table
-    rows = table.frames * (fps / table.rate)  # fractional frame of the session of each row
+    rows = np.asarray(table.frames * (fps / table.rate), np.float64)  # fractional frame of the session of each row
     n_frames = int(np.floor(rows[-1] + 1e-6)) + 1
     if n_frames * table.points[0].size > MAX_VALUES:
         raise FormatError(
             f"expected at most {MAX_VALUES} values at {fps:g} frames per second, found {n_frames} frames of "
             f"{len(table.names)} points; correct the file's DataRate, or cut it to the frames to compare"
         )
-    frames = np.arange(n_frames)
+    frames, points = np.arange(n_frames), np.empty((n_frames, *table.points.shape[1:]))
+    for start in range(0, n_frames, _BLOCK):
+        block = slice(start, start + _BLOCK)
+        points[block] = _interpolated(rows, table.points, frames[block])
+    return MarkerTable(table.names, frames, frames / fps, points, fps)
+
+
+def _interpolated(rows: Array, points: Array, frames: NDArray[np.int64]) -> Array:
+    """Interpolate points, (n, m, 3), that belong to fractional frames `rows`, (n,), to whole frames, (k, m, 3)."""
     after = np.clip(np.searchsorted(rows, frames - 1e-6), 1, len(rows) - 1) if len(rows) > 1 else np.zeros_like(frames)
     before = np.maximum(after - 1, 0)
     span = np.maximum(rows[after] - rows[before], 1e-12)
     weight = np.clip((frames - rows[before]) / span, 0.0, 1.0)[:, None, None]
-    first, second = table.points[before], table.points[after]
-    points = np.where(weight < 1e-6, first, np.where(weight > 1 - 1e-6, second, first + weight * (second - first)))
-    return MarkerTable(table.names, frames, frames / fps, points, fps)
+    first, second = points[before], points[after]
+    return np.where(weight < 1e-6, first, np.where(weight > 1 - 1e-6, second, first + weight * (second - first)))
 
 
 def best_rigid(source: Array, target: Array) -> Array:

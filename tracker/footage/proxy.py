@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import msgspec
 import numpy as np
 
 from tracker.errors import RecordingError
@@ -25,12 +26,23 @@ from tracker.files import write_text_atomic
 from tracker.footage.frame_index import stamp_of
 from tracker.footage.video import Footage
 from tracker.geometry.arrays import Image
+from tracker.text_files import TextKind, read_json
+from tracker.validation import check
 
 FOLDER = "proxies"
 VERSION = 1
 _QUALITY = 88
 _FLUSH_FRAMES = 100
 _END = np.dtype("<u8")
+_KIND = TextKind("proxy", 100_000, RecordingError, "delete it")
+
+
+class _About(msgspec.Struct):
+    """The content of NAME.json."""
+
+    version: int
+    stamp: str
+    n_frames: int
 
 
 class Proxy:
@@ -44,8 +56,11 @@ class Proxy:
 
     def fits(self, footage: Path) -> bool:
         """Return whether it was made from this footage in its present version."""
-        about = self._read_about()
-        return about is not None and about.get("version") == VERSION and about.get("stamp") == stamp_of(footage)
+        try:
+            about: _About = check(read_json(self._about, _KIND), _About, f"proxy {self._about}", RecordingError)
+        except RecordingError:
+            return False
+        return about.version == VERSION and about.stamp == stamp_of(footage)
 
     def exists(self) -> bool:
         """Return whether there is a proxy, of any footage."""
@@ -132,13 +147,6 @@ class Proxy:
         """Delete the proxy."""
         for path in (self._about, self._index, self._pictures):
             path.unlink(missing_ok=True)
-
-    def _read_about(self) -> dict[str, Any] | None:
-        try:
-            about = json.loads(self._about.read_text("utf-8"))
-        except (OSError, ValueError):
-            return None
-        return about if isinstance(about, dict) else None
 
     def _read_ends(self) -> Any:
         """Read the ends of the frames that are complete."""

@@ -29,7 +29,7 @@ MAX_STUDIO_M = 100.0
 MIN_STUDIO_M = 0.05
 """Cameras read as millimetres that are all nearer to the origin than this have translations in metres."""
 _ROTATION_TOLERANCE = 1e-3  # a rotation matrix printed with four digits still passes
-_KIND = TextKind("calibration", 1_000_000, CalibrationError)
+_KIND = TextKind("calibration", 500_000, CalibrationError)
 """A camera takes about 1 kB."""
 
 _Pixels: TypeAlias = Annotated[float, Meta(ge=1, le=MAX_SIDE_PX, multiple_of=1)]

@@ -5,6 +5,7 @@ none. See `tracker/body/models/gavrila22.toml` for an example.
 """
 
 import fnmatch
+import os
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -30,7 +31,7 @@ PRESETS = tuple(
 )
 
 
-_KIND = TextKind("body model", 1_000_000, ModelError)
+_KIND = TextKind("body model", 500_000, ModelError)
 """A model of 20 parts takes 10 kB."""
 
 _Height: TypeAlias = Annotated[float, Meta(ge=0.3, le=3.0, description="a height of 0.3 to 3 metres")]
@@ -138,7 +139,7 @@ def load_model(name_or_path: str | Path, height_m: float | None = None) -> BodyM
         text = (resources.files("tracker") / "body" / "models" / f"{name_or_path}.toml").read_text("utf-8")
     else:
         path = Path(name_or_path)
-        if path.suffix != ".toml" or not path.is_file():
+        if path.suffix != ".toml" or not os.path.isfile(path):  # unlike pathlib's, for any name
             raise ModelError(
                 f"body model '{name_or_path}' not found: expected one of {', '.join(PRESETS)} "
                 "or the path of a .toml file"

@@ -1,8 +1,9 @@
 """Rows of numbers from the lines of a table file: a frame number first, the same number of columns in each."""
 
+import csv
 from array import array
-from collections.abc import Sequence
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,53 +13,70 @@ from tracker.validation import MAX_FRAMES, quoted
 
 MAX_VALUES = 40_000_000
 """Largest number of values of a table, 320 MB: an hour of 30 points at 120 Hz."""
+_NUMBERS = msgspec.json.Decoder(list[float])
 
 
 class NumberRows:
     """Collects the rows of a table; checks each as it comes, so that no small file takes much memory."""
 
-    def __init__(self, where: str, n_columns: int, n_required: int) -> None:
+    def __init__(self, where: str, separator: str, n_columns: int, n_required: int) -> None:
         """Begin a table.
 
         Args:
             where: kind and path of the file, for messages.
+            separator: of the columns, a tab or comma.
             n_columns: number of columns.
             n_required: number of columns, from the first, that are not blank in any row. Others may be: NaN.
         """
-        self._where, self._n_columns, self._n_required = where, n_columns, n_required
+        self._where, self._separator = where, separator
+        self._n_columns, self._n_required = n_columns, n_required
         self._values = array("d")
         self._lines = array("q")
 
-    def add(self, fields: Sequence[str], line: int) -> None:
+    def add(self, text: str, line: int) -> None:
         """Add a row; `line` is its number in the file, from 1.
 
         Raises:
             FormatError: the row has another number of columns or is not numbers, or the table is too large.
         """
-        if len(fields) > self._n_columns or len(fields) < self._n_required:
-            raise FormatError(
-                f"{self._where}, line {line}: expected {self._n_columns} columns, found {len(fields)}; export it again"
-            )
         if len(self._values) + self._n_columns > MAX_VALUES:
             raise FormatError(
                 f"{self._where}, line {line}: expected at most {MAX_VALUES} values, found more; cut it in pieces"
             )
-        try:
-            try:
-                row = [float(f) for f in fields]
-            except ValueError:  # blank fields are rare
-                row = [float(f) if f and not f.isspace() else np.nan for f in fields]
-        except ValueError as error:
-            raise FormatError(f"{self._where}, line {line}: expected numbers, found {error}; correct it") from error
+        row = self._complete_row(text) or self._row(text, line)
         if not (row[0].is_integer() and abs(row[0]) <= MAX_FRAMES):
             raise FormatError(
                 f"{self._where}, line {line}: expected a whole frame number of at most {MAX_FRAMES} first, "
-                f"found {quoted(fields[0])}; correct it"
+                f"found {row[0]:g}; correct it"
             )
-        self._values.extend(row)
-        if len(row) < self._n_columns:
-            self._values.extend([np.nan] * (self._n_columns - len(row)))
+        self._values.frombytes(np.array(row).tobytes())
         self._lines.append(line)
+
+    def _complete_row(self, text: str) -> list[float] | None:
+        """Parse a row without blanks, twice as fast as `_row`; None if it needs a closer look."""
+        if self._separator != ",":
+            if "," in text:
+                return None
+            text = text.replace(self._separator, ",")
+        try:
+            row = _NUMBERS.decode(f"[{text}]")
+        except msgspec.DecodeError:
+            return None
+        return row if len(row) == self._n_columns else None
+
+    def _row(self, text: str, line: int) -> list[float]:
+        where = f"{self._where}, line {line}"
+        try:
+            fields = next(csv.reader([text], delimiter=self._separator))
+            row = [float(f) if f and not f.isspace() else np.nan for f in fields]
+        except csv.Error as error:
+            raise FormatError(f"{where}: {error}; export it again") from error
+        except ValueError as error:
+            wrong = next(f for f in fields if not _is_number(f))
+            raise FormatError(f"{where}: expected numbers, found {quoted(wrong)}; correct it") from error
+        if not self._n_required <= len(row) <= self._n_columns:
+            raise FormatError(f"{where}: expected {self._n_columns} columns, found {len(row)}; export it again")
+        return row + [np.nan] * (self._n_columns - len(row))
 
     def table(self, limit: float) -> tuple[NDArray[np.int64], Array]:
         """Return the frame numbers, (n,), and the other columns, (n, n_columns - 1), which the caller may change.
@@ -88,3 +106,11 @@ class NumberRows:
                     f"found {column[row]:g}; correct it"
                 )
         return frames, values
+
+
+def _is_number(field: str) -> bool:
+    try:
+        float(field or "nan")
+    except ValueError:
+        return field.isspace()
+    return True

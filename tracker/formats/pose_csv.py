@@ -10,11 +10,9 @@ Angles are in degrees (`_deg`), lengths in metres (`_m`); the quaternions of bal
 have no unit. Frames are 0-based.
 """
 
-import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 from typing import Annotated
 
@@ -114,18 +112,14 @@ def read_pose_table(path: str | Path) -> PoseTable:
         first = ""
     head = _read_head(comments, where)
     n_head = len(comments)
-    reader = csv.reader(chain([first], lines))
-    try:
-        columns = next(reader, [])
-        if columns[:1] != ["frame"]:
-            raise FormatError(f"{where}, line {n_head + 1}: expected 'frame' as the first column; export it again")
-        names, factors = _read_columns(columns[1:], f"{where}, line {n_head + 1}")
-        rows = NumberRows(where, len(columns), n_required=len(columns))
-        for row in reader:
-            if row:
-                rows.add(row, n_head + reader.line_num)
-    except csv.Error as error:
-        raise FormatError(f"{where}, line {n_head + reader.line_num}: {error}; export it again") from error
+    columns = [column.strip('"') for column in first.split(",")]
+    if columns[0] != "frame":
+        raise FormatError(f"{where}, line {n_head + 1}: expected 'frame' as the first column; export it again")
+    names, factors = _read_columns(columns[1:], f"{where}, line {n_head + 1}")
+    rows = NumberRows(where, ",", len(columns), n_required=len(columns))
+    for number, line in enumerate(lines, n_head + 2):
+        if line.strip():
+            rows.add(line, number)
     frames, values = rows.table(_MAX_VALUE)
     if frames[0] < 0:
         raise FormatError(f"{where}: expected frames from 0, found {frames[0]}; correct it")

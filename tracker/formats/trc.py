@@ -69,13 +69,13 @@ def read_trc(path: str | Path) -> MarkerTable:
             f"{where}, line 4: expected 1 to {_MAX_POINTS} point names, each once, found {quoted(list(names))}; "
             "rename them"
         )
-    rows = NumberRows(where, 2 + 3 * len(names), n_required=2)
+    rows = NumberRows(where, "\t", 2 + 3 * len(names), n_required=2)
     for number, line in enumerate(lines, 6):
         if text := line.rstrip():  # some writers end rows with tabs, some drop them
-            rows.add(text.split("\t"), number)
+            rows.add(text, number)
     frames, values = rows.table(_MAX_COORDINATE)
+    values[:, 1:] *= scale  # the three-dimensional view would be scaled in a copy
     points = values[:, 1:].reshape(len(frames), len(names), 3)
-    points *= scale
     # A point with a missing coordinate is missing.
     points[np.isnan(points).any(axis=-1)] = np.nan
     return MarkerTable(names, frames - frames[0], values[:, 0], points, rate)

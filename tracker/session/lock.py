@@ -15,7 +15,7 @@ import time
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Annotated
+from typing import Annotated, TypeAlias
 
 import msgspec
 from msgspec import Meta
@@ -31,16 +31,19 @@ _KIND = TextKind("lock", 10_000, SessionError)
 _WRITING_S = 0.2  # an unreadable lock file may be in the process of being written
 
 
+_Word: TypeAlias = Annotated[str, Meta(max_length=300)]
+
+
 class Holder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The holder of a lock."""
 
-    host: str
+    host: _Word
     process: Annotated[int, Meta(ge=1, le=2**31 - 1, description="the number of a process")]
-    started: str
+    started: _Word
     """Start time of the process according to the system; empty if unknown. Process numbers are reused."""
-    since: str
+    since: _Word
     """Time at which the lock was taken, ISO 8601."""
-    token: str
+    token: _Word
     """Identifies this lock uniquely."""
 
 

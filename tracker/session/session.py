@@ -37,6 +37,7 @@ from tracker.session.session_file import (
     checked,
     read_session_file,
 )
+from tracker.validation import quoted
 
 SESSION_FILE = "session.toml"
 CALIBRATION_FILE = "calibration.toml"
@@ -152,7 +153,7 @@ def load_session(folder: str | Path) -> Session:
     """
     folder = _tidy(Path(folder))
     path = folder / SESSION_FILE
-    if not path.is_file():
+    if not os.path.isfile(path):  # unlike pathlib's, it is False for a name too long for the system
         raise SessionError(f"{folder} is not a session: expected {SESSION_FILE} in it; make one with 'quadrille new'")
     row = read_session_file(path)
     return Session(
@@ -313,4 +314,12 @@ def _relative(path: Path, folder: Path) -> str:
 
 
 def _resolve(text: str, folder: Path) -> Path:
-    return _tidy(folder / text)
+    path = _tidy(folder / text)
+    try:
+        path.exists()
+    except OSError as error:
+        raise SessionError(
+            f"session {folder}: expected the path of a file or folder, found {quoted(text)}, where the system says: "
+            f"{error.strerror}; correct it"
+        ) from error
+    return path

@@ -30,7 +30,7 @@ VERSION_WITHOUT_FLOOR = 1
 Up: TypeAlias = Literal["x", "-x", "y", "-y", "z", "-z"]
 UPS: tuple[str, ...] = get_args(Up)
 
-_KIND = TextKind("session", 1_000_000, SessionError, "correct it or make a new session")
+_KIND = TextKind("session", 500_000, SessionError, "correct it or make a new session")
 """A camera takes 100 bytes."""
 
 _PersonName: TypeAlias = Annotated[

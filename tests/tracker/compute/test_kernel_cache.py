@@ -203,3 +203,15 @@ def test_old_kernels_are_pruned(tmp_path, monkeypatch):
     assert {i for i in range(20) if f"f.g-key{i}.py311.nbi" in left} == set(range(9, 20))
     assert {i for i in range(20) if f"compiled-{i}" in left} == set(range(9, 20))
     assert sum("young" in name for name in left) == 20
+
+
+@pytest.mark.parametrize("damage", [b"[" * 100_000, b"{", b"[1]", b'{"a": 3}', b"\xff"], ids=lambda d: str(d[:6]))
+def test_damaged_keys_are_computed_again(tmp_path, monkeypatch, damage):
+    monkeypatch.setattr(kernel_cache, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(kernel_cache, "_computed_keys", lambda _: {"a": "b"})
+    compute = kernel_cache.kernel_keys.__wrapped__
+    assert compute() == {"a": "b"}
+    (stored,) = tmp_path.glob("keys-*.json")
+    stored.write_bytes(damage)
+    assert compute() == {"a": "b"}
+    assert stored.read_bytes() == b'{"a": "b"}'

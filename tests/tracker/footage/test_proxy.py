@@ -83,3 +83,14 @@ def test_it_cannot_be_written(proxy, clip, tmp_path):
     (tmp_path / "proxies").write_text("in the way")
     with pytest.raises(RecordingError, match="cannot write the proxy"):
         make(proxy, clip)
+
+
+@pytest.mark.parametrize(
+    "damage", [b"[" * 100_000, b"{", b"[1]", b'{"version": "1"}', b"\xff"], ids=lambda d: str(d[:6])
+)
+def test_a_damaged_note_on_its_source_is_that_of_no_footage(proxy, clip, tmp_path, damage):
+    make(proxy, clip)
+    (tmp_path / "proxies" / "cam.json").write_bytes(damage)
+    assert not proxy.fits(clip)
+    assert make(proxy, clip)[-1] == N
+    assert proxy.fits(clip)

@@ -86,7 +86,7 @@ GOOD = "# quadrille poses, version 1\n# model = ball\n# height_m = 1.7\nframe,hi
         ("1,2", "1,nan", "line 6, column 2: expected a finite number within 1e\\+09, found nan"),
         ("1,2", "1,inf", "line 6, column 2"),
         ("1,2", "1,1e300", "line 6, column 2"),
-        ("1,2", "1.5,2", "line 6: expected a whole frame number of at most 10000000 first, found '1.5'"),
+        ("1,2", "1.5,2", "line 6: expected a whole frame number of at most 10000000 first, found 1.5"),
         ("1,2", "1e300,2", "line 6: expected a whole frame number"),
         ("0,1", "-1,1", "expected frames from 0, found -1"),
         ("1,2", f"1,{'2' * 140_000}", "line 6: field larger than field limit"),

@@ -1,0 +1,114 @@
+"""An hour of scripted annotation in a browser: nothing goes wrong, and neither the program nor the page grows.
+
+`QUADRILLE_SOAK=1` takes the whole hour, and only then memory is judged: caches fill in the first half. To run it alone:
+`QUADRILLE_SOAK=1 python -m pytest -m slow tests/soak/test_hours_of_annotation.py`.
+"""
+
+import asyncio
+import random
+import shutil
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chromium import FLAGS, chromium_path
+from page_driver import dragging, shows
+from playwright.async_api import async_playwright
+from program import ROOT, started, visited
+
+from tracker.session.session import load_session
+from tracker.store.annotation_store import AnnotationStore
+
+SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
+HOUR_S = 3600.0
+JUDGED_S = 1800.0
+"""A shorter soak is not judged by its memory."""
+MOST_MB_PER_MINUTE = 0.2
+POINTS = ("left_wrist", "right_wrist", "left_elbow", "right_elbow", "left_knee", "right_ankle", "head", "torso")
+KEYS = ("Control+z", "Control+z", "Control+Shift+z", "h", "h", "Shift+H", "Shift+H", "]", "[", "m", "c", "r")
+N_FRAMES = 50
+SEED = 7
+
+
+def resident_mb(pid):
+    """Memory of a process that is in use, MB."""
+    line = next(x for x in Path(f"/proc/{pid}/status").read_text().splitlines() if x.startswith("VmRSS"))
+    return int(line.split()[1]) / 1e3
+
+
+async def heap_mb(devtools):
+    """What the page's objects take after a collection of garbage, MB."""
+    await devtools.send("HeapProfiler.collectGarbage")
+    metrics = (await devtools.send("Performance.getMetrics"))["metrics"]
+    return next(m["value"] for m in metrics if m["name"] == "JSHeapUsedSize") / 1e6
+
+
+async def go_to(page, frame):
+    await page.locator("#frame").fill(str(frame))
+    await page.keyboard.press("Enter")
+    await page.locator("#frame").blur()
+    await shows(page, f"quadrille.state.shown.frame === {frame} && quadrille.state.overlay.frame === {frame}", 60)
+
+
+async def act(page, rng):
+    """What an annotator does on a frame: look, drag some joints in some views, change their mind, search, go on."""
+    await go_to(page, rng.randrange(N_FRAMES))
+    for _ in range(rng.randint(1, 3)):
+        offset = rng.uniform(-15, 15), rng.uniform(-15, 15)
+        async with dragging(page, rng.randrange(4), rng.choice(POINTS), offset):
+            await asyncio.sleep(0.1)
+        await asyncio.sleep(rng.uniform(0.1, 0.4))
+    for key in rng.sample(KEYS, 2):
+        await page.keyboard.press(key)
+        await asyncio.sleep(0.1)
+    await page.keyboard.press("Escape")
+    if rng.random() < 0.1:
+        await page.locator("#search-frame").click()
+        await shows(page, "quadrille.state.state.job.running === false", 120)
+    if rng.random() < 0.1:
+        await page.locator("#play").click()
+        await asyncio.sleep(1.0)
+        await page.keyboard.press("Space")
+    await shows(page, "quadrille.state.state.saved", 60)
+
+
+def slope_per_minute(times_s, values):
+    """Growth over the second half of the measurements, per minute."""
+    half = [(t, v) for t, v in zip(times_s, values, strict=True) if t >= times_s[-1] / 2]
+    return float(np.polyfit(*np.transpose(half), 1)[0] * 60) if len(half) > 1 else float("nan")
+
+
+@pytest.mark.slow
+async def test_an_hour_of_annotation_loses_nothing_and_does_not_grow(tmp_path, cases, report):
+    folder = Path(shutil.copytree(SAMPLE, tmp_path / "session"))
+    length_s, rng = cases(HOUR_S), random.Random(SEED)
+    rows = []
+    n = 0
+    async with (
+        async_playwright() as playwright,
+        await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS) as browser,
+        started(folder) as program,
+        visited(browser, program.address) as page,
+    ):
+        devtools = await page.context.new_cdp_session(page)
+        await devtools.send("Performance.enable")
+        begun = measured = time.monotonic()
+        while time.monotonic() < begun + length_s:
+            await act(page, rng)
+            n += 1
+            if time.monotonic() >= measured + min(60.0, length_s / 6):
+                measured = time.monotonic()
+                rows.append((measured - begun, resident_mb(program.pid), await heap_mb(devtools)))
+                report(
+                    f"{rows[-1][0] / 60:.1f} min, {n} frames, program {rows[-1][1]:.0f} MB, page {rows[-1][2]:.1f} MB"
+                )
+        await program.stop()
+    times, *memory = zip(*rows, strict=True)
+    growth = [slope_per_minute(times, values) for values in memory]
+    report(f"{n} frames in {times[-1] / 60:.0f} min: {growth[0]:+.2f} and {growth[1]:+.2f} MB a minute, second half")
+    store = AnnotationStore(load_session(folder).annotations_path)
+    assert len(store.history(limit=1_000_000)) > n / 2
+    store.close()
+    if length_s >= JUDGED_S:
+        assert max(growth) < MOST_MB_PER_MINUTE

@@ -1,0 +1,165 @@
+"""Mutated text files: each is read or refused by one sentence, quickly and in little memory."""
+
+import json
+import random
+import socket
+import time
+import tomllib
+import traceback
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mutation import json_bytes, mutate_bytes, mutate_tree, toml_bytes
+
+from tracker.errors import TrackerError
+from tracker.evaluation.metrics import at_rate
+from tracker.formats.anipose import read_calibration
+from tracker.formats.joint_maps import guess_joint_map, read_joint_map
+from tracker.formats.model_toml import format_model, load_model, parse_model
+from tracker.formats.pose_csv import read_pose_table
+from tracker.formats.trc import read_trc
+from tracker.geometry.ground_plane import up_rotation
+from tracker.session import lock
+from tracker.session.session import load_session, save_floor
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).resolve().parents[2]
+SAMPLES = ROOT / "sample_sessions"
+MODELS = ROOT / "tracker" / "body" / "models"
+MAX_S, MAX_BYTES = 2.0, 500e6
+
+JOINT_MAP = 'left_shoulder = "LSHO"\nleft_wrist = "LWRA"\nneck = "C7"\n'
+LOCK = {
+    "host": socket.gethostname(), "process": 999_999, "started": "12345", "since": "2025-11-01T10:00:00+00:00",
+    "token": "0123456789abcdef",
+}  # fmt: skip
+
+
+def shown_camera(camera):
+    """What the views compute of a camera before there is any footage."""
+    camera.project(np.array([[0.1, 0.2, 0.3], [1.0, 1.0, 1.0]]))
+    camera.undistort_points(np.array([[1.0, 2.0]]))
+    camera.scaled(0.5)
+
+
+def shown_model(model):
+    """What the views compute of a body; a model that was read can be written and read again."""
+    again = parse_model(format_model(model), "again")
+    assert again.value_names == model.value_names
+    model.points_world(model.neutral())
+    for part, shape in zip(model.parts, model.shapes, strict=True):
+        shape.triangles(8, 8)
+        bytes.fromhex(part.color.removeprefix("#"))
+    assert np.isfinite(model.kinematics(model.neutral()).Ts_world_part).all()
+
+
+def read_session(path):
+    session = load_session(path.parent)
+    assert 1 <= session.n_frames * session.fps < 1e13
+    up_rotation(session.up, session.floor)
+    for person in session.people:
+        bytes.fromhex(person.color.removeprefix("#"))
+    for source in session.cameras:
+        source.footage.exists()
+    save_floor(session, session.up, session.floor)
+
+
+def read_cameras(path):
+    for camera in read_calibration(path):
+        shown_camera(camera)
+
+
+def read_model(path):
+    shown_model(load_model(path))
+
+
+def read_markers(path):
+    table = read_trc(path)
+    at_rate(table, 25.0)
+    guess_joint_map(table.names, path.name)
+
+
+def read_lock(path):
+    with lock.SessionLock(path.parent):
+        pass
+
+
+def sources(pattern, *folders):
+    return [p.read_bytes() for folder in folders for p in sorted(folder.glob(pattern))]
+
+
+KINDS = {
+    "session": ("session.toml", sources("*/session.toml", SAMPLES), read_session, 4000),
+    "calibration": ("calibration.toml", sources("*/calibration.toml", SAMPLES), read_cameras, 4000),
+    "model": ("person.toml", sources("*.toml", MODELS, SAMPLES / "tango" / "models"), read_model, 4000),
+    "TRC": ("truth.trc", sources("*/*.trc", SAMPLES), read_markers, 4000),
+    "lock": ("lock.json", [json_bytes(LOCK)], read_lock, 4000),
+    "pose table": ("truth.csv", sources("*/*.csv", SAMPLES), read_pose_table, 1000),
+    "joint map": ("map.toml", [JOINT_MAP.encode()], read_joint_map, 1000),
+}
+"""For each kind: name of the file, examples, what reads it, and the full number of cases."""
+
+
+def resident_bytes(key):
+    line = next(s for s in Path("/proc/self/status").read_text().splitlines() if s.startswith(key))
+    return int(line.split()[1]) * 1024
+
+
+def mutated(rng, name, examples, others):
+    """One file, mutated once to four times."""
+    data = rng.choice(examples)
+    if name.endswith((".toml", ".json")) and rng.random() < 0.5:
+        tree = tomllib.loads(data.decode()) if name.endswith(".toml") else json.loads(data)
+        return (toml_bytes if name.endswith(".toml") else json_bytes)(mutate_tree(rng, tree))
+    for _ in range(rng.choice((1, 1, 1, 1, 2, 4))):
+        data = mutate_bytes(rng, data, others) or b" "
+    return data
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_mutated_files_are_read_or_refused(kind, tmp_path, cases, report, monkeypatch):
+    name, examples, read, full = KINDS[kind]
+    monkeypatch.setattr(lock, "_WRITING_S", 0.0)  # nobody writes these locks meanwhile
+    sample = SAMPLES / "elbow_rotation"
+    others = [e for _, some, _, _ in KINDS.values() for e in some]
+    (tmp_path / "models").mkdir()
+    for other in ("session.toml", "calibration.toml", "models/person.toml"):
+        (tmp_path / other).write_bytes((sample / other).read_bytes())
+    if kind == "session":  # that of the dancers names their models and cameras
+        examples = [(sample / name).read_bytes()]
+    rng, n = random.Random(f"mutated {kind}"), cases(full)
+    failures, refused, slowest = [], 0, 0.0
+    Path("/proc/self/clear_refs").write_text("5")  # the peak counts from here
+    before = resident_bytes("VmRSS")
+    for case in range(n):
+        data = mutated(rng, name, examples, others)
+        path = tmp_path / name
+        path.write_bytes(data)
+        start = time.thread_time()
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                read(path)
+        except TrackerError as error:
+            refused += 1
+            if len(str(error)) > 2000:
+                failures.append(f"case {case}: a message of {len(str(error))} characters: {str(error)[:300]}")
+        except Exception:
+            failures.append(f"case {case}: {traceback.format_exc(limit=-3)}\n{data[:300]!r}")
+        took = time.thread_time() - start
+        slowest = max(slowest, took)
+        if took > MAX_S:
+            failures.append(f"case {case}: {took:.1f} s for {len(data)} bytes: {data[:100]!r}")
+        del data
+        path.unlink(missing_ok=True)
+    grown = resident_bytes("VmHWM") - before
+    report(
+        f"{kind}: {n} mutated files, {refused} refused, {n - refused} read, {len(failures)} failures, "
+        f"slowest {slowest:.2f} s, memory {grown / 1e6:.0f} MB"
+    )
+    assert not failures, "\n".join(failures[:10])
+    assert grown < MAX_BYTES
+    assert 0 < refused < n  # neither all are refused nor all are read

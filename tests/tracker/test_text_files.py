@@ -1,0 +1,140 @@
+"""Text files are refused by size and depth before they are parsed, and read from whatever a path names."""
+
+import contextlib
+import os
+import threading
+import time
+import tracemalloc
+from pathlib import Path
+
+import pytest
+
+from tracker.errors import SessionError
+from tracker.text_files import MAX_NESTING, TextKind, parse_toml, read_json, read_lines, read_text, read_toml
+
+KIND = TextKind("odd file", 1_000_000, SessionError, "mend it")
+
+
+def all_lines(path, kind):
+    return list(read_lines(path, kind))
+
+
+@pytest.mark.parametrize("read", [read_text, read_toml, read_json, all_lines])
+def test_a_file_of_many_megabytes_is_refused_unread(tmp_path, read):
+    """Parsed, this one took a minute and a half."""
+    path = tmp_path / "a.toml"
+    path.write_text(f"a = [{'0,' * 10_000_000}]")
+    start = time.thread_time()
+    tracemalloc.start()
+    with pytest.raises(SessionError, match=r"odd file .*a\.toml: expected at most 1 MB, found more; check that"):
+        read(path, KIND)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert time.thread_time() - start < 0.1
+    assert peak < 200_000
+
+
+@pytest.mark.parametrize("read", [read_text, all_lines])
+def test_a_device_without_end_is_refused(read):
+    with pytest.raises(SessionError, match=r"/dev/zero.*at most 1"):
+        read(Path("/dev/zero"), KIND)
+
+
+def test_a_pipe_is_read(tmp_path):
+    """As in `--calibration <(command)`."""
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    writer = threading.Thread(target=path.write_text, args=("a = 1",))
+    writer.start()
+    assert read_toml(path, KIND) == {"a": 1}
+    writer.join()
+
+
+def test_a_byte_order_mark_is_no_text(tmp_path):
+    (tmp_path / "a").write_bytes(b"\xef\xbb\xbfa = 1")
+    assert read_toml(tmp_path / "a", KIND) == {"a": 1}
+
+
+@pytest.mark.parametrize("read", [read_text, all_lines])
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("none", "odd file .*none not found; check the path"),
+        (
+            "latin",
+            "odd file .*latin cannot be read: expected UTF-8 text, found: .* position 3.*; mend it",
+        ),
+        (".", "cannot be read: expected UTF-8 text, found: .*Is a directory"),
+        ("x" * 400, "cannot be read: .*File name too long"),
+        ("a\0b", "cannot be read: .*null byte"),
+    ],
+)
+def test_paths_that_are_no_text_file(tmp_path, read, name, expected):
+    (tmp_path / "latin").write_bytes(b"abc\xfcdef")
+    with pytest.raises(SessionError, match=expected):
+        read(tmp_path / name, KIND)
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
+def test_lines(tmp_path, newline):
+    (tmp_path / "a").write_bytes(newline.join(["one", "", "two\u2028", "three"]).encode())
+    assert all_lines(tmp_path / "a", KIND) == ["one", "", "two\u2028", "three"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a = " + "[" * 100_000,
+        "a = " + "{a = " * 100_000,
+        "a = " + "[" * (MAX_NESTING + 1) + "]" * (MAX_NESTING + 1),
+        ".".join("a" * 100_000) + " = 1",
+        "[" + ".".join(["'a'", '"b"', "c "] * 100) + "]",
+        "a = 'it' # '''\nb = " + "[" * 1000,
+        'a = "\\"" \nb = ' + "[" * 1000,
+        'a = """x\\""" ""\n""" \nb = ' + "[" * 1000,
+    ],
+    ids=lambda text: text[:12],
+)
+def test_deep_nesting_is_refused_at_once(text):
+    start = time.thread_time()
+    with pytest.raises(SessionError, match="odd file x: expected at most 32 levels of nesting, found more; correct it"):
+        parse_toml(text, "x", KIND)
+    assert time.thread_time() - start < 0.5
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a = " + "[" * MAX_NESTING + "]" * MAX_NESTING,
+        "a = '" + "[" * 1000 + "'",
+        'a = "' + "{" * 1000 + '\\""',
+        "a = '''" + "[\n" * 1000 + "'''",
+        'a = """' + "[\n" * 1000 + '"\\""" """',
+        "a = 1 # " + "[" * 1000 + " 'it\nb = 2",
+        "a = '" + ".x" * 1000 + "' # " + ".x" * 1000,
+        "a = [" + "1.5, " * 1000 + "]",
+        "".join(f"[[a]]\nb.c = {i}\n" for i in range(1000)),
+    ],
+    ids=lambda text: text[:12],
+)
+def test_brackets_that_do_not_nest_are_read(text):
+    assert parse_toml(text, "x", KIND)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a=[" + "0," * 499_000 + "]", "".join(f"[k{i}]\n" for i in range(110_000)), "a=[" + "{a=1}," * 165_000 + "]",
+        "".join(f"{'.'.join('a' * 31)}{i}=1\n" for i in range(14_000)), '"""\\' * 240_000, '"\\' * 490_000,
+        "'" * 990_000, ".a" * 490_000, "a." * 490_000, "[" * 990_000, '"' * 990_000, "#\n" * 490_000,
+        "a=0x" + "f" * 990_000, "a=[" + '"",' * 330_000 + "]", "[[a]]\n" * 160_000,
+    ],
+    ids=lambda text: text[:12],
+)  # fmt: skip
+def test_the_largest_files_take_less_than_two_seconds(text):
+    assert len(text) <= KIND.max_bytes
+    start = time.thread_time()
+    with contextlib.suppress(SessionError):
+        parse_toml(text, "x", KIND)
+    assert time.thread_time() - start < 2.0
