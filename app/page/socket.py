@@ -199,6 +199,8 @@ class PageConnection:
                 await self._send_history()
                 for update in await asyncio.to_thread(self._feed.updates, self._controller, with_figures):
                     await self._send(update)
+                if state.footage.error and (sent is None or sent.footage.error != state.footage.error):
+                    await self._notice(state.footage.error)
                 if state.track.failed and (sent is None or sent.track is not state.track):
                     await self._notice(state.track.message)
             except TrackerError as error:
