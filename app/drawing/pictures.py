@@ -31,6 +31,11 @@ def footage(image: Image | None, size: tuple[int, int]) -> bytes:
     return _jpeg(_blank(size, "frame damaged") if image is None else image)
 
 
+def unreadable(size: tuple[int, int]) -> bytes:
+    """Encode the placeholder for a frame that cannot be read now, as JPEG of a width and height, px."""
+    return _jpeg(_blank(size, "frame unreadable"))
+
+
 def distance(view: ViewEvidence) -> bytes:
     """Encode the distance image of a view as JPEG, bright at the edges and dark at its limit."""
     near = 1.0 - view.distance / max(1e-6, 2 * view.theta_px)

@@ -90,5 +90,5 @@ def _wanted(state: State, view: View) -> dict[Key, tuple[object, ...]]:
                 if layer == "parts"
                 else ()
             )
-            wanted[layer, camera] = (state.frame, *content, *poses)
+            wanted[layer, camera] = (state.frame, state.footage.recoveries, *content, *poses)
     return wanted

@@ -3,7 +3,7 @@
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import lru_cache
@@ -45,19 +45,23 @@ class FrameCache:
                 footage.
             rest_s: time a frame is shown before its evidence is computed.
         """
-        self.observer, self._proxies, self._rest_s = observer, proxies, rest_s
+        self.observer, self._proxies, self._rest_s = observer, list(proxies), rest_s
         self._images = ByteBoundedCache(self._undistorted, _IMAGE_BYTES)
         self._pictures = ByteBoundedCache(self._picture, _PICTURE_BYTES)
         self._resamplers = lru_cache(_SIZES)(self._resampler)
-        self._evidence = ByteBoundedCache(observer.evidence, _EVIDENCE_BYTES)
+        self._evidence = ByteBoundedCache(self._compute_evidence, _EVIDENCE_BYTES)
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="evidence")
         self._wanted: int | None = None
         self._n_pictures = 0  # number of pictures in the making
         self._idle = threading.Condition()
+        self._failed: dict[Hashable, Callable[[], object]] = {}  # what could not be read, and how to try it again
+        self._failed_lock = threading.Lock()
+        self.on_unreadable: Callable[[], None] = lambda: None
+        """Called when footage could not be read, from any thread; `problem` tells what is wrong."""
 
     def images(self, frame: int) -> tuple[Image | None, ...]:
-        """Return the undistorted images of all views, shared by all callers; None for a damaged image."""
-        return tuple(self._images.get((frame, camera)) for camera in range(len(self.observer.cameras)))
+        """Return the undistorted images of all views, shared by all callers; None for a damaged or unreadable one."""
+        return tuple(self._image_or_none(frame, camera) for camera in range(len(self.observer.cameras)))
 
     def evidence(self, frame: int) -> tuple[ViewEvidence, ...]:
         """Return the evidence of a frame; computes it if needed.
@@ -70,7 +74,35 @@ class FrameCache:
             raise RecordingError(
                 f"frame {frame} is not there yet: the footage is being indexed ({share:.0%} so far); wait a moment"
             )
-        return self._evidence.get(frame)
+        try:
+            return self._evidence.get(self._versions(frame))
+        except RecordingError:
+            self._remember("evidence", lambda: self._evidence.get(self._versions(frame)))
+            raise
+
+    def problem(self) -> str | None:
+        """Try to read again what could not be read; return what is wrong, or None if all can be read."""
+        with self._failed_lock:
+            failed = dict(self._failed)
+        errors = dict.fromkeys(self.observer.recording.problems())
+        for what, read in failed.items():
+            try:
+                read()
+            except RecordingError as error:
+                errors[str(error)] = None
+                continue
+            with self._failed_lock:
+                if self._failed.get(what) is read:
+                    del self._failed[what]
+        more = len(errors) - 1
+        also = f" (and {more} other{'s' if more > 1 else ''} like it)" if more > 0 else ""
+        return next(iter(errors)) + also if errors else None
+
+    def _remember(self, what: Hashable, read: Callable[[], object]) -> None:
+        """Remember the last thing of a kind that could not be read."""
+        with self._failed_lock:
+            self._failed[what] = read
+        self.on_unreadable()
 
     @property
     def listed_share(self) -> float | None:
@@ -95,7 +127,7 @@ class FrameCache:
 
     def cached_evidence(self, frame: int) -> tuple[ViewEvidence, ...] | None:
         """Return the evidence of a frame if it is cached."""
-        return self._evidence.peek(frame)
+        return self._evidence.peek(self._versions(frame))
 
     def request(self, frame: int, done: Callable[[int], None]) -> None:
         """Compute the evidence of a frame in the background, unless another is requested first.
@@ -115,10 +147,10 @@ class FrameCache:
                 self._idle.wait_for(lambda: not self._n_pictures, _WAIT_S)
             try:
                 if self._wanted == frame and self._is_indexed(frame):
-                    self._evidence.get(frame)
+                    self.evidence(frame)
                     done(frame)
-            except RecordingError as error:  # the pictures of the frame show it
-                _LOG.warning("no evidence of frame %d: %s", frame, error)
+            except RecordingError as error:  # `problem` tells the pages
+                _LOG.debug("no evidence of frame %d: %s", frame, error)
             except Exception:
                 _LOG.exception("no evidence of frame %d", frame)
 
@@ -130,9 +162,16 @@ class FrameCache:
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     def image(self, frame: int, camera: int, reduction: float = 1) -> bytes:
-        """Return the undistorted image of one view as JPEG, reduced by a factor along either side."""
+        """Return the undistorted image of one view as JPEG, reduced by a factor along either side.
+
+        An image that is damaged or cannot be read is a placeholder that says so.
+        """
         with self._making_picture():
-            return self._pictures.get((frame, camera, reduction))
+            try:
+                return self._pictures.get((frame, camera, reduction, self.observer.recording.version(camera)))
+            except RecordingError:
+                self._remember_view(frame, camera)
+                return pictures.unreadable(self._resamplers(camera, reduction).camera.size)
 
     @contextmanager
     def _making_picture(self) -> Iterator[None]:
@@ -145,29 +184,52 @@ class FrameCache:
                 self._n_pictures -= 1
                 self._idle.notify_all()
 
-    def _picture(self, key: tuple[int, int, float]) -> bytes:
-        """Make the picture of a frame, camera and reduction, resampled once."""
-        frame, camera, reduction = key
+    def _picture(self, key: tuple[int, int, float, int]) -> bytes:
+        """Make the picture of a frame, camera, reduction and version, resampled once."""
+        frame, camera, reduction, _ = key
         image, view = self._read(frame, camera), self._resamplers(camera, reduction)
         return pictures.footage(None if image is None else view.image(image, view.whole), view.camera.size)
 
     def _resampler(self, camera: int, reduction: float) -> WorkingView:
         return WorkingView(self.observer.cameras[camera].camera, 1 / reduction, cv2.BORDER_CONSTANT)
 
-    def _undistorted(self, key: tuple[int, int]) -> Image | None:
-        """Return the undistorted image of a frame and camera."""
-        image = self._read(*key)
-        return None if image is None else self.observer.cameras[key[1]].camera.undistort_image(image)
+    def _image_or_none(self, frame: int, camera: int) -> Image | None:
+        try:
+            return self._images.get((frame, camera, self.observer.recording.version(camera)))
+        except RecordingError:
+            self._remember_view(frame, camera)
+            return None
+
+    def _undistorted(self, key: tuple[int, int, int]) -> Image | None:
+        """Return the undistorted image of a frame, camera and version."""
+        frame, camera, _ = key
+        image = self._read(frame, camera)
+        return None if image is None else self.observer.cameras[camera].camera.undistort_image(image)
+
+    def _compute_evidence(self, key: tuple[int, ...]) -> tuple[ViewEvidence, ...]:
+        return self.observer.evidence(key[0])
+
+    def _versions(self, frame: int) -> tuple[int, ...]:
+        """Return a frame and the version of each camera's footage, which its evidence depends on."""
+        return frame, *(self.observer.recording.version(camera) for camera in range(len(self.observer.cameras)))
+
+    def _remember_view(self, frame: int, camera: int) -> None:
+        self._remember(camera, lambda: self.observer.recording.read_view(camera, frame))
 
     def _read(self, frame: int, camera: int) -> Image | None:
         """Read a frame of a camera as filmed, from its proxy if that contains the frame."""
         proxy = self._proxy_of(frame, camera)
-        if proxy is None:
-            return self.observer.recording.read_view(camera, frame)
-        return proxy.read(frame + self.observer.cameras[camera].offset)
+        if proxy is not None:
+            try:
+                return proxy.read(frame + self.observer.cameras[camera].offset)
+            except RecordingError as error:
+                _LOG.warning("%s; the footage is shown without it", error)
+                self._proxies[camera] = None
+        return self.observer.recording.read_view(camera, frame)
 
     def _proxy_of(self, frame: int, camera: int) -> Proxy | None:
-        """Return the proxy of a camera if it contains the frame."""
+        """Return the proxy of a camera if it contains the frame and the footage is still what it was made from."""
         proxy = self._proxies[camera] if self._proxies else None
-        at = frame + self.observer.cameras[camera].offset
-        return None if proxy is None or at >= proxy.n_frames else proxy
+        if proxy is None or self.observer.recording.version(camera) > 0:
+            return None
+        return proxy if frame + self.observer.cameras[camera].offset < proxy.n_frames else None

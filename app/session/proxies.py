@@ -6,8 +6,9 @@ from typing import Any
 from app.runtime.progress import Reporter
 from tracker.files import refuse_links
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.image_folder import ImageFolder
 from tracker.footage.proxy import FOLDER, Proxy
-from tracker.footage.video import ImageFolder, open_footage
+from tracker.footage.video import open_footage
 from tracker.session.lock import SessionLock
 from tracker.session.session import Session
 

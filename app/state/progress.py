@@ -49,9 +49,14 @@ class RangeState:
 
 @dataclass(frozen=True)
 class FootageState:
-    """How many frames of the videos are indexed; long footage is indexed in the background when it is first opened."""
+    """How many frames of the videos are indexed, and whether all can be read.
+
+    Long footage is indexed in the background when it is first opened.
+    """
 
     listed: float | None = None
     """Share of the footage, 0 to 1; None when all of it is indexed."""
     error: str | None = None
     """What is wrong with a file; None if nothing is."""
+    recoveries: int = 0
+    """Number of times that unreadable footage could be read again. Its pictures are made again then."""

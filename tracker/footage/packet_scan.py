@@ -1,17 +1,22 @@
 """List the frames of a video from its packets, a hundred times faster than decoding."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import av
 import numpy as np
 from av.container import InputContainer
+from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
 from tracker.errors import RecordingError
 from tracker.footage.frame_index import Index
 
+_CHECKED_FRAMES = 16
+"""Number of frames whose time stamps are compared with the decoder's, enough for any order of B-frames to show."""
+_RATE_JITTER = 0.2
+"""The rate is variable if intervals between frames differ by more than this share of the median interval."""
 _EVERY_PACKETS = 4000
 """Number of packets between two reports."""
 _BREATH_PACKETS = 100
@@ -79,6 +84,43 @@ def list_frames(container: InputContainer, where: str, report: Callable[[PacketS
             "copy or convert it again"
         )
     return index
+
+
+def check_order(index: Index, frames: Iterator[VideoFrame], where: str) -> VideoFrame:
+    """Check that a decoder shows the first frames in the order of their time stamps; return the first.
+
+    Args:
+        index: of the video, not empty.
+        frames: as decoded from the beginning.
+        where: names the video in messages.
+
+    Raises:
+        RecordingError: the order differs.
+    """
+    first = None
+    for expected in index.pts[:_CHECKED_FRAMES]:
+        frame = next(frames, None)
+        if frame is None or frame.pts != expected:
+            raise RecordingError(
+                f"{where} has time stamps that do not follow the order of its frames, as AVI files with B-frames have; "
+                "convert it to MP4"
+            )
+        first = first or frame
+    assert first is not None
+    return first
+
+
+def rate_of(index: Index, declared: float, tick_s: float) -> tuple[float, bool]:
+    """Return the mean frame rate, 1/s, and whether it is constant; `declared` is the header's, 0 for none."""
+    intervals = np.diff(index.pts)
+    if not len(intervals):
+        return declared or 1.0, True
+    mean = float(1 / (intervals.mean() * tick_s))
+    usual = np.median(intervals)
+    # Coarse ticks (a millisecond in Matroska) shift single frames by up to one tick.
+    constant = bool(np.all(np.abs(intervals - usual) <= max(_RATE_JITTER * usual, 1)))
+    # The header's rate is exact; the mean over a short clip is rounded to ticks.
+    return (declared if constant and abs(declared / mean - 1) < 0.005 else mean), constant
 
 
 def _sorted(shown: list[int], keys: list[int], position: dict[int, int], before: int | None) -> Index:

@@ -24,6 +24,7 @@ import numpy as np
 from tracker.errors import RecordingError
 from tracker.files import write_text_atomic
 from tracker.footage.frame_index import stamp_of
+from tracker.footage.image_file import decode_image
 from tracker.footage.video import Footage
 from tracker.geometry.arrays import Image
 from tracker.text_files import TextKind, read_json
@@ -90,10 +91,10 @@ class Proxy:
         try:
             with self._pictures.open("rb") as file:
                 file.seek(begin)
-                data = np.frombuffer(file.read(end - begin), np.uint8)
+                data = file.read(end - begin)
         except OSError as error:
             raise RecordingError(f"cannot read {self._pictures}: {error.strerror}; delete it") from error
-        image = cv2.imdecode(data, cv2.IMREAD_COLOR_RGB) if data.size else None
+        image = decode_image(data, str(self._pictures))
         if image is None:
             raise RecordingError(f"{self._pictures} is damaged at frame {k}; delete it and run quadrille index again")
         return np.asarray(image, dtype=np.uint8)

@@ -4,19 +4,22 @@ import threading
 from collections import OrderedDict
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 from types import TracebackType
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import RecordingError
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.video import IMAGE_SUFFIXES, open_footage, read_image
+from tracker.footage.image_file import IMAGE_SUFFIXES, read_image, read_unchanged
+from tracker.footage.video import open_footage
 from tracker.geometry.arrays import Image
 
 DEFAULT_CACHE_BYTES = 256 * 2**20
+_Key = tuple[int, int, int]
+"""Camera, version of its footage, frame."""
 
 
 class Recording:
@@ -51,7 +54,7 @@ class Recording:
         for source, footage in zip(self._cameras, self._footage, strict=True):
             check_size(source.camera.name, footage.path, footage.size, source.camera.size)
         self.fps = next((f.fps for f in self._footage if f.fps is not None), None)
-        self._cache: OrderedDict[tuple[int, int], Image] = OrderedDict()
+        self._cache: OrderedDict[_Key, Image] = OrderedDict()
         self._cache_bytes, self._cached_bytes = cache_bytes, 0
         self._cache_lock = threading.Lock()
 
@@ -77,6 +80,20 @@ class Recording:
         footage = self._footage[camera]
         return k + self._cameras[camera].offset < footage.n_frames or footage.listed_share is None
 
+    def version(self, camera: int) -> int:
+        """Return how often the footage of a camera, by its index, was found replaced; its frames may differ since."""
+        return self._footage[camera].version
+
+    def problems(self) -> list[str]:
+        """Look at the files of all cameras again; return what is wrong with each that cannot be read, in order."""
+        found = []
+        for footage in self._footage:
+            try:
+                footage.look_again()
+            except RecordingError as error:
+                found.append(str(error))
+        return found
+
     def read(self, k: int) -> tuple[Image | None, ...]:
         """Read frame k of each camera as filmed, (H, W, 3) RGB, not writable; None if it is damaged.
 
@@ -94,7 +111,7 @@ class Recording:
     def cached(self, k: int) -> bool:
         """Return whether frame k of every camera is in the cache."""
         with self._cache_lock:
-            return all((i, k) in self._cache for i in range(len(self._cameras)))
+            return all((i, f.version, k) in self._cache for i, f in enumerate(self._footage))
 
     def close(self) -> None:
         """Release all files."""
@@ -113,18 +130,20 @@ class Recording:
             raise RecordingError(f"expected a frame from 0 to {self.n_frames - 1}, found {k}")
 
     def _read_one(self, camera: int, k: int) -> Image | None:
+        footage = self._footage[camera]
         with self._cache_lock:
-            image = self._cache.get((camera, k))
+            key = camera, footage.version, k
+            image = self._cache.get(key)
             if image is not None:
-                self._cache.move_to_end((camera, k))
+                self._cache.move_to_end(key)
                 return image
-        image = self._footage[camera].read(k + self._cameras[camera].offset)
+        image = footage.read(k + self._cameras[camera].offset)
         if image is not None:
             image.setflags(write=False)  # all readers share it
-            self._keep((camera, k), image)
+            self._keep((camera, footage.version, k), image)
         return image
 
-    def _keep(self, key: tuple[int, int], image: Image) -> None:
+    def _keep(self, key: _Key, image: Image) -> None:
         with self._cache_lock:
             if key in self._cache:  # another thread was faster
                 return
@@ -167,14 +186,13 @@ def read_background(source: CameraSource) -> Image | None:
 
 
 def _mean_frame(path: Path, camera: str) -> Image:
-    footage = open_footage(path, camera)
-    total, count = np.zeros((footage.size[1], footage.size[0], 3)), 0
-    for k in range(footage.n_frames):
-        image = footage.read(k)
-        if image is not None:
-            total += image
-            count += 1
-    footage.close()
+    with closing(open_footage(path, camera)) as footage:
+        total, count = np.zeros((footage.size[1], footage.size[0], 3)), 0
+        for k in range(footage.n_frames):
+            image = footage.read(k)
+            if image is not None:
+                total += image
+                count += 1
     if not count:
         raise RecordingError(f"camera '{camera}': no frame of the background {path} can be decoded; record it again")
     return np.round(total / count).astype(np.uint8)
@@ -188,16 +206,16 @@ def read_mask(source: CameraSource, k: int) -> NDArray[np.uint8] | None:
     """
     if source.masks is None:
         return None
-    path = source.masks / f"{k + source.offset:06d}.png"
-    if not path.is_file():
+    path, where = source.masks / f"{k + source.offset:06d}.png", f"camera '{source.camera.name}'"
+    if not path.exists():
+        if not source.masks.is_dir():  # otherwise tracking would go on without any mask
+            raise RecordingError(f"{where}: the folder of masks {source.masks} is not there; put it back")
         return None
-    data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
-    mask = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    mask = read_unchanged(path, f"{where}: mask")
     if mask is None or mask.ndim != 2 or mask.dtype != np.uint8:
         found = "no image" if mask is None else f"{mask.dtype} with {mask.shape[2] if mask.ndim > 2 else 1} channels"
         raise RecordingError(
-            f"camera '{source.camera.name}': expected a gray 8-bit image as mask, found {found} in {path}; "
-            "export masks as single-channel PNG"
+            f"{where}: expected a gray 8-bit image as mask, found {found} in {path}; export masks as single-channel PNG"
         )
     check_size(source.camera.name, path, mask.shape[1::-1], source.camera.size)
     return np.asarray(mask, dtype=np.uint8)

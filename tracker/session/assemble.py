@@ -6,8 +6,9 @@ from pathlib import Path
 
 from tracker.errors import RecordingError, SessionError
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.image_file import IMAGE_SUFFIXES
 from tracker.footage.recording import check_size, read_background, read_mask
-from tracker.footage.video import IMAGE_SUFFIXES, Footage, open_footage
+from tracker.footage.video import Footage, open_footage
 from tracker.formats.anipose import Units, read_calibration
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera

@@ -1,4 +1,4 @@
-"""Watch the indexing of the footage, and show frames as soon as they are indexed."""
+"""Watch the footage: show frames as soon as they are indexed, and say which cannot be read until they can."""
 
 import threading
 
@@ -7,41 +7,55 @@ from app.state.progress import FootageState
 from tracker.errors import TrackerError
 
 _POLL_S = 0.2
+"""Time between two looks while frames are being indexed."""
+_RETRY_S = 1.0
+"""Time between two attempts to read footage that could not be read."""
+_GATHER_S = 0.1
+"""Time until a failure is told: a drive that is gone takes several cameras with it, and one notice names them all."""
 
 
 class FootageScan:
-    """Watches in its own thread until all frames of all videos are indexed."""
+    """Watches in its own thread."""
 
     def __init__(self, session_state: SessionState) -> None:
         """Start to watch."""
         self._session_state = session_state
-        self._closing = threading.Event()
-        self._thread: threading.Thread | None = None
-        if self._update():
-            self._thread = threading.Thread(target=self._watch, name="listing", daemon=True)
-            self._thread.start()
+        self._closing, self._failed = threading.Event(), threading.Event()
+        session_state.frames.on_unreadable = self._failed.set
+        pause_s = self._update()
+        self._thread = threading.Thread(target=self._watch, args=(pause_s,), name="footage", daemon=True)
+        self._thread.start()
 
     def close(self) -> None:
         """Stop watching."""
         self._closing.set()
-        if self._thread:
-            self._thread.join()
+        self._failed.set()
+        self._thread.join(_RETRY_S)  # a network drive that is gone may hold it for minutes
 
-    def _watch(self) -> None:
-        while not self._closing.wait(_POLL_S):
-            if not self._update():
-                return
+    def _watch(self, pause_s: float | None) -> None:
+        while True:
+            if self._failed.wait(pause_s):
+                self._failed.clear()
+                if self._closing.wait(_GATHER_S):
+                    return
+            pause_s = self._update()
 
-    def _update(self) -> bool:
-        """Update the state; returns whether frames are missing."""
+    def _update(self) -> float | None:
+        """Update the state; returns the time until the next look, s, or None to wait for a failure."""
         session_state = self._session_state
+        before = session_state.state.footage
         try:
-            share, error = session_state.frames.listed_share, None
+            share = session_state.frames.listed_share
+            error = session_state.frames.problem()
         except TrackerError as failure:
             share, error = None, str(failure)
-        found = FootageState(share, error)
-        if found != session_state.state.footage:
+        recovered = before.error is not None and error is None
+        found = FootageState(share, error, before.recoveries + recovered)
+        if found != before:
             with session_state.lock:
-                session_state.set(footage=found)
+                # The evidence may have been computed by the attempt to read it again.
+                session_state.set(footage=found, **session_state.costs(session_state.state.poses))
                 session_state.request_evidence()
-        return share is not None
+        if error is not None:
+            return _RETRY_S
+        return None if share is None else _POLL_S

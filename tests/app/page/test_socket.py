@@ -339,9 +339,8 @@ async def test_evidence_waits_for_the_pictures(controller):
 
     async with visiting(controller) as page:
         await page.hear("image", lambda m: m["of"] == 4)
-        await page.hear("state", lambda m: m["cost_px"] is not None)
-        frames.image = slow
-        frames._evidence._compute = lambda k: made.append("evidence") or evidence(k)
+        frames.image, frames._rest_s = slow, 0.2
+        frames._evidence._compute = lambda key: made.append("evidence") or evidence(key[0])
         await page.send("seek", frame=7)
         await page.hear("state", lambda m: m["frame"] == 7 and m["cost_px"] is not None)
     assert made == ["image"] * 4 + ["evidence"]

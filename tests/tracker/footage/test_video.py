@@ -9,7 +9,8 @@ import pytest
 from clips import SIZE, N, encode, number, write_images
 
 from tracker.errors import RecordingError
-from tracker.footage.video import ImageFolder, VideoFile, open_footage
+from tracker.footage.image_folder import ImageFolder
+from tracker.footage.video import VideoFile, open_footage
 
 
 def decode_all(path):

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from tracker.errors import SessionError, TrackerError
-from tracker.footage.video import open_footage, read_image
+from tracker.footage.image_file import read_image
+from tracker.footage.video import open_footage
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.formats.trc import read_trc

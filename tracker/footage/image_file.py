@@ -1,0 +1,105 @@
+"""Decode image files. Sizes are read from the header and checked before any pixel is decoded."""
+
+import struct
+from io import BytesIO
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image as Pillow
+
+from tracker.errors import RecordingError
+from tracker.geometry.arrays import Image
+
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+MAX_PIXELS = 80_000_000
+"""Largest number of pixels of an image or of a video's frame. A film camera of 12288x6480 has 79.6 million.
+
+A file of a hundred kilobytes can promise any size, and decoding it would take all memory.
+"""
+_MAX_BYTES = 8 * MAX_PIXELS
+"""Largest size of an image file: four channels of 16 bits, not compressed."""
+_NO_HEADER = (OSError, ValueError, SyntaxError, LookupError, TypeError, OverflowError, struct.error)
+"""The errors by which Pillow says that bytes are no image that it knows."""
+
+
+def read_image(path: Path, where: str) -> Image:
+    """Read an image as 8-bit RGB, (H, W, 3); `where` begins the message.
+
+    Raises:
+        RecordingError: the file is missing, not an image or too large.
+    """
+    image = read_image_or_none(path, where)
+    if image is None:
+        raise RecordingError(f"{where}: {path} is damaged or not an image; export it again")
+    return image
+
+
+def read_image_or_none(path: Path, where: str) -> Image | None:
+    """Read an image as 8-bit RGB, (H, W, 3); None if it is damaged.
+
+    Raises:
+        RecordingError: the file is missing or too large.
+    """
+    image = decode_image(_read(path, where), f"{where}: {path}")
+    return None if image is None else np.asarray(image, dtype=np.uint8)
+
+
+def read_unchanged(path: Path, where: str) -> NDArray[np.generic] | None:
+    """Read an image with the channels and the depth of the file, (H, W) or (H, W, C); None if it is damaged.
+
+    Raises:
+        RecordingError: the file is missing or too large.
+    """
+    return decode_image(_read(path, where), f"{where}: {path}", cv2.IMREAD_UNCHANGED)
+
+
+def decode_image(data: bytes, where: str, flags: int = cv2.IMREAD_COLOR_RGB) -> NDArray[np.generic] | None:
+    """Decode the bytes of an image file with flags of OpenCV; None if they are damaged or no image.
+
+    Raises:
+        RecordingError: the image is too large.
+    """
+    try:
+        with Pillow.open(BytesIO(data)) as header:
+            size = header.size
+    except Pillow.DecompressionBombError:
+        raise RecordingError(_too_large(where, "more than twice as many")) from None
+    except _NO_HEADER:
+        return None
+    check_pixels(size, where)
+    try:
+        image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
+    except cv2.error:  # a header that Pillow accepts and OpenCV does not
+        return None
+    return None if image is None else np.asarray(image)
+
+
+def check_pixels(size: tuple[int, int], where: str) -> None:
+    """Check the size of an image, width and height, before it is decoded.
+
+    Raises:
+        RecordingError: it has more than `MAX_PIXELS`.
+    """
+    if size[0] * size[1] > MAX_PIXELS:
+        raise RecordingError(_too_large(where, f"{size[0]}x{size[1]}"))
+
+
+def _too_large(where: str, found: str) -> str:
+    return f"{where}: expected at most {MAX_PIXELS // 10**6} million pixels, found {found}; reduce it"
+
+
+def _read(path: Path, where: str) -> bytes:
+    try:
+        if path.exists() and not path.is_file():  # a pipe or a device would be read for ever
+            raise RecordingError(f"{where}: expected a file, found {path}, which is none; check the path")
+        # Not cv2.imread, which cannot open every path on every system and prints.
+        if (size := path.stat().st_size) > _MAX_BYTES:
+            raise RecordingError(
+                f"{where}: expected an image of at most {_MAX_BYTES // 10**6} MB, found {size // 10**6} MB in {path}; "
+                "export it again"
+            )
+        return path.read_bytes()
+    except OSError as error:
+        raise RecordingError(f"{where}: cannot read {path}: {error.strerror}; check the path") from error

@@ -1,0 +1,80 @@
+"""One opened video file, decoded from one place on."""
+
+from collections.abc import Generator, Iterable
+from itertools import chain
+from pathlib import Path
+
+import av
+from av.packet import Packet
+from av.video.frame import VideoFrame
+
+from tracker.errors import RecordingError
+from tracker.footage.image_file import MAX_PIXELS, check_pixels
+
+_OPTIONS = {"max_pixels": str(MAX_PIXELS)}
+"""A stream can have other sizes than its header: the decoder refuses them as well."""
+
+
+class VideoDecoder:
+    """A container and its decoder. Not safe to use from several threads.
+
+    They end together. libav reads a null pointer where packets are asked of a container that has been closed, which
+    ends the program; PyAV does not check it.
+    """
+
+    def __init__(self, path: Path, where: str) -> None:
+        """Open a file before its first frame.
+
+        Args:
+            path: the file.
+            where: begins the message.
+
+        Raises:
+            RecordingError: it has no video, or frames that are too large.
+            av.FFmpegError: it cannot be opened.
+        """
+        self._container = av.open(str(path), options=_OPTIONS)
+        try:
+            if not self._container.streams.video:
+                raise RecordingError(f"{where}: expected a video, found a file without a video stream")
+            self.stream = self._container.streams.video[0]
+            """The first video stream."""
+            if self.stream.codec_context is None:
+                raise RecordingError(
+                    f"{where}: expected a video that FFmpeg can decode, found another; convert it to MP4"
+                )
+            check_pixels((self.stream.codec_context.width, self.stream.codec_context.height), where)
+            self.stream.codec_context.options = _OPTIONS
+            # Frame threads would delay the output by as many frames; cameras are decoded in parallel anyway.
+            self.stream.thread_type = "SLICE"
+        except BaseException:
+            self._container.close()
+            raise
+        self.tick_s = float(self.stream.time_base or 0)
+        """Unit of time stamps, s."""
+        self.frames = self._decode(self._container.demux(self.stream))
+        """The frames from here on, in display order; damaged packets yield nothing."""
+
+    def seek(self, pts: int) -> Packet | None:
+        """Move to a time stamp, or before it; returns the first packet from there, or None if it cannot be reached."""
+        try:
+            self._container.seek(pts, stream=self.stream)
+            packets = self._container.demux(self.stream)
+            first = next(packets)
+        except (av.FFmpegError, StopIteration):
+            return None
+        self.frames.close()
+        self.frames = self._decode(chain([first], packets))
+        return first
+
+    def close(self) -> None:
+        """Release the file. Nothing may be read afterwards."""
+        self.frames.close()  # a closed generator reads nothing
+        self._container.close()
+
+    def _decode(self, packets: Iterable[Packet]) -> Generator[VideoFrame, None, None]:
+        for packet in packets:
+            try:
+                yield from packet.decode()
+            except av.InvalidDataError:
+                continue
