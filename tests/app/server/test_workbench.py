@@ -126,6 +126,22 @@ def test_the_next_folder_is_taken_where_there_is_no_room(open_with, places, n_fu
     assert len(open_with(lambda controller: None)) == 1
 
 
+def test_edits_of_a_folder_that_is_away_at_the_end_are_kept(open_with, session, run, tmp_path):
+    def edit(controller):
+        drag(controller, "torso", (10.0, 0.0))
+        session.rename(tmp_path / "away")
+        drag(controller, "left_wrist", (10.0, 0.0))
+        edit.values = controller.state.poses[0]
+
+    with pytest.raises(TrackerError, match=r"are not there .* they are kept in .*rescue"):
+        open_with(edit)
+    assert not session.exists()
+    (tmp_path / "away").rename(session)
+    (session / "lock.json").unlink()  # went away too; it counts as left by a dead program when this process has ended
+    assert run("restore", session)[0] == 0
+    np.testing.assert_array_equal(stored(session)[0].values, edit.values)
+
+
 def test_a_damaged_rescue_file_is_refused_and_changes_nothing(open_with, session, run, places):
     with pytest.raises(TrackerError):
         open_with(edit_on_a_full_disk)
