@@ -33,7 +33,7 @@ FileStem: TypeAlias = Annotated[
 ]
 """A name after which files are named too; it must not lead out of their folder."""
 FilePath: TypeAlias = Annotated[
-    str, Meta(pattern=r"^[^\x00-\x1f\x7f]{1,4000}\Z", description="the path of a file or folder")
+    str, Meta(pattern=r"^[^\x00-\x1f\x7f]{1,1000}\Z", description="the path of a file or folder")
 ]
 Color: TypeAlias = Annotated[str, Meta(pattern=r"^#[0-9a-fA-F]{6}\Z", description="a colour such as #f2a33a")]
 FrameRate: TypeAlias = Annotated[

@@ -1,5 +1,7 @@
-"""`quadrille restore`: go back to a backup of a damaged store."""
+"""`quadrille restore`: go back to a backup of damaged annotations, and write edits that a rescue file holds."""
 
+import os
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,10 +14,11 @@ if TYPE_CHECKING:
 
 
 def command(session: SessionArg, /, backup: str | None = None, json: bool = False) -> None:
-    """Go back to a backup of the annotations, if they are damaged.
+    """Go back to a backup of damaged annotations, and write edits that could not be written when the program ended.
 
     Each opening that finds the annotations as they were written keeps a backup of them in the folder `backups` of the
-    session, the last three of them. The damaged file is kept beside the restored one.
+    session, the last three of them. The damaged file is kept beside the restored one. Edits that could not be written
+    are in a rescue file, whose path the program has printed; each becomes an entry of the history.
 
     Args:
         session: session folder.
@@ -36,7 +39,8 @@ def restore(folder: Path, backup: str | None) -> dict[str, Any]:
 
     Returns:
         A summary. `backup` is the path of the backup that was restored, None if there was no need; `kept` is the path
-        of the file that it replaced; `backups` are the paths of all backups, newest first.
+        of the file that it replaced; `backups` are the paths of all backups, newest first; `rescued` is the number of
+        edits that were written from rescue files.
 
     Raises:
         SessionError: there is no session, no such backup, or none that is not damaged.
@@ -45,6 +49,7 @@ def restore(folder: Path, backup: str | None) -> dict[str, Any]:
     from tracker.session.session import ANNOTATIONS_FILE, SESSION_FILE
     from tracker.store import backups
 
+    folder = Path(os.path.abspath(folder))
     if not (folder / SESSION_FILE).is_file():
         raise SessionError(f"{folder} is not a session: expected {SESSION_FILE} in it; give the folder of a session")
     path = folder / ANNOTATIONS_FILE
@@ -55,13 +60,28 @@ def restore(folder: Path, backup: str | None) -> dict[str, Any]:
             restored = backups.restore(path, path.parent / backups.FOLDER / Path(backup).name)
         elif damage is not None:
             restored = backups.restore(path)
+        rescued = _replayed(folder, path)
     return {
         "folder": str(folder),
         "damage": damage,
         "backup": None if restored is None else str(restored.backup),
         "kept": None if restored is None or restored.kept is None else str(restored.kept),
+        "rescued": rescued,
         "backups": [str(path) for path in backups.backups_of(path)],
     }
+
+
+def _replayed(folder: Path, path: Path) -> int:
+    """Write the edits of all rescue files of a session, oldest first; returns their number."""
+    from app.storage import rescue
+    from tracker.store.annotation_store import AnnotationStore
+
+    with closing(AnnotationStore(path, read_only=True)) as store:
+        files = rescue.find(folder, store.id)
+    if not files:
+        return 0
+    with closing(AnnotationStore(path)) as store:
+        return sum(rescue.replay(found.path, store) for found in files)
 
 
 def _damage(path: Path) -> str | None:
@@ -79,10 +99,12 @@ def _damage(path: Path) -> str | None:
 
 def _format(found: dict[str, Any]) -> str:
     lines = []
-    if found["backup"] is None:
+    if found["backup"] is None and not found["rescued"]:
         lines.append(f"{found['folder']}: the annotations are as they were written, nothing to restore")
-    else:
+    if found["backup"] is not None:
         lines.append(f"{found['folder']}: restored {found['backup']}")
+    if found["rescued"]:
+        lines.append(f"{found['folder']}: wrote {found['rescued']} rescued edits, the last entries of its history")
     if found["kept"] is not None:
         lines.append(f"the file that it replaces is kept as {found['kept']}")
     if found["backups"]:

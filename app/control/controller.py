@@ -26,6 +26,7 @@ from app.control.session.activities import Activities
 from app.control.session.footage_scan import FootageScan
 from app.control.session.history import History
 from app.control.session.kernel_warmup import KernelWarmup
+from app.control.session.save_retry import SaveRetry
 from app.control.session.session_state import SessionState
 from app.control.session.stored_poses import StoredPoses
 from app.control.tracking.inconsistent_frames import InconsistentFrames
@@ -94,6 +95,7 @@ class Controller:
         """Chooses what the 3-D view shows."""
         self._inconsistent_frames = InconsistentFrames(session_state)
         self._footage_scan = FootageScan(session_state)
+        self._save_retry = SaveRetry(session_state)
         self._compiling: KernelWarmup | None = None
 
     @property
@@ -135,6 +137,7 @@ class Controller:
 
     def close(self) -> None:
         """Stop all work and save; the controller must not be used afterwards."""
+        self._save_retry.close()
         with self.activities.editing():
             self.history.save()
         self.dragging.close()

@@ -4,7 +4,7 @@ import asyncio
 import itertools
 import logging
 from collections import deque
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Sequence
 from typing import Any
 
 import aiohttp
@@ -43,15 +43,20 @@ _COALESCED = (wire.Seek, wire.SetView, ReplayStep, PreviewCandidate, SetSearchSp
 class PaneSocket:
     """Serves every page that is open on the session."""
 
-    def __init__(self, controller: Controller) -> None:
-        """Serve this controller's session."""
-        self._controller = controller
+    def __init__(self, controller: Controller, notices: Sequence[str] = ()) -> None:
+        """Serve this controller's session.
+
+        Args:
+            controller: of the session.
+            notices: shown by every page when it connects.
+        """
+        self._controller, self._notices = controller, notices
         self._pages = itertools.count(1)
 
     async def serve(self, socket: web.WebSocketResponse) -> None:
         """Serve one page until its socket closes."""
         page = PageConnection(next(self._pages), self._controller, socket)
-        await page.serve()
+        await page.serve(self._notices)
 
 
 class PageConnection:
@@ -83,11 +88,15 @@ class PageConnection:
         self._sent_history: HistoryMessage | None = None
         self._loop = asyncio.get_running_loop()
 
-    async def serve(self) -> None:
-        """Serve the page until its socket closes; its drags end then."""
+    async def serve(self, notices: Sequence[str] = ()) -> None:
+        """Serve the page until its socket closes; its drags end then.
+
+        Args:
+            notices: that it shows first.
+        """
         unsubscribe = self._controller.subscribe(self._wake)
         self._changed.set()
-        tasks = [asyncio.create_task(self._guarded(t)) for t in (self._send_all(), self._act())]
+        tasks = [asyncio.create_task(self._guarded(t)) for t in (self._send_all(notices), self._act())]
         try:
             async for message in self._socket:
                 if message.type in (aiohttp.WSMsgType.TEXT, aiohttp.WSMsgType.BINARY):
@@ -166,8 +175,10 @@ class PageConnection:
 
     # --- controller to page ------------------------------------------------------------------------------------
 
-    async def _send_all(self) -> None:
+    async def _send_all(self, notices: Sequence[str]) -> None:
         await self._send(messages.session(self._controller.session))
+        for notice in notices:
+            await self._send(NoticeMessage("info", notice))
         while True:
             await self._changed.wait()
             self._changed.clear()
@@ -175,7 +186,8 @@ class PageConnection:
             self._sent, began = state, self._loop.time()
             with_figures = self._figures_are_due(state)
             try:
-                if with_figures:  # otherwise the vectors go first: the eye follows them
+                # Otherwise the vectors go first: the eye follows them. No page may show what is not on disk as saved.
+                if with_figures or (self._sent_text is not None and self._sent_text.saved and not state.saved):
                     await self._send_state(state)
                 if sent is None or sent.timeline_version != state.timeline_version:  # after the text, which names cells
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
@@ -201,8 +213,7 @@ class PageConnection:
         sent, now = self._sent_text, self._loop.time()
         is_busy = state.is_dragging or (state.search.running and sent is not None and sent.job.running)
         due = self._sent_text_at + _READABLE_S
-        # Before poses that are not on disk: no page may show them beside "saved".
-        if sent is None or not is_busy or now >= due or sent.saved != state.saved:
+        if sent is None or not is_busy or now >= due:
             self._sent_text_at = now
             return True
         if self._reminder is None:

@@ -22,7 +22,9 @@ from app.server.private_viser import PrivateViser
 from app.server.server import create_app, serve_forever, static_folder
 from app.session import proxies
 from app.session.frame_cache import FrameCache
+from app.storage import rescue
 from app.storage.saver import Saver
+from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.session.lock import SessionLock
@@ -61,14 +63,18 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
         store = AnnotationStore(session.annotations_path)
         if store.backup_error is not None:
             say(store.backup_error)
+        offers = [found.offer for found in rescue.find(session.folder, store.id)]
+        for offer in offers:
+            say(offer)
         frames = FrameCache(Observer(session.cameras, recording), proxies.proxies(session))
-        controller = Controller(session, Saver(session, store, _author()), frames)
+        saver = Saver(session, store, _author())
+        controller = Controller(session, saver, frames)
         viser = PrivateViser()
         try:
             SceneView(viser.server, controller)
             Gizmos(viser.server, controller)
             Panels(viser.server, controller)
-            app = create_app(PaneSocket(controller), viser.socket_path, access, static)
+            app = create_app(PaneSocket(controller, offers), viser.socket_path, access, static)
 
             def ready(address: str, opened: str) -> None:
                 for name in proxies.stale(session):
@@ -80,11 +86,25 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
 
             asyncio.run(_until_interrupted(serve_forever(app, access, serving.host, serving.port, ready)))
         finally:
-            controller.close()
-            if controller.state.save_error is not None:
-                say(f"not everything is saved: {controller.state.save_error}")
+            try:
+                controller.close()
+            finally:  # also where a second Ctrl+C ends the work
+                unsaved = _keep_unsaved(saver, session.folder)
             viser.stop()
             store.close()
+            if unsaved is not None:
+                raise TrackerError(unsaved)
+
+
+def _keep_unsaved(saver: Saver, folder: Path) -> str | None:
+    """Keep edits that cannot be written; returns what to tell the user, None if all are saved."""
+    if saver.error is None:
+        return None
+    try:
+        path = saver.rescue()
+    except TrackerError as error:
+        return f"edits are lost: {saver.error}; {error}"
+    return f"edits are not saved: {saver.error}; they are kept in {path}, and 'quadrille restore {folder}' writes them"
 
 
 def _indices() -> Path:
@@ -93,9 +113,9 @@ def _indices() -> Path:
 
 
 async def _until_interrupted(serving: Coroutine[Any, Any, None]) -> None:
-    """Run until SIGINT or SIGTERM, then shut the server down."""
+    """Run until SIGINT, SIGTERM or the end of the terminal, then shut the server down."""
     task = asyncio.ensure_future(serving)
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, task.cancel)
     try:
         await task

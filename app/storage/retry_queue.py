@@ -7,6 +7,7 @@ and are written with the next edit or on request.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from app.storage.rescue import UnsavedEdit
 from tracker.errors import TrackerError
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import Change, PinChange, PoseChange
@@ -68,8 +69,26 @@ class RetryQueue:
         written = self.retry()
         return self._edits.get(last.ticket, last.ticket), written
 
-    def retry(self) -> list[int]:
-        """Write queued edits until one fails; returns the frames written, ascending."""
+    @property
+    def edits(self) -> list[UnsavedEdit]:
+        """The queued edits, in order."""
+        return [UnsavedEdit(e.label, e.changes, e.amend, e.by_program) for e in self._queue]
+
+    def retry(self, patient: bool = True) -> list[int]:
+        """Write queued edits until one fails.
+
+        Args:
+            patient: wait for another program that has locked the file.
+
+        Returns:
+            The frames written, ascending.
+        """
+        if patient:
+            return self._retry()
+        with self._store.impatient():
+            return self._retry()
+
+    def _retry(self) -> list[int]:
         frames: set[int] = set()
         self.error = None
         while self._queue:

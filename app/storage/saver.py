@@ -2,16 +2,19 @@
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from app.state.people import ShownPose
 from app.state.state import State
+from app.storage import rescue
 from app.storage.frame_index import FrameIndex
 from app.storage.retry_queue import RetryQueue
 from app.storage.revisions import ModelRevisions
 from tracker.errors import SessionError
+from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
 from tracker.pipeline.tracked_changes import keyframes_of
@@ -52,6 +55,7 @@ class Saver:
             author: of the edits, for the history.
         """
         self._session, self._store, self._queue = session, store, RetryQueue(store, author)
+        self._author = author
         self.revisions = ModelRevisions(session, store)
         """The bodies that poses were made with."""
         self.index = FrameIndex(store, [p.name for p in session.people])
@@ -207,9 +211,28 @@ class Saver:
         self.index.update(written)
         return edit
 
-    def retry(self) -> None:
-        """Try again to write the queued edits; if that fails, `error` says why."""
-        self.index.update(self._queue.retry())
+    def retry(self, patient: bool = True) -> None:
+        """Try again to write the queued edits; if that fails, `error` says why.
+
+        Args:
+            patient: wait for another program that has locked the file.
+        """
+        self.index.update(self._queue.retry(patient))
+
+    def rescue(self) -> Path | None:
+        """Keep the queued edits in a rescue file outside of the session.
+
+        Returns:
+            Its path; None if no edit is queued.
+
+        Raises:
+            SessionError: it cannot be written anywhere.
+        """
+        edits = self._queue.edits
+        if not edits:
+            return None
+        models = {r: format_model(self.revisions.body(r)) for r in rescue.revisions_of(edits)}
+        return rescue.write(self._session.folder, self._store, edits, models, self._author, self.error or "")
 
     def undo(self) -> list[int]:
         """Revert the last entry of the history; returns its frames, ascending.

@@ -89,11 +89,11 @@ def mutate_tree(rng, tree):
                 key
             )
         elif kind == 2 and isinstance(holder, list):
-            holder.extend([holder[key]] * rng.choice((1, 3, 300)))
+            holder.extend(copy.deepcopy([holder[key]] * rng.choice((1, 3, 300))))
         elif kind == 3:
             holder[key] = copy.deepcopy(rng.choice(holders))  # another part of the same file
         else:
-            holder[key] = rng.choice(ODD_VALUES)
+            holder[key] = copy.deepcopy(rng.choice(ODD_VALUES))
     return tree
 
 

@@ -48,11 +48,11 @@ class Page:
 
 
 @asynccontextmanager
-async def visiting(controller):
+async def visiting(controller, notices=()):
     async def serve(request):
         socket = web.WebSocketResponse(decode_text=False)
         await socket.prepare(request)
-        await PaneSocket(controller).serve(socket)
+        await PaneSocket(controller, notices).serve(socket)
         return socket
 
     app = web.Application()

@@ -15,7 +15,10 @@ ROOT = Path(__file__).resolve().parents[2]
 class Program:
     """`quadrille open SESSION` in a process of its own. Without a token a page finds it again after a restart."""
 
-    def __init__(self, session: Path, *options: str) -> None:
+    def __init__(self, session: Path, *options: str, hears_errors: bool = False) -> None:
+        """Prepare it; with `hears_errors`, `errors` holds its standard error when it has ended."""
+        self._hears_errors = hears_errors
+        self.errors = ""
         self._words = [sys.executable, "-m", "app", "open", str(session), "--no-browser", "--no-token", *options]
         self._process: asyncio.subprocess.Process | None = None
         self.address = ""
@@ -33,6 +36,7 @@ class Program:
             str(port),
             cwd=ROOT,
             stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE if self._hears_errors else None,
             env={**os.environ, "PYTHONUNBUFFERED": "1"},
         )
         async with asyncio.timeout(120):
@@ -48,6 +52,12 @@ class Program:
             self._process.kill()
         await self._process.wait()
         self.address = ""
+
+    async def ended(self) -> int:
+        """Wait for its end; returns its status."""
+        _, errors = await asyncio.wait_for(self._process.communicate(), 60)
+        self.errors = (errors or b"").decode()
+        return self._process.returncode
 
     async def stop(self) -> None:
         """End it as Ctrl+C does."""

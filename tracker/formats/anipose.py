@@ -20,7 +20,7 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import DISTORTION_COUNTS, Camera
 from tracker.text_files import TextKind, read_toml
-from tracker.validation import MAX_SIDE_PX, FileStem, Number, Vector, check
+from tracker.validation import MAX_SIDE_PX, FileStem, Number, Vector, check, quoted
 
 Units = Literal["m", "mm"]
 
@@ -116,10 +116,10 @@ def write_calibration(path: str | Path, cameras: Sequence[Camera]) -> None:
 
 
 def _camera(section: str, data: Any, path: Path, metres_per_unit: float) -> Camera:
-    where = f"calibration {path}, camera '{section}'"
+    where = f"calibration {path}, camera {quoted(section)}"
     if not isinstance(data, dict):
         raise CalibrationError(
-            f"calibration {path}: expected sections of cameras, found the lone key '{section}'; remove it"
+            f"calibration {path}: expected sections of cameras, found the lone key {quoted(section)}; remove it"
         )
     row: _CameraSection = check(data, _CameraSection, where, CalibrationError)
     name = check(section, FileStem, where, CalibrationError) if row.name is None else row.name

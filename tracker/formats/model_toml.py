@@ -48,6 +48,10 @@ _TAPERS: dict[str, Any] = {
     "ellipsoid": Annotated[None, Meta(description="no taper of an ellipsoid")],
 }
 """Type of the taper by shape. A union would be one declaration, but msgspec 0.22 crashes on it."""
+_Parent: TypeAlias = Annotated[
+    str,
+    Meta(pattern=r"^[^\x00-\x1f\x7f]{0,200}\Z", description="the name of the parent part, or none for the root,"),
+]
 _Turn: TypeAlias = Annotated[float, Meta(ge=0, le=180, description="an angle of 0 to 180 degrees")]
 
 
@@ -72,7 +76,7 @@ class _AxisRow(_Row):
 class _JointRow(_Row):
     name: Name
     child: Name
-    parent: str = ""
+    parent: _Parent = ""
     position: _Position = (0.0, 0.0, 0.0)
     kind: Literal["revolute", "ball"] = "revolute"
     axes: Annotated[list[_AxisRow], Meta(max_length=6, description="at most 6 axes")] = []

@@ -27,8 +27,7 @@ _REST_WEIGHT = 0.003
 """Weight of keeping the chain at its pose at the grab, per rad, against 1 per metre for the dragged point. It
 determines what the pointer does not, and holds the point back by some 0.1 mm."""
 _STIFF_WEIGHT = 0.015
-"""The same for joints that bend little, such as the waist: limbs move first, and the trunk follows beyond their
-reach."""
+"""The same for joints that bend little, such as the waist: a drag of the trunk turns the body before it bends it."""
 _DEPTH_WEIGHT = 0.1
 """Weight of keeping the point's depth, against 1 for being under the pointer. If the limb's lengths allow only one of
 the two, the point follows the pointer."""
@@ -124,8 +123,8 @@ def grab(
 ) -> Grab:
     """Grab a point of a body.
 
-    The root point moves the whole body. A point of a limb, or of a head on a bending neck, moves its chain up to the
-    trunk. A point of the trunk turns the body about its root and bends the trunk.
+    The root point moves the whole body. A point of a limb moves that limb alone, and a head on a bending neck its neck.
+    A point of the trunk, a shoulder or a hip turns the body about its root and bends the trunk.
 
     Args:
         model: the body.
@@ -190,7 +189,9 @@ def _grab_handle(
     carries_others = handle.part in model.parents
     if handle.moves_body:
         follows = of_root & model.dof_is_length
-    elif np.any(own & ~np.isfinite(model.spreads)) or (np.any(own) and not carries_others):
+    elif np.any(own & ~np.isfinite(model.spreads)):
+        follows = own & ~np.isfinite(model.spreads)
+    elif np.any(own) and not carries_others:
         follows = own
     else:
         follows = handle.movers & ~model.dof_is_length

@@ -170,7 +170,7 @@ def load_session(folder: str | Path) -> Session:
 
 def _load_cameras(row: SessionFile, folder: Path) -> tuple[CameraSource, ...]:
     """Join the calibration and the footage of each camera, in the order of session.toml."""
-    calibrated = {c.name: c for c in read_calibration(folder / row.calibration)}
+    calibrated = {c.name: c for c in read_calibration(_resolve(row.calibration, folder))}
     odd = calibrated.keys() ^ {c.name for c in row.cameras}
     if odd:
         raise SessionError(

@@ -5,7 +5,9 @@ state and head are changed in place.
 """
 
 import json
+import secrets
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,9 @@ from tracker.store.records import (
     PoseRecord,
 )
 
+_ID = "store_id"
+"""Setting of a store: a random text that rescue files name it by."""
+
 
 class AnnotationStore:
     """The annotations of a session. Safe to use from several threads; one program may write at a time.
@@ -41,10 +46,21 @@ class AnnotationStore:
         """
         self._connection = Connection(path, read_only)
         self._edits = edit_tree.EditTree(self._connection)
+        if not read_only and self.setting(_ID) is None:
+            self.set_setting(_ID, secrets.token_hex(8))
 
     def close(self) -> None:
         """Release the file."""
         self._connection.close()
+
+    @property
+    def id(self) -> str:
+        """Identifies the store, and copies of it; empty for an older one that was opened read only."""
+        return str(self.setting(_ID, ""))
+
+    def impatient(self) -> AbstractContextManager[None]:
+        """Do not wait for other programs that have locked the file, but raise at once, within a `with` block."""
+        return self._connection.impatient()
 
     @property
     def backup_error(self) -> str | None:

@@ -15,6 +15,8 @@ from tracker.store import backups, checksums, schema, verification
 
 _OF_THE_FILE = (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY)
 """Primary codes of errors after which the file is opened again: its drive or folder may have gone away."""
+_TIMEOUT_S = 10.0
+"""Time to wait for other programs that have locked the file."""
 
 
 class Connection:
@@ -77,6 +79,16 @@ class Connection:
                     self.db.execute("ROLLBACK")
                 raise
             self._contents = contents
+
+    @contextmanager
+    def impatient(self) -> Generator[None, None, None]:
+        """Raise at once where other programs have locked the file, within a `with` block."""
+        with self._lock:
+            self.db.execute("PRAGMA busy_timeout = 0")
+            try:
+                yield
+            finally:
+                self.db.execute(f"PRAGMA busy_timeout = {_TIMEOUT_S * 1000:.0f}")
 
     def one(self, sql: str, parameters: Sequence[Any]) -> Any:
         """Return the first row of a query, or None."""
@@ -211,7 +223,7 @@ def _connect(path: Path, mode: str) -> sqlite3.Connection:
         uri=True,
         isolation_level=None,  # transactions are explicit
         check_same_thread=False,
-        timeout=10.0,
+        timeout=_TIMEOUT_S,
     )
     # No write-ahead log: it needs shared memory, which network drives lack. EXTRA syncs the folder's entry besides what
     # FULL syncs; without it a power cut could restore the journal and lose the last commit.

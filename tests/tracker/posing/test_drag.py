@@ -203,6 +203,36 @@ def test_from_any_pose_the_joint_follows_or_a_limit_holds_it(gavrila, seed):
         assert np.linalg.norm(end - start - way) < np.linalg.norm(way)  # nearer than it was
 
 
+LIMBS = [
+    (side, *joints)
+    for side in ("left", "right")
+    for joints in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
+]
+
+
+@pytest.mark.parametrize("name", ["gavrila22", "gavrila22_cones", "gavrila34"])
+@pytest.mark.parametrize("seed", range(6))
+def test_no_drag_of_a_limb_moves_another(name, seed):
+    """Any pose, size, view, pointer and kind of drag, with the arms and legs of the other joints where they were."""
+    rng = np.random.default_rng(seed)
+    model = load_model(name, rng.uniform(1.5, 1.95))
+    values = shaken(model, model.neutral(), rng, 0.8, 0.4)
+    for side, *joints in LIMBS:
+        own = {f"{side}_{joint}" for joint in joints[1:]}
+        others = [n for n in model.point_names if n not in own]
+        for point in own:
+            camera = cameras_around()[rng.integers(3)]
+            start = camera.project(place(model, values, point))
+            grabbed = grab(model, values, camera, point, start)
+            for change in (drag, push, turn):
+                moved = change(grabbed, start + rng.uniform(-120, 120, 2), values)
+                for other in others:
+                    assert np.linalg.norm(place(model, moved, other) - place(model, values, other)) < 0.02, (
+                        point,
+                        other,
+                    )
+
+
 def test_what_a_hand_hardly_needs(gavrila):
     assert minor_points(gavrila) == ("neck",)  # rigid there
     bending = load_model("gavrila34")
