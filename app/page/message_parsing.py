@@ -77,5 +77,5 @@ def _value(data: str | bytes) -> Any:
     """Return a message as plain data; None if only a part of it is JSON that Python can hold."""
     try:
         return msgspec.json.decode(data)
-    except (msgspec.DecodeError, RecursionError):
+    except (msgspec.DecodeError, UnicodeError, RecursionError):
         return None

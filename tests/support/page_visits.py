@@ -70,3 +70,12 @@ async def visiting(controller, notices=()):
             yield page
     finally:
         await runner.cleanup()
+
+
+@asynccontextmanager
+async def joined(address):
+    """A page of a running program, by its address."""
+    async with aiohttp.ClientSession() as session, session.ws_connect(address + "ws", max_msg_size=0) as socket:
+        page = Page(socket)
+        await page.shows("image", "contours", "joints")
+        yield page

@@ -28,6 +28,11 @@ class Program:
         """Number of its process."""
         return self._process.pid
 
+    @property
+    def status(self) -> int | None:
+        """How its process has ended; None while it runs."""
+        return self._process.returncode
+
     async def start(self, port: int = 0) -> None:
         """Start it at a port; 0 takes a free one."""
         self._process = await asyncio.create_subprocess_exec(

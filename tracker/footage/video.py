@@ -170,10 +170,8 @@ class VideoFile:
         try:
             return frame_index.file_version_of(self.path)
         except FileNotFoundError:
-            self._release()
             raise RecordingError(f"{self._where} is not there any more; put it back") from None
         except OSError as error:
-            self._release()
             raise RecordingError(f"{self._where} cannot be reached: {error.strerror}; check the disk") from error
 
     def _follow_file(self) -> None:
@@ -184,7 +182,11 @@ class VideoFile:
         """
         if self._closed:
             raise RecordingError(f"{self._where} has been closed")
-        found = self._present_version()
+        try:
+            found = self._present_version()
+        except RecordingError:
+            self._release()
+            raise
         if found == self._opened_version:
             if self._decoder is None:
                 try:
@@ -330,10 +332,10 @@ class VideoFile:
             RecordingError: the video is truncated, has no usable time stamps, or is being written.
             av.FFmpegError: it cannot be read.
         """
-        stamp = frame_index.stamp_of(self.path)
+        version = self._present_version()
         with av.open(str(self.path)) as container:
             index = packet_scan.list_frames(container, self._where, report)
-        if frame_index.stamp_of(self.path) != stamp:
+        if self._present_version() != version:
             raise RecordingError(f"{self._where} is being written; wait until it is complete")
         frame_index.save(self.path, self._indices, index)
         return index
@@ -344,8 +346,6 @@ class VideoFile:
             self._finish(self._list(self._grow), declared_rate, tick_s)
         except av.FFmpegError as error:
             self._fail(self._unreadable(error))
-        except OSError as error:
-            self._fail(RecordingError(f"{self._where} cannot be reached: {error.strerror}; check the disk"))
         except RecordingError as error:
             self._fail(error)
 

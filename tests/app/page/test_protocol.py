@@ -69,6 +69,8 @@ def test_settings_left_out_are_not_changed():
         ('{"type":"select","person":0,"point":"%s"}' % ("x" * 300), "text of length <= 200 as 'point'", "'xxx"),
         (b'{"type":"\xff"}', "a message in JSON", "12 bytes"),
         ('{"type":"\\ud800"}', "a message in JSON", "17 bytes"),
+        (b'{"type":1,"\xe5":2}', "as 'type'", ""),  # wrong before the byte that is wrong as well
+        (b'7\xe5', "a group of keys", ""),
         ("[" * 100_000, "a group of keys", "None"),
         ('{"type":"seek","frame":' + "[" * 100_000, "a message in JSON", "100023 bytes"),
     ],
