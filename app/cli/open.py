@@ -15,6 +15,7 @@ def command(
     port: int = 8080,
     allow_host: tuple[str, ...] = (),
     browser: bool = True,
+    token: bool = True,
     sample: str | None = None,
     start_again: bool = False,
 ) -> None:
@@ -26,6 +27,7 @@ def command(
         port: port to listen at; 0 takes a free one.
         allow_host: names by which browsers may call this machine.
         browser: open the page in the default browser.
+        token: require the token in the printed address. Without it every account of this machine can use the page.
         sample: name of the sample: tango, two people to be placed by hand (the default), or elbow_rotation, one person.
         start_again: discard the working copy of the sample and make a new one.
     """
@@ -38,4 +40,4 @@ def command(
             "leave one of them out"
         )
     folder = sample_copy(sample or DEFAULT_SAMPLE, start_again) if session is None else session
-    open_session(folder, Serving(host, port, allow_host, browser), lambda line: print(line, flush=True))
+    open_session(folder, Serving(host, port, allow_host, browser, token), lambda line: print(line, flush=True))

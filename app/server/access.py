@@ -2,11 +2,11 @@
 
 A browser lets any page on the internet send requests to this machine, so listening on loopback alone protects nothing.
 Every request must name the server by an expected name (against DNS rebinding). If it has an Origin, that must have the
-same name and port. A server that listens beyond loopback also requires a token.
+same name and port. Every account of this machine reaches loopback, so a request must also have the token of this start.
 """
 
-import hashlib
 import ipaddress
+import logging
 import re
 import secrets
 from collections.abc import Iterable, Mapping
@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 
 from tracker.errors import TrackerError
 
+_LOG = logging.getLogger(__name__)
 _HOST = re.compile(r"(?P<name>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9_.-]+)(?::(?P<port>[0-9]{1,5}))?")
 _DEFAULT_PORTS = {"http": "80", "https": "443"}
 
@@ -26,13 +27,17 @@ class Access:
     hosts: frozenset[str] = frozenset()
     """Names of the server besides those of loopback; lower case, without port."""
     token: str | None = None
-    """Token required in the page's address or its cookie; None if only loopback can connect."""
+    """Token required in the page's address or its cookie; None for no such requirement."""
+    invitation: "Invitation | None" = None
+    """Stands for the token once, in the address that a browser is started with."""
 
-    @property
-    def cookie(self) -> str:
-        """Name of the token's cookie. It depends on the token, because programs on other ports share cookies."""
-        assert self.token is not None
-        return "quadrille_" + hashlib.sha256(self.token.encode()).hexdigest()[:12]
+    def cookie(self, host: str) -> str:
+        """Return the name of the token's cookie for a Host header.
+
+        Programs on other ports share cookies, so it has the port. A later start replaces it.
+        """
+        called = _HOST.fullmatch(host)
+        return f"quadrille_{(called and called['port']) or _DEFAULT_PORTS['http']}"
 
     def refusal(self, host: str | None, origin: str | None, tokens: Iterable[str] = ()) -> str | None:
         """Return why a request is refused, or None if it may pass.
@@ -50,16 +55,52 @@ class Access:
             )
         if origin is not None and not _same(origin, called):
             return f"expected a request of this page, found one of '{origin}'; open the page itself"
-        if self.token is not None and not any(secrets.compare_digest(self.token, t) for t in tokens):
-            return "expected this start's token, found none or another; open the address printed at the start"
+        if self.token is not None and not any(self._admits(t) for t in tokens):
+            return (
+                "expected the token of this start, found none or another; open the address that quadrille open "
+                "printed on its terminal, with everything after the question mark"
+            )
         return None
 
+    def _admits(self, token: str) -> bool:
+        assert self.token is not None
+        return _equal(self.token, token) or (self.invitation is not None and self.invitation.redeem(token))
 
-def access_for(host: str, allow_hosts: Iterable[str] = ()) -> Access:
+
+class Invitation:
+    """A code that admits one request.
+
+    Other accounts see the command line of a browser, and with it the address that it is started with.
+    """
+
+    def __init__(self) -> None:
+        """Make a code."""
+        self.code = secrets.token_urlsafe(32)
+        self._is_used = False
+
+    def redeem(self, code: str) -> bool:
+        """Return whether this is the code, for the first time."""
+        if not _equal(self.code, code):
+            return False
+        if self._is_used:
+            _LOG.warning(
+                "the address that the browser was started with was opened again without its cookie; if the page is not "
+                "open in your browser, another account of this machine may have opened it: start again"
+            )
+        was_used, self._is_used = self._is_used, True
+        return not was_used
+
+
+def access_for(host: str, allow_hosts: Iterable[str] = (), token: bool = True) -> Access:
     """Return the checks for a server that listens at `host`.
 
+    Args:
+        host: address to listen at.
+        allow_hosts: names by which browsers may call this machine.
+        token: whether requests need the token that is made here.
+
     Raises:
-        TrackerError: `host` is not loopback and `allow_hosts` is empty, or a name is malformed.
+        TrackerError: `host` is not loopback and `allow_hosts` is empty or no token is wanted, or a name is malformed.
     """
     names = frozenset(name.strip().lower() for name in allow_hosts)
     malformed = sorted(name for name in names if (match := _HOST.fullmatch(name)) is None or match["port"])
@@ -68,14 +109,17 @@ def access_for(host: str, allow_hosts: Iterable[str] = ()) -> Access:
             f"expected --allow-host to be a host name without port, found '{malformed[0]}'; "
             "give it like lab.example.org"
         )
-    if is_loopback(host):
-        return Access(names)
-    if not names:
+    if not is_loopback(host) and not token:
+        raise TrackerError(
+            f"expected a token for a page that other machines reach, found --no-token with --host {host}; "
+            "leave out one of them"
+        )
+    if not is_loopback(host) and not names:
         raise TrackerError(
             f"listening on '{host}' needs the names by which browsers may call this machine, found none; "
             "add --allow-host NAME, or use --host 127.0.0.1 and an SSH tunnel"
         )
-    return Access(names, secrets.token_urlsafe(32))
+    return Access(names, secrets.token_urlsafe(32), Invitation()) if token else Access(names)
 
 
 def is_loopback(name: str) -> bool:
@@ -86,6 +130,11 @@ def is_loopback(name: str) -> bool:
         return ipaddress.ip_address(name.strip("[]")).is_loopback
     except ValueError:
         return False
+
+
+def _equal(secret: str, found: str) -> bool:
+    """Compare in constant time. What a request brings may be any text, also no Unicode."""
+    return secrets.compare_digest(secret.encode(), found.encode("utf-8", "surrogatepass"))
 
 
 def _same(origin: str, called: re.Match[str]) -> bool:

@@ -7,8 +7,10 @@ check, and listens on a private socket (`private_viser`).
 import asyncio
 import errno
 import logging
+import os
 import weakref
 from collections.abc import AsyncIterator, Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -16,7 +18,7 @@ import aiohttp
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
-from app.server import viser_proxy
+from app.server import connections, viser_proxy
 from app.server.access import Access, is_loopback
 from tracker.errors import TrackerError
 
@@ -27,6 +29,8 @@ _PAGE_POLICY = (
     "frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 _MAX_MESSAGE_BYTES = 1 << 20  # what a page sends is a line or two of JSON
+_MAX_PATH_CHARACTERS = 2000
+_MAX_NAME_BYTES = 255
 _HEARTBEAT_S = 20.0
 _CLOSE_TIMEOUT_S = 1.0
 
@@ -55,7 +59,8 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
         response = web.FileResponse(static / "index.html")
         if access.token is not None and "token" in request.query:
             # Set with the page itself: after a redirect, a browser that followed a link would not send a Strict cookie.
-            response.set_cookie(access.cookie, access.token, httponly=True, samesite="Strict", path="/")
+            name = access.cookie(request.headers["Host"])
+            response.set_cookie(name, access.token, httponly=True, samesite="Strict", path="/")
         return response
 
     async def pane_socket(request: web.Request) -> web.StreamResponse:
@@ -85,6 +90,7 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
     app.router.add_get("/viser", proxy.handle)
     app.router.add_get("/viser/{path:.*}", proxy.handle)
     app.on_response_prepare.append(_add_headers)
+    app.on_response_prepare.append(connections.keep_sockets)
     app.on_shutdown.append(_close_sockets)
 
     async def client(_: web.Application) -> AsyncIterator[None]:
@@ -96,7 +102,7 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
 
 
 async def serve_forever(
-    app: web.Application, access: Access, host: str, port: int, on_ready: Callable[[str], None]
+    app: web.Application, access: Access, host: str, port: int, on_ready: Callable[[str, str], None]
 ) -> None:
     """Serve until the task is cancelled, then close all sockets.
 
@@ -105,19 +111,21 @@ async def serve_forever(
         access: as given to `create_app`; its token is part of the address.
         host: address to listen at.
         port: port to listen at; 0 for a free one.
-        on_ready: called once with the page's address when the server answers.
+        on_ready: called once when the server answers, with the page's address and the one to start a browser with.
 
     Raises:
         TrackerError: the port is taken, or the address is not this machine's.
     """
-    runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=2.0)
+    runner = connections.LimitedRunner(app)
     await runner.setup()
     try:
         try:
             await web.TCPSite(runner, host, port).start()
         except (OSError, OverflowError) as error:
             raise TrackerError(_listen_message(host, port, error)) from error
-        on_ready(page_address(access, host, runner.addresses[0][1]))
+        port = runner.addresses[0][1]
+        once = None if access.invitation is None else access.invitation.code
+        on_ready(page_address(access, host, port), page_address(replace(access, token=once), host, port))
         await asyncio.Event().wait()
     finally:
         await runner.cleanup()
@@ -142,18 +150,32 @@ def static_folder() -> Path:
 def _guard(access: Access) -> Middleware:
     @web.middleware
     async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+        connections.request_arrived(request)
         hosts = request.headers.getall("Host", [])
-        tokens = [] if access.token is None else [request.query.get("token"), request.cookies.get(access.cookie)]
+        cookie = request.cookies.get(access.cookie(hosts[0])) if hosts else None
+        # The cookie first: a page that is loaded again must not use up its invitation twice.
+        tokens = [] if access.token is None else [cookie, request.query.get("token")]
         why = access.refusal(
             hosts[0] if len(hosts) == 1 else None,
             request.headers.get("Origin"),
             [token for token in tokens if token is not None],
         )
         if why is not None:
-            return web.Response(status=403, text=f"Quadrille refused this request: {why}.\n")
+            return _refused(403, f"Quadrille refused this request: {why}.\n")
+        if len(request.raw_path) > _MAX_PATH_CHARACTERS:
+            return _refused(414, f"Expected an address of at most {_MAX_PATH_CHARACTERS} characters.\n")
+        if max(map(len, os.fsencode(request.path).split(b"/"))) > _MAX_NAME_BYTES:
+            raise web.HTTPNotFound  # no file system has such names: looking for one would be an error
         return await handler(request)
 
     return guard
+
+
+def _refused(status: int, text: str) -> web.Response:
+    """Answer a request that nothing may follow."""
+    response = web.Response(status=status, text=text)
+    response.force_close()
+    return response
 
 
 async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:

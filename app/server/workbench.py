@@ -41,6 +41,8 @@ class Serving:
     allow_hosts: tuple[str, ...] = ()
     browser: bool = True
     """Whether to open the page in the default browser."""
+    token: bool = True
+    """Whether requests need a token."""
 
 
 def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> None:
@@ -55,7 +57,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
         TrackerError: the session cannot be opened, is open elsewhere, or the port is taken.
     """
     session = load_session(folder)
-    access = access_for(serving.host, serving.allow_hosts)
+    access = access_for(serving.host, serving.allow_hosts, serving.token)
     static = static_folder()
     with SessionLock(session.folder), Recording(session.cameras, indices=_indices(), in_background=True) as recording:
         store = AnnotationStore(session.annotations_path)
@@ -74,13 +76,13 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
             Panels(viser.server, controller)
             app = create_app(PaneSocket(controller, offers), viser.socket_path, access, static)
 
-            def ready(address: str) -> None:
+            def ready(address: str, opened: str) -> None:
                 for name in proxies.stale(session):
                     say(f"the proxy of camera {name} is of other footage: run quadrille index {session.folder} again")
                 say(f"{session.name}: {address}")
                 controller.compile_kernels()
                 if serving.browser:
-                    threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+                    threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
 
             asyncio.run(_until_interrupted(serve_forever(app, access, serving.host, serving.port, ready)))
         finally:

@@ -494,9 +494,9 @@ async def main(port):
     from app.server.server import create_app, serve_forever, static_folder
 
     scene = PrivateViser()
-    access = access_for("127.0.0.1")
+    access = access_for("127.0.0.1", token=False)
     app: web.Application = create_app(FakeEndpoint(n_people=1), scene.socket_path, access, static_folder())
-    await serve_forever(app, access, "127.0.0.1", port, print)
+    await serve_forever(app, access, "127.0.0.1", port, lambda address, _: print(address))
 
 
 if __name__ == "__main__":

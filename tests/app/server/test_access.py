@@ -57,8 +57,9 @@ def test_beyond_loopback_wants_name_and_token():
     assert "Host" in REMOTE.refusal("other.example.org:8080", None, ["secret"])
 
 
-def test_access_for_loopback_needs_no_token():
-    assert access_for("127.0.0.1").token is None
+def test_loopback_needs_a_token_unless_none_is_wanted():
+    assert access_for("127.0.0.1").token
+    assert access_for("127.0.0.1", token=False).token is None
     assert access_for("localhost", ["tunnel.example.org"]).hosts == {"tunnel.example.org"}
 
 
@@ -80,3 +81,21 @@ def test_access_beyond_loopback_without_names_says_what_to_do():
 def test_malformed_names_are_refused(name):
     with pytest.raises(TrackerError, match="host name without port"):
         access_for("0.0.0.0", [name])
+
+
+def test_a_page_that_other_machines_reach_cannot_do_without_a_token():
+    with pytest.raises(TrackerError, match="--no-token"):
+        access_for("0.0.0.0", ["lab.example.org"], token=False)
+
+
+@pytest.mark.parametrize("found", ["\xe9", "\ud800", "\x00", "\U0001f600", "secret\xe9"])
+def test_any_text_can_be_compared_with_the_token(found):
+    assert "token" in REMOTE.refusal("localhost:8080", None, [found])
+
+
+@pytest.mark.parametrize(
+    ("host", "name"),
+    [("localhost:8080", "8080"), ("localhost", "80"), ("[::1]", "80"), ("[::1]:9", "9"), ("a:b:c", "80")],
+)
+def test_the_cookie_has_the_port_that_the_page_is_called_by(host, name):
+    assert REMOTE.cookie(host) == f"quadrille_{name}"

@@ -9,11 +9,11 @@ from aiohttp import web
 from yarl import URL
 
 from app.server import server
-from app.server.access import Access
+from app.server.access import Access, Invitation
 from tracker.errors import TrackerError
 
 NOBODY = Path("/nowhere/viser")
-NAMED = Access(frozenset({"lab.example.org"}), "secret")
+NAMED = Access(frozenset({"lab.example.org"}), "secret", Invitation())
 
 
 class EchoPanes:
@@ -233,16 +233,51 @@ class TestToken:
                 assert response.status == 403
         async with client.get("/?token=secret", headers=host) as response:
             assert response.status == 200
-            cookie = response.cookies[NAMED.cookie]
+            cookie = response.cookies[NAMED.cookie(host["Host"])]
             assert cookie["httponly"]
             assert cookie["samesite"] == "Strict"
-        holder = host | {"Cookie": f"{NAMED.cookie}={cookie.value}"}
+        holder = host | {"Cookie": f"{cookie.key}={cookie.value}"}
         for path in ("/", "/static/main.js", "/viser/"):
             async with client.get(path, headers=holder) as response:
                 assert response.status == 200
         async with client.ws_connect("/ws", headers=holder) as sock:
             await sock.send_str("hello")
             assert await sock.receive_str() == "hello"
+
+    @pytest.mark.parametrize("token", ["\xe9", "secret\xe9", "%C3%A9", "%ED%A0%80", "\u20ac"])
+    async def test_a_token_that_is_not_ascii_is_refused_like_any_other(self, port, token):
+        for line in (f"/?token={token} HTTP/1.1", f"/ HTTP/1.1\r\nCookie: {NAMED.cookie('localhost')}={token}"):
+            reader, writer = await asyncio.open_connection("127.0.0.1", port)
+            writer.write(f"GET {line}\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
+            status = int((await reader.read()).split()[1])
+            writer.close()
+            assert status in (400, 403)
+
+    async def test_the_address_that_a_browser_is_started_with_admits_once(self, client, caplog):
+        invited = {"token": NAMED.invitation.code}
+        async with client.get("/", params=invited) as response:
+            assert response.status == 200
+            (cookie,) = response.cookies.values()
+            assert cookie.value == NAMED.token
+        holder = {"Cookie": f"{cookie.key}={cookie.value}"}  # the client keeps no cookies of addresses without a name
+        async with client.get("/", params=invited, headers=holder) as response:  # loaded again
+            assert response.status == 200
+        assert not caplog.records
+        async with client.get("/", params=invited) as response:
+            assert response.status == 403
+        assert "another account" in caplog.text
+
+    async def test_who_types_the_address_is_told_which_one_to_open(self, client):
+        async with client.get("/") as response:
+            assert response.status == 403
+            assert "open the address that quadrille open printed" in await response.text()
+
+
+@pytest.mark.parametrize("prefix", ["/", "/static/", "/static/a/", "/viser/", "/ws/"])
+@pytest.mark.parametrize("name", ["a" * 300, "a" * 1900, "a" * 7000, "a/" * 3000, "%C3%A9" * 200, "a" * 70_000, "%00"])
+async def test_long_paths_are_not_found(port, fake_viser, caplog, prefix, name):
+    status, _ = await raw_get(port, prefix + name)
+    assert status in (400, 404, 414) or (prefix, name) == ("/viser/", "%00")
 
 
 async def test_serving_a_busy_port_names_it_and_the_remedy():
@@ -252,13 +287,15 @@ async def test_serving_a_busy_port_names_it_and_the_remedy():
         port = busy.getsockname()[1]
         app = server.create_app(EchoPanes(), NOBODY, Access(), server.static_folder())
         with pytest.raises(TrackerError, match=rf"port {port} .* in use; .*--port"):
-            await server.serve_forever(app, Access(), "127.0.0.1", port, lambda _: None)
+            await server.serve_forever(app, Access(), "127.0.0.1", port, lambda *_: None)
 
 
 async def test_serving_tells_the_address_and_closes_its_sockets_at_the_end():
     ready = asyncio.get_running_loop().create_future()
     app = server.create_app(EchoPanes(), NOBODY, Access(), server.static_folder())
-    task = asyncio.create_task(server.serve_forever(app, Access(), "127.0.0.1", 0, ready.set_result))
+    task = asyncio.create_task(
+        server.serve_forever(app, Access(), "127.0.0.1", 0, lambda address, _: ready.set_result(address))
+    )
     address = await asyncio.wait_for(ready, 20.0)
     async with aiohttp.ClientSession() as session, session.ws_connect(address + "ws") as sock:
         task.cancel()
