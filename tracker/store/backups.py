@@ -122,8 +122,8 @@ def _damage(backup: Path) -> str | None:
     try:
         with closing(sqlite3.connect(f"{backup.absolute().as_uri()}?mode=ro", uri=True)) as db:
             return verification.damage(db)
-    except sqlite3.Error as error:
-        return str(error)
+    except (sqlite3.Error, *verification.UNDECODABLE) as error:
+        return f"{type(error).__name__}: {error}"
 
 
 def _is_copy(backup: Path, db: sqlite3.Connection) -> bool:
@@ -131,7 +131,7 @@ def _is_copy(backup: Path, db: sqlite3.Connection) -> bool:
     try:
         with closing(sqlite3.connect(f"{backup.absolute().as_uri()}?mode=ro", uri=True)) as other:
             return checksums.contents(other) == checksums.contents(db)
-    except sqlite3.Error:  # an older version, or damaged
+    except (sqlite3.Error, *verification.UNDECODABLE):  # an older version, or damaged
         return False
 
 

@@ -210,6 +210,8 @@ class Connection:
             raise SessionError(
                 f"annotations {self._path} cannot be read or written: {error}; check the disk and who has the file open"
             ) from error
+        except verification.UNDECODABLE as error:
+            raise self._damaged(f"its definitions or rows cannot be decoded ({type(error).__name__})") from error
         except OSError as error:
             raise SessionError(
                 f"annotations {self._path} cannot be read or written: {error.strerror}; check the disk and your rights"

@@ -9,6 +9,9 @@ _BROKEN = (
 )  # fmt: skip
 """Primary codes of errors that show damage while a store is checked; other errors concern the disk or its users."""
 
+UNDECODABLE = (UnicodeDecodeError, OverflowError, MemoryError)
+"""What Python raises instead of an error of SQLite where names, texts or lengths in a damaged file are nonsense."""
+
 
 def damage(db: sqlite3.Connection) -> str | None:
     """Return what is wrong with a store of this version or an older one; None if it passes.
@@ -25,7 +28,9 @@ def damage(db: sqlite3.Connection) -> str | None:
         try:
             return _damage(db)
         finally:
-            db.execute("ROLLBACK")
+            db.rollback()
+    except UNDECODABLE as error:
+        return f"its definitions or rows cannot be decoded ({type(error).__name__})"
     except sqlite3.Error as error:
         if primary_code(error) in _BROKEN:
             return f"SQLite reports: {error}"

@@ -98,6 +98,16 @@ def test_a_truncated_file_is_damaged(path, size):
         AnnotationStore(path)
 
 
+def test_definitions_that_are_no_text(path):
+    """SQLite quotes them in its message, which Python cannot decode."""
+    with closing(sqlite3.connect(path)) as db:
+        db.execute("PRAGMA writable_schema = ON")
+        db.execute("UPDATE sqlite_master SET name = CAST(x'7FEB16F4' AS TEXT), sql = 'CREATE' WHERE name = 'poses'")
+        db.commit()
+    with pytest.raises(DamagedStoreError):
+        AnnotationStore(path)
+
+
 def test_a_damaged_pose_of_an_older_version_is_found_before_the_upgrade(tmp_path):
     path = tmp_path / "annotations.sqlite"
     with closing(sqlite3.connect(path)) as db:
