@@ -17,6 +17,8 @@ from tracker.simulate.record import Simulation, simulate
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.confidence import Status
 
+pytestmark = pytest.mark.slow
+
 N = 6
 BAD = 3
 """The frame at which something happens."""

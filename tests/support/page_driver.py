@@ -35,7 +35,7 @@ async def shows(page, expression, timeout_s=20.0):
     try:
         async with asyncio.timeout(timeout_s):
             while not await page.evaluate(drawn):
-                await asyncio.sleep(0.02)
+                await asyncio.sleep(0.04)
     except TimeoutError:
         raise AssertionError(f"after {timeout_s} s the page still does not show: {expression}") from None
 

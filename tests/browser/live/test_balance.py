@@ -13,6 +13,8 @@ from tracker.fitting.gauss_newton import fit_to_points
 from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
 
+pytestmark = pytest.mark.slow
+
 JOINTS = ("shoulder", "knee", "ankle", "elbow", "wrist")
 VIEWS = (0, 2)
 CLICK_PX = 4

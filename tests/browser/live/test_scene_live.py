@@ -25,6 +25,8 @@ from tracker.session.session import Person, create_session, load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
 
+pytestmark = pytest.mark.slow
+
 SIZE = (640, 480)
 PAINTED = 4
 """The silhouettes are painted so many times as large, then brought to size: their edges are where they belong."""

@@ -26,6 +26,8 @@ from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
 from tracker.tracking.chamfer.settings import TrackSettings, pose_cost
 
+pytestmark = pytest.mark.slow
+
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 TANGO = ROOT / "sample_sessions" / "tango"
 BY_DRAGS, BY_SLIDERS = 0, 25

@@ -9,6 +9,8 @@ import pytest_asyncio
 from page_driver import shows, state_of
 from program import ROOT, started, visit_again, visited
 
+pytestmark = pytest.mark.slow
+
 RUNS = "quadrille.state.searchRuns?.runs"
 OVER = f"{RUNS}?.at(-1)?.state === 'over'"
 

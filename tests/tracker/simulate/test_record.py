@@ -77,6 +77,7 @@ def test_the_footage_shows_the_person_against_the_background(folder):
     assert change[~mask].std() > 0.5
 
 
+@pytest.mark.slow
 def test_the_same_arguments_give_the_same_bytes_and_another_seed_others(folder, tmp_path):
     again, other = tmp_path / "small", tmp_path / "other"
     simulate(again, Simulation(**ARGUMENTS, masks=True))
@@ -94,12 +95,14 @@ def test_the_fitted_body_can_be_filmed_itself(tmp_path):
     assert true.parts == preset.parts
 
 
+@pytest.mark.slow
 def test_progress_counts_images(tmp_path):
     calls = []
     simulate(tmp_path / "s", Simulation(**(ARGUMENTS | {"n_frames": 2})), progress=lambda *call: calls.append(call))
     assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
+@pytest.mark.slow
 def test_two_people_have_truth_each_and_masks_by_person(tmp_path):
     session = simulate(tmp_path / "s", Simulation(**(ARGUMENTS | {"n_frames": 1}), scene="tango", masks=True))
     assert [p.name for p in session.people] == ["man", "woman"]

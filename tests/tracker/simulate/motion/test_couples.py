@@ -12,6 +12,8 @@ from tracker.simulate.people.skeleton import altered_model
 from tracker.simulate.people.skin import make_skin
 from tracker.simulate.stage.rasterizer import vertex_normals
 
+pytestmark = pytest.mark.slow
+
 MAN, WOMAN = 0, 1
 
 

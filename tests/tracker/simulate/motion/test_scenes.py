@@ -147,6 +147,7 @@ def test_arms_cross_the_trunk_and_rest_against_it_without_passing_through(perfor
     assert np.mean(np.array(everything) < 1.0) < 0.05
 
 
+@pytest.mark.slow
 def test_leaving_goes_to_a_corner_and_comes_back(true_model):
     corners = set()
     for seed in range(4):

@@ -37,6 +37,7 @@ def test_impossible_cameras_are_refused(n, size, found):
         make_cameras(n, size, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [3, 4, 6])
 def test_nothing_in_the_room_hides_a_person_in_its_middle(n, monkeypatch):
     monkeypatch.setattr(room, "SAMPLES", 1)  # one a pixel will do

@@ -60,6 +60,7 @@ def test_masks_tell_people_apart_and_the_nearer_hides_the_other(backdrops):
     assert np.sum(both == 1) < 0.8 * np.sum(alone)
 
 
+@pytest.mark.slow
 def test_the_fitted_bodys_mask_is_that_of_its_inside_test(backdrops):
     model = load_model("gavrila22", 1.7)
     values = standing(model)
