@@ -45,6 +45,8 @@ async def heap_mb(devtools):
 
 
 async def go_to(page, frame):
+    if await page.evaluate("quadrille.state.playing"):
+        await page.locator("#play").click()  # else it plays on past the frame
     await page.locator("#frame").fill(str(frame))
     await page.keyboard.press("Enter")
     await page.locator("#frame").blur()
@@ -69,7 +71,6 @@ async def act(page, rng):
     if rng.random() < 0.1:
         await page.locator("#play").click()
         await asyncio.sleep(1.0)
-        await page.keyboard.press("Space")
     await shows(page, "quadrille.state.state.saved", 60)
 
 
