@@ -24,7 +24,7 @@ def _plain(value: Any) -> Any:
     """Return a numpy scalar as a Python one."""
     if isinstance(value, np.generic):
         return value.item()
-    raise NotImplementedError(f"messages hold no {type(value)}")
+    raise TypeError(f"messages hold no {type(value)}")
 
 
 _ENCODER = msgspec.json.Encoder(enc_hook=_plain)

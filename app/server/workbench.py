@@ -97,7 +97,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
 
 
 def _keep_unsaved(saver: Saver, folder: Path) -> str | None:
-    """Keep edits that cannot be written; returns what to tell the user, None if all are saved."""
+    """Keep edits that cannot be written; returns a message for the user, None if all are saved."""
     if saver.error is None:
         return None
     try:

@@ -57,7 +57,7 @@ class FrameCache:
         self._failed: dict[Hashable, Callable[[], object]] = {}  # what could not be read, and how to try it again
         self._failed_lock = threading.Lock()
         self.on_unreadable: Callable[[], None] = lambda: None
-        """Called when footage could not be read, from any thread; `problem` tells what is wrong."""
+        """Called when footage could not be read, from any thread; `problem` returns the reason."""
 
     def images(self, frame: int) -> tuple[Image | None, ...]:
         """Return the undistorted images of all views, shared by all callers; None for a damaged or unreadable one."""
@@ -149,7 +149,7 @@ class FrameCache:
                 if self._wanted == frame and self._is_indexed(frame):
                     self.evidence(frame)
                     done(frame)
-            except RecordingError as error:  # `problem` tells the pages
+            except RecordingError as error:  # the pages show `problem`
                 _LOG.debug("no evidence of frame %d: %s", frame, error)
             except Exception:
                 _LOG.exception("no evidence of frame %d", frame)

@@ -11,7 +11,7 @@ _POLL_S = 0.2
 _RETRY_S = 1.0
 """Time between two attempts to read footage that could not be read."""
 _GATHER_S = 0.1
-"""Time until a failure is told: a drive that is gone takes several cameras with it, and one notice names them all."""
+"""Time until a failure is shown: a drive that is gone takes several cameras with it, and one notice names them all."""
 
 
 class FootageScan:

@@ -48,7 +48,7 @@ class SessionState:
         self._subscribers: list[Callable[[State], None]] = []
         self._stored: tuple[tuple[ShownPose, ...], Pins] | None = None  # the shown poses and pins that are on disk
         self.unwritten: list[Callable[[], bool]] = []
-        """Functions that tell whether a part of the controller holds poses that it has not saved yet."""
+        """Functions that return whether a part of the controller holds poses that it has not saved yet."""
         self._edit: int | None = None  # the entry of the history that the current gesture amends
         self.open_edit_owner: object = None
         """The gesture whose next save amends the last entry of the history; None if a save makes a new entry."""
