@@ -9,8 +9,8 @@ from app.page.message_types import Command, Frame, GesturePhase, Index, Name, Nu
 DragMode: TypeAlias = Literal["move", "turn", "push"]
 
 
-class Drag(Command, frozen=True, tag="drag"):
-    """Drag a point, or a part by its surface."""
+class _PointerGesture(Command, frozen=True):
+    """A gesture of the pointer in a view."""
 
     phase: GesturePhase
     frame: Frame
@@ -18,13 +18,18 @@ class Drag(Command, frozen=True, tag="drag"):
     camera: Index
     person: Index
     point: Name
-    """Name of the point; ignored if `part` is given."""
+    """Name of the point."""
     u: Number
     v: Number
+
+
+class Drag(_PointerGesture, frozen=True, tag="drag"):
+    """Drag a point, or a part by its surface."""
+
     seq: Index
     """Rises by one with every drag message of a page."""
     part: Index | None = None
-    """Part held by its surface."""
+    """Part held by its surface; the point is ignored then."""
     mode: DragMode = "move"
 
 
@@ -118,16 +123,9 @@ PoseEdit: TypeAlias = Union[  # noqa: UP007
 ]
 
 
-class DragPin(Command, frozen=True, tag="pin"):
+class DragPin(_PointerGesture, frozen=True, tag="pin"):
     """Set or drag a pin: the position of a joint in a view."""
 
-    phase: GesturePhase
-    frame: Frame
-    camera: Index
-    person: Index
-    point: Name
-    u: Number
-    v: Number
     live: bool
     """Whether the body follows the pin."""
 

@@ -105,7 +105,7 @@ def setup(controller: Controller, state: State) -> wire.SearchSetupMessage:
         step_rad=search.step_rad,
         step_m=search.step_m,
         speed=state.search_view.speed,
-        leaves=tuple(wire.SearchLeaf(**vars(leaf)) for leaf in leaves),
+        leaves=tuple(leaves),
     )
 
 

@@ -5,6 +5,7 @@ from typing import Annotated, Literal, TypeAlias
 import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
+from app.control.search.search_settings import SearchLeaf
 from app.page.message_types import MAX_INT, Command, Index, Message, Name, Number, Part
 
 OutlierMode: TypeAlias = Literal["truncated", "paper"]
@@ -124,27 +125,6 @@ class SetLandscapeDof(Command, frozen=True, tag="landscape_set"):
 
 
 # --- to the page ----------------------------------------------------------------------------------------------------
-
-
-class SearchLeaf(Part, frozen=True):
-    """A group of degrees of freedom that is searched together.
-
-    A bound or step is null if it does not apply to the group, or differs within it.
-    """
-
-    person: int
-    name: str
-    dofs: tuple[str, ...]
-    bound_rad: float | None
-    step_rad: float | None
-    bound_m: float | None
-    step_m: float | None
-    angles: int
-    """Number of angles among its degrees of freedom."""
-    lengths: int
-    """Number of lengths among them."""
-    own: bool
-    """Whether any bound or step differs from that of all groups."""
 
 
 class SearchSetupMessage(Message, frozen=True, tag="search_setup"):

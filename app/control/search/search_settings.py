@@ -17,8 +17,8 @@ _PLAIN = ("bound_rad", "bound_m", "step_rad", "step_m")
 
 
 @dataclass(frozen=True)
-class Leaf:
-    """One group of degrees of freedom that is searched together."""
+class SearchLeaf:
+    """A group of degrees of freedom that is searched together."""
 
     person: int
     """Index of the person."""
@@ -27,13 +27,13 @@ class Leaf:
     dofs: tuple[str, ...]
     """Names of its active degrees of freedom."""
     bound_rad: float | None
-    """Largest change of its angles, rad; None if it has none or they differ."""
+    """Largest change of its angles, rad; no value if it has none or they differ."""
     step_rad: float | None
-    """Spacing along its angles, rad; None likewise."""
+    """Spacing along its angles, rad; no value likewise."""
     bound_m: float | None
-    """Largest change of its positions, metres; None likewise."""
+    """Largest change of its positions, metres; no value likewise."""
     step_m: float | None
-    """Spacing along its positions, metres; None likewise."""
+    """Spacing along its positions, metres; no value likewise."""
     angles: int
     """Number of its degrees of freedom that are angles."""
     lengths: int
@@ -44,7 +44,7 @@ class Leaf:
 
 def leaves(
     models: Sequence[BodyModel], settings: SearchSettings, free: Sequence[NDArray[np.bool_]] | None = None
-) -> list[Leaf]:
+) -> list[SearchLeaf]:
     """Return the leaves of the decomposition, in the order of search within one pass.
 
     Args:
@@ -59,7 +59,7 @@ def leaves(
         bounds, steps = settings.lattice(model, at)
         is_length = model.dof_is_length[at]
         found.append(
-            Leaf(
+            SearchLeaf(
                 stage.person, stage.group.name, stage.group.dofs,
                 _common(bounds[~is_length]), _common(steps[~is_length]),
                 _common(bounds[is_length]), _common(steps[is_length]),
