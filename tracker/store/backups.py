@@ -57,8 +57,7 @@ def back_up(db: sqlite3.Connection, path: Path) -> str | None:
             return None  # nothing to lose
         known = backups_of(path)
         if not (known and _is_copy(known[0], db)):
-            stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S%f")[:-3]
-            _copy(db, path.parent / FOLDER / f"{path.stem}-{stamp}Z{path.suffix}")
+            _copy(db, path.parent / FOLDER / f"{path.stem}-{_stamp()}{path.suffix}")
             for old in backups_of(path)[_N_KEPT:]:
                 old.unlink(missing_ok=True)
     except (OSError, sqlite3.Error) as error:
@@ -77,15 +76,18 @@ def restore(path: Path, backup: Path | None = None) -> Restored:
         SessionError: there is no such backup, or the folder cannot be written.
     """
     chosen = [backup] if backup is not None else backups_of(path)
-    passing = next((b for b in chosen if not _damage(b)), None)
-    if passing is None:
-        found = "; ".join(f"{b.name}: {_damage(b)}" for b in chosen) or "none"
+    problems = []
+    for passing in chosen:
+        if (problem := _damage(passing)) is None:
+            break
+        problems.append(f"{passing.name}: {problem}")
+    else:
         raise SessionError(
-            f"expected a backup of {path} that passes its checks, found {found}; put a copy of the file in its place, "
-            "or move it away to begin without poses"
+            f"expected a backup of {path} that passes its checks, found {'; '.join(problems) or 'none'}; put a copy of "
+            "the file in its place, or move it away to begin without poses"
         )
     try:
-        with closing(sqlite3.connect(f"{passing.absolute().as_uri()}?mode=ro", uri=True)) as source:
+        with closing(_reader(passing)) as source:
             fresh = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
             _copy(source, fresh)
         try:
@@ -105,8 +107,7 @@ def _set_aside(path: Path) -> Path | None:
         for ending in _JOURNALS:
             path.with_name(path.name + ending).unlink(missing_ok=True)
         return None
-    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S%f")[:-3]
-    kept = path.with_name(f"{path.stem}-replaced-{stamp}Z{path.suffix}")
+    kept = path.with_name(f"{path.stem}-replaced-{_stamp()}{path.suffix}")
     for ending in _JOURNALS:  # first: a store without its journal is repaired by hand, a strange journal is not
         beside = path.with_name(path.name + ending)
         if beside.exists():
@@ -120,7 +121,7 @@ def _damage(backup: Path) -> str | None:
     if not backup.is_file() or backup.stat().st_size == 0:
         return "there is no such file, or it is empty"
     try:
-        with closing(sqlite3.connect(f"{backup.absolute().as_uri()}?mode=ro", uri=True)) as db:
+        with closing(_reader(backup)) as db:
             return verification.damage(db)
     except (sqlite3.Error, *verification.UNDECODABLE) as error:
         return f"{type(error).__name__}: {error}"
@@ -129,10 +130,20 @@ def _damage(backup: Path) -> str | None:
 def _is_copy(backup: Path, db: sqlite3.Connection) -> bool:
     """Return whether a backup holds the same rows as an open store."""
     try:
-        with closing(sqlite3.connect(f"{backup.absolute().as_uri()}?mode=ro", uri=True)) as other:
+        with closing(_reader(backup)) as other:
             return checksums.contents(other) == checksums.contents(db)
     except (sqlite3.Error, *verification.UNDECODABLE):  # an older version, or damaged
         return False
+
+
+def _reader(backup: Path) -> sqlite3.Connection:
+    """Open a backup, which stays as it is."""
+    return sqlite3.connect(f"{backup.absolute().as_uri()}?mode=ro", uri=True)
+
+
+def _stamp() -> str:
+    """Return the present time for the name of a file; names sort by it."""
+    return datetime.now(UTC).strftime("%Y%m%dT%H%M%S%f")[:-3] + "Z"
 
 
 def _copy(source: sqlite3.Connection, to: Path) -> None:

@@ -69,15 +69,9 @@ class Connection:
         """
         with self._lock, self._errors():
             self._reopen_moved(for_writing=True)
-            self.db.execute("BEGIN IMMEDIATE")
-            try:
+            with _all_or_nothing(self.db):
                 yield self.db
                 contents = checksums.contents(self.db)
-                self.db.execute("COMMIT")
-            except BaseException:
-                if self.db.in_transaction:  # a full disk may have ended it already
-                    self.db.execute("ROLLBACK")
-                raise
             self._contents = contents
 
     @contextmanager
@@ -140,14 +134,8 @@ class Connection:
             schema.show_as_new(self.db)
             return
         if schema.version(self.db) < schema.VERSION:
-            self.db.execute("BEGIN IMMEDIATE")  # all or nothing: a power cut leaves the older file
-            try:
+            with _all_or_nothing(self.db):  # a power cut leaves the older file
                 schema.upgrade(self.db)
-                self.db.execute("COMMIT")
-            except BaseException:
-                if self.db.in_transaction:
-                    self.db.execute("ROLLBACK")
-                raise
         checksums.watch(self.db)
 
     def _note(self) -> None:
@@ -236,14 +224,25 @@ def _connect(path: Path, mode: str) -> sqlite3.Connection:
     return db
 
 
+@contextmanager
+def _all_or_nothing(db: sqlite3.Connection) -> Generator[None, None, None]:
+    """Commit what is written within a `with` block, or roll it back where that raises."""
+    db.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        db.execute("COMMIT")
+    except BaseException:
+        if db.in_transaction:  # a full disk may have ended it already
+            db.execute("ROLLBACK")
+        raise
+
+
 def _create(path: Path) -> None:
     """Write an empty store. It appears complete: an empty file in its place was not left by a crash."""
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
-        with closing(_connect(temporary, "rwc")) as db:
-            db.execute("BEGIN IMMEDIATE")
+        with closing(_connect(temporary, "rwc")) as db, _all_or_nothing(db):
             schema.create(db)
-            db.execute("COMMIT")
         temporary.rename(path)
         sync_folder(path.parent)
     finally:
