@@ -9,6 +9,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ import numba
 from platformdirs import user_cache_path
 
 from tracker.compute.kernel_keys import KernelKeys, UnknownSourceError
+from tracker.files import write_text_atomic
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _MARK, _KEYS = "compiled-", "keys-"
@@ -107,7 +109,9 @@ def kernel_keys() -> dict[str, str]:
         keys = msgspec.json.decode(stored.read_bytes(), type=dict[str, str])
     except (OSError, msgspec.DecodeError, RecursionError):
         keys = _computed_keys(environment)
-        _write(stored, json.dumps(keys))
+        with suppress(OSError):  # they are then computed again
+            stored.parent.mkdir(parents=True, exist_ok=True)
+            write_text_atomic(stored, json.dumps(keys))
     return keys
 
 
@@ -167,14 +171,3 @@ def _text(path: Path) -> str:
         return path.read_text("utf-8")
     except OSError:
         return ""
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a file atomically. A failure is ignored: the keys are then computed again."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, delete=False) as file:
-            file.write(text)
-        os.replace(file.name, path)
-    except OSError:
-        return

@@ -7,6 +7,7 @@ orientation, as OpenCV and therefore calibration tools read them.
 
 import threading
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import av
@@ -72,9 +73,8 @@ class VideoFile:
             raise RecordingError(f"{self._where} not found; check the path")
         self._opened_version = self._present_version()
         try:
-            decoder = VideoDecoder(path, self._where)
-            declared_rate = float(decoder.stream.average_rate or 0)
-            try:
+            with closing(VideoDecoder(path, self._where)) as decoder:
+                declared_rate = float(decoder.stream.average_rate or 0)
                 index = frame_index.load(path, indices)
                 if index is None and not in_background:
                     index = self._list()
@@ -82,8 +82,6 @@ class VideoFile:
                     self._finish(index, declared_rate, decoder.tick_s)
                 self._index = self._listed.frames
                 first = next(decoder.frames, None) if index is None else self._first_frame(index, decoder)
-            finally:
-                decoder.close()
             self._open()
         except av.FFmpegError as error:
             raise self._unreadable(error) from error
@@ -213,8 +211,7 @@ class VideoFile:
             RecordingError: it is unreadable or different.
             av.FFmpegError: it cannot be opened.
         """
-        decoder = VideoDecoder(self.path, self._where)
-        try:
+        with closing(VideoDecoder(self.path, self._where)) as decoder:
             index = frame_index.load(self.path, self._indices) or self._list()
             before = self._listed.frames.pts
             both = min(len(before), len(index.pts))
@@ -228,8 +225,6 @@ class VideoFile:
             if size != self.size:
                 raise self._changed(f"{self.size[0]}x{self.size[1]} pixels as before", f"{size[0]}x{size[1]}")
             declared_rate = float(decoder.stream.average_rate or 0)
-        finally:
-            decoder.close()
         self._finish(index, declared_rate, decoder.tick_s)
         self._open()
         self._opened_version, self._refused, self._index = found, None, index
@@ -351,11 +346,8 @@ class VideoFile:
 
     def _grow(self, listed: PacketScan) -> None:
         if not self.n_frames:
-            decoder = VideoDecoder(self.path, self._where)
-            try:
+            with closing(VideoDecoder(self.path, self._where)) as decoder:
                 self._first_frame(listed.frames, decoder)
-            finally:
-                decoder.close()
         with self._grown:
             if self._closed or self._is_listed:  # another version is listed meanwhile
                 raise RecordingError(f"{self._where} has been closed")
