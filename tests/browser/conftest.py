@@ -6,8 +6,9 @@ import pytest_asyncio
 from aiohttp import web
 from chromium import FLAGS, chromium_path
 from fake_endpoint import FakeEndpoint
-from page_driver import OPENED, listening, shows
+from page_driver import OPENED, shows
 from playwright.async_api import Error, async_playwright
+from serving import listening
 
 from app.server.access import Access
 from app.server.server import create_app, static_folder

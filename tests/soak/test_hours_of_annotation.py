@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chromium import FLAGS, chromium_path
+from memory import memory_mb
 from page_driver import dragging, shows
 from playwright.async_api import async_playwright
 from program import ROOT, started, visited
@@ -29,12 +30,6 @@ POINTS = ("left_wrist", "right_wrist", "left_elbow", "right_elbow", "left_knee",
 KEYS = ("Control+z", "Control+z", "Control+Shift+z", "h", "h", "Shift+H", "Shift+H", "]", "[", "m", "c", "r")
 N_FRAMES = 50
 SEED = 7
-
-
-def resident_mb(pid):
-    """Memory of a process that is in use, MB."""
-    line = next(x for x in Path(f"/proc/{pid}/status").read_text().splitlines() if x.startswith("VmRSS"))
-    return int(line.split()[1]) / 1e3
 
 
 async def heap_mb(devtools):
@@ -100,7 +95,7 @@ async def test_an_hour_of_annotation_loses_nothing_and_does_not_grow(tmp_path, c
             n += 1
             if time.monotonic() >= measured + min(60.0, length_s / 6):
                 measured = time.monotonic()
-                rows.append((measured - begun, resident_mb(program.pid), await heap_mb(devtools)))
+                rows.append((measured - begun, memory_mb("VmRSS", program.pid), await heap_mb(devtools)))
                 report(
                     f"{rows[-1][0] / 60:.1f} min, {n} frames, program {rows[-1][1]:.0f} MB, page {rows[-1][2]:.1f} MB"
                 )

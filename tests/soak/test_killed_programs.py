@@ -14,6 +14,7 @@ from contextlib import asynccontextmanager, closing, suppress
 
 import aiohttp
 import pytest
+from page_driver import until
 from program import ROOT, Program
 
 from tracker.store.annotation_store import AnnotationStore
@@ -99,12 +100,6 @@ async def test_edits_shown_as_saved_survive_sigkill(tmp_path, cases, report):
     assert lost == []
 
 
-async def until(condition):
-    async with asyncio.timeout(60):
-        while not condition():
-            await asyncio.sleep(0.02)
-
-
 def command(*words, **more):
     return subprocess.run(
         [sys.executable, "-m", "app", *map(str, words)], cwd=ROOT, capture_output=True, text=True, timeout=120, **more
@@ -124,13 +119,13 @@ async def test_edits_on_a_full_disk_survive_the_end_of_the_program(tmp_path, cas
         async with page_of(program.address) as socket:
             watching = asyncio.create_task(watch(socket, seen))
             await edit(socket, first)
-            await until(lambda: first in seen.saved)  # noqa: B023
+            await until(lambda: first in seen.saved, 60)  # noqa: B023
             size = (session / "annotations.sqlite").stat().st_size
             resource.prlimit(program.pid, resource.RLIMIT_FSIZE, (size, size))
             last = first + rng.randint(90, 99)  # more than free pages of the file hold
             for k in range(first + 1, last + 1):
                 await edit(socket, k)
-            await until(lambda: last in seen.shown)  # noqa: B023
+            await until(lambda: last in seen.shown, 60)  # noqa: B023
             os.kill(program.pid, signal.SIGTERM)
             status = await program.ended()
             watching.cancel()

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from memory import memory_mb
 from mutation import json_bytes, mutate_bytes, mutate_tree, toml_bytes
 
 from tracker.errors import TrackerError
@@ -29,7 +30,7 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLES = ROOT / "sample_sessions"
 MODELS = ROOT / "tracker" / "body" / "models"
-MAX_S, MAX_BYTES = 2.0, 500e6
+MAX_S, MAX_MB = 2.0, 500.0
 
 JOINT_MAP = 'left_shoulder = "LSHO"\nleft_wrist = "LWRA"\nneck = "C7"\n'
 LOCK = {
@@ -103,11 +104,6 @@ KINDS = {
 """For each kind: name of the file, examples, what reads it, and the full number of cases."""
 
 
-def resident_bytes(key):
-    line = next(s for s in Path("/proc/self/status").read_text().splitlines() if s.startswith(key))
-    return int(line.split()[1]) * 1024
-
-
 def mutated(rng, name, examples, others):
     """One file, mutated once to four times."""
     data = rng.choice(examples)
@@ -133,7 +129,7 @@ def test_mutated_files_are_read_or_refused(kind, tmp_path, cases, report, monkey
     rng, n = random.Random(f"mutated {kind}"), cases(full)
     failures, refused, slowest = [], 0, 0.0
     Path("/proc/self/clear_refs").write_text("5")  # the peak counts from here
-    before = resident_bytes("VmRSS")
+    before = memory_mb("VmRSS")
     for case in range(n):
         data = mutated(rng, name, examples, others)
         path = tmp_path / name
@@ -155,11 +151,11 @@ def test_mutated_files_are_read_or_refused(kind, tmp_path, cases, report, monkey
             failures.append(f"case {case}: {took:.1f} s for {len(data)} bytes: {data[:100]!r}")
         del data
         path.unlink(missing_ok=True)
-    grown = resident_bytes("VmHWM") - before
+    grown = memory_mb("VmHWM") - before
     report(
         f"{kind}: {n} mutated files, {refused} refused, {n - refused} read, {len(failures)} failures, "
-        f"slowest {slowest:.2f} s, memory {grown / 1e6:.0f} MB"
+        f"slowest {slowest:.2f} s, memory {grown:.0f} MB"
     )
     assert not failures, "\n".join(failures[:10])
-    assert grown < MAX_BYTES
+    assert grown < MAX_MB
     assert 0 < refused < n  # neither all are refused nor all are read

@@ -4,22 +4,8 @@ import asyncio
 import json
 from contextlib import asynccontextmanager
 
-from aiohttp import web
-
 OPENED = "window.quadrille?.state.overlay && quadrille.state.overlay.frame === quadrille.state.shown?.frame"
 """That a page shows its first frame, for `shows`."""
-
-
-@asynccontextmanager
-async def listening(app, port=0):
-    """Serve on loopback; gives the port. Ends at once, as when the program is killed."""
-    runner = web.AppRunner(app, shutdown_timeout=0.1)
-    await runner.setup()
-    await web.TCPSite(runner, "127.0.0.1", port, reuse_address=True).start()
-    try:
-        yield runner.addresses[0][1]
-    finally:
-        await runner.cleanup()
 
 
 async def shows(page, expression, timeout_s=20.0):

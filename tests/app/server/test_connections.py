@@ -1,11 +1,11 @@
 """Connections are limited in number and in age; pages are not."""
 
 import asyncio
-from contextlib import asynccontextmanager, closing
+from contextlib import closing
 
 import aiohttp
 import pytest
-from aiohttp import web
+from serving import running
 
 from app.server import connections, server
 from app.server.access import Access
@@ -24,16 +24,9 @@ def short_times(monkeypatch):
     monkeypatch.setattr(connections, "LINGER_S", 0.2)
 
 
-@asynccontextmanager
-async def serving():
+def serving():
     app = server.create_app(EchoPanes(), server.static_folder() / "nobody", Access(), server.static_folder())
-    runner = connections.LimitedRunner(app)
-    await runner.setup()
-    await web.TCPSite(runner, "127.0.0.1", 0).start()
-    try:
-        yield runner.addresses[0][1]
-    finally:
-        await runner.cleanup()
+    return running(connections.LimitedRunner(app))
 
 
 async def end_of(reader):

@@ -6,6 +6,7 @@ from pathlib import Path
 import aiohttp
 import pytest
 from aiohttp import web
+from serving import listening
 from yarl import URL
 
 from app.server import server
@@ -57,17 +58,6 @@ async def listening_at(app, path):
     await web.UnixSite(runner, path).start()
     try:
         yield path
-    finally:
-        await runner.cleanup()
-
-
-@asynccontextmanager
-async def listening(app):
-    runner = web.AppRunner(app, shutdown_timeout=1.0)
-    await runner.setup()
-    await web.TCPSite(runner, "127.0.0.1", 0).start()
-    try:
-        yield runner.addresses[0][1]
     finally:
         await runner.cleanup()
 

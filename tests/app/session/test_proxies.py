@@ -1,6 +1,7 @@
 """`quadrille index`: what it makes, how it goes on, and that the page looks at it."""
 
 import numpy as np
+import pytest
 from gestures import wait_for
 
 from app.session import proxies
@@ -74,33 +75,31 @@ def test_a_proxy_of_other_footage_is_not_looked_at(run, session):
     assert [p is None for p in proxies.proxies(loaded)].count(True) == 1
 
 
-def test_a_proxy_that_vanishes_is_replaced_by_the_footage(run, session):
+@pytest.fixture
+def indexed(run, session):
+    """An indexed session and its frames, looked at through the proxies."""
     assert run("index", session)[0] == 0
     loaded = load_session(session)
     recording = Recording(loaded.cameras)
     frames = FrameCache(Observer(loaded.cameras, recording), proxies.proxies(loaded))
-    try:
-        assert frames.images(31)[0] is not None
-        for path in (session / proxies.FOLDER).glob("*.mjpeg"):
-            path.unlink()
-        assert all(image is not None for image in frames.images(32))
-        assert frames.problem() is None
-    finally:
-        frames.close()
-        recording.close()
+    yield loaded, frames
+    frames.close()
+    recording.close()
 
 
-def test_a_proxy_is_not_looked_at_once_its_footage_is_replaced(run, session):
-    assert run("index", session)[0] == 0
-    loaded = load_session(session)
-    recording = Recording(loaded.cameras)
-    frames = FrameCache(Observer(loaded.cameras, recording), proxies.proxies(loaded))
-    try:
-        front = next(i for i, c in enumerate(loaded.cameras) if c.camera.name == "FRONT")
-        before = frames.images(31)[front]
-        loaded.cameras[front].footage.write_bytes((session / "BACK.mp4").read_bytes())
-        assert frames.problem() is None  # the same number of frames of the same size
-        assert np.abs(frames.images(31)[front].astype(int) - before).mean() > 4
-    finally:
-        frames.close()
-        recording.close()
+def test_a_proxy_that_vanishes_is_replaced_by_the_footage(indexed, session):
+    _, frames = indexed
+    assert frames.images(31)[0] is not None
+    for path in (session / proxies.FOLDER).glob("*.mjpeg"):
+        path.unlink()
+    assert all(image is not None for image in frames.images(32))
+    assert frames.problem() is None
+
+
+def test_a_proxy_is_not_looked_at_once_its_footage_is_replaced(indexed, session):
+    loaded, frames = indexed
+    front = next(i for i, c in enumerate(loaded.cameras) if c.camera.name == "FRONT")
+    before = frames.images(31)[front]
+    loaded.cameras[front].footage.write_bytes((session / "BACK.mp4").read_bytes())
+    assert frames.problem() is None  # the same number of frames of the same size
+    assert np.abs(frames.images(31)[front].astype(int) - before).mean() > 4

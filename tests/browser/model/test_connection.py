@@ -4,7 +4,8 @@ import asyncio
 
 import pytest
 from aiohttp import ClientSession, WSServerHandshakeError
-from page_driver import dragging, listening, shows, until
+from page_driver import dragging, shows, until
+from serving import listening
 
 from app.server.access import Access
 from app.server.private_viser import PrivateViser

@@ -76,7 +76,8 @@ class Clone:
         copied.mkdir(parents=True)
         for path in (SOURCE / "compute").glob("*.py"):
             shutil.copy(path, copied)
-        shutil.copy(SOURCE / "__init__.py", folder / "tracker")
+        for name in ("__init__", "files", "errors"):
+            shutil.copy(SOURCE / f"{name}.py", folder / "tracker")
         self.near = folder / "tracker" / "near"
         self.near.mkdir()
         for name, text in {"__init__": "", "callee": CALLEE, "caller": CALLER}.items():
