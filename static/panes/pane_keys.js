@@ -4,10 +4,10 @@ import { BY_KEY } from "../model/layers.js";
 import { inArea, plain } from "../widgets/key_matching.js";
 
 /**
- * @param {{grid: import("./pane_grid.js").PaneGrid, layers: import("../model/layers.js").Layers,
+ * @param {{grid: import("./pane_grid.js").PaneGrid, gestures: import("./gestures.js").Gestures, layers: import("../model/layers.js").Layers,
  *   layersMenu: import("./layers_menu.js").LayersMenu}} parts
  */
-export function paneBindings({ grid, layers, layersMenu }) {
+export function paneBindings({ grid, gestures, layers, layersMenu }) {
   return inArea("Views", [
     { keys: ["A"], label: "Layers", matches: plain("a"), run: () => layersMenu.toggle() },
     {
@@ -30,6 +30,12 @@ export function paneBindings({ grid, layers, layersMenu }) {
       label: "Show the whole image",
       matches: plain("0"),
       run: () => grid.typeCamera(0) || grid.resetViews(),
+    },
+    {
+      keys: ["N"],
+      label: "Take the next of the joints that overlap under the pointer",
+      matches: plain("n"),
+      run: () => gestures.offerNext(),
     },
   ]);
 }

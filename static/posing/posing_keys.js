@@ -39,6 +39,13 @@ export function posingBindings(posing, inspector, why) {
       matches: plain("o", undefined, true),
       run: () => posing.toggleLock(posing.limb.dofs),
     },
+    { keys: ["D"], label: "Hold the joint in place during drags, or release it", matches: plain("d"), run: () => posing.toggleHold() },
+    {
+      keys: ["Shift D"],
+      label: "Release all held joints of the person on this frame",
+      matches: plain("d", undefined, true),
+      run: () => posing.releaseAll(),
+    },
     { keys: ["M"], label: "Mirror the pose left to right", matches: plain("m"), run: () => posing.mirror() },
     {
       keys: ["Shift X"],
