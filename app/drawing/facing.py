@@ -30,9 +30,9 @@ def facing_arrow(body: PosedBody, camera: Camera) -> tuple[FloatArray, bool]:
         return np.zeros((0, 4), np.float32), False
     part = model.part_index[_HEAD]
     face = face_part(model)
-    tip, barb = face + (_LENGTH * model.height_m, 0.0, 0.0), _BARB * model.height_m
-    ends = [face, tip] + [tip + (-barb, sign * barb, 0.0) for sign in (-1, 1)] + [tip + (-barb, 0.0, -barb)]
-    points = rigid.apply(body.kinematics.Ts_world_part[part], np.array(ends))
+    tip, barb = face + np.array([_LENGTH * model.height_m, 0.0, 0.0]), _BARB * model.height_m
+    barbs = tip + barb * np.array([(-1.0, -1.0, 0.0), (-1.0, 1.0, 0.0), (-1.0, 0.0, -1.0)])
+    points = rigid.apply(body.kinematics.Ts_world_part[part], np.vstack([face, tip, barbs]))
     depths = camera.depths(points)
     if depths.min() < NEAR_PLANE_M:
         return np.zeros((0, 4), np.float32), False
@@ -56,5 +56,7 @@ def nose(model: BodyModel, part: int) -> tuple[Array, Array]:
     if model.parts[part].name != _HEAD:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
     length, width = _NOSE[0] * model.height_m, _NOSE[1] * model.height_m
-    corners = np.array([(length, 0, -0.3 * width), (-width, -width, -width), (-width, width, -width), (-width, 0, width)])
+    corners = np.array(
+        [(length, 0, -0.3 * width), (-width, -width, -width), (-width, width, -width), (-width, 0, width)]
+    )
     return face_part(model) + corners, np.array([(0, 2, 1), (0, 3, 2), (0, 1, 3)])

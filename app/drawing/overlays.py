@@ -41,7 +41,17 @@ _EDGE_STRIDE_PX = 3
 
 
 PathKind = Literal[
-    "model", "hidden", "facing", "facing_away", "candidate", "ghost", "part_edge", "epipolar", "accepted", "rejected", "floor"
+    "model",
+    "hidden",
+    "facing",
+    "facing_away",
+    "candidate",
+    "ghost",
+    "part_edge",
+    "epipolar",
+    "accepted",
+    "rejected",
+    "floor",
 ]
 Side = Literal["left", "right", ""]
 SIDES: tuple[Side, ...] = get_args(Side)
@@ -286,7 +296,14 @@ def _by_part(
     people, colors = surfaces_of(models).people, part_colors(session.people)
     sides = [side_of(part.name) for model in models for part in model.parts]
     return [
-        Path(index, int(people[part]), kind, colors[part], contour.pieces_px[chosen & (contour.parts == part)], sides[part])
+        Path(
+            index,
+            int(people[part]),
+            kind,
+            colors[part],
+            contour.pieces_px[chosen & (contour.parts == part)],
+            sides[part],
+        )
         for part in np.unique(contour.parts[chosen])
     ]
 

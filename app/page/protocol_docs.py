@@ -26,7 +26,8 @@ _WIDTH = 120
 _PLAIN = {int: "number", float: "number", str: "string", bool: "boolean", type(None): "null"}
 
 _LITERALS = (
-    "PictureLayer", "Layer", "Status", "CurveGroup", "RangeAction", "DragMode", "GesturePhase", "PathKind", "RunState", "Side",
+    "PictureLayer", "Layer", "Status", "CurveGroup", "RangeAction", "DragMode", "GesturePhase", "PathKind", "RunState",
+    "Side",
 )  # fmt: skip
 """Literal types with a name of their own in the page."""
 

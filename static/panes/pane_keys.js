@@ -1,7 +1,7 @@
 /** Keys of the camera panes and their layers. */
 
 import { BY_KEY } from "../model/layers.js";
-import { inArea, plain } from "../widgets/key_matching.js";
+import { alt, inArea, plain } from "../widgets/key_matching.js";
 
 /**
  * @param {{grid: import("./pane_grid.js").PaneGrid, gestures: import("./gestures.js").Gestures, layers: import("../model/layers.js").Layers,
@@ -32,9 +32,9 @@ export function paneBindings({ grid, gestures, layers, layersMenu }) {
       run: () => grid.typeCamera(0) || grid.resetViews(),
     },
     {
-      keys: ["N"],
+      keys: ["Alt O"],
       label: "Take the next of the joints that overlap under the pointer",
-      matches: plain("n"),
+      matches: alt("KeyO", false),
       run: () => gestures.offerNext(),
     },
   ]);

@@ -192,26 +192,26 @@ class FakeEndpoint:
             case "drag":
                 await self.drag(message)
             case "pose" if message["action"] == "hold":
-                (self.held_joints.add if message["held"] else self.held_joints.discard)(
-                    (message["person"], message["point"])
-                )
-                await self.send_overlay()
+                await self.hold(message)
             case "search":
                 await self.search(message["action"])
             case "track":
                 await self.track(message["action"], message.get("until"))
-            case "follow":
-                self.state["follow"] = message["follow"]
+            case "follow" | "snap":
+                is_follow = message["type"] == "follow"
+                self.state |= {"follow": message["follow"]} if is_follow else {"snapped": message["camera"]}
                 await self.broadcast(self.state)
             case "curves":
                 self.curves_group = message["group"]
                 if self.curves_group:
                     await self.send_curves(np.arange(self.n_frames), replace=True)
-            case "snap":
-                self.state["snapped"] = message["camera"]
-                await self.broadcast(self.state)
             case "undo" | "redo":
                 await self.broadcast(self.state)
+
+    async def hold(self, message):
+        change = self.held_joints.add if message["held"] else self.held_joints.discard
+        change((message["person"], message["point"]))
+        await self.send_overlay()
 
     async def cast(self, message):
         if message["action"] == "solo":

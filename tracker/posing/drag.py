@@ -10,7 +10,7 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 from tracker.posing.grab import Grab, Holds, limb_points
 from tracker.posing.orient import orient
-from tracker.posing.reaching import DEPTH_WEIGHT, HOLD_WEIGHT, QUICK, PointerTarget, reach, restore_held
+from tracker.posing.reaching import HOLD_WEIGHT, QUICK, PointerTarget, as_other_views_placed, reach, restore_held
 
 _ON_JOINT_PX = 8.0
 """Largest distance of a grabbed point from its joint at which turning works like a knob, px."""
@@ -26,12 +26,12 @@ _MIN_PUSH_DEPTH_M = 0.3
 _HEADINGS_RAD = (np.radians(np.arange(-90.0, 91.0)), np.radians(np.linspace(-1.0, 1.0, 41)))
 """Turns about the vertical that one move tries, against the last move, coarse and fine."""
 _NEAR_HEADING_M, _SAME_SIDE_M = 0.03, 0.01
-"""Distances in the view that outweigh one radian of turn from the grab and from the last move, metres. A shoulder at the
-outline turns far for little: the first keeps an aim that is slightly off from turning the body. Of two headings that
-look alike the second takes the nearer."""
+"""Distances in the view that outweigh one radian of turn from the grab and from the last move, metres. A shoulder at
+the outline turns far for little: the first keeps an aim that is slightly off from turning the body. Of two headings
+that look alike the second takes the nearer."""
 _NEAR_SIDE_M = 3e-4
-"""Squared distance in the view that outweighs one metre of depth, metres. It decides which way a shoulder at the outline
-is drawn inwards: towards the camera."""
+"""Squared distance in the view that outweighs one metre of depth, metres. It decides which way a shoulder at the
+outline is drawn inwards: towards the camera."""
 
 
 def drag(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
@@ -77,8 +77,9 @@ def turn(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
     joint.
 
     The turned joint is the active one next to the grabbed point. The body turns if it is grabbed as a whole, or by a
-    shoulder or a hip; that tilts it. With the pointer on the joint itself, the part turns like a knob by the pointer's motion to the right. A joint that cannot
-    turn about the line of sight turns so that the point comes near to its target.
+    shoulder or a hip; that tilts it. With the pointer on the joint itself, the part turns like a knob by the pointer's
+    motion to the right. A joint that cannot turn about the line of sight turns so that the point comes near to its
+    target.
 
     Args:
         grabbed: from `grab` or `grab_part`.
@@ -139,7 +140,7 @@ def _follow(grabbed: Grab, target_world: Array, pose: Array, depth_weight: float
         case "limb":
             return reach(grabbed, target_world, pose, grabbed.active_dofs, grabbed.holds, depth_weight)
         case "body":
-            placed = target_world if depth_weight else _seen_as_placed(grabbed, target_world)
+            placed = target_world if depth_weight else as_other_views_placed(grabbed, target_world)[0]
             moved = _moved_body(grabbed, placed, pose)
         case "heading":
             moved = _turned_about_vertical(grabbed, target_world, pose, depth_weight or 0.0)
@@ -155,21 +156,6 @@ def _moved_body(grabbed: Grab, target_world: Array, pose: Array) -> Array:
     return grabbed.model.retract(pose, np.where(grabbed.active_dofs, step, 0.0))
 
 
-def _seen_as_placed(grabbed: Grab, target_world: Array) -> Array:
-    """Return the position under the pointer, (3,), metres, at which the root is seen where other views placed it.
-
-    Without other views it has the depth of the target, (3,).
-    """
-    own = grabbed.holds.of(grabbed.holds.points == 0)
-    sight = target_world - grabbed.camera.center_world
-    sight = sight / np.linalg.norm(sight)
-    # Least squares over the distance s along the line of sight: W (target + s sight - hold), and little of s itself.
-    W, off = own.weights.reshape(-1, 3), (own.targets_world - target_world).reshape(-1, 3)
-    seen = W @ sight
-    step = seen @ np.einsum("nij,nj->ni", own.weights, off).ravel() / (seen @ seen + DEPTH_WEIGHT**2)
-    return np.asarray(target_world + step * sight)
-
-
 def _turned_about_vertical(grabbed: Grab, target_world: Array, pose: Array, depth_weight: float) -> Array:
     """Return a pose with the body turned about the vertical through its root, so that the point is nearest to a target.
 
@@ -181,7 +167,10 @@ def _turned_about_vertical(grabbed: Grab, target_world: Array, pose: Array, dept
     T_root = kinematics.Ts_world_part[0]
     R_last = model.kinematics(pose).Ts_world_part[0, :3, :3] @ T_root[:3, :3].T
     angle = last = float(rigid.so3_log(R_last) @ up)
-    placed = grabbed.holds.of(~grabbed.holds.moved_by(model, model.limb_dofs)).scaled(HOLD_WEIGHT)
+    placed = grabbed.holds.of(~grabbed.holds.moved_by(model, model.limb_dofs))
+    if grabbed.placed_elsewhere is not None:
+        placed = placed.joined(grabbed.placed_elsewhere)
+    placed = placed.scaled(HOLD_WEIGHT)
     arms = np.vstack([grabbed.point_world(grabbed.pose), placed.targets_world]) - T_root[:3, 3]
     level, across = arms - (arms @ up)[:, None] * up, np.cross(up, arms)
     target = rigid.apply(camera.T_camera_world, target_world)

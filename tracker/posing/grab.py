@@ -31,8 +31,8 @@ class Constraints:
     active_dofs: NDArray[np.bool_] | None = None
     """Degrees of freedom that may change, (n_dofs,); None: all."""
     held: Mapping[str, Sequence[Camera]] = field(default_factory=dict)
-    """Points that stay where they are in space as far as the drag allows (see `holdable_points`), with the views in which
-    they were placed. A point that was placed in one view may still move along its line of sight."""
+    """Points that stay where they are in space as far as the drag allows (see `holdable_points`), with the views in
+    which they were placed. A point that was placed in one view may still move along its line of sight."""
     up_world: tuple[float, float, float] = _UP
     """The vertical, a unit vector in the world."""
 
@@ -58,6 +58,14 @@ class Holds:
     def of(self, chosen: NDArray[np.bool_]) -> "Holds":
         """Return some of them, (N,) bool."""
         return Holds(self.points[chosen], self.targets_world[chosen], self.weights[chosen])
+
+    def joined(self, other: "Holds") -> "Holds":
+        """Return both."""
+        rows = zip(
+            (self.points, self.targets_world, self.weights),
+            (other.points, other.targets_world, other.weights), strict=True,
+        )  # fmt: skip
+        return Holds(*(np.concatenate(pair) for pair in rows))
 
     def scaled(self, factor: float) -> "Holds":
         """Return them with other weights."""
@@ -99,7 +107,9 @@ class Grab:
     unlocked_dofs: NDArray[np.bool_]
     """Degrees of freedom that may change at all, (n_dofs,)."""
     holds: Holds
-    """Points that are held; the grabbed point itself across the lines of sight of other views."""
+    """Other points that are held."""
+    placed_elsewhere: Holds | None
+    """The grabbed point, known across the lines of sight of other views in which it was placed; None without any."""
     up_world: Array
     """The vertical, (3,), a unit vector."""
 
@@ -237,35 +247,30 @@ def _grab_handle(
         raise TrackerError(
             f"expected a point that something moves, found {handle.name} with all of that locked; unlock it"
         )
-    holds = _holds(model, kinematics, camera, handle, constraints.held)
+    holds = _holds(model, kinematics, {n: views for n, views in constraints.held.items() if n != handle.name})
+    others = [v for v in constraints.held.get(handle.name, ()) if not _is_same_view(v, camera)]
+    elsewhere = _holds(model, kinematics, {handle.name: others}) if others else None
     pointer_px = np.asarray(pointer_px, dtype=np.float64)
     return Grab(
         model, camera.pinhole, handle.part, handle.point_part, np.array(pose), pointer_px,
         float(camera.depths(point_world)), camera.pinhole.project(point_world) - pointer_px, role, follows, unlocked,
-        holds, np.array(constraints.up_world, dtype=np.float64),
+        holds, elsewhere, np.array(constraints.up_world, dtype=np.float64),
     )  # fmt: skip
 
 
-def _holds(
-    model: BodyModel, kinematics: Kinematics, camera: Camera, handle: _Handle, held: Mapping[str, Sequence[Camera]]
-) -> Holds:
-    """Return the held points at their present positions."""
-    points, weights = [], []
-    for name in holdable_points(model):
-        if name not in held:
-            continue
-        point = model.point_names.index(name)
-        is_own = point == handle.point
-        # The drag places the point across this view's lines of sight; what the other views know of it stays.
-        views = [v for v in held[name] if not (is_own and np.array_equal(v.T_world_camera, camera.T_world_camera))]
-        if views:
-            points.append(point)
-            weights.append(_across(views, model.points_at(kinematics, np.array([point]))[0]))
-        elif not is_own:
-            points.append(point)
-            weights.append(np.eye(3))
-    chosen = np.array(points, dtype=np.int64)
-    return Holds(chosen, model.points_at(kinematics, chosen), np.array(weights).reshape(-1, 3, 3))
+def _holds(model: BodyModel, kinematics: Kinematics, held: Mapping[str, Sequence[Camera]]) -> Holds:
+    """Return held points at their present positions."""
+    names = [name for name in holdable_points(model) if name in held]
+    points = np.array([model.point_names.index(name) for name in names], dtype=np.int64)
+    places = model.points_at(kinematics, points)
+    weights = [
+        _across(held[name], place) if held[name] else np.eye(3) for name, place in zip(names, places, strict=True)
+    ]
+    return Holds(points, places, np.array(weights).reshape(-1, 3, 3))
+
+
+def _is_same_view(view: Camera, other: Camera) -> bool:
+    return np.array_equal(view.T_world_camera, other.T_world_camera)
 
 
 def _across(views: Sequence[Camera], point_world: Array) -> Array:

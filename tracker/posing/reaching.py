@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TypedDict
 
 import numpy as np
@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import Kinematics
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import NormalEquations, PosePrior, ResidualBlock, normal_equations, solve
+from tracker.fitting.gauss_newton import (
+    Fit,
+    NormalEquations,
+    PosePrior,
+    ResidualBlock,
+    normal_equations,
+    solve,
+    value_mask,
+)
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M
@@ -25,7 +33,7 @@ class _Solving(TypedDict):
 
 HOLD_WEIGHT = 0.5
 """Weight of keeping a held point of the dragged limb, against 1 per metre for being under the pointer."""
-DEPTH_WEIGHT = 0.1
+_DEPTH_WEIGHT = 0.1
 """Weight of keeping the dragged point's depth. If the limb's lengths allow only one of the two, the point follows the
 pointer."""
 _HELD_DEPTH_WEIGHT = 0.02
@@ -36,9 +44,15 @@ point back by some 0.1 mm."""
 _STIFF_WEIGHT = 0.015
 """The same for joints that bend little, such as the waist: a drag of the trunk turns the body before it bends it."""
 
+_AGREE_M = 0.1
+"""Distance between lines of sight of a point in two views at which the earlier one counts by half, metres."""
+
 _REACHED_M, _REACHED_DEPTH_M = 0.002, 0.02
 """Tolerances across the line of sight and along it within which a point has reached its target, metres. The pull to the
 rest pose holds a point back in depth by some 4 mm."""
+_NEAR_M, _OTHER_SIDE = 0.05, 0.8
+"""Distance in space from the target beyond which the other sides of a limb are tried, metres; and share of the cost
+below which it goes there."""
 _BEND_RAD = 0.35
 """Angle by which the last joint of a chain is bent to leave the singularity of a straight limb, rad."""
 _STRETCHED = 0.999
@@ -59,7 +73,7 @@ class PointerTarget:
     grabbed: Grab
     target_world: Array
     """Target of the point, (3,), metres: under the pointer, at the depth."""
-    depth_weight: float = DEPTH_WEIGHT
+    depth_weight: float = _DEPTH_WEIGHT
 
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
@@ -106,7 +120,8 @@ def reach(
     model = grabbed.model
     holds = holds.of(holds.moved_by(model, active_dofs))
     if depth_weight is None:
-        depth_weight = _HELD_DEPTH_WEIGHT if len(holds.points) else DEPTH_WEIGHT
+        target_world, depth_weight = as_other_views_placed(grabbed, target_world)
+        depth_weight = max(depth_weight, _HELD_DEPTH_WEIGHT if len(holds.points) else _DEPTH_WEIGHT)
     # For a held wrist to stay while the elbow is dragged, the elbow must bend: joints beyond the point follow too.
     beyond = np.any(model.moves[:, model.point_parts[holds.points]], axis=1) & model.limb_dofs
     active = active_dofs | (beyond & grabbed.unlocked_dofs)
@@ -119,7 +134,44 @@ def reach(
     def is_done(found: Array) -> bool:
         return _has_reached(grabbed, found, target_world) or _is_stretched(grabbed, found, active_dofs, target_world)
 
-    return _solve_bending(model, pose, blocks, active, is_done)
+    fit = _solve_bending(model, pose, blocks, active, is_done)
+    if _is_near(grabbed, fit.pose, active_dofs, target_world):
+        return fit.pose
+    # Descent along the view does not cross between the two depths at which a limb is seen, nor around a limit. A first
+    # solution in space does, from here or from the limb at rest.
+    in_space = [PointerTarget(grabbed, target_world, 1.0), *blocks[1:]]
+    at_rest = np.where(value_mask(model, active & model.limb_dofs), _relaxed(model), pose)
+    for start in (pose, at_rest):
+        nearer = solve(model, start, in_space, active, **_BENT).pose
+        other = solve(model, nearer, blocks, active, **QUICK)
+        if other.cost < _OTHER_SIDE * fit.cost:
+            fit = other
+    return fit.pose
+
+
+def as_other_views_placed(grabbed: Grab, target_world: Array) -> tuple[Array, float]:
+    """Return the target at the depth at which other views see the grabbed point where they placed it.
+
+    That is the point of the pointer's line of sight nearest to those of the other views. The farther these pass, the
+    less they count: the point then moves away from where they saw it.
+
+    Args:
+        grabbed: the grab.
+        target_world: target under the pointer, (3,), metres.
+
+    Returns:
+        The target, (3,), metres, and the weight of its depth; 0 where no other view placed the point.
+    """
+    own = grabbed.placed_elsewhere
+    if own is None:
+        return target_world, 0.0
+    sight = target_world - grabbed.camera.center_world
+    sight = sight / np.linalg.norm(sight)
+    across, off = own.weights[0] @ sight, own.weights[0] @ (target_world - own.targets_world[0])
+    information = float(across @ across)
+    step = -float(across @ off) / (information + _DEPTH_WEIGHT**2)
+    trust = 1 / (1 + (float(np.linalg.norm(off + step * across)) / _AGREE_M) ** 2)
+    return target_world + trust * step * sight, HOLD_WEIGHT * trust * information**0.5
 
 
 def restore_held(model: BodyModel, pose: Array, holds: Holds, unlocked_dofs: NDArray[np.bool_]) -> Array:
@@ -142,7 +194,7 @@ def restore_held(model: BodyModel, pose: Array, holds: Holds, unlocked_dofs: NDA
 
         if np.any(of_limb.distances(model, pose) > _UNMOVED_M):
             blocks: list[ResidualBlock] = [of_limb, _rest_prior(model, pose)]
-            pose = _solve_bending(model, pose, blocks, own & unlocked_dofs, is_done)
+            pose = _solve_bending(model, pose, blocks, own & unlocked_dofs, is_done).pose
     return pose
 
 
@@ -157,7 +209,7 @@ def _solve_bending(
     blocks: Sequence[ResidualBlock],
     active_dofs: NDArray[np.bool_],
     is_done: Callable[[Array], bool],
-) -> Array:
+) -> Fit:
     """Solve, and solve again with the last joint of the chain bent if that comes nearer.
 
     At a straight limb the gradient of bending is 0.
@@ -172,13 +224,43 @@ def _solve_bending(
     fit = solve(model, pose, blocks, active_dofs=active_dofs, **QUICK)
     joint, first = model.dof_joint[active_dofs][[-1, 0]]
     if joint == first or is_done(fit.pose):
-        return fit.pose
+        return fit
     for bend in (_BEND_RAD, -_BEND_RAD):
         start = model.clip(model.retract(pose, np.where(active_dofs & (model.dof_joint == joint), bend, 0.0)))
         bent = solve(model, start, blocks, active_dofs=active_dofs, **_BENT)
         if bent.cost < fit.cost:
             fit = solve(model, bent.pose, blocks, active_dofs=active_dofs, **QUICK)
-    return fit.pose
+    return fit
+
+
+@lru_cache(maxsize=32)
+def _relaxed(model: BodyModel) -> Array:
+    """Return the neutral pose with elbows and knees slightly bent, (n_values,)."""
+    hinges = np.array([len(joint.axes) == 1 for joint in model.joints])[model.dof_joint]
+    return model.clip(model.retract(model.neutral(), np.where(hinges, _BEND_RAD, 0.0)))
+
+
+def _is_near(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_], target_world: Array) -> bool:
+    """Return whether the grabbed point is so near its target that no other side of the limb is tried.
+
+    A target beyond the chain's full length counts at that length.
+    """
+    places = _chain(grabbed, pose, active_dofs)
+    length = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    way = target_world - places[-1]
+    reachable = places[-1] + min(1.0, length / max(float(np.linalg.norm(way)), 1e-9)) * way
+    return float(np.linalg.norm(places[0] - reachable)) < _NEAR_M
+
+
+def _chain(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_]) -> Array:
+    """Return the positions of the grabbed point and of the joints up to the first that follows it, (n, 3), metres."""
+    model, part, first = grabbed.model, grabbed.part, int(grabbed.model.dof_joint[active_dofs][0])
+    places = [grabbed.point_world(pose)]
+    Ts_world_part = model.kinematics(pose).Ts_world_part
+    while part != first:
+        places.append(Ts_world_part[part, :3, 3])
+        part = int(model.parents[part])
+    return np.array([*places, Ts_world_part[first, :3, 3]])
 
 
 def _has_reached(grabbed: Grab, pose: Array, target_world: Array) -> bool:
@@ -190,12 +272,6 @@ def _has_reached(grabbed: Grab, pose: Array, target_world: Array) -> bool:
 
 def _is_stretched(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_], target_world: Array) -> bool:
     """Return whether the chain of the point has its full length and its target is farther away."""
-    model, part, first = grabbed.model, grabbed.part, int(grabbed.model.dof_joint[active_dofs][0])
-    places = [grabbed.point_world(pose)]
-    Ts_world_part = model.kinematics(pose).Ts_world_part
-    while part != first:
-        places.append(Ts_world_part[part, :3, 3])
-        part = int(model.parents[part])
-    places.append(Ts_world_part[first, :3, 3])
+    places = _chain(grabbed, pose, active_dofs)
     length = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
     return bool(min(np.linalg.norm(p - places[-1]) for p in (places[0], target_world)) > _STRETCHED * length)

@@ -123,7 +123,11 @@ class Dragging:
             short_m, wanted_px = _shortfall(self._mode_grab, np.array(pointer_px), values, mode)
             seqs = (*(s for s in session_state.state.drag_seqs if s[0] != page), (page, seq))[-16:]
             people = session_state.people_with_pose(drag.person, values)
-            session_state.set(people=people, drag=replace(drag, pointer_px=pointer_px, short_m=short_m, wanted_px=wanted_px), drag_seqs=seqs)
+            session_state.set(
+                people=people,
+                drag=replace(drag, pointer_px=pointer_px, short_m=short_m, wanted_px=wanted_px),
+                drag_seqs=seqs,
+            )
             self._scores_moves = not is_last
             if not is_last:
                 self._costs.offer(session_state.state)
@@ -181,9 +185,7 @@ class Dragging:
                 session_state.set(**costs)
 
 
-def _shortfall(
-    grabbed: Grab, pointer_px: Array, values: Array, mode: str
-) -> tuple[float, tuple[float, float] | None]:
+def _shortfall(grabbed: Grab, pointer_px: Array, values: Array, mode: str) -> tuple[float, tuple[float, float] | None]:
     """Return by how many metres a grabbed point stays behind the pointer, and where it should be, px.
 
     A body that turns about the vertical, or about a line of sight, is not meant to be under the pointer.

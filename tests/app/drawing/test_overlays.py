@@ -95,7 +95,9 @@ def test_visible_and_hidden_contours_are_what_the_tracing_says(controller):
     paths = drawn(controller, state, view=view_of("contours", "hidden"))
     for kind, those in (("hidden", traced.occluded), ("model", ~traced.occluded)):
         found = kinds_of(paths, kind, camera=1)
-        np.testing.assert_array_equal(rows_sorted([p.segments_px for p in found]), rows_sorted([traced.pieces_px[those]]))
+        np.testing.assert_array_equal(
+            rows_sorted([p.segments_px for p in found]), rows_sorted([traced.pieces_px[those]])
+        )
         assert {p.color for p in found} == {session.people[0].color}
     assert {p.kind for p in drawn(controller, state, view=view_of("hidden"))} == {"hidden"}
 

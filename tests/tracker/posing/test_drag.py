@@ -10,7 +10,7 @@ from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
 from tracker.posing import reaching
 from tracker.posing.drag import bend, drag, push, turn
-from tracker.posing.grab import Constraints, grab, grab_part, minor_points, regrab
+from tracker.posing.grab import grab, grab_part, minor_points, regrab
 from tracker.posing.picking import part_hulls
 
 SIDE = camera_at("side", (3.0, 2.5, 1.0))
@@ -247,8 +247,8 @@ def test_a_shoulder_or_hip_bends_the_trunk_only_with_the_modifier(point, bent):
     start = SIDE.project(place(model, model.neutral(), point))
     hand = grab(model, model.neutral(), SIDE, point, start)
     assert bent in minor_points(model)
-    assert not np.any(drag(hand, start + (12.0, -4.0), model.neutral())[own])
-    bent_pose = bend(hand, start + (12.0, -4.0), model.neutral())
+    assert not np.any(drag(hand, start + np.array([12.0, -4.0]), model.neutral())[own])
+    bent_pose = bend(hand, start + np.array([12.0, -4.0]), model.neutral())
     assert np.abs(bent_pose[own]).max() > 0.01
     assert np.linalg.norm(SIDE.project(place(model, bent_pose, point)) - start - (12.0, -4.0)) < 0.5
 
