@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import SessionError
-from tracker.formats.model_toml import parse_model
+from tracker.formats.model_toml import format_model, parse_model
 from tracker.geometry.arrays import Array
 from tracker.motion.interpolation import interpolate_pose
 from tracker.posing.retarget import retarget_pose
@@ -158,8 +158,8 @@ def _stored_poses(session: Session, person: Person, frames: range) -> dict[int, 
                 continue  # another program has cleared it
             if record.model_revision not in models:
                 toml = store.model_revision(record.model_revision).toml
-                models[record.model_revision] = parse_model(
-                    toml, f"of '{person.name}', revision {record.model_revision}"
-                )
+                where = f"of '{person.name}', revision {record.model_revision}"
+                is_present = toml == format_model(person.model)
+                models[record.model_revision] = person.model if is_present else parse_model(toml, where)
             out[row.frame] = StoredPose(PosedBody(models[record.model_revision], record.values), record)
     return out
