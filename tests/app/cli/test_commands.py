@@ -3,6 +3,7 @@
 import json
 import shutil
 from contextlib import closing
+from importlib import metadata
 from pathlib import Path
 from typing import get_args, get_type_hints
 
@@ -71,6 +72,10 @@ def test_new_info_init_track_evaluate(run, tmp_path):
     assert sorted(p.name for p in s.iterdir()) == [
         "annotations.sqlite", "backups", "calibration.toml", "models", "session.toml",
     ]  # fmt: skip
+
+
+def test_version(run):
+    assert run("--version") == (0, f"quadrille {metadata.version('quadrille')}\n", "")
 
 
 def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
