@@ -8,7 +8,7 @@ from importlib import metadata
 import tyro
 from rich.console import Console
 
-from app.cli import bench, evaluate, index, info, init, new, restore, simulate, track
+from app.cli import bench, evaluate, index, info, init, new, relink, restore, simulate, track
 from app.cli import open as open_
 from app.runtime import process_exit
 from app.runtime.malloc_trim import give_back_freed_memory
@@ -18,6 +18,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "open": open_.command,
     "new": new.command,
     "info": info.command,
+    "relink": relink.command,
     "index": index.command,
     "init": init.command,
     "track": track.command,

@@ -90,7 +90,7 @@ def assemble(request: NewSession) -> Session:
         for f in footage.values():
             f.close()
     for source in sources:
-        _check_side_files(source)
+        check_side_files(source)
     people = _make_people(request.people, request.models, request.heights)
     return create_session(request.folder, cameras=sources, people=people, fps=fps, n_frames=n_frames, up=request.up)
 
@@ -137,11 +137,15 @@ def find_masks(folder: Path, camera: str) -> Path:
     return path
 
 
-def _check_side_files(source: CameraSource) -> None:
-    """Read the background and the first mask, so that a misfit shows before tracking starts."""
+def check_side_files(source: CameraSource) -> None:
+    """Read the background and the first mask, so that a misfit shows before tracking starts.
+
+    Raises:
+        RecordingError: one is missing, unreadable or of another size than the camera.
+    """
     read_background(source)
     if source.masks is not None:
-        first = min(source.masks.glob("[0-9]" * 6 + ".png"))
+        first = min(find_masks(source.masks.parent, source.masks.name).glob("[0-9]" * 6 + ".png"))
         read_mask(source, int(first.stem) - source.offset)
 
 

@@ -189,6 +189,24 @@ def _load_cameras(row: SessionFile, folder: Path) -> tuple[CameraSource, ...]:
     )
 
 
+def save_cameras(session: Session, cameras: Sequence[CameraSource]) -> Session:
+    """Replace the places of footage, backgrounds and masks in a session's session.toml.
+
+    Args:
+        session: as it was loaded.
+        cameras: the same cameras with other paths.
+
+    Returns:
+        The session with those cameras.
+
+    Raises:
+        SessionError: a path is not allowed, or the folder cannot be written.
+    """
+    changed = replace(session, cameras=tuple(_absolute(c) for c in cameras))
+    _save_session_file(changed)
+    return changed
+
+
 def save_floor(session: Session, up: str, floor: GroundPlane | None) -> Session:
     """Replace the floor in a session's session.toml.
 
@@ -204,14 +222,18 @@ def save_floor(session: Session, up: str, floor: GroundPlane | None) -> Session:
         SessionError: the folder cannot be written.
     """
     changed = replace(session, up=up, floor=floor)
-    _checked_content(changed)
+    _save_session_file(changed)
+    return changed
+
+
+def _save_session_file(session: Session) -> None:
+    _checked_content(session)
     try:
-        _write_session(changed, session.folder)
+        _write_session(session, session.folder)
     except OSError as error:
         raise SessionError(
             f"cannot write {session.folder / SESSION_FILE}: {error}; see that you may write to the folder"
         ) from error
-    return changed
 
 
 def save_model(session: Session, person: int, model: BodyModel) -> Session:
