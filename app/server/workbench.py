@@ -28,6 +28,7 @@ from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.session.lock import SessionLock
+from tracker.session.relink import require_files
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 
@@ -57,6 +58,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
         TrackerError: the session cannot be opened, is open elsewhere, or the port is taken.
     """
     session = load_session(folder)
+    require_files(session)
     access = access_for(serving.host, serving.allow_hosts, serving.token)
     static = static_folder()
     with SessionLock(session.folder), Recording(session.cameras, indices=_indices(), in_background=True) as recording:
