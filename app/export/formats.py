@@ -79,10 +79,10 @@ FORMATS: Mapping[str, ExportFormat] = {
     f.name: f
     for f in (
         ExportFormat("trc", "joint centers (TRC)", (".trc",), _trc, _PLACE, one_person=True),
-        ExportFormat("csv", "tables of joints and of angles (CSV)", (".csv", "_angles.csv"), _csv, _PLACE),
+        ExportFormat("csv", "tables of joints and angles (CSV)", (".csv", "_angles.csv"), _csv, _PLACE),
         ExportFormat(
             "mot",
-            "OpenSim motion, with its model (.osim)",
+            "OpenSim motion with its model (MOT, OSIM)",
             (".mot", ".osim"),
             _mot,
             frozenset(("axes",)),
@@ -112,7 +112,7 @@ FORMATS: Mapping[str, ExportFormat] = {
         ),
         ExportFormat(
             "mp4",
-            "overlay video of one view or of all (MP4)",
+            "overlay video (MP4)",
             (".mp4",),
             _mp4,
             frozenset(("view",)),
