@@ -40,7 +40,7 @@ async def heap_mb(devtools):
 
 
 async def go_to(page, frame):
-    # Paused within the page: a click from here may come after the end of the clip, and play it anew.
+    # Paused within the page: a click from here may come after the end of the clip, and start it again.
     await page.evaluate("() => quadrille.state.playing && document.querySelector('#play').click()")
     await page.locator("#frame").fill(str(frame))
     await page.keyboard.press("Enter")
