@@ -53,7 +53,7 @@ def _person(person: Person) -> wire.PersonInfo:
         "height_m": model.height_m,
         "points": list(model.point_names),
         "minor": list(minor_points(model)),
-        "bones": overlays.bones(model),
+        "bones": model.bones,
         "parts": [part.name for part in model.parts],
         **dof_labels.described(model),
     }

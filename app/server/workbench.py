@@ -18,6 +18,7 @@ from app.scene3d.gizmos import Gizmos
 from app.scene3d.panels import Panels
 from app.scene3d.scene import SceneView
 from app.server.access import access_for
+from app.server.export_routes import ExportRoutes
 from app.server.private_viser import PrivateViser
 from app.server.server import create_app, serve_forever, static_folder
 from app.session import proxies
@@ -77,6 +78,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
             Gizmos(viser.server, controller)
             Panels(viser.server, controller)
             app = create_app(PaneSocket(controller, offers), viser.socket_path, access, static)
+            ExportRoutes(session.folder).add_to(app)
 
             def ready(address: str, opened: str) -> None:
                 for name in proxies.stale(session):

@@ -21,6 +21,8 @@ class ImageFolder:
     size: tuple[int, int]
     """Width and height, px."""
     n_frames: int
+    files: list[Path]
+    """The images, in order."""
     numbers: tuple[int, ...] | None
     """Number of each image according to its name; None if the names are not numbered in equal steps."""
     fps: None = None
@@ -49,10 +51,10 @@ class ImageFolder:
                 f"{self._where}: expected images of one kind ({', '.join(IMAGE_SUFFIXES)}), "
                 f"found {' and '.join(kinds) or 'none'}; leave only the frames of this camera in it"
             )
-        self._files = sorted(images, key=_natural)
-        self.n_frames = len(self._files)
-        self.numbers = image_numbers([f.stem for f in self._files])
-        height, width = read_image(self._files[0], self._where).shape[:2]
+        self.files = sorted(images, key=_natural)
+        self.n_frames = len(self.files)
+        self.numbers = image_numbers([f.stem for f in self.files])
+        height, width = read_image(self.files[0], self._where).shape[:2]
         self.size = (width, height)
 
     def read(self, k: int) -> Image | None:
@@ -64,11 +66,11 @@ class ImageFolder:
         if not 0 <= k < self.n_frames:
             raise RecordingError(f"{self._where}: expected a frame from 0 to {self.n_frames - 1}, found {k}")
         self.look_again()  # one message for all frames
-        image = read_image_or_none(self._files[k], self._where)
+        image = read_image_or_none(self.files[k], self._where)
         if image is not None and image.shape[1::-1] != self.size:
             raise RecordingError(
                 f"{self._where}: expected {self.size[0]}x{self.size[1]} pixels as in the first image, found "
-                f"{image.shape[1]}x{image.shape[0]} in {self._files[k].name}; give all images one size"
+                f"{image.shape[1]}x{image.shape[0]} in {self.files[k].name}; give all images one size"
             )
         return image
 

@@ -111,10 +111,13 @@ def _with_matrices(data: Any, depth: int = 0) -> Any:
     if not isinstance(data, dict):
         return data
     rows, columns, values = data.get("rows"), data.get("cols"), data.get("data")
-    if isinstance(values, list) and "sizes" in data and "dt" in data:  # of one dimension, in OpenCV 5
-        return values
-    if isinstance(values, list) and isinstance(rows, int | float) and isinstance(columns, int | float):
-        if 0 < rows < 1000 and 0 < columns < 1000 and rows * columns == len(values):
-            m = int(columns)
-            return [values[i : i + m] for i in range(0, len(values), m)]
+    if isinstance(values, list):
+        if "sizes" in data and "dt" in data:  # of one dimension, in OpenCV 5
+            return values
+        if _is_count(rows) and _is_count(columns) and rows * columns == len(values):
+            return [values[i : i + int(columns)] for i in range(0, len(values), int(columns))]
     return {str(key): _with_matrices(value, depth + 1) for key, value in data.items()}
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int | float) and 0 < value < 1000
