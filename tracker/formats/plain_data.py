@@ -4,7 +4,7 @@ A matrix of OpenCV's FileStorage becomes a list of rows in all three.
 """
 
 import re
-from typing import Any
+from typing import Any, TypeGuard
 from xml.etree import ElementTree
 
 import msgspec
@@ -119,5 +119,5 @@ def _with_matrices(data: Any, depth: int = 0) -> Any:
     return {str(key): _with_matrices(value, depth + 1) for key, value in data.items()}
 
 
-def _is_count(value: Any) -> bool:
+def _is_count(value: Any) -> TypeGuard[float]:
     return isinstance(value, int | float) and 0 < value < 1000
