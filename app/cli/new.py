@@ -16,7 +16,7 @@ class NewArguments:
     session: SessionArg
     """folder to make."""
     calibration: Path
-    """TOML file in the anipose / Pose2Sim layout."""
+    """file of the cameras: TOML of anipose, Pose2Sim or Caliscope, or JSON, YAML or XML with K, R and t of each."""
     videos: tuple[Path, ...] = ()
     """video files or image folders, each named after its camera; images are paired by their numbers."""
     camera: tuple[str, ...] = ()
@@ -39,8 +39,8 @@ class NewArguments:
     """rate at which the cameras filmed, if the videos declare another one (high-speed) or all footage is images."""
     up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
     """world axis that points up."""
-    units: Literal["m", "mm"] = "m"
-    """unit of the calibration's translations."""
+    units: Literal["m", "cm", "mm"] | None = None
+    """unit of the calibration's translations; by default the one that its layout fixes, else metres."""
 
 
 def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:

@@ -9,7 +9,8 @@ from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_file import IMAGE_SUFFIXES
 from tracker.footage.recording import check_size, read_background, read_mask
 from tracker.footage.video import Footage, open_footage
-from tracker.formats.anipose import Units, read_calibration
+from tracker.formats.calibration import read_cameras
+from tracker.formats.camera_section import Units
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
 from tracker.session.matching import (
@@ -33,7 +34,7 @@ class NewSession:
     folder: Path
     """Where the session goes; must not exist, or be empty."""
     calibration: Path
-    """TOML file in the anipose layout."""
+    """TOML, JSON, YAML or XML file (`tracker.formats.calibration`)."""
     videos: Sequence[Path] = ()
     """Video files or image folders, each named after its camera."""
     camera_paths: Mapping[str, Path] = field(default_factory=dict)
@@ -57,8 +58,8 @@ class NewSession:
     folders of images."""
     up: str = "z"
     """World axis that points up."""
-    units: Units = "m"
-    """Unit of the calibration's translations."""
+    units: Units | None = None
+    """Unit of the calibration's translations; by default the one that its layout fixes, else metres."""
 
 
 def assemble(request: NewSession) -> Session:
@@ -70,7 +71,7 @@ def assemble(request: NewSession) -> Session:
         CalibrationError: the calibration is malformed.
         ModelError: a body model is unknown or malformed.
     """
-    calibrated = {c.name: c for c in read_calibration(request.calibration, request.units)}
+    calibrated = {c.name: c for c in read_cameras(request.calibration, request.units)}
     check_names(request.cameras, list(calibrated), "camera", "--cameras")
     if twice := [n for n in request.cameras if request.cameras.count(n) > 1]:
         raise SessionError(f"expected each camera once as --cameras, found '{twice[0]}' twice; leave one out")
@@ -80,12 +81,13 @@ def assemble(request: NewSession) -> Session:
     paths = match_footage(names, request.videos, request.camera_paths, unused)
     footage = {name: open_footage(paths[name], name) for name in names}
     try:
+        cameras = {name: calibrated[name].camera(footage[name].size) for name in names}
         for name in names:
-            check_size(name, footage[name].path, footage[name].size, calibrated[name].size)
+            check_size(name, footage[name].path, footage[name].size, cameras[name].size)
         fps = common_rate(footage, request.fps)
         check_image_numbers(footage, request.offsets)
         n_frames = common_length(footage, request.offsets)
-        sources = tuple(_source(request, calibrated[name], footage[name], fps) for name in names)
+        sources = tuple(_source(request, cameras[name], footage[name], fps) for name in names)
     finally:
         for f in footage.values():
             f.close()
