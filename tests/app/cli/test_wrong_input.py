@@ -229,6 +229,7 @@ def test_a_session_open_already(run, session):
     assert stored(session) == {} if (session / "annotations.sqlite").exists() else True
 
 
+@pytest.mark.slow
 def test_a_busy_port(session):
     """In a process of its own, as it comes: nothing but the sentence, and no lock left behind."""
     with socket.create_server(("127.0.0.1", 0)) as server:
