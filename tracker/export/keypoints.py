@@ -73,12 +73,12 @@ def _keypoints(body: PosedBody, camera: Camera, points_px: Array, occluded: NDAr
     return Keypoints(points_px, visibility, box, _area([px[shown] for px, shown in parts], box))
 
 
-def _area(parts_px: Sequence[Array], box: tuple[float, float, float, float]) -> float:
+def _area(part_points_px: Sequence[Array], box: tuple[float, float, float, float]) -> float:
     """Return the area of parts within a box, px^2. Parts are convex, so each covers the hull of its points, (n, 2)."""
     x, y, width, height = box
     scale = _SILHOUETTE_PX / max(width, height, 1.0)
     mask = np.zeros((max(1, round(height * scale)), max(1, round(width * scale))), np.uint8)
-    for points in parts_px:
+    for points in part_points_px:
         if len(points):
             at = (points - (x, y)) * scale - 0.5
             cv2.fillConvexPoly(mask, cv2.convexHull(np.round(16 * at).astype(np.int32)), (1,), shift=4)
