@@ -42,7 +42,7 @@ test-library: test-quick kernels
 test-page: $(VENV)/.tested
 	nice -n 5 $(PYTEST) --no-loadscope-reorder -m "not slow" tests/browser
 
-test-slow: $(VENV)/.tested kernels
+test-slow: $(VENV)/.slow kernels
 	$(PYTEST) -m slow
 
 # Once, not in each process of the tests at the same time.
@@ -85,6 +85,11 @@ $(VENV)/.installed: pyproject.toml constraints.txt | $(BIN)/python
 $(VENV)/.tested: $(VENV)/.installed tests/support/chromium.py
 	$(PIP) install --constraint constraints.txt --editable '.[dev]'
 	$(BIN)/python tests/support/chromium.py
+	touch $@
+
+# .slow: the programs that exported files are read by; OpenSim is big.
+$(VENV)/.slow: $(VENV)/.tested
+	$(PIP) install --constraint constraints.txt --editable '.[dev,slow]'
 	touch $@
 
 # The path is for npm's own scripts, which look for node there.

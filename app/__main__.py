@@ -3,11 +3,12 @@
 import os
 import sys
 from collections.abc import Callable
+from importlib import metadata
 
 import tyro
 from rich.console import Console
 
-from app.cli import bench, evaluate, index, info, init, new, restore, simulate, track
+from app.cli import bench, evaluate, export, index, info, init, new, relink, restore, simulate, track
 from app.cli import open as open_
 from app.runtime import process_exit
 from app.runtime.malloc_trim import give_back_freed_memory
@@ -17,10 +18,12 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "open": open_.command,
     "new": new.command,
     "info": info.command,
+    "relink": relink.command,
     "index": index.command,
     "init": init.command,
     "track": track.command,
     "evaluate": evaluate.command,
+    "export": export.command,
     "restore": restore.command,
     "simulate": simulate.command,
     "bench": bench.command,
@@ -33,6 +36,9 @@ for _name, _command in _COMMANDS.items():
 def main() -> None:
     """Run the command line. Errors of users and files are one sentence on standard error and status 1."""
     words = sys.argv[1:]
+    if words[:1] == ["--version"]:
+        print(f"quadrille {_version()}")
+        return
     if not words or (words[0] not in _COMMANDS and words[0] not in ("-h", "--help")):
         words = ["open", *words]
     try:
@@ -48,6 +54,14 @@ def main() -> None:
     except BrokenPipeError:  # as in `quadrille evaluate S | head -1`: the reader has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # discard what is still buffered
         sys.exit(141)
+
+
+def _version() -> str:
+    """Return the version of the program; "unknown" in a source tree that is not installed."""
+    try:
+        return metadata.version("quadrille")
+    except metadata.PackageNotFoundError:
+        return "unknown (not installed)"
 
 
 def program() -> None:

@@ -47,22 +47,28 @@ def command(arguments: Annotated[EvaluateArguments, tyro.conf.arg(name="")]) -> 
 
     at = load_target(arguments.session, arguments.person, several=False)
     reference = read_reference(arguments.reference, at.session, at.people[0], arguments.joint_map, arguments.axes)
-    found = evaluate(at, reference, arguments.frames, arguments.align)
+    found = evaluate(at, reference, arguments.frames, arguments.align, arguments.axes)
     print(format_json(found) if arguments.json else _format(found))
 
 
-def evaluate(at: Target, reference: "Reference", frames: str | None, align: "Alignment") -> dict[str, Any]:
+def evaluate(
+    at: Target, reference: "Reference", frames: str | None, align: "Alignment", axes: str = "x,y,z"
+) -> dict[str, Any]:
     """Compare the stored poses of one person with a reference, over the given frames or all that have poses.
+
+    Returns:
+        The errors; `notes` has a sentence if the two differ in length or lie metres apart.
 
     Raises:
         SessionError: the person has no pose.
     """
+    from tracker.evaluation.comparability import distance_note, length_note
     from tracker.evaluation.metrics import evaluate_joints, evaluate_poses
     from tracker.evaluation.references import stored_motion
 
     session, (index,) = at
     person = session.people[index]
-    joints, motion = stored_motion(session, index)
+    joints, motion, _ = stored_motion(session, index)
     if motion is None or not motion.poses:
         raise SessionError(f"'{person.name}' has no poses yet; place the body in the page, or use init and track")
     poses = motion.poses
@@ -70,7 +76,9 @@ def evaluate(at: Target, reference: "Reference", frames: str | None, align: "Ali
     result = evaluate_joints(joints, reference.joints, wanted, align)
     if reference.motion is not None:
         result = evaluate_poses(result, motion, reference.motion, wanted)
-    return {"person": person.name, **asdict(result)}
+    apart = distance_note(joints, reference.joints, wanted, axes) if align == "none" else None
+    notes = [note for note in (length_note(session.n_frames, reference.n_frames), apart) if note is not None]
+    return {"person": person.name, **asdict(result), "notes": notes}
 
 
 def _format(found: dict[str, Any]) -> str:
@@ -86,4 +94,5 @@ def _format(found: dict[str, Any]) -> str:
         lines.append(f"  without twist {found['long_axis_error_deg']:.2f} deg")
         errors = found["per_part_axis_deg"].items()
         lines += [f"  {part.replace('_', ' '):16} {error:6.2f} deg" for part, error in errors]
+    lines += [f"note: {note}" for note in found["notes"]]
     return "\n".join(lines)

@@ -18,9 +18,12 @@ def command(session: SessionArg, /, json: bool = False) -> None:
         json: print one JSON object.
     """
     from app.session.proxies import index
+    from tracker.session.relink import require_files
     from tracker.session.session import load_session
 
-    found = index(load_session(session), Reporter(silent=json))
+    loaded = load_session(session)
+    require_files(loaded)
+    found = index(loaded, Reporter(silent=json))
     if json:
         print(format_json(found))
     else:

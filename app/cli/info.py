@@ -26,8 +26,10 @@ def command(session: SessionArg, /, json: bool = False) -> None:
 
 def summarize(session: "Session") -> dict[str, Any]:
     """Summarize the cameras, people and poses of a session."""
+    from tracker.session.relink import missing_files
     from tracker.store.annotation_store import AnnotationStore
 
+    missing = missing_files(session)
     poses: dict[str, list[FrameRow]] = {p.name: [] for p in session.people}
     if session.annotations_path.exists():
         with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
@@ -46,6 +48,7 @@ def summarize(session: "Session") -> dict[str, Any]:
                 "background": c.background is not None,
                 "masks": c.masks is not None,
                 "offset": c.offset,
+                "missing": [m.kind for m in missing if m.camera == c.camera.name],
             }
             for c in session.cameras
         ],
@@ -69,8 +72,11 @@ def _format(summary: dict[str, Any]) -> str:
     for c in summary["cameras"]:
         extras = "".join(f", {name}" for name in ("background", "masks") if c[name])
         shift = f", offset {c['offset']}" if c["offset"] else ""
-        lines.append(f"  camera {c['name']}: {c['size'][0]}x{c['size'][1]}, {c['footage']}{extras}{shift}")
+        missing = f", {' and '.join(c['missing'])} missing" if c["missing"] else ""
+        lines.append(f"  camera {c['name']}: {c['size'][0]}x{c['size'][1]}, {c['footage']}{extras}{shift}{missing}")
     for p in summary["people"]:
         body = f"{p['model']} of {p['height_m']:.2f} m, {p['dofs']} degrees of freedom"
         lines.append(f"  person {p['name']}: {body}, {p['poses']} poses, {p['keyframes']} keyframes")
+    if any(c["missing"] for c in summary["cameras"]):
+        lines.append(f"files are missing: put them back, or run quadrille relink {summary['folder']} --search FOLDER")
     return "\n".join(lines)

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from tracker.session.session import Person, Session
 
 
+_MISFIT_MM = 100.0
+"""Mean distance of the body from the joints above which they are not those of a person of its height."""
+
+
 @dataclass(frozen=True)
 class InitArguments:
     """Arguments of `quadrille init`."""
@@ -66,7 +70,17 @@ def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None
         found = init_from_joints(at, frame, joints, arguments.fit_sizes)
         residual = f"{found['mean_mm']:.1f} mm from {len(found['residual_mm'])} joints on average"
         text = f"{found['person']}, frame {frame}: {residual}"
-    print(format_json(found) if arguments.json else text)
+        if found["mean_mm"] > _MISFIT_MM:
+            height_m = at.session.people[at.people[0]].model.height_m
+            text += (
+                f"\nnote: these joints fit no body of {height_m:.2f} m: check the Units of the file and the names of "
+            )
+            text += "its joints, or say --fit-sizes"
+    lines = [text, *(f"  view {name}: {view['text']}" for name, view in found["views"].items())]
+    seeing = [name for name, view in found["views"].items() if view["n_inside"]]
+    if len(seeing) == 1 < len(found["views"]):
+        lines.append(f"note: only '{seeing[0]}' has the body in its picture: check --axes and the world of the file")
+    print(format_json(found) if arguments.json else "\n".join(lines))
 
 
 def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool) -> dict[str, Any]:
@@ -79,10 +93,10 @@ def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool)
         sizes: measure the body's lengths from all frames first. They become a new model revision; no pose changes.
 
     Returns:
-        The residual of each joint, mm, and their mean.
+        The residual of each joint, mm, their mean, and the place of the body in each view.
 
     Raises:
-        TrackerError: the joints have no such frame.
+        TrackerError: the joints have no such frame, or the body would be in no picture.
     """
     import numpy as np
 
@@ -103,6 +117,7 @@ def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool)
     if sizes:
         person = replace(person, model=fit_sizes(person.model, joints))
     fit = fit_to_points(person.model, limbs)
+    views = _views(session, person, fit.pose)
     with SessionLock(session.folder):
         if sizes:
             people = tuple(person if i == index else p for i, p in enumerate(session.people))
@@ -111,7 +126,7 @@ def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool)
     fitted = dict(zip(person.model.point_names, person.model.points_world(fit.pose), strict=True))
     residuals = {n: float(1000 * np.linalg.norm(fitted[n] - p)) for n, p in limbs.items()}
     mean = float(np.mean(list(residuals.values())))
-    return {"person": person.name, "frame": frame, "residual_mm": residuals, "mean_mm": mean}
+    return {"person": person.name, "frame": frame, "residual_mm": residuals, "mean_mm": mean, "views": views}
 
 
 def init_from_poses(at: Target, frame: int, table: "PoseTable") -> dict[str, Any]:
@@ -123,7 +138,7 @@ def init_from_poses(at: Target, frame: int, table: "PoseTable") -> dict[str, Any
         table: poses of a body with the person's degrees of freedom.
 
     Raises:
-        TrackerError: the table has no such frame, or poses of another body.
+        TrackerError: the table has no such frame, or poses of another body, or the body would be in no picture.
     """
     import numpy as np
 
@@ -141,9 +156,28 @@ def init_from_poses(at: Target, frame: int, table: "PoseTable") -> dict[str, Any
     row = np.flatnonzero(table.frames == frame)
     if not len(row):
         raise TrackerError(f"expected a pose of frame {frame}, found frames {table.frames.tolist()[:8]} in the table")
+    views = _views(session, person, values[row[0]])
     with SessionLock(session.folder):
         _store_keyframe(session, person, frame, values[row[0]], "poses")
-    return {"person": person.name, "frame": frame}
+    return {"person": person.name, "frame": frame, "views": views}
+
+
+def _views(session: "Session", person: "Person", pose: "Array") -> dict[str, Any]:
+    """Return the place of a body in the view of each camera.
+
+    Raises:
+        TrackerError: it is in no picture.
+    """
+    from tracker.geometry.framing import framings
+
+    found = framings([c.camera for c in session.cameras], person.model.points_world(pose))
+    if not any(f.n_inside for f in found):
+        listed = "; ".join(f"'{f.camera}' {f.text}" for f in found)
+        raise TrackerError(
+            f"expected '{person.name}' in the picture of a camera, found nobody there ({listed}); check --axes, the "
+            "units of the file, and that it is in the world of the calibration"
+        )
+    return {f.camera: {**f._asdict(), "text": f.text} for f in found}
 
 
 def _differences(found: Sequence[str], expected: Sequence[str]) -> str:

@@ -16,11 +16,13 @@ class NewArguments:
     session: SessionArg
     """folder to make."""
     calibration: Path
-    """TOML file in the anipose / Pose2Sim layout."""
+    """file of the cameras: TOML of anipose, Pose2Sim or Caliscope, or JSON, YAML or XML with K, R and t of each."""
     videos: tuple[Path, ...] = ()
-    """video files or image folders, each named after its camera."""
+    """video files or image folders, each named after its camera; images are paired by their numbers."""
     camera: tuple[str, ...] = ()
     """NAME=PATH: footage of a camera, under any file name."""
+    cameras: tuple[str, ...] = ()
+    """names of the calibrated cameras to use, in this order; all by default."""
     background: Path | None = None
     """folder of CAM.png or CAM.mp4 of the empty scene."""
     masks: Path | None = None
@@ -34,11 +36,11 @@ class NewArguments:
     height: tuple[str, ...] = ()
     """body height in metres of all people, or NAME=METRES."""
     fps: float | None = None
-    """frame rate; needed if all footage is folders of images."""
+    """rate at which the cameras filmed, if the videos declare another one (high-speed) or all footage is images."""
     up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
     """world axis that points up."""
-    units: Literal["m", "mm"] = "m"
-    """unit of the calibration's translations."""
+    units: Literal["m", "cm", "mm"] | None = None
+    """unit of the calibration's translations; by default the one that its layout fixes, else metres."""
 
 
 def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
@@ -51,6 +53,7 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
             calibration=arguments.calibration,
             videos=arguments.videos,
             camera_paths=parse_pairs(arguments.camera, "--camera", Path),
+            cameras=arguments.cameras,
             background=arguments.background,
             masks=arguments.masks,
             offsets=parse_pairs(arguments.offset, "--offset", int),
@@ -63,3 +66,5 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
         )
     )
     print(f"made {made.folder}: {len(made.cameras)} cameras, {made.n_frames} frames at {made.fps:g} per second")
+    if declared := {f"{c.declared_fps:g}" for c in made.cameras if c.declared_fps is not None}:
+        print(f"the videos declare {' or '.join(sorted(declared))} frames per second")

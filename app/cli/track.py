@@ -108,9 +108,11 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
     from tracker.footage.recording import Recording
     from tracker.pipeline.stored_run import TrackTask, stored_run
     from tracker.session.lock import SessionLock
+    from tracker.session.relink import require_files
     from tracker.store.annotation_store import AnnotationStore
 
     session, stopped = at.session, False
+    require_files(session)
     with (
         SessionLock(session.folder),
         closing(AnnotationStore(session.annotations_path)) as store,

@@ -10,7 +10,7 @@ from app.drawing.facing import facing_arrow
 from app.state.page_view import View
 from app.state.people import DragState
 from app.state.state import State
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours, part_edges
 from tracker.contours.occluding_contours import Contour
 from tracker.contours.pieces import PIECE_PX
@@ -102,19 +102,6 @@ class Handle:
     """Whether it stays in place while others are dragged."""
     side: Side
     """Side of the body."""
-
-
-def bones(model: BodyModel) -> list[tuple[str, str]]:
-    """Return the pairs of points that a stick figure connects: each point and the joint that carries its part."""
-    pairs = []
-    for i, name in enumerate(model.point_names):
-        part = int(model.point_parts[i])
-        joint = model.joints[part]
-        if i != part:
-            pairs.append((joint.name, name))  # a landmark is connected to its part's joint
-        elif joint.parent:
-            pairs.append((model.joints[model.part_index[joint.parent]].name, name))
-    return pairs
 
 
 def paths(session: Session, state: State, view: View, views: Sequence[ViewEvidence] | None) -> list[Path]:

@@ -28,12 +28,12 @@ def footage(image: Image | None, size: tuple[int, int]) -> bytes:
         image: undistorted, (H, W, 3) RGB; None where the frame is damaged.
         size: width and height of the placeholder for a damaged frame, px.
     """
-    return _jpeg(_blank(size, "frame damaged") if image is None else image)
+    return _jpeg(placeholder(size, "frame damaged") if image is None else image)
 
 
 def unreadable(size: tuple[int, int]) -> bytes:
     """Encode the placeholder for a frame that cannot be read now, as JPEG of a width and height, px."""
-    return _jpeg(_blank(size, "frame unreadable"))
+    return _jpeg(placeholder(size, "frame unreadable"))
 
 
 def distance(view: ViewEvidence) -> bytes:
@@ -107,7 +107,8 @@ def _chunk(name: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
 
 
-def _blank(size: tuple[int, int], text: str) -> Image:
+def placeholder(size: tuple[int, int], text: str) -> Image:
+    """Return a picture of a width and height, px, that says in words why it shows nothing."""
     image = np.full((size[1], size[0], 3), 24, np.uint8)
     cv2.putText(image, text, (20, size[1] // 2), cv2.FONT_HERSHEY_SIMPLEX, size[0] / 640, (200, 200, 200), 2)
     return image

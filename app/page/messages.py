@@ -54,7 +54,7 @@ def _person(person: Person) -> wire.PersonInfo:
         "points": list(model.point_names),
         "minor": list(minor_points(model)),
         "heading": list(heading_points(model)),
-        "bones": overlays.bones(model),
+        "bones": model.bones,
         "parts": [part.name for part in model.parts],
         **dof_labels.described(model),
     }

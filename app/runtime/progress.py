@@ -5,8 +5,37 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.text import Text
+
+_OUTLIER = 8.0
+"""An item that takes longer than this many times the median compiled kernels or waited for a disk."""
+
+
+class Pace:
+    """The usual time of an item, without the first one and without outliers: those compile kernels.
+
+    Tracking compiles at the first frame, and again where a search is needed for the first time.
+    """
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        """Start the clock."""
+        self._now, self._last, self._durations_s = now, now(), list[float]()
+
+    def tick(self) -> None:
+        """Note that an item is done."""
+        now = self._now()
+        self._durations_s.append(now - self._last)
+        self._last = now
+
+    @property
+    def item_s(self) -> float | None:
+        """Mean time of an item, s; None until two are done."""
+        durations = sorted(self._durations_s[1:])
+        if not durations:
+            return None
+        usual = [d for d in durations if d <= _OUTLIER * durations[(len(durations) - 1) // 2]]
+        return max(1e-6, sum(usual) / len(usual))
 
 
 class Reporter:
@@ -24,30 +53,48 @@ class Reporter:
     @contextmanager
     def over(self, total: int, what: str) -> Iterator[Callable[[], None]]:
         """Yield a function to call after each of `total` items."""
+        pace = Pace()
         if self._silent:
             yield lambda: None
         elif self._console.is_terminal:
-            columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), _RateColumn(), TimeRemainingColumn())
+            columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), _PaceColumn(pace))
             with Progress(*columns, console=self._console) as bar:
                 task = bar.add_task(what, total=total)
-                yield lambda: bar.advance(task)
+
+                def advance() -> None:
+                    pace.tick()
+                    bar.advance(task)
+
+                yield advance
         else:
-            done, began = 0, time.monotonic()
+            done = 0
 
             def tick() -> None:
                 nonlocal done
                 done += 1
+                pace.tick()
                 if done % max(1, total // 10) == 0 or done == total:
-                    rate = done / max(1e-6, time.monotonic() - began)
-                    left = "" if done == total else f", {(total - done) / rate:.0f} s left"
-                    self._console.print(f"{what}: {done} of {total}, {rate:.1f}/s{left}", highlight=False)
+                    self._console.print(f"{what}: {done} of {total}{pace_text(pace, total - done)}", highlight=False)
 
             yield tick
 
 
-class _RateColumn(ProgressColumn):
-    """Items per second."""
+def pace_text(pace: Pace, left: int) -> str:
+    """Return the rate, and the time that `left` items will take, such as `, 4.1/s, 12 s left`; empty if unknown."""
+    if pace.item_s is None:
+        return ""
+    seconds = left * pace.item_s
+    time_left = f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
+    return f", {1 / pace.item_s:.1f}/s" + (f", {time_left} left" if left else "")
+
+
+class _PaceColumn(ProgressColumn):
+    """Rate and time left."""
+
+    def __init__(self, pace: Pace) -> None:
+        super().__init__()
+        self._pace = pace
 
     def render(self, task: Task) -> Text:
         """Text of the column."""
-        return Text("" if task.speed is None else f"{task.speed:.1f}/s")
+        return Text(pace_text(self._pace, round((task.total or 0) - task.completed)).removeprefix(", "))

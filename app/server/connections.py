@@ -46,10 +46,16 @@ def request_arrived(request: web.Request) -> None:
         connection.expire_in(ANSWER_S)
 
 
+def keep_open(request: web.Request) -> None:
+    """Lift the limit of age for an answer that takes long to make; a later request limits it again."""
+    if (connection := _connection_of(request)) is not None:
+        connection.expire_in(None)
+
+
 async def keep_sockets(request: web.Request, response: web.StreamResponse) -> None:
     """Lift the limit of age for a WebSocket; a signal for `on_response_prepare`."""
-    if isinstance(response, web.WebSocketResponse) and (connection := _connection_of(request)) is not None:
-        connection.expire_in(None)
+    if isinstance(response, web.WebSocketResponse):
+        keep_open(request)
 
 
 class _Connection(asyncio.Protocol):

@@ -18,6 +18,7 @@ from app.scene3d.gizmos import Gizmos
 from app.scene3d.panels import Panels
 from app.scene3d.scene import SceneView
 from app.server.access import access_for
+from app.server.export_routes import ExportRoutes
 from app.server.private_viser import PrivateViser
 from app.server.server import create_app, serve_forever, static_folder
 from app.session import proxies
@@ -28,6 +29,7 @@ from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.session.lock import SessionLock
+from tracker.session.relink import require_files
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 
@@ -57,6 +59,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
         TrackerError: the session cannot be opened, is open elsewhere, or the port is taken.
     """
     session = load_session(folder)
+    require_files(session)
     access = access_for(serving.host, serving.allow_hosts, serving.token)
     static = static_folder()
     with SessionLock(session.folder), Recording(session.cameras, indices=_indices(), in_background=True) as recording:
@@ -75,6 +78,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
             Gizmos(viser.server, controller)
             Panels(viser.server, controller)
             app = create_app(PaneSocket(controller, offers), viser.socket_path, access, static)
+            ExportRoutes(session.folder).add_to(app)
 
             def ready(address: str, opened: str) -> None:
                 for name in proxies.stale(session):

@@ -8,6 +8,7 @@ import { button, byId } from "../widgets/elements.js";
 import { makeSplitter } from "../widgets/splitter.js";
 import { watchTyping } from "../widgets/typing.js";
 import { Announcer } from "./announcer.js";
+import { ExportPanel } from "./export_panel.js";
 import { FirstSteps } from "./first_steps.js";
 import { HistoryList } from "./history_list.js";
 import { KeyList } from "./key_list.js";
@@ -48,6 +49,7 @@ export function mount(context, rooms) {
   watchConnection(byId("banner", HTMLElement), store);
   makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement));
   const history = new HistoryList(store, send);
+  new ExportPanel(store, context.notify);
   new SavedMark(store, send);
   new Announcer(byId("announcer", HTMLElement), store);
   const firstSteps = new FirstSteps(store);

@@ -42,26 +42,33 @@ def session(tmp_path):
     return Path(shutil.copytree(SAMPLE, tmp_path / "session"))
 
 
+@pytest.fixture(scope="session")
+def observer(tmp_path_factory):
+    """The sample's footage, opened once for all tests that only look at it."""
+    loaded = load_session(shutil.copytree(SAMPLE, tmp_path_factory.mktemp("footage") / "session"))
+    recording = Recording(loaded.cameras)
+    yield Observer(loaded.cameras, recording)
+    recording.close()
+
+
 @pytest.fixture
-def opened(session):
+def opened(session, observer):
     """Open the session; each call is a restart."""
     open_now = []
 
     def close():
         while open_now:
-            controller, recording, store = open_now.pop()
+            controller, store = open_now.pop()
             controller.close()
-            recording.close()
             store.close()
 
     def open_it():
         close()
         loaded = load_session(session)
-        recording = Recording(loaded.cameras)
         store = AnnotationStore(loaded.annotations_path)
-        frames = FrameCache(Observer(loaded.cameras, recording), rest_s=0)  # no page waits for pictures
+        frames = FrameCache(observer, rest_s=0)  # no page waits for pictures
         controller = Controller(loaded, Saver(loaded, store), frames)
-        open_now.append((controller, recording, store))
+        open_now.append((controller, store))
         wait_for(lambda: controller.state.cost_px is not None)
         return controller
 

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 CAMERAS = {"FRONT": "cam1", "RIGHT": "cam2", "BACK": "cam3"}
-COMMAND = re.compile(r"^ {4}quadrille (new|track|evaluate)\b((?:[^\\\n]|\\\n)*)", re.MULTILINE)
+COMMAND = re.compile(r"^ {4}quadrille (new|track|evaluate|export)\b((?:[^\\\n]|\\\n)*)", re.MULTILINE)
 FRAMES = "0:3"
 """In place of README's longer range: the sample has 50 frames."""
 
@@ -43,15 +43,22 @@ def quadrille(folder, *words):
     return done.stdout
 
 
+@pytest.mark.slow
 def test_readme_takes_a_recording_from_videos_to_an_error(recording):
-    written = {
-        command: shlex.split(rest.replace("\\\n", " "))
+    found = [
+        (command, shlex.split(rest.replace("\\\n", " ")))
         for command, rest in COMMAND.findall((ROOT / "README.md").read_text("utf-8"))
-    }
-    assert written.keys() == {"new", "track", "evaluate"}
+    ]
+    written = dict(found)
+    assert written.keys() == {"new", "track", "evaluate", "export"}
     quadrille(recording, "new", *written["new"])
     # In place of the hand in the page.
     quadrille(recording, "init", "my_session", "--method", "joints", "--joints", "joints.trc")
     quadrille(recording, "track", *(FRAMES if re.fullmatch(r"\d+:\d+", w) else w for w in written["track"]))
     shown = quadrille(recording, "evaluate", *written["evaluate"])
     assert "person: 3 frames, 0 missing, 0 lost" in shown
+    exports = [words for command, words in found if command == "export"]
+    for words in (exports[0], exports[-1]):  # others: tests/app/cli/test_export.py
+        quadrille(recording, "export", *(FRAMES if re.fullmatch(r"\d+:\d+", w) else w for w in words))
+    assert (recording / "motion.trc").stat().st_size > 1000
+    assert (recording / "overlay.mp4").stat().st_size > 10_000

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from chromium import FLAGS, chromium_path
 from memory import memory_mb
-from page_driver import dragging, shows
+from page_driver import dragging, shows, state_of
 from playwright.async_api import async_playwright
 from program import ROOT, started, visited
 
@@ -40,12 +40,15 @@ async def heap_mb(devtools):
 
 
 async def go_to(page, frame):
-    if await page.evaluate("quadrille.state.playing"):
-        await page.locator("#play").click()  # else it plays on past the frame
+    # Paused within the page: a click from here may come after the end of the clip, and start it again.
+    await page.evaluate("() => quadrille.state.playing && document.querySelector('#play').click()")
     await page.locator("#frame").fill(str(frame))
     await page.keyboard.press("Enter")
     await page.locator("#frame").blur()
-    await shows(page, f"quadrille.state.shown.frame === {frame} && quadrille.state.overlay.frame === {frame}", 60)
+    try:
+        await shows(page, f"quadrille.state.shown.frame === {frame} && quadrille.state.overlay.frame === {frame}", 60)
+    except AssertionError as error:
+        raise AssertionError(f"{error}; it is in the state {await state_of(page)}") from None
 
 
 async def act(page, rng):

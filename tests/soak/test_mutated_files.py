@@ -17,6 +17,7 @@ from mutation import json_bytes, mutate_bytes, mutate_tree, toml_bytes
 from tracker.errors import TrackerError
 from tracker.evaluation.metrics import at_rate
 from tracker.formats.anipose import read_calibration
+from tracker.formats.calibration import read_cameras
 from tracker.formats.joint_maps import guess_joint_map, read_joint_map
 from tracker.formats.model_toml import format_model, load_model, parse_model
 from tracker.formats.pose_csv import read_pose_table
@@ -37,6 +38,36 @@ LOCK = {
     "host": socket.gethostname(), "process": 999_999, "started": "12345", "since": "2025-11-01T10:00:00+00:00",
     "token": "0123456789abcdef",
 }  # fmt: skip
+
+
+CAMERA = {
+    "name": "a", "size": [640, 480], "K": [[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]],
+    "dist": [-0.3, 0.1, 0.0, 0.0, 0.0], "R": [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]], "t": [0.1, 1.0, 4.0],
+}  # fmt: skip
+CHAIN = """%YAML:1.0
+---
+cam0:
+  camera_model: pinhole
+  intrinsics: [500.0, 500.0, 320.0, 240.0]
+  distortion_coeffs: [-0.3, 0.1, 0.0, 0.0]
+  resolution: [640, 480]
+cam1:
+  T_cn_cnm1:
+  - [1.0, 0.0, 0.0, 0.1]
+  - [0.0, 1.0, 0.0, 0.0]
+  - [0.0, 0.0, 1.0, 1.0e-3]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: pinhole
+  intrinsics: [500.0, 500.0, 320.0, 240.0]
+  distortion_coeffs: [-0.3, 0.1, 0.0, 0.0]
+  resolution: [640, 480]
+"""
+STORAGE = """<?xml version="1.0"?>
+<opencv_storage><K_1 type_id="opencv-matrix"><rows>3</rows><cols>3</cols><dt>d</dt>
+<data>500. 0. 320. 0. 500. 240. 0. 0. 1.</data></K_1><W_1>640</W_1><H_1>480</H_1>
+<R_1 type_id="opencv-matrix"><rows>3</rows><cols>1</cols><dt>d</dt><data>0.1 0.2 0.3</data></R_1>
+<T_1 type_id="opencv-matrix"><rows>3</rows><cols>1</cols><dt>d</dt><data>0. 0. 4.</data></T_1></opencv_storage>
+"""
 
 
 def shown_camera(camera):
@@ -68,9 +99,14 @@ def read_session(path):
     save_floor(session, session.up, session.floor)
 
 
-def read_cameras(path):
+def read_own_cameras(path):
     for camera in read_calibration(path):
         shown_camera(camera)
+
+
+def read_foreign(path):
+    for entry in read_cameras(path):
+        shown_camera(entry.camera((640, 480)))
 
 
 def read_model(path):
@@ -94,7 +130,10 @@ def sources(pattern, *folders):
 
 KINDS = {
     "session": ("session.toml", sources("*/session.toml", SAMPLES), read_session, 4000),
-    "calibration": ("calibration.toml", sources("*/calibration.toml", SAMPLES), read_cameras, 4000),
+    "calibration": ("calibration.toml", sources("*/calibration.toml", SAMPLES), read_own_cameras, 4000),
+    "JSON cameras": ("cameras.json", [json_bytes({"cameras": [CAMERA]})], read_foreign, 2000),
+    "YAML cameras": ("cameras.yml", [CHAIN.encode()], read_foreign, 2000),
+    "XML cameras": ("cameras.xml", [STORAGE.encode()], read_foreign, 2000),
     "model": ("person.toml", sources("*.toml", MODELS, SAMPLES / "tango" / "models"), read_model, 4000),
     "TRC": ("truth.trc", sources("*/*.trc", SAMPLES), read_markers, 4000),
     "lock": ("lock.json", [json_bytes(LOCK)], read_lock, 4000),

@@ -163,6 +163,19 @@ class BodyModel:
         return np.array([(0.0, 0.0, 0.0)] * len(self.joints) + landmarks) * self.height_m
 
     @cached_property
+    def bones(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of points that a stick figure connects: each point and the joint that carries its part."""
+        pairs = []
+        for i, name in enumerate(self.point_names):
+            part = int(self.point_parts[i])
+            joint = self.joints[part]
+            if i != part:
+                pairs.append((joint.name, name))  # a landmark is connected to its part's joint
+            elif joint.parent:
+                pairs.append((self.joints[self.part_index[joint.parent]].name, name))
+        return tuple(pairs)
+
+    @cached_property
     def tree(self) -> Tree:
         """The joint tree as arrays, for `forward_kinematics`."""
         ops, axes = [], []

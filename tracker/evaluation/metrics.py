@@ -87,7 +87,10 @@ def evaluate_joints(
         FormatError: there is nothing to compare.
     """
     joints = tuple(j for j in JOINTS if j in estimated.names and j in reference.names)
-    estimate, truth = _gather(estimated, joints, frames), _gather(reference, joints, frames)  # (n, m, 3), NaN: none
+    estimate, truth = (
+        gather_joints(estimated, joints, frames),
+        gather_joints(reference, joints, frames),
+    )  # (n, m, 3), NaN: none
     is_limb = np.array([j in LIMB_JOINTS for j in joints], dtype=bool)
     both: NDArray[np.bool_] = np.all(np.isfinite(estimate) & np.isfinite(truth), axis=-1)  # (n, m)
     if not both[:, is_limb].any():
@@ -185,6 +188,18 @@ def remap_axes(table: MarkerTable, axes: str) -> MarkerTable:
     Raises:
         FormatError: not three different axes, or they mirror the world.
     """
+    matrix = axes_matrix(axes)
+    if np.linalg.det(matrix) < 0:
+        raise FormatError(f"--axes {axes} would mirror the world, left to right; turn one sign, e.g. x,-z,y")
+    return replace(table, points=table.points @ matrix.T)
+
+
+def axes_matrix(axes: str) -> Array:
+    """Return the matrix, (3, 3), that maps a file's coordinates to axes such as `x,-z,y`; it may mirror.
+
+    Raises:
+        FormatError: not three different axes.
+    """
     matrix = np.zeros((3, 3))
     words = [w.strip() for w in axes.split(",")]
     for row, word in enumerate(words[:3]):
@@ -192,9 +207,7 @@ def remap_axes(table: MarkerTable, axes: str) -> MarkerTable:
             matrix[row, "xyz".index(word[-1])] = -1.0 if word.startswith("-") else 1.0
     if len(words) != 3 or abs(np.linalg.det(matrix)) != 1:
         raise FormatError(f"--axes expected three different axes such as x,-z,y, found '{axes}'")
-    if np.linalg.det(matrix) < 0:
-        raise FormatError(f"--axes {axes} would mirror the world, left to right; turn one sign, e.g. x,-z,y")
-    return replace(table, points=table.points @ matrix.T)
+    return matrix
 
 
 def at_rate(table: MarkerTable, fps: float) -> MarkerTable:
@@ -239,7 +252,7 @@ def best_rigid(source: Array, target: Array) -> Array:
     return rigid.transform(R, center_target - R @ center_source)
 
 
-def _gather(table: MarkerTable, joints: Sequence[str], frames: Sequence[int]) -> Array:
+def gather_joints(table: MarkerTable, joints: Sequence[str], frames: Sequence[int]) -> Array:
     """Collect the positions of joints in frames, (n_frames, n_joints, 3); NaN where missing."""
     out = np.full((len(frames), len(joints), 3), np.nan)
     rows: NDArray[np.int64] = np.searchsorted(table.frames, frames)

@@ -26,6 +26,8 @@ class Reference(NamedTuple):
     """Joints under the project's names."""
     motion: Motion | None
     """Poses of any body; None if unknown."""
+    n_frames: int | None = None
+    """Length of the recording that it is of, in the session's frames; None if unknown."""
 
 
 def read_joints(path: Path, fps: float, joint_map: Path | None = None, axes: str = "x,y,z") -> MarkerTable:
@@ -40,8 +42,12 @@ def read_joints(path: Path, fps: float, joint_map: Path | None = None, axes: str
     Raises:
         FormatError: the file or the map is malformed, or no convention fits.
     """
+    return _joints(read_trc(path), path, fps, joint_map, axes)
+
+
+def _joints(markers: MarkerTable, path: Path, fps: float, joint_map: Path | None, axes: str) -> MarkerTable:
     mapping = read_joint_map(joint_map) if joint_map is not None else None
-    return joints_of(at_rate(remap_axes(read_trc(path), axes), fps), str(path), mapping)
+    return joints_of(at_rate(remap_axes(markers, axes), fps), str(path), mapping)
 
 
 def read_reference(
@@ -62,10 +68,12 @@ def read_reference(
         return _of_session(path if path.is_dir() else path.parent, session, person)
     if path.suffix.lower() == ".csv":
         motion = _of_table(read_pose_table(path), path, model)
-        return Reference(joints_of_poses(*motion, session.fps), motion)
+        return Reference(joints_of_poses(*motion, session.fps), motion, max(motion.poses) + 1)
     if path.suffix.lower() != ".trc":
         raise FormatError(f"expected a reference as .trc, .csv or session folder, found '{path}'")
-    return Reference(read_joints(path, session.fps, joint_map, axes), None)
+    markers = read_trc(path)
+    n_frames = round((int(markers.frames[-1]) + 1) * session.fps / markers.rate)
+    return Reference(_joints(markers, path, session.fps, joint_map, axes), None, n_frames)
 
 
 def stored_motion(session: Session, person: int) -> Reference:
@@ -102,7 +110,7 @@ def _of_session(folder: Path, session: Session, person: int) -> Reference:
     index = next((i for i, p in enumerate(other.people) if p.name == name), 0 if len(other.people) == 1 else None)
     if index is None:
         raise SessionError(f"expected a person '{name}' in {folder}, found {', '.join(p.name for p in other.people)}")
-    return stored_motion(other, index)
+    return stored_motion(other, index)._replace(n_frames=other.n_frames)
 
 
 def _of_table(table: PoseTable, path: Path, own: BodyModel) -> Motion:

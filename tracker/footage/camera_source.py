@@ -19,3 +19,5 @@ class CameraSource:
     """Folder of %06d.png by video frame: 0 background, 255 anyone, 1..K person K; original pixels; absolute."""
     offset: int = 0
     """Frame k of the session is frame k + offset of the footage; not negative."""
+    declared_fps: float | None = None
+    """Frame rate that the video declares where it is not the session's, as for high-speed footage, 1/s."""

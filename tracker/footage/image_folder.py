@@ -1,11 +1,17 @@
 """A folder of images as the footage of one camera."""
 
 import re
+from collections import Counter
+from collections.abc import Sequence
+from itertools import islice, pairwise
 from pathlib import Path
 
 from tracker.errors import RecordingError
 from tracker.footage.image_file import IMAGE_SUFFIXES, read_image, read_image_or_none
 from tracker.geometry.arrays import Image
+
+_REGULAR_SHARE = 0.5
+"""Share of equal steps between the numbers of images; the names are times if fewer are equal."""
 
 
 class ImageFolder:
@@ -15,6 +21,10 @@ class ImageFolder:
     size: tuple[int, int]
     """Width and height, px."""
     n_frames: int
+    files: list[Path]
+    """The images, in order."""
+    numbers: tuple[int, ...] | None
+    """Number of each image according to its name; None if the names are not numbered in equal steps."""
     fps: None = None
     """Images have no frame rate."""
     has_constant_rate: bool = True
@@ -41,9 +51,10 @@ class ImageFolder:
                 f"{self._where}: expected images of one kind ({', '.join(IMAGE_SUFFIXES)}), "
                 f"found {' and '.join(kinds) or 'none'}; leave only the frames of this camera in it"
             )
-        self._files = sorted(images, key=_natural)
-        self.n_frames = len(self._files)
-        height, width = read_image(self._files[0], self._where).shape[:2]
+        self.files = sorted(images, key=_natural)
+        self.n_frames = len(self.files)
+        self.numbers = image_numbers([f.stem for f in self.files])
+        height, width = read_image(self.files[0], self._where).shape[:2]
         self.size = (width, height)
 
     def read(self, k: int) -> Image | None:
@@ -55,11 +66,11 @@ class ImageFolder:
         if not 0 <= k < self.n_frames:
             raise RecordingError(f"{self._where}: expected a frame from 0 to {self.n_frames - 1}, found {k}")
         self.look_again()  # one message for all frames
-        image = read_image_or_none(self._files[k], self._where)
+        image = read_image_or_none(self.files[k], self._where)
         if image is not None and image.shape[1::-1] != self.size:
             raise RecordingError(
                 f"{self._where}: expected {self.size[0]}x{self.size[1]} pixels as in the first image, found "
-                f"{image.shape[1]}x{image.shape[0]} in {self._files[k].name}; give all images one size"
+                f"{image.shape[1]}x{image.shape[0]} in {self.files[k].name}; give all images one size"
             )
         return image
 
@@ -74,6 +85,32 @@ class ImageFolder:
 
     def close(self) -> None:
         """Do nothing: no file stays open."""
+
+
+def image_numbers(stems: Sequence[str]) -> tuple[int, ...] | None:
+    """Return the numbers of images by their names without suffix: the one run of digits in which all names differ.
+
+    Returns:
+        The numbers, in the order of the names; None if the names differ otherwise, or are times rather than numbers.
+    """
+    rows = [re.split(r"(\d+)", stem) for stem in stems]
+    if len({len(row) for row in rows}) != 1:
+        return None
+    varying = [i for i, column in enumerate(zip(*rows, strict=True)) if len(set(column)) > 1]
+    if len(varying) != 1 or varying[0] % 2 == 0:  # odd places hold digits
+        return None
+    numbers = tuple(int(row[varying[0]]) for row in rows)
+    steps = Counter(b - a for a, b in pairwise(numbers))
+    step, count = steps.most_common(1)[0]
+    return numbers if step > 0 and count >= _REGULAR_SHARE * sum(steps.values()) else None
+
+
+def missing_numbers(numbers: Sequence[int], at_most: int = 5) -> list[int]:
+    """Return the first few numbers that a numbered folder leaves out; the usual step may be more than 1."""
+    steps = Counter(b - a for a, b in pairwise(numbers))
+    step = max(1, steps.most_common(1)[0][0]) if steps else 1
+    gaps = (n for a, b in pairwise(numbers) for n in range(a + step, b, step))
+    return list(islice(gaps, at_most))
 
 
 def _natural(path: Path) -> list[tuple[int, int | str]]:

@@ -1,7 +1,7 @@
 """List the frames of a video from its packets, a hundred times faster than decoding."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import NamedTuple
 
 import av
@@ -12,6 +12,7 @@ from av.video.stream import VideoStream
 
 from tracker.errors import RecordingError
 from tracker.footage.frame_index import Index
+from tracker.footage.video_decoder import VideoDecoder
 
 _CHECKED_FRAMES = 16
 """Number of frames whose time stamps are compared with the decoder's, enough for any order of B-frames to show."""
@@ -86,20 +87,22 @@ def list_frames(container: InputContainer, where: str, report: Callable[[PacketS
     return index
 
 
-def check_order(index: Index, frames: Iterator[VideoFrame], where: str) -> VideoFrame:
+def check_order(index: Index, decoder: VideoDecoder, where: str) -> VideoFrame:
     """Check that a decoder shows the first frames in the order of their time stamps; return the first.
+
+    A stream without B-frames keeps the order of its packets: there the first frame is enough.
 
     Args:
         index: of the video, not empty.
-        frames: as decoded from the beginning.
+        decoder: of the video, at its beginning.
         where: names the video in messages.
 
     Raises:
         RecordingError: the order differs.
     """
     first = None
-    for expected in index.pts[:_CHECKED_FRAMES]:
-        frame = next(frames, None)
+    for expected in index.pts[: _CHECKED_FRAMES if decoder.has_b_frames else 1]:
+        frame = next(decoder.frames, None)
         if frame is None or frame.pts != expected:
             raise RecordingError(
                 f"{where} has time stamps that do not follow the order of its frames, as AVI files with B-frames have; "

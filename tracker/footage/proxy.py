@@ -63,6 +63,18 @@ class Proxy:
             return False
         return about.version == VERSION and about.stamp == stamp_of(footage)
 
+    def follow(self, footage: Path) -> bool:
+        """Keep the proxy for footage that has moved: same size and time of change. Returns whether it was kept."""
+        try:
+            about: _About = check(read_json(self._about, _KIND), _About, f"proxy {self._about}", RecordingError)
+            stamp = stamp_of(footage)
+            if about.version != VERSION or about.stamp.split("|")[-2:] != stamp.split("|")[-2:]:
+                return False
+            write_text_atomic(self._about, json.dumps({**msgspec.structs.asdict(about), "stamp": stamp}))
+        except (RecordingError, OSError):  # no proxy, or none that can be kept: it is made again
+            return False
+        return True
+
     def exists(self) -> bool:
         """Return whether there is a proxy, of any footage."""
         return self._about.is_file()

@@ -378,7 +378,7 @@ class VideoFile:
                 raise RecordingError(f"{self._where} has been closed")
 
     def _first_frame(self, index: Index, decoder: VideoDecoder) -> VideoFrame:
-        return packet_scan.check_order(index, decoder.frames, self._where)
+        return packet_scan.check_order(index, decoder, self._where)
 
 
 def _displayed_size(frame: VideoFrame) -> tuple[int, int]:

@@ -2,71 +2,26 @@
 
 One section per camera: `name`, `size` (width, height), `matrix` (3x3), `distortions` (OpenCV's order), `rotation`
 (Rodrigues vector, or a 3x3 matrix) and `translation` with `X_camera = R X_world + t`, `fisheye`. A section
-`metadata` is not a camera. The file does not state whether its lengths are metres or millimetres; the caller does.
+`metadata` is not a camera. Caliscope's `camera_array.toml` has its sections below `cameras`; they are named after its
+videos, `cam_0` and so on. The file does not state whether its lengths are metres or millimetres; the caller does.
 """
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Any
 
-import msgspec
-import numpy as np
 import tomli_w
-from msgspec import Meta
 
 from tracker.errors import CalibrationError
 from tracker.files import write_text_atomic
+from tracker.formats.camera_section import METRES, CameraEntry, Units, check_names_and_units, read_entry
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import DISTORTION_COUNTS, Camera
-from tracker.text_files import TextKind, read_toml
-from tracker.validation import MAX_SIDE_PX, FileStem, Number, Vector, check, quoted
+from tracker.geometry.cameras import Camera
+from tracker.text_files import TextKind, parse_toml, read_text
+from tracker.validation import quoted
 
-Units = Literal["m", "mm"]
-
-MAX_STUDIO_M = 100.0
-"""A camera read as metres and farther from the origin than this has translations in millimetres."""
-MIN_STUDIO_M = 0.05
-"""Cameras read as millimetres that are all nearer to the origin than this have translations in metres."""
-_ROTATION_TOLERANCE = 1e-3  # a rotation matrix printed with four digits still passes
-_KIND = TextKind("calibration", 500_000, CalibrationError)
+KIND = TextKind("calibration", 500_000, CalibrationError)
 """A camera takes about 1 kB."""
-
-_Pixels: TypeAlias = Annotated[float, Meta(ge=1, le=MAX_SIDE_PX, multiple_of=1)]
-_Focal: TypeAlias = Annotated[float, Meta(ge=1, le=1e9)]
-_Zero: TypeAlias = Annotated[float, Meta(ge=0, le=0)]
-_One: TypeAlias = Annotated[float, Meta(ge=1, le=1)]
-_Rodrigues: TypeAlias = Annotated[
-    tuple[Number, Number, Number], Meta(description="a Rodrigues vector of 3 values or a 3x3 matrix")
-]
-_RotationMatrix: TypeAlias = Annotated[
-    tuple[Vector, Vector, Vector], Meta(description="a Rodrigues vector of 3 values or a 3x3 matrix")
-]
-
-
-class _CameraSection(msgspec.Struct):
-    """The section of one camera; it may have other keys besides."""
-
-    size: Annotated[tuple[_Pixels, _Pixels], Meta(description="width and height in whole pixels, from 1 to 32767,")]
-    matrix: Annotated[
-        tuple[tuple[_Focal, Number, Number], tuple[_Zero, _Focal, Number], tuple[_Zero, _Zero, _One]],
-        Meta(description="[[fx, skew, cx], [0, fy, cy], [0, 0, 1]] with positive fx and fy"),
-    ]
-    rotation: list[Any]
-    """`_Rodrigues` or `_RotationMatrix`."""
-    translation: Vector
-    distortions: list[Number] = []
-    name: FileStem | None = None
-    fisheye: bool = False
-
-    def __post_init__(self) -> None:
-        if self.fisheye:
-            raise ValueError(
-                "expected OpenCV's lens model with 4, 5 or 8 coefficients, found a fisheye lens, which is not "
-                "supported; undistort the footage first and calibrate it without fisheye"
-            )
-        if len(self.distortions) not in DISTORTION_COUNTS:
-            raise ValueError(f"expected 0, 4, 5 or 8 values as 'distortions', found {len(self.distortions)}")
 
 
 def read_calibration(path: str | Path, units: Units = "m") -> tuple[Camera, ...]:
@@ -79,23 +34,22 @@ def read_calibration(path: str | Path, units: Units = "m") -> tuple[Camera, ...]
     Raises:
         CalibrationError: the file is missing or malformed, or describes impossible cameras.
     """
-    path = Path(path)
-    if units not in ("m", "mm"):
-        raise CalibrationError(f"expected units m or mm, found '{units}'; correct --units")
-    data = read_toml(path, _KIND)
-    sections = {name: section for name, section in data.items() if name.lower() != "metadata"}
-    if not sections:
-        raise CalibrationError(
-            f"calibration {path}: expected one section per camera, such as [cam01], found none; "
-            "export it in the anipose or Pose2Sim layout"
-        )
-    cameras = tuple(_camera(name, section, path, 1.0 if units == "m" else 1e-3) for name, section in sections.items())
-    names = [c.name for c in cameras]
-    twice = sorted({n for n in names if names.count(n) > 1})
-    if twice:
-        raise CalibrationError(f"calibration {path}: two cameras are named '{twice[0]}'; give each its own name")
-    _check_units(cameras, path, units)
-    return cameras
+    return tuple(entry.camera() for entry in parse_calibration(read_text(Path(path), KIND), str(path), units))
+
+
+def parse_calibration(text: str, source: str, units: Units = "m") -> tuple[CameraEntry, ...]:
+    """Read the cameras of the text of a calibration file; `source` names it in messages.
+
+    Raises:
+        CalibrationError: the text is malformed, or describes impossible cameras.
+    """
+    where = f"calibration {source}"
+    if units not in METRES:
+        raise CalibrationError(f"expected units {', '.join(METRES)}, found '{units}'; correct --units")
+    sections = _sections(parse_toml(text, source, KIND), where)
+    entries = tuple(read_entry(name, section, where, METRES[units]) for name, section in sections.items())
+    check_names_and_units(entries, where, units)
+    return entries
 
 
 def write_calibration(path: str | Path, cameras: Sequence[Camera]) -> None:
@@ -115,53 +69,38 @@ def write_calibration(path: str | Path, cameras: Sequence[Camera]) -> None:
     write_text_atomic(Path(path), tomli_w.dumps(data))
 
 
-def _camera(section: str, data: Any, path: Path, metres_per_unit: float) -> Camera:
-    where = f"calibration {path}, camera {quoted(section)}"
-    if not isinstance(data, dict):
+def _sections(data: dict[str, Any], where: str) -> dict[str, Any]:
+    """Return the sections of the cameras by name.
+
+    Raises:
+        CalibrationError: there are none, or keys that belong to no camera.
+    """
+    if "camera_count" in data and "charuco" in data:
         raise CalibrationError(
-            f"calibration {path}: expected sections of cameras, found the lone key {quoted(section)}; remove it"
+            f"{where}: expected a calibration, found the settings of a Caliscope project; give its camera_array.toml"
         )
-    row: _CameraSection = check(data, _CameraSection, where, CalibrationError)
-    name = check(section, FileStem, where, CalibrationError) if row.name is None else row.name
-    translation = np.array(row.translation) * metres_per_unit
-    T_camera_world = rigid.transform(_rotation(row.rotation, where), translation)
-    width, height = map(int, row.size)
-    K, distortion = np.array(row.matrix), np.array(row.distortions, dtype=np.float64)
-    return Camera(name, (width, height), K, distortion, rigid.inverse(T_camera_world))
+    if set(data) == {"cameras"} and isinstance(data["cameras"], dict):
+        data = {_caliscope_name(key, section): section for key, section in data["cameras"].items()}
+    sections = {name: section for name, section in data.items() if name.lower() != "metadata"}
+    ignored = {
+        name for name, section in sections.items() if isinstance(section, dict) and section.get("ignore") is True
+    }
+    if not sections.keys() - ignored:
+        raise CalibrationError(
+            f"{where}: expected one section per camera, such as [cam01], found none; "
+            "export it in the anipose or Pose2Sim layout"
+        )
+    for name, section in sections.items():
+        if not isinstance(section, dict):
+            raise CalibrationError(
+                f"{where}: expected sections of cameras, found the lone key {quoted(name)}; remove it"
+            )
+    return {name: section for name, section in sections.items() if name not in ignored}
 
 
-def _rotation(value: list[Any], where: str) -> Array:
-    """Convert a Rodrigues vector, or a matrix that is a rotation within rounding, to a rotation matrix (3, 3)."""
-    is_matrix = any(isinstance(row, list) for row in value)
-    rotation = np.array(
-        check(value, _RotationMatrix if is_matrix else _Rodrigues, f"{where}, rotation", CalibrationError)
-    )
-    if rotation.shape == (3,):
-        return rigid.so3_exp(rotation)
-    error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
-    determinant = float(np.linalg.det(rotation))
-    if error > _ROTATION_TOLERANCE or determinant < 0:
-        raise CalibrationError(
-            f"{where}: 'rotation' is not a rotation: expected orthonormal rows and determinant 1, "
-            f"found rows off by {error:.2g} and determinant {determinant:.3g}; calibrate again"
-        )
-    # Use the nearest rotation: a rounded matrix would shear what it maps.
-    U, _, V = np.linalg.svd(rotation)
-    return U @ V
-
-
-def _check_units(cameras: tuple[Camera, ...], path: Path, units: Units) -> None:
-    distances = [float(np.linalg.norm(c.center_world)) for c in cameras]
-    farthest = max(distances)
-    if units == "m" and farthest > MAX_STUDIO_M:
-        name = cameras[distances.index(farthest)].name
-        raise CalibrationError(
-            f"calibration {path}: camera '{name}' would stand {farthest:.0f} m from the origin, so its translations "
-            "look like millimetres and metres were expected; say --units mm"
-        )
-    # All at the origin is one camera that defines the world, which has no scale to check.
-    if units == "mm" and 0 < farthest < MIN_STUDIO_M:
-        raise CalibrationError(
-            f"calibration {path}: read as millimetres all cameras would stand within {farthest * 1000:.2g} mm of the "
-            "origin, so its translations look like metres; leave out --units mm"
-        )
+def _caliscope_name(key: str, section: Any) -> str:
+    """Return the name of a camera of Caliscope, after which its video is named: `cam_0`, once `port_0`."""
+    for number in ("cam_id", "port"):
+        if isinstance(section, dict) and isinstance(section.get(number), int):
+            return f"{number.removesuffix('_id')}_{section[number]}"
+    return key

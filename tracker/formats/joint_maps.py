@@ -3,6 +3,7 @@
 The project's own names are those of `BodyModel.point_names`: `left_shoulder`, `left_wrist`, `neck`, ...
 """
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -94,9 +95,15 @@ def guess_joint_map(markers: Sequence[str], source: str) -> JointMap:
     if max(present) < _MIN_JOINTS:
         raise FormatError(
             f"the markers of {source} follow no known convention (our own, COCO, CMU, BODY_25): found "
-            f"{', '.join(markers[:8])}{', ...' if len(markers) > 8 else ''}; name the joints with --joint-map FILE.toml"
+            f"{', '.join(markers[:8])}{', ...' if len(markers) > 8 else ''}; give a --joint-map FILE.toml with a line "
+            f"such as left_shoulder = {_quoted(markers[0])} for each joint (docs/recordings.md has an example)"
         )
     return KNOWN[present.index(max(present))]
+
+
+def _quoted(marker: str) -> str:
+    """Return a marker's name as a string of TOML."""
+    return json.dumps(marker, ensure_ascii=False)
 
 
 def read_joint_map(path: str | Path) -> JointMap:

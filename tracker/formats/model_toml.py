@@ -9,6 +9,7 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
@@ -152,8 +153,9 @@ def load_model(name_or_path: str | Path, height_m: float | None = None) -> BodyM
     return parse_model(text, str(name_or_path), height_m)
 
 
+@lru_cache(maxsize=16)
 def parse_model(text: str, source: str, height_m: float | None = None) -> BodyModel:
-    """Parse and check a model's TOML text; `source` names it in messages.
+    """Parse and check a model's TOML text; `source` names it in messages. Cached: opening reads a model several times.
 
     Raises:
         ModelError: syntax, an unknown or missing key, a loop, a missing parent, impossible numbers.

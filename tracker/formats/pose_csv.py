@@ -82,7 +82,7 @@ def write_pose_table(
     """
     frames = np.arange(len(values)) if frames is None else np.asarray(frames)
     assert np.shape(values) == (len(frames), len(model.value_names))
-    units = _units(model)
+    units = value_units(model)
     factors = [np.degrees(1.0) if u == "_deg" else 1.0 for u in units]
     lines = [
         f"{_TITLE}{VERSION}",
@@ -127,8 +127,8 @@ def read_pose_table(path: str | Path) -> PoseTable:
     return PoseTable(head.model, head.height_m, names, frames, values)
 
 
-def _units(model: BodyModel) -> list[str]:
-    """Return the unit of each value as its column's suffix."""
+def value_units(model: BodyModel) -> list[str]:
+    """Return the unit of each value of a pose as its column's suffix: `_m`, `_deg` or none."""
     lengths = {
         model.value_names[v] for v, is_length in zip(model.dof_value, model.dof_is_length, strict=True) if is_length
     }

@@ -89,6 +89,7 @@ def write_trc(
     *,
     frames: Sequence[int] | NDArray[np.int64] | None = None,
     units: Literal["m", "mm"] = "m",
+    from_frame_0: bool = True,
 ) -> None:
     """Write a TRC file, exact to a tenth of a micrometre; `read_trc` reads it back.
 
@@ -97,28 +98,32 @@ def write_trc(
         names: names of the points, (m,).
         points: positions, (n, m, 3), metres; NaN where missing.
         rate: frames per second.
-        frames: frame of each row, from 0, ascending; by default every frame from 0. Frame# is one more. If the first is
-            not 0, a blank row for frame 0 comes first, because readers count from the first row.
+        frames: frame of each row, from 0, ascending; by default every frame from 0. Frame# is one more.
         units: of the lengths in the file.
+        from_frame_0: whether a blank row for frame 0 comes first if the first frame is not 0. Readers that count from
+            the first row, such as `read_trc`, then find the frames; others want rows at one rate.
     """
     path = Path(path)
     frames = np.arange(len(points)) if frames is None else np.asarray(frames)
     assert points.shape == (len(frames), len(names), 3)
-    if len(frames) and frames[0] != 0:
+    if from_frame_0 and len(frames) and frames[0] != 0:
         frames = np.concatenate([[0], frames])
         points = np.concatenate([np.full((1, len(names), 3), np.nan), points])
+    first = int(frames[0]) + 1 if len(frames) else 1
     scale, digits = (1.0, 7) if units == "m" else (1000.0, 4)
     lines = [
         f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
         "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
-        f"{rate:.10g}\t{rate:.10g}\t{len(frames)}\t{len(names)}\t{units}\t{rate:.10g}\t1\t{len(frames)}",
+        f"{rate:.10g}\t{rate:.10g}\t{len(frames)}\t{len(names)}\t{units}\t{rate:.10g}\t{first}\t{len(frames)}",
         "Frame#\tTime\t" + "\t\t\t".join(names) + "\t\t",
         "\t\t" + "\t".join(f"{axis}{i}" for i in range(1, len(names) + 1) for axis in "XYZ"),
         "",
     ]
     for frame, row in zip(frames.tolist(), points, strict=True):
         cells = ["" if np.isnan(x) else f"{x * scale:.{digits}f}" for x in row.ravel()]
-        lines.append("\t".join([str(frame + 1), f"{frame / rate:.6f}", *cells]))
+        # OpenSim counts no empty cell at the end of a row unless a tab follows it.
+        end = "" if cells and cells[-1] else "\t"
+        lines.append("\t".join([str(frame + 1), f"{frame / rate:.6f}", *cells]) + end)
     write_text_atomic(path, "\n".join(lines) + "\n")
 
 

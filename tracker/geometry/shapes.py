@@ -6,7 +6,7 @@ cross-section are solids of revolution, determined by their profile.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
@@ -130,16 +130,9 @@ class TaperedSuperquadric:
 
     def profile(self, tolerance_m: float) -> Profile | None:
         """Return the profile in unit coordinates, thinned within a tolerance; None if not a solid of revolution."""
-        (a1, a2, a3), e1, (k, ky) = self.half_axes, self.exponents[0], self.taper
-        if self.exponents[1] != 1.0 or k != ky:
+        if self.exponents[1] != 1.0 or self.taper[0] != self.taper[1]:
             return None
-        eta = np.linspace(-np.pi / 2, np.pi / 2, 401)[1:-1]
-        z, r = _signed_power(np.sin(eta), e1), np.cos(eta) ** e1
-        s = 1 + k * z
-        away = np.cos(eta) ** (2 - e1) / s
-        along = _signed_power(np.sin(eta), 2 - e1) - k * np.cos(eta) ** 2 / s
-        selected = _chords(np.stack([max(a1, a2) * r * s, a3 * z], axis=1), tolerance_m)
-        return _with_ends((r * s)[selected], z[selected], away[selected], along[selected])
+        return _superquadric_profile(self, tolerance_m)
 
     @property
     def enclosure(self) -> Enclosure:
@@ -244,6 +237,19 @@ class Ellipsoid:
 
 
 Shape = TaperedSuperquadric | EllipticalCone | Ellipsoid
+
+
+@lru_cache(maxsize=1024)
+def _superquadric_profile(shape: TaperedSuperquadric, tolerance_m: float) -> Profile:
+    """Return the profile of a superquadric of revolution; cached, because a change of one part leaves the others."""
+    (a1, a2, a3), e1, k = shape.half_axes, shape.exponents[0], shape.taper[0]
+    eta = np.linspace(-np.pi / 2, np.pi / 2, 401)[1:-1]
+    z, r = _signed_power(np.sin(eta), e1), np.cos(eta) ** e1
+    s = 1 + k * z
+    away = np.cos(eta) ** (2 - e1) / s
+    along = _signed_power(np.sin(eta), 2 - e1) - k * np.cos(eta) ** 2 / s
+    selected = _chords(np.stack([max(a1, a2) * r * s, a3 * z], axis=1), tolerance_m)
+    return _with_ends((r * s)[selected], z[selected], away[selected], along[selected])
 
 
 def _signed_power(base: Array, exponent: float) -> Array:

@@ -1,6 +1,6 @@
 """Make a session from a calibration and loose footage: match them, and check that they fit together."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -9,16 +9,21 @@ from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_file import IMAGE_SUFFIXES
 from tracker.footage.recording import check_size, read_background, read_mask
 from tracker.footage.video import Footage, open_footage
-from tracker.formats.anipose import Units, read_calibration
+from tracker.formats.calibration import read_cameras
+from tracker.formats.camera_section import Units
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
+from tracker.session.matching import (
+    check_image_numbers,
+    check_names,
+    common_length,
+    common_rate,
+    match_footage,
+    same_rate,
+)
 from tracker.session.session import PALETTE, Person, Session, create_session
-from tracker.validation import FrameRate, check
 
 DEFAULT_MODEL = "gavrila34"
-
-_RATE_TOLERANCE = 5e-4
-"""Relative difference above which two frame rates differ; 29.97 and 30 differ by twice as much."""
 _VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
 
 
@@ -29,11 +34,13 @@ class NewSession:
     folder: Path
     """Where the session goes; must not exist, or be empty."""
     calibration: Path
-    """TOML file in the anipose layout."""
+    """TOML, JSON, YAML or XML file (`tracker.formats.calibration`)."""
     videos: Sequence[Path] = ()
     """Video files or image folders, each named after its camera."""
     camera_paths: Mapping[str, Path] = field(default_factory=dict)
     """Footage by camera name, under any file name; goes before `videos`."""
+    cameras: Sequence[str] = ()
+    """Names of the calibrated cameras to use, in the session's order; all if empty."""
     background: Path | None = None
     """Folder of CAM.png or CAM.mp4 of the empty scene."""
     masks: Path | None = None
@@ -47,11 +54,12 @@ class NewSession:
     heights: Mapping[str, float] | float | None = None
     """Body height of all people, or by name, metres; the model's own for names left out."""
     fps: float | None = None
-    """Frame rate, 1/s; needed if all footage is folders of images."""
+    """Frame rate at which the cameras filmed, 1/s; overrides the rate that the videos declare. Needed if all footage is
+    folders of images."""
     up: str = "z"
     """World axis that points up."""
-    units: Units = "m"
-    """Unit of the calibration's translations."""
+    units: Units | None = None
+    """Unit of the calibration's translations; by default the one that its layout fixes, else metres."""
 
 
 def assemble(request: NewSession) -> Session:
@@ -63,117 +71,83 @@ def assemble(request: NewSession) -> Session:
         CalibrationError: the calibration is malformed.
         ModelError: a body model is unknown or malformed.
     """
-    cameras = read_calibration(request.calibration, request.units)
-    _check_names(request.offsets, [c.name for c in cameras], "camera", "--offset")
-    paths = _match(cameras, request.videos, request.camera_paths)
-    sources = tuple(
-        CameraSource(
-            c,
-            paths[c.name],
-            _find_background(request.background, c) if request.background is not None else None,
-            _find_masks(request.masks, c) if request.masks is not None else None,
-            request.offsets.get(c.name, 0),
-        )
-        for c in cameras
-    )
-    footage = {c.name: open_footage(paths[c.name], c.name) for c in cameras}
+    calibrated = {c.name: c for c in read_cameras(request.calibration, request.units)}
+    check_names(request.cameras, list(calibrated), "camera", "--cameras")
+    if twice := [n for n in request.cameras if request.cameras.count(n) > 1]:
+        raise SessionError(f"expected each camera once as --cameras, found '{twice[0]}' twice; leave one out")
+    names = list(request.cameras) or list(calibrated)
+    unused = calibrated.keys() - set(names)
+    check_names(request.offsets, names, "camera", "--offset")
+    paths = match_footage(names, request.videos, request.camera_paths, unused)
+    footage = {name: open_footage(paths[name], name) for name in names}
     try:
-        for c in cameras:
-            check_size(c.name, footage[c.name].path, footage[c.name].size, c.size)
-        fps = _common_rate(footage, request.fps)
-        n_frames = _common_length(footage, request.offsets)
+        cameras = {name: calibrated[name].camera(footage[name].size) for name in names}
+        for name in names:
+            check_size(name, footage[name].path, footage[name].size, cameras[name].size)
+        fps = common_rate(footage, request.fps)
+        check_image_numbers(footage, request.offsets)
+        n_frames = common_length(footage, request.offsets)
+        sources = tuple(_source(request, cameras[name], footage[name], fps) for name in names)
     finally:
         for f in footage.values():
             f.close()
     for source in sources:
-        _check_side_files(source)
+        check_side_files(source)
     people = _make_people(request.people, request.models, request.heights)
     return create_session(request.folder, cameras=sources, people=people, fps=fps, n_frames=n_frames, up=request.up)
 
 
-def _match(cameras: Sequence[Camera], videos: Sequence[Path], camera_paths: Mapping[str, Path]) -> dict[str, Path]:
-    """Find the footage of each camera: by the option, else by the name of the file or folder."""
-    names = [c.name for c in cameras]
-    _check_names(camera_paths, names, "camera", "--camera")
-    paths = dict(camera_paths)
-    for video in videos:
-        name = video.name if video.is_dir() else video.stem
-        if name in camera_paths or video in camera_paths.values():
-            continue
-        if name not in names:
-            raise SessionError(
-                f"video {video} belongs to no calibrated camera: expected one named {', '.join(names)}; "
-                f"rename it, leave it out or say --camera NAME={video}"
-            )
-        if name in paths:
-            raise SessionError(f"camera '{name}' has two videos, {paths[name]} and {video}; leave one out")
-        paths[name] = video
-    missing = [n for n in names if n not in paths]
-    if missing:
-        raise SessionError(
-            f"no video for camera {', '.join(missing)}; give a file named {missing[0]}.mp4, "
-            f"say --camera {missing[0]}=PATH, or remove the camera from the calibration"
-        )
-    return paths
+def _source(request: NewSession, camera: Camera, footage: Footage, fps: float) -> CameraSource:
+    return CameraSource(
+        camera,
+        footage.path,
+        find_background(request.background, camera.name) if request.background is not None else None,
+        find_masks(request.masks, camera.name) if request.masks is not None else None,
+        request.offsets.get(camera.name, 0),
+        None if footage.fps is None or same_rate(footage.fps, fps) else footage.fps,
+    )
 
 
-def _common_rate(footage: Mapping[str, Footage], fps: float | None) -> float:
-    rates = {name: f.fps for name, f in footage.items() if f.fps is not None}
-    for name, f in footage.items():
-        if not f.has_constant_rate:
-            raise RecordingError(
-                f"camera '{name}': {f.path} has a variable frame rate, expected a constant one; "
-                "convert it to a constant rate with frames at the times of the other cameras"
-            )
-    wanted = fps if fps is not None else next(iter(rates.values()), None)
-    if wanted is None:
-        raise RecordingError("folders of images do not say their frame rate; say --fps RATE")
-    check(wanted, FrameRate, "--fps" if fps is not None else "footage", RecordingError)
-    if any(abs(rate / wanted - 1) > _RATE_TOLERANCE for rate in rates.values()):
-        found = ", ".join(f"'{name}' {rate:.6g}" for name, rate in rates.items())
-        asked = "one frame rate for all cameras" if fps is None else f"{fps:.6g} frames per second"
-        raise RecordingError(f"expected {asked}, found {found}; convert the videos to the same rate")
-    return wanted
+def find_background(folder: Path, camera: str) -> Path:
+    """Find the background of a camera by its name, an image or a video.
 
-
-def _common_length(footage: Mapping[str, Footage], offsets: Mapping[str, int]) -> int:
-    """Number of frames that all cameras have; lengths may differ by the offsets alone."""
-    rest = {name: f.n_frames - offsets.get(name, 0) for name, f in footage.items()}
-    if len({f.n_frames for f in footage.values()}) > 1 and len(set(rest.values())) > 1:
-        found = ", ".join(f"'{name}' {f.n_frames}" for name, f in footage.items())
-        raise RecordingError(
-            f"expected videos of the same number of frames, found {found}; "
-            "cut them to the same start and end, or say --offset CAM=N for a camera that began N frames earlier"
-        )
-    return min(rest.values())
-
-
-def _find_background(folder: Path, camera: Camera) -> Path:
+    Raises:
+        RecordingError: there is none.
+    """
     for suffix in (*IMAGE_SUFFIXES, *_VIDEO_SUFFIXES):
-        path = folder / f"{camera.name}{suffix}"
+        path = folder / f"{camera}{suffix}"
         if path.is_file():
             return path
     raise RecordingError(
-        f"camera '{camera.name}': no background in {folder}: expected {camera.name}.png or {camera.name}.mp4; "
+        f"camera '{camera}': no background in {folder}: expected {camera}.png or {camera}.mp4; "
         "add it or leave out --background"
     )
 
 
-def _find_masks(folder: Path, camera: Camera) -> Path:
-    path = folder / camera.name
+def find_masks(folder: Path, camera: str) -> Path:
+    """Find the folder of masks of a camera by its name.
+
+    Raises:
+        RecordingError: there is none, or it has no masks.
+    """
+    path = folder / camera
     if not any(path.glob("[0-9]" * 6 + ".png")):
         raise RecordingError(
-            f"camera '{camera.name}': no masks in {path}: expected files named 000000.png and so on by video frame; "
+            f"camera '{camera}': no masks in {path}: expected files named 000000.png and so on by video frame; "
             "add them or leave out --masks"
         )
     return path
 
 
-def _check_side_files(source: CameraSource) -> None:
-    """Read the background and the first mask, so that a misfit shows before tracking starts."""
+def check_side_files(source: CameraSource) -> None:
+    """Read the background and the first mask, so that a misfit shows before tracking starts.
+
+    Raises:
+        RecordingError: one is missing, unreadable or of another size than the camera.
+    """
     read_background(source)
     if source.masks is not None:
-        first = min(source.masks.glob("[0-9]" * 6 + ".png"))
+        first = min(find_masks(source.masks.parent, source.masks.name).glob("[0-9]" * 6 + ".png"))
         read_mask(source, int(first.stem) - source.offset)
 
 
@@ -181,18 +155,12 @@ def _make_people(
     names: Sequence[str], models: Mapping[str, str] | str, heights: Mapping[str, float] | float | None
 ) -> tuple[Person, ...]:
     if isinstance(models, Mapping):
-        _check_names(models, names, "person", "--model")
+        check_names(models, names, "person", "--model")
     if isinstance(heights, Mapping):
-        _check_names(heights, names, "person", "--height")
+        check_names(heights, names, "person", "--height")
     people = []
     for i, name in enumerate(names):
         model = models.get(name, DEFAULT_MODEL) if isinstance(models, Mapping) else models
         height = heights.get(name) if isinstance(heights, Mapping) else heights
         people.append(Person(name, load_model(model, height), PALETTE[i % len(PALETTE)]))
     return tuple(people)
-
-
-def _check_names(given: Iterable[str], known: Sequence[str], what: str, option: str) -> None:
-    unknown = [n for n in given if n not in known]
-    if unknown:
-        raise SessionError(f"{option} names an unknown {what} '{unknown[0]}'; expected one of {', '.join(known)}")

@@ -30,11 +30,10 @@ from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry.ground_plane import GroundPlane
 from tracker.session.session_file import (
-    VERSION,
-    VERSION_WITHOUT_FLOOR,
     FloorRow,
     SessionFile,
     checked,
+    needed_version,
     read_session_file,
 )
 from tracker.validation import quoted
@@ -64,7 +63,7 @@ class Session:
     name: str
     """Title for display."""
     fps: float
-    """Frame rate of all cameras, 1/s."""
+    """Rate at which all cameras filmed, 1/s; what a video declares may differ (`CameraSource.declared_fps`)."""
     n_frames: int
     """Number of frames that all cameras have."""
     cameras: tuple[CameraSource, ...]
@@ -184,9 +183,28 @@ def _load_cameras(row: SessionFile, folder: Path) -> tuple[CameraSource, ...]:
             _resolve(c.background, folder) if c.background is not None else None,
             _resolve(c.masks, folder) if c.masks is not None else None,
             c.offset,
+            c.declared_fps,
         )
         for c in row.cameras
     )
+
+
+def save_cameras(session: Session, cameras: Sequence[CameraSource]) -> Session:
+    """Replace the places of footage, backgrounds and masks in a session's session.toml.
+
+    Args:
+        session: as it was loaded.
+        cameras: the same cameras with other paths.
+
+    Returns:
+        The session with those cameras.
+
+    Raises:
+        SessionError: a path is not allowed, or the folder cannot be written.
+    """
+    changed = replace(session, cameras=tuple(_absolute(c) for c in cameras))
+    _save_session_file(changed)
+    return changed
 
 
 def save_floor(session: Session, up: str, floor: GroundPlane | None) -> Session:
@@ -204,14 +222,18 @@ def save_floor(session: Session, up: str, floor: GroundPlane | None) -> Session:
         SessionError: the folder cannot be written.
     """
     changed = replace(session, up=up, floor=floor)
-    _checked_content(changed)
+    _save_session_file(changed)
+    return changed
+
+
+def _save_session_file(session: Session) -> None:
+    _checked_content(session)
     try:
-        _write_session(changed, session.folder)
+        _write_session(session, session.folder)
     except OSError as error:
         raise SessionError(
             f"cannot write {session.folder / SESSION_FILE}: {error}; see that you may write to the folder"
         ) from error
-    return changed
 
 
 def save_model(session: Session, person: int, model: BodyModel) -> Session:
@@ -271,9 +293,11 @@ def _checked_content(session: Session) -> dict[str, Any]:
             row["background"] = _relative(c.background, session.folder)
         if c.masks is not None:
             row["masks"] = _relative(c.masks, session.folder)
-        cameras.append(row | {"offset": c.offset})
+        row["offset"] = c.offset
+        if c.declared_fps is not None:
+            row["declared_fps"] = c.declared_fps
+        cameras.append(row)
     data: dict[str, Any] = {
-        "version": VERSION_WITHOUT_FLOOR if session.floor is None else VERSION,
         "name": session.name,
         "fps": session.fps,
         "n_frames": session.n_frames,
@@ -284,6 +308,7 @@ def _checked_content(session: Session) -> dict[str, Any]:
     }
     if session.floor is not None:
         data["floor"] = {"normal": session.floor.normal.tolist(), "offset_m": float(session.floor.offset_m)}
+    data = {"version": needed_version(data)} | data
     checked(data, f"session {session.folder}")
     return data
 

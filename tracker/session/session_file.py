@@ -23,9 +23,9 @@ from tracker.validation import (
     check_version,
 )
 
-VERSION = 2
-VERSION_WITHOUT_FLOOR = 1
-"""Version written for a session without a floor, so that older programs can read it."""
+VERSION = 3
+"""Newest version. A session is written in the oldest version that can describe it, so that older programs can read it:
+version 2 has a floor, version 3 a camera with a `declared_fps`."""
 
 Up: TypeAlias = Literal["x", "-x", "y", "-y", "z", "-z"]
 UPS: tuple[str, ...] = get_args(Up)
@@ -65,6 +65,7 @@ class CameraRow(_Row):
     offset: Annotated[
         int, Meta(ge=-MAX_FRAMES, le=MAX_FRAMES, description=f"a whole number of frames, at most {MAX_FRAMES},")
     ] = 0
+    declared_fps: FrameRate | None = None
 
     def __post_init__(self) -> None:
         if self.offset < 0:
@@ -123,6 +124,13 @@ def read_session_file(path: Path) -> SessionFile:
     where = f"session {path}"
     check_version(data, VERSION, where, SessionError)
     return checked(data, where)
+
+
+def needed_version(data: dict[str, Any]) -> int:
+    """Return the oldest version that can describe the content of a session file."""
+    if any("declared_fps" in row for row in data["cameras"]):
+        return 3
+    return 2 if "floor" in data else 1
 
 
 def checked(data: Any, where: str) -> SessionFile:

@@ -3,6 +3,7 @@
 import json
 import shutil
 from contextlib import closing
+from importlib import metadata
 from pathlib import Path
 from typing import get_args, get_type_hints
 
@@ -12,8 +13,10 @@ from command_line import SAMPLE, assert_refused, stored
 
 from app.cli.track import _SETTINGS, TrackArguments
 from tracker.compute.kernel_cache import compiled_mark
+from tracker.evaluation.metrics import axes_matrix
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
+from tracker.formats.trc import read_trc, write_trc
 from tracker.pipeline.methods import METHODS
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
@@ -71,6 +74,48 @@ def test_new_info_init_track_evaluate(run, tmp_path):
     assert sorted(p.name for p in s.iterdir()) == [
         "annotations.sqlite", "backups", "calibration.toml", "models", "session.toml",
     ]  # fmt: skip
+
+
+def test_version(run):
+    assert run("--version") == (0, f"quadrille {metadata.version('quadrille')}\n", "")
+
+
+def test_init_says_where_the_body_is_and_refuses_what_is_nowhere(run, session, tmp_path):
+    status, out, _ = run("init", session, "--joints", SAMPLE / "truth.trc", "--json")
+    views = json.loads(out)["views"]
+    assert (status, list(views)) == (0, ["FRONT", "RIGHT", "BACK", "LEFT"])
+    assert all(2 < view["distance_m"] < 7 and view["n_inside"] == view["n_points"] for view in views.values())
+    out = run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "1")[1]
+    assert out.splitlines()[1] == f"  view FRONT: {views['FRONT']['distance_m']:.2f} m, in the picture"
+
+    joints = read_trc(SAMPLE / "truth.trc")
+    write_trc(tmp_path / "far.trc", joints.names, joints.points + np.array([0.0, 40.0, 30.0]), 25.0)
+    expected = [
+        "expected 'person' in the picture",
+        "'FRONT' 4",
+        "m, behind the camera",
+        "px beside the picture",
+        "--axes",
+    ]
+    assert_refused(run("init", session, "--joints", tmp_path / "far.trc", "--frame", "2"), expected)
+    assert sorted(stored(session)) == [0, 1]
+
+    write_trc(tmp_path / "small.trc", joints.names, joints.points / 1000, 25.0)
+    out = run("init", session, "--joints", tmp_path / "small.trc", "--frame", "2")[1]
+    assert "note: these joints fit no body of 1.78 m: check the Units" in out
+
+
+def test_evaluate_notes_a_reference_that_is_of_something_else(run, session, tmp_path):
+    run("init", session, "--joints", SAMPLE / "truth.trc")
+    same = json.loads(run("evaluate", session, "--reference", SAMPLE / "truth.trc", "--json")[1])
+    assert same["notes"] == []
+    joints = read_trc(SAMPLE / "truth.trc")
+    write_trc(tmp_path / "y_up.trc", joints.names, joints.points[:40] @ axes_matrix("x,-z,y"), 25.0)
+    out = run("evaluate", session, "--reference", tmp_path / "y_up.trc")[1]
+    length, apart = [line for line in out.splitlines() if line.startswith("note: ")]
+    assert "the session has 50 frames and the reference 40" in length
+    assert "with --axes x,-z,y it would be 0.0" in apart
+    assert "--axes" not in run("evaluate", session, "--reference", tmp_path / "y_up.trc", "--axes", "x,-z,y")[1]
 
 
 def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
@@ -156,6 +201,7 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     assert (json.loads(out)["frames"], json.loads(out)["resumed_at"]) == (6, None)
 
 
+@pytest.mark.slow
 def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run, session, monkeypatch):
     """What the second pass finds better is in the store at once, in the one entry of the history."""
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")

@@ -1,5 +1,6 @@
 """What wrong input gets at the command line: one sentence, status 1, and nothing half-written."""
 
+import json
 import shutil
 import socket
 import subprocess
@@ -200,8 +201,20 @@ def test_a_session_whose_video_is_gone(run, session):
     run("init", session, "--joints", SAMPLE / "truth.trc")
     (session / "BACK.mp4").unlink()
     for words in (("track", session), ("open", session, "--port", "0", "--no-browser")):
-        assert_refused(run(*words), ["'BACK'", "BACK.mp4"])
+        assert_refused(run(*words), ["'BACK'", "BACK.mp4", f"quadrille relink {session} --search FOLDER"])
         assert not (session / "lock.json").exists()
+    before = stored(session)
+    cameras = json.loads(run("info", session, "--json")[1])["cameras"]
+    assert [c["name"] for c in cameras if c["missing"] == ["footage"]] == ["BACK"]
+    assert "BACK.mp4, background, footage missing" in run("info", session)[1]
+    assert_refused(run("relink", session), ["'BACK'", "--search FOLDER"])
+    status, out, _ = run("relink", session, "--search", session / "models", "--json")
+    assert (status, json.loads(out)["relinked"], len(json.loads(out)["missing"])) == (1, [], 1)
+    shutil.copy(SAMPLE / "BACK.mp4", session.parent / "moved.mp4")
+    assert_refused(run("relink", session, "--camera", "BACK"), ["--camera as NAME=VALUE"])
+    assert run("relink", session, "--camera", f"BACK={session.parent / 'moved.mp4'}")[0] == 0
+    assert json.loads(run("info", session, "--json")[1])["cameras"][2]["missing"] == []
+    assert stored(session)[0].values.tolist() == before[0].values.tolist()
 
 
 def test_a_session_open_already(run, session):
@@ -216,6 +229,7 @@ def test_a_session_open_already(run, session):
     assert stored(session) == {} if (session / "annotations.sqlite").exists() else True
 
 
+@pytest.mark.slow
 def test_a_busy_port(session):
     """In a process of its own, as it comes: nothing but the sentence, and no lock left behind."""
     with socket.create_server(("127.0.0.1", 0)) as server:

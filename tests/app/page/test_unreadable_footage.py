@@ -4,8 +4,20 @@ import pytest
 from page_visits import visiting
 
 from app.control.session import footage_scan
+from tracker.evidence.observer import Observer
+from tracker.footage.recording import Recording
+from tracker.session.session import load_session
 
 FRONT = "FRONT.mp4"
+
+
+@pytest.fixture
+def observer(session):
+    """The footage of this test's own session."""
+    cameras = load_session(session).cameras
+    recording = Recording(cameras)
+    yield Observer(cameras, recording)
+    recording.close()
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 from clips import SIZE, N, encode, number, write_images
 
 from tracker.errors import RecordingError
-from tracker.footage.image_folder import ImageFolder
+from tracker.footage.image_folder import ImageFolder, image_numbers, missing_numbers
 from tracker.footage.video import VideoFile, open_footage
 
 
@@ -241,7 +241,7 @@ def test_time_stamps_out_of_order(tmp_path):
         VideoFile(path, "cam")
 
 
-@pytest.mark.parametrize("name", ["cam01", "cam02", "cam03", "cam04"])
+@pytest.mark.parametrize("name", ["cam01", *(pytest.param(f"cam0{i}", marks=pytest.mark.slow) for i in (2, 3, 4))])
 def test_real_footage(data_folder, name):
     video = VideoFile(data_folder("balance_real") / f"{name}.mp4", name)
     assert (video.n_frames, video.fps, video.has_constant_rate) == (100, 60.0, True)
@@ -259,6 +259,23 @@ def test_images_in_natural_order(tmp_path, suffix):
     assert (images.n_frames, images.size, images.fps) == (12, SIZE, None)
     assert [number(images.read(k)) for k in (11, 0, 2, 10)] == [11, 0, 2, 10]
     assert images.read(5)[0, 0].tolist() == [20, 20, 5]  # RGB
+
+
+@pytest.mark.parametrize(
+    ("stems", "numbers", "missing"),
+    [
+        (["f1", "f2", "f10"], (1, 2, 10), [3, 4, 5, 6, 7]),
+        (["cam2_take3_0008", "cam2_take3_0009"], (8, 9), []),
+        (["a00", "a02", "a04", "a08"], (0, 2, 4, 8), [6]),  # every other frame was kept
+        (["17-03-11", "17-04-02", "18-04-59"], None, []),  # names of times
+        (["1698000017", "1698000054", "1698000083", "1698000125"], None, []),
+        (["a", "b"], None, []),
+        (["img5"], None, []),
+    ],
+)
+def test_numbers_of_images(stems, numbers, missing):
+    assert image_numbers(stems) == numbers
+    assert missing_numbers(numbers or (1,)) == missing
 
 
 def test_image_folder_out_of_range(tmp_path):

@@ -1,3 +1,6 @@
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -92,3 +95,16 @@ def test_joint_map_names_a_missing_marker(tmp_path):
     (tmp_path / "map.toml").write_text('left_hip = "LHJC"')
     with pytest.raises(FormatError, match=r"no marker 'LHJC'.*expected one of A, B"):
         joints_of(table(["A", "B"]), "x.trc", read_joint_map(tmp_path / "map.toml"))
+
+
+def test_the_documented_joint_map(tmp_path):
+    """The example of the documents names every joint."""
+    page = Path(__file__).resolve().parents[3] / "docs" / "recordings.md"
+    lines = [line.strip() for line in page.read_text("utf-8").splitlines() if re.match(r' {4}\w+ = "', line)]
+    (tmp_path / "map.toml").write_text("\n".join(lines))
+    assert set(read_joint_map(tmp_path / "map.toml").markers) == set(JOINTS)
+
+
+def test_unknown_names_are_answered_with_an_example_of_a_map():
+    with pytest.raises(FormatError, match=r'a line such as left_shoulder = "C7"'):
+        guess_joint_map(["C7", "LSHO"], "x.trc")

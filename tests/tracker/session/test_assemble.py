@@ -1,3 +1,4 @@
+import tomllib
 from fractions import Fraction
 
 import cv2
@@ -6,8 +7,10 @@ import pytest
 from clips import SIZE, encode, write_images
 
 from tracker.errors import CalibrationError, ModelError, RecordingError, SessionError
+from tracker.evaluation.metrics import at_rate
 from tracker.footage.recording import Recording
 from tracker.formats.anipose import write_calibration
+from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 from tracker.session.assemble import NewSession, assemble
@@ -70,6 +73,33 @@ def test_images_alone_need_a_rate(room):
     folders = [write_images(room / name, [f"{i}.png" for i in range(9)]) for name in ("front", "left")]
     assert_refused(room, RecordingError, "--fps", videos=folders)
     assert new(room, videos=folders, fps=25.0).fps == 25.0
+
+
+def numbered(room, **names):
+    for name in names:
+        (room / f"{name}.mp4").unlink(missing_ok=True)
+    return [
+        write_images(room / camera, [f"{camera}_{i:04d}.png" for i in numbers]) for camera, numbers in names.items()
+    ]
+
+
+def test_images_are_paired_by_their_number(room):
+    folders = numbered(room, front=range(20, 29), left=range(20, 29))
+    assert new(room, videos=folders, fps=25.0).n_frames == 9
+
+
+def test_image_missing_within_a_folder(room):
+    folders = numbered(room, front=range(9), left=[0, 1, 2, 4, 5, 6, 7, 8])
+    expected = r"camera 'left': .*left has no image with number 3, expected every number from 0 to 8"
+    assert_refused(room, RecordingError, expected, videos=folders, fps=25.0)
+
+
+def test_images_of_other_instants(room):
+    """As many images, but the first of one camera and the last of the other are missing."""
+    folders = numbered(room, front=range(9), left=range(1, 10))
+    expected = r"camera 'front': .* no image with number 9, which other cameras have"
+    assert_refused(room, RecordingError, expected, videos=folders, fps=25.0)
+    assert new(room, videos=folders, fps=25.0, offsets={"front": 1}).n_frames == 8
 
 
 def test_people_models_and_heights(room):
@@ -157,8 +187,30 @@ def test_television_rate_is_not_thirty(room):
     assert_refused(room, RecordingError, r"'front' 30, 'left' 29\.97")
 
 
-def test_rate_that_the_videos_do_not_have(room):
-    assert_refused(room, RecordingError, r"expected 60 frames per second, found 'front' 30", fps=60.0)
+def test_rate_that_overrides_what_the_videos_declare(room):
+    """High-speed footage declares the rate at which it is to be played."""
+    encode(room / "left.mp4", n=9, rate=25)
+    session = new(room, fps=240.0)
+    for at in (session, load_session(room / "s")):
+        assert (at.fps, [c.declared_fps for c in at.cameras]) == (240.0, [30.0, 25.0])
+    assert tomllib.loads((room / "s" / "session.toml").read_text())["version"] == 3
+    table = MarkerTable(("p",), np.arange(9), np.arange(9) / 240, np.zeros((9, 1, 3)), 240.0)
+    assert at_rate(table, session.fps) is table  # a TRC file of the true rate is read frame by frame
+
+
+def test_rate_that_the_videos_declare_is_not_stored_twice(room):
+    assert [c.declared_fps for c in new(room, fps=30.0).cameras] == [None, None]
+    assert tomllib.loads((room / "s" / "session.toml").read_text())["version"] == 1
+
+
+def test_some_of_the_cameras(room):
+    session = new(room, cameras=["left"])  # the video of the other is given and left out
+    assert [c.camera.name for c in session.cameras] == ["left"]
+    assert [c.camera.name for c in load_session(room / "s").cameras] == ["left"]
+
+
+def test_cameras_in_another_order(room):
+    assert [c.camera.name for c in new(room, cameras=["left", "front"]).cameras] == ["left", "front"]
 
 
 def test_variable_rate(room):
@@ -178,6 +230,8 @@ def test_size_unlike_the_calibration(room):
     ("changes", "kind", "expected"),
     [
         ({"camera_paths": {"lft": "x.mp4"}}, SessionError, "--camera names an unknown camera 'lft'.*front, left"),
+        ({"cameras": ["left", "lft"]}, SessionError, "--cameras names an unknown camera 'lft'.*front, left"),
+        ({"cameras": ["left", "left"]}, SessionError, "'left' twice"),
         ({"offsets": {"lft": 1}}, SessionError, "--offset names an unknown camera 'lft'"),
         ({"offsets": {"left": -2}}, SessionError, "others an offset of 2"),
         ({"offsets": {"left": 9}}, SessionError, "check the footage and the offsets"),

@@ -1,0 +1,118 @@
+"""`quadrille export`: write stored poses to files of other programs."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from app.cli.arguments import SessionArg
+from app.cli.json_output import format_json
+from app.cli.target import load_target, parse_frames
+from app.export.formats import FORMATS, ExportFormat, find_format
+from app.runtime.progress import Reporter
+from tracker.errors import TrackerError
+
+if TYPE_CHECKING:
+    from tracker.export.motion import ExportedMotion
+
+_FORMATS_HELP = "; ".join(f"{f.name}: {f.title}" for f in FORMATS.values()) + ". By default as --out ends."
+
+
+@dataclass(frozen=True)
+class ExportArguments:
+    """Arguments of `quadrille export`."""
+
+    session: SessionArg
+    """session folder."""
+    out: Path
+    """file to write, or a folder that exists, for a file named after the session."""
+    format: Annotated[str | None, tyro.conf.arg(help=f"{_FORMATS_HELP}. By default as --out ends.", metavar="NAME")] = (
+        None
+    )
+    person: str | None = None
+    """name; all people by default. In trc, mot and bvh each of several people has a file: OUT_NAME.trc."""
+    frames: str | None = None
+    """A:B, half open; from the first to the last pose by default."""
+    axes: Literal["calibration", "y-up"] | None = None
+    """trc, csv, mot, bvh: calibration, the session's world (default of trc and csv); y-up, with the floor at y = 0."""
+    units: Literal["m", "mm"] | None = None
+    """trc, csv, bvh: unit of lengths; m by default."""
+    view: str | None = None
+    """mp4: name of the camera; a grid of all views by default."""
+    keypoints: Literal["all", "coco17", "body"] | None = None
+    """coco: the 17 keypoints of people, all points of the body, or both, which is the default."""
+    skip_lost: bool = False
+    """treat poses whose status is lost as missing."""
+    overwrite: bool = False
+    """replace files that exist."""
+    json: bool = False
+    """print one JSON object."""
+
+
+def command(arguments: Annotated[ExportArguments, tyro.conf.arg(name="")]) -> None:
+    """Write stored poses to a file of another program. docs/export.md describes each format.
+
+    Ctrl+C stops it and leaves no file behind.
+    """
+    from app.export.export import check_options, export, n_ticks
+    from tracker.export.motion import read_motion
+
+    at = load_target(arguments.session, arguments.person, several=True)
+    chosen = find_format(arguments.format, arguments.out)
+    out = _file(arguments.out, chosen, at.session.folder.name)
+    given = {name: getattr(arguments, name) for name in ("axes", "units", "view", "keypoints")}
+    options = check_options(chosen, at.session, given)
+    frames = None if arguments.frames is None else parse_frames(arguments.frames, at.session)
+    motion = read_motion(at.session, at.people, frames, arguments.skip_lost)
+    with Reporter(silent=arguments.json).over(n_ticks(chosen, motion), "exporting") as tick:
+        paths = export(chosen, motion, options, out, arguments.overwrite, tick)
+    found = _summary(motion, chosen, paths, arguments.skip_lost) | {
+        "axes": options.axes if "axes" in chosen.options else None
+    }
+    print(format_json(found) if arguments.json else _format(found))
+
+
+def _file(out: Path, chosen: ExportFormat, name: str) -> Path:
+    """Return the file to write.
+
+    Raises:
+        TrackerError: its suffix is of another format, or its folder is missing.
+    """
+    out = out / f"{name}{chosen.suffixes[0]}" if out.is_dir() else out
+    if out.suffix.lower() != chosen.suffixes[0]:
+        raise TrackerError(
+            f"expected --out to end in {chosen.suffixes[0]} for format {chosen.name}, found '{out.name}'; "
+            f"rename it to {out.name.removesuffix(out.suffix)}{chosen.suffixes[0]}"
+        )
+    if not out.parent.is_dir():
+        raise TrackerError(f"expected --out in a folder that exists, found none at {out.parent}; make it first")
+    return out
+
+
+def _summary(motion: "ExportedMotion", chosen: ExportFormat, paths: list[Path], skip_lost: bool) -> dict[str, Any]:
+    return {
+        "format": chosen.name,
+        "files": [str(path) for path in paths],
+        "people": [p.person.name for p in motion.exported],
+        "frames": [motion.frames.start, motion.frames.stop],
+        "missing": motion.n_missing,
+        "lost": motion.n_lost,
+        "lost_skipped": skip_lost,
+        "refitted": sum(p.n_refitted for p in motion.exported) if chosen.one_body else 0,
+    }
+
+
+def _format(found: dict[str, Any]) -> str:
+    first, last = found["frames"]
+    axes = "" if found["axes"] is None else f", axes {found['axes']}"
+    lines = [f"wrote {path}" for path in found["files"]]
+    lines.append(f"{', '.join(found['people'])}, frames {first}:{last}{axes}")
+    if found["missing"]:
+        lines.append(f"{found['missing']} poses are missing and {FORMATS[found['format']].gaps}")
+    if found["lost"]:
+        advice = "treated as missing" if found["lost_skipped"] else "written as they are; --skip-lost leaves them out"
+        lines.append(f"{found['lost']} poses are lost, {advice}")
+    if found["refitted"]:
+        lines.append(f"{found['refitted']} poses of earlier body sizes were refitted to the present body")
+    return "\n".join(lines)

@@ -1,0 +1,138 @@
+"""The formats that a session is exported to, one entry each. Another format is a writer and an entry here."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tracker.errors import TrackerError
+
+if TYPE_CHECKING:
+    from tracker.export.motion import ExportedMotion
+    from tracker.export.options import AxesName, ExportOptions
+
+Writer = Callable[["ExportedMotion", "ExportOptions", Sequence[Path], Callable[[], None]], None]
+"""Writes a motion to the files of one format, and calls the function after each frame."""
+
+
+@dataclass(frozen=True)
+class ExportFormat:
+    """A format that a session is exported to."""
+
+    name: str
+    """By which the command line and the page refer to it."""
+    title: str
+    """What it holds, for people."""
+    suffixes: tuple[str, ...]
+    """What follows the name in the name of each file; the first names the format."""
+    write: Writer
+    options: frozenset[str] = frozenset()
+    """Options that it has: `axes`, `units`, `keypoints`, `view`."""
+    one_person: bool = False
+    """Whether each person gets files of their own."""
+    axes: "AxesName" = "calibration"
+    """Axes by default, as programs that read it expect them."""
+    gaps: str = "left empty"
+    """What happens to frames without a pose."""
+    one_body: bool = False
+    """Whether all poses of a person are of one body; those of earlier sizes are refitted."""
+
+
+def _trc(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:
+    from tracker.export.writers import write_person_trc
+
+    write_person_trc(motion, options, paths, tick)
+
+
+def _csv(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:
+    from tracker.export.writers import write_tables
+
+    write_tables(motion, options, paths, tick)
+
+
+def _mot(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:
+    from tracker.export.writers import write_person_opensim
+
+    write_person_opensim(motion, options, paths, tick)
+
+
+def _coco(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:
+    from tracker.export.writers import write_keypoints
+
+    write_keypoints(motion, options, paths, tick)
+
+
+def _bvh(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:
+    from tracker.export.writers import write_person_bvh
+
+    write_person_bvh(motion, options, paths, tick)
+
+
+def _mp4(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:
+    from app.export.overlay_video import write_overlay_video
+
+    write_overlay_video(motion, options, paths[0], tick)
+
+
+_PLACE = frozenset(("axes", "units"))
+FORMATS: Mapping[str, ExportFormat] = {
+    f.name: f
+    for f in (
+        ExportFormat("trc", "joint centers (TRC)", (".trc",), _trc, _PLACE, one_person=True),
+        ExportFormat("csv", "tables of joints and angles (CSV)", (".csv", "_angles.csv"), _csv, _PLACE),
+        ExportFormat(
+            "mot",
+            "OpenSim motion with its model (MOT, OSIM)",
+            (".mot", ".osim"),
+            _mot,
+            frozenset(("axes",)),
+            one_person=True,
+            axes="y-up",
+            gaps="left out",
+            one_body=True,
+        ),
+        ExportFormat(
+            "coco",
+            "keypoints in each view (COCO)",
+            (".json",),
+            _coco,
+            frozenset(("keypoints",)),
+            gaps="left without annotation",
+        ),
+        ExportFormat(
+            "bvh",
+            "skeleton animation (BVH)",
+            (".bvh",),
+            _bvh,
+            _PLACE,
+            one_person=True,
+            axes="y-up",
+            gaps="interpolated",
+            one_body=True,
+        ),
+        ExportFormat(
+            "mp4",
+            "overlay video (MP4)",
+            (".mp4",),
+            _mp4,
+            frozenset(("view",)),
+            gaps="shown without a body",
+        ),
+    )
+}
+"""All formats by name."""
+
+
+def find_format(name: str | None, out: Path) -> ExportFormat:
+    """Return a format by name, or without one by the suffix of a file.
+
+    Raises:
+        TrackerError: there is no such format.
+    """
+    if name is not None and name in FORMATS:
+        return FORMATS[name]
+    by_suffix = next((f for f in FORMATS.values() if f.suffixes[0] == out.suffix.lower()), None)
+    if name is None and by_suffix is not None:
+        return by_suffix
+    found = f"'{name}'" if name is not None else f"none, and no known suffix in '{out.name}'"
+    raise TrackerError(f"expected --format to be one of {', '.join(FORMATS)}, found {found}")

@@ -1,0 +1,152 @@
+"""Export the session to a file that the browser downloads.
+
+A request names a format, people, frames and options; the file is made in a temporary folder, sent and deleted. No path
+comes from the network. One export runs at a time.
+"""
+
+import asyncio
+import logging
+import tempfile
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from aiohttp import web
+
+from app.export.formats import FORMATS, ExportFormat
+from app.server import connections
+from tracker.errors import TrackerError
+
+_LOG = logging.getLogger(__name__)
+_CHUNK_BYTES = 1 << 18
+_OPTIONS = ("axes", "units", "view", "keypoints")
+
+
+class _StoppedError(Exception):
+    """The page that asked for an export is gone, or the program ends."""
+
+
+class ExportRoutes:
+    """Answers `/export`: the list of formats, the progress, and the files."""
+
+    def __init__(self, folder: Path) -> None:
+        """Export the session of a folder."""
+        self._folder = folder
+        self._busy = asyncio.Lock()
+        self._done, self._total = 0, 0
+        self._is_ending = False
+
+    def add_to(self, app: web.Application) -> None:
+        """Add the routes to an application."""
+        app.router.add_get("/export", self._list)
+        app.router.add_get("/export/progress", self._progress)
+        app.router.add_get("/export/{format}", self._export)
+        app.on_shutdown.append(self._end)
+
+    async def _end(self, _: web.Application) -> None:
+        self._is_ending = True
+
+    async def _list(self, _: web.Request) -> web.Response:
+        return web.json_response(
+            [{"name": f.name, "title": f.title, "options": sorted(f.options), "axes": f.axes} for f in FORMATS.values()]
+        )
+
+    async def _progress(self, _: web.Request) -> web.Response:
+        return web.json_response({"done": self._done, "total": self._total})
+
+    async def _export(self, request: web.Request) -> web.StreamResponse:
+        chosen = FORMATS.get(request.match_info["format"])
+        if chosen is None:
+            raise web.HTTPNotFound(text=f"Expected a format of {', '.join(FORMATS)}.\n")
+        # Without a token, an image in a foreign page could start the work, though never read the result.
+        if request.headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none"):
+            raise web.HTTPForbidden(text="Expected a request of this page, found one of another site.")
+        if self._busy.locked():
+            raise web.HTTPConflict(text="Another export is in progress; wait for it to finish.")
+        async with self._busy:
+            connections.keep_open(request)
+            with tempfile.TemporaryDirectory(prefix="quadrille-export-") as folder:
+                try:
+                    made = await asyncio.to_thread(self._make, chosen, request, Path(folder))
+                except TrackerError as error:
+                    raise web.HTTPBadRequest(text=str(error)) from error
+                except _StoppedError:
+                    raise web.HTTPServiceUnavailable(text="The export was stopped.") from None
+                finally:
+                    self._done = self._total = 0
+                return await _send(request, made)
+
+    def _make(self, chosen: ExportFormat, request: web.Request, folder: Path) -> Path:
+        """Make the file to send: the exported file, or a ZIP archive of several.
+
+        Raises:
+            TrackerError: an option is wrong, or there is nothing to export.
+            _StoppedError: nobody waits for it any more.
+        """
+        from app.export.export import check_options, export, n_ticks
+        from tracker.export.motion import read_motion
+        from tracker.formats.file_names import identifier
+        from tracker.session.session import load_session
+
+        query = request.query
+        session = load_session(self._folder)
+        names = [p.name for p in session.people]
+        person = query.get("person")
+        if person is not None and person not in names:
+            raise TrackerError(f"expected a person of {', '.join(names)}, found '{person}'; reload the page")
+        people = tuple(range(len(names))) if person is None else (names.index(person),)
+        options = check_options(chosen, session, {name: query.get(name) for name in _OPTIONS})
+        frames = None if not query.get("frames") else _frames(query["frames"], session.n_frames)
+        motion = read_motion(session, people, frames, query.get("skip_lost") == "1")
+        self._total = n_ticks(chosen, motion)
+        stem = identifier(session.folder.name)
+        paths = export(chosen, motion, options, folder / f"{stem}{chosen.suffixes[0]}", tick=self._tick(request))
+        if len(paths) == 1:
+            return paths[0]
+        archive = folder / f"{stem}_{chosen.name}.zip"
+        with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+            for path in paths:
+                file.write(path, path.name)
+        return archive
+
+    def _tick(self, request: web.Request) -> Callable[[], None]:
+        """Return what counts the progress, and stops the work when nobody waits for it."""
+
+        def tick() -> None:
+            self._done += 1
+            if self._is_ending or request.transport is None or request.transport.is_closing():
+                raise _StoppedError
+
+        return tick
+
+
+def _frames(text: str, n_frames: int) -> range:
+    """Parse A:B, half open, of a request.
+
+    Raises:
+        TrackerError: it is no range within the session.
+    """
+    first, colon, last = text.partition(":")
+    if colon and all(word.isascii() and word.isdigit() and len(word) < 10 for word in (first, last)):
+        frames = range(int(first), int(last))
+        if frames and frames.stop <= n_frames:
+            return frames
+    raise TrackerError(f"expected frames as A:B within 0:{n_frames} (A included, B not), found '{text[:40]}'")
+
+
+async def _send(request: web.Request, path: Path) -> web.StreamResponse:
+    """Send a file as a download."""
+    headers: Mapping[str, Any] = {
+        "Content-Type": "application/octet-stream",
+        "Content-Length": str(path.stat().st_size),
+        "Content-Disposition": f"attachment; filename*=UTF-8''{quote(path.name)}",
+    }
+    response = web.StreamResponse(headers=headers)
+    await response.prepare(request)
+    with path.open("rb") as file:
+        while chunk := file.read(_CHUNK_BYTES):
+            await response.write(chunk)
+    await response.write_eof()
+    return response

@@ -1,0 +1,207 @@
+/** Popover that exports the session to a file of another program, which the browser downloads. */
+
+import { button, byId } from "../widgets/elements.js";
+import { opensPopover, togglePopover } from "../widgets/popovers.js";
+
+const PROGRESS_MS = 400;
+/** Longest text of the server that is shown as its reason. */
+const MAX_REASON = 400;
+
+/** @typedef {{name: string, title: string, options: string[], axes: string}} Format */
+
+export class ExportPanel {
+  #store;
+  #notify;
+  #panel = byId("export-panel", HTMLElement);
+  #open = byId("show-export", HTMLButtonElement);
+  #format = byId("export-format", HTMLSelectElement);
+  #person = byId("export-person", HTMLSelectElement);
+  #view = byId("export-view", HTMLSelectElement);
+  #frames = byId("export-frames", HTMLInputElement);
+  #progress = byId("export-progress", HTMLOutputElement);
+  #start;
+  #cancel;
+  /** @type {Format[]} */
+  #formats = [];
+  /** @type {AbortController | null} the export in progress */
+  #running = null;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {(notice: import("../model/protocol.js").NoticeMessage) => void} notify
+   */
+  constructor(store, notify) {
+    this.#store = store;
+    this.#notify = notify;
+    opensPopover(this.#panel, this.#open, () => void this.toggle());
+    this.#start = button("export-start", () => void this.#run());
+    this.#cancel = button("export-cancel", () => this.#running?.abort());
+    this.#format.addEventListener("change", () => this.#show());
+    this.#frames.addEventListener("keydown", (event) => event.key === "Enter" && void this.#run());
+    for (const select of this.#panel.querySelectorAll("select")) this.#select(select);
+  }
+
+  async toggle() {
+    if (!this.#panel.matches(":popover-open")) {
+      try {
+        await this.#fill();
+      } catch {
+        this.#say("error", "The list of formats could not be loaded. Try again when the page is connected.");
+        return;
+      }
+    }
+    togglePopover(this.#panel, this.#open);
+  }
+
+  /** @param {HTMLSelectElement} select whose keys must not reach the page */
+  #select(select) {
+    select.addEventListener("keydown", (event) => event.key !== "Escape" && event.stopPropagation());
+  }
+
+  /** Fill the choices of the session, and the marked range. */
+  async #fill() {
+    if (!this.#formats.length) {
+      const answer = await fetch("export");
+      if (!answer.ok) throw new Error(`status ${answer.status}`);
+      this.#formats = await answer.json();
+      this.#format.replaceChildren(...this.#formats.map(({ name, title }) => new Option(capital(title), name)));
+    }
+    const { session, range } = this.#store.facts;
+    const people = session?.people.map(({ name }) => new Option(name, name)) ?? [];
+    const cameras = session?.cameras.map(({ name }) => new Option(name, name)) ?? [];
+    choices(this.#person, [new Option("Everyone", ""), ...people]);
+    choices(this.#view, [new Option("Grid of all", ""), ...cameras]);
+    if (range) this.#frames.value = `${range.first}-${range.last}`;
+    this.#show();
+  }
+
+  /** Show the options that the chosen format has. */
+  #show() {
+    const format = this.#formats.find(({ name }) => name === this.#format.value);
+    const has = new Set([...(format?.options ?? []), ...((this.#store.facts.session?.people.length ?? 0) > 1 ? ["person"] : [])]);
+    for (const part of this.#panel.querySelectorAll("[data-option]")) {
+      if (part instanceof HTMLElement) part.hidden = !has.has(part.dataset.option ?? "");
+    }
+    byId("export-axes", HTMLSelectElement).value = format?.axes ?? "calibration";
+  }
+
+  /** @returns {string | null} the address of the export; null, with the reason shown, if the frames are wrong */
+  #address() {
+    const words = new URLSearchParams();
+    for (const field of this.#panel.querySelectorAll("select[data-option]")) {
+      if (field instanceof HTMLSelectElement && !field.hidden && field.value) words.set(field.dataset.option ?? "", field.value);
+    }
+    const text = this.#frames.value.trim();
+    if (text) {
+      const frames = /^(\d{1,8})(?:\s*[-–]\s*(\d{1,8}))?$/.exec(text);
+      const last = (this.#store.facts.session?.n_frames ?? 1) - 1;
+      const [from, to] = frames ? [Number(frames[1]), Number(frames[2] ?? frames[1])] : [0, -1];
+      if (from > to || to > last) {
+        this.#tell(`Expected frames within 0-${last}, such as 0-${Math.min(9, last)}, or nothing.`, true);
+        return null;
+      }
+      words.set("frames", `${from}:${to + 1}`);
+    }
+    if (byId("export-skip-lost", HTMLInputElement).checked) words.set("skip_lost", "1");
+    return `export/${this.#format.value}?${words}`;
+  }
+
+  async #run() {
+    if (this.#running) return;
+    const address = this.#address();
+    if (address === null) {
+      this.#frames.focus();
+      return;
+    }
+    const running = (this.#running = new AbortController());
+    this.#start.disabled = true;
+    this.#cancel.hidden = false;
+    this.#tell("Exporting…");
+    const timer = setInterval(() => void this.#showProgress(), PROGRESS_MS);
+    try {
+      const answer = await fetch(address, { signal: running.signal });
+      if (!answer.ok) throw new Error((await answer.text()).slice(0, MAX_REASON));
+      const name = fileName(answer.headers.get("Content-Disposition") ?? "");
+      save(await answer.blob(), name);
+      this.#tell(`Saved ${name}`);
+      this.#say("info", `Exported ${name}.`);
+    } catch (error) {
+      if (running.signal.aborted) this.#tell("Canceled");
+      else {
+        const reason = error instanceof TypeError ? "the program cannot be reached" : String(/** @type {Error} */ (error).message);
+        this.#tell(`Failed: ${reason}`, true);
+        this.#say("error", `Export failed: ${reason}`);
+      }
+    } finally {
+      clearInterval(timer);
+      this.#running = null;
+      this.#start.disabled = false;
+      this.#cancel.hidden = true;
+    }
+  }
+
+  async #showProgress() {
+    try {
+      const { done, total } = await (await fetch("export/progress")).json();
+      if (this.#running && total) this.#tell(`Exporting, ${Math.floor((100 * done) / total)}%`);
+    } catch {
+      // The export itself reports that the program cannot be reached.
+    }
+  }
+
+  /**
+   * Show a line in the panel, which covers the notices.
+   *
+   * @param {string} text
+   * @param {boolean} isFailure
+   */
+  #tell(text, isFailure = false) {
+    this.#progress.textContent = text;
+    this.#progress.classList.toggle("is-failed", isFailure);
+  }
+
+  /**
+   * @param {"error" | "info"} level
+   * @param {string} text
+   */
+  #say(level, text) {
+    this.#notify({ type: "notice", level, text });
+  }
+}
+
+/**
+ * Replace the options of a select, and keep what was chosen if it is still there.
+ *
+ * @param {HTMLSelectElement} select
+ * @param {HTMLOptionElement[]} options
+ */
+function choices(select, options) {
+  const chosen = select.value;
+  select.replaceChildren(...options);
+  if (options.some(({ value }) => value === chosen)) select.value = chosen;
+}
+
+/** @param {string} disposition header with the name of a file */
+function fileName(disposition) {
+  const name = /filename\*=UTF-8''([^;]+)/.exec(disposition)?.[1];
+  return name ? decodeURIComponent(name) : "export";
+}
+
+/**
+ * Save data as a file of the browser.
+ *
+ * @param {Blob} data
+ * @param {string} name
+ */
+function save(data, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(data);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+}
+
+/** @param {string} text */
+function capital(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}

@@ -1,0 +1,100 @@
+"""`quadrille export`: files by name, wrong input, overwriting."""
+
+import errno
+import json
+
+import pytest
+from bodies import MODELS
+from command_line import assert_refused
+from stored_motions import store_motion
+
+from app.export.formats import FORMATS
+from tracker.formats.trc import read_trc
+
+
+@pytest.fixture
+def couple(tmp_path):
+    folder = tmp_path / "s"
+    store_motion(folder, [MODELS["gavrila22"]] * 2, gaps={(0, 3), (0, 7)}, lost={(1, 5)})
+    return folder
+
+
+def test_each_person_has_a_file_of_the_name(run, couple, tmp_path):
+    status, out, _ = run("export", couple, "--format", "trc", "--out", tmp_path / "m.trc", "--json")
+    assert status == 0
+    found = json.loads(out)
+    assert found["files"] == [str(tmp_path / f"m_{name}.trc") for name in ("ann", "bob")]
+    assert (found["frames"], found["missing"], found["lost"]) == ([0, 8], 2, 1)
+    status, out, _ = run("export", couple, "--out", tmp_path / "m.mot", "--person", "bob", "--skip-lost")
+    assert status == 0
+    assert (tmp_path / "m.osim").is_file()
+    lines = out.splitlines()
+    assert lines[2:] == [
+        "bob, frames 0:8, axes y-up", "1 poses are missing and left out", "1 poses are lost, treated as missing"
+    ]  # fmt: skip
+    rows = (tmp_path / "m.mot").read_text().splitlines()
+    assert rows[2] == "nRows=7"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["m.mot", "m.osim", "m_ann.trc", "m_bob.trc", "s"]
+
+
+def test_a_folder_takes_the_name_of_the_session(run, couple, tmp_path):
+    assert run("export", couple, "--format", "csv", "--out", tmp_path, "--frames", "2:4")[0] == 0
+    assert (tmp_path / "s_angles.csv").is_file()
+    assert len((tmp_path / "s.csv").read_text().splitlines()) == 1 + 2 * 2
+
+
+def test_a_file_is_replaced_only_on_request(run, couple, tmp_path):
+    path = tmp_path / "m.trc"
+    path.write_text("mine")
+    words = ("export", couple, "--out", path, "--person", "ann")
+    assert_refused(run(*words), ["expected", str(path), "not to exist", "--overwrite"])
+    assert path.read_text() == "mine"
+    assert run(*words, "--overwrite")[0] == 0
+    assert len(read_trc(path).frames) == 7  # from the first pose to the last
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["--format", "fbx"], ["--format to be one of trc, csv, mot, coco, bvh, mp4", "found 'fbx'"]),
+        (["--format", "trc", "--out", "{}/a.csv"], ["--out to end in .trc", "'a.csv'", "rename it to a.trc"]),
+        (["--out", "{}/a"], ["--format to be one of", "no known suffix in 'a'"]),
+        (["--out", "{}/none/a.trc"], ["in a folder that exists", "none"]),
+        (["--person", "eve"], ["--person to be one of ann, bob, found 'eve'"]),
+        (["--frames", "5:99"], ["--frames as A:B within 0:8", "'5:99'"]),
+        (["--frames", "3:4", "--person", "ann"], ["expected poses of 'ann' in frames 3:4, found none"]),
+        (["--frames", "5:6", "--person", "bob", "--skip-lost"], ["found none that is not lost"]),
+        (["--view", "cam0"], ["expected no --view with format trc", "--axes, --units"]),
+        (["--format", "mot", "--out", "{}/a.mot", "--units", "mm"], ["expected no --units with format mot", "--axes"]),
+        (["--format", "mp4", "--out", "{}/a.mp4", "--view", "x"], ["--view to be one of cam0, cam1, cam2, found 'x'"]),
+        (["--format", "mp4", "--out", "{}/a.mp4"], ["cam0", "not found"]),
+    ],
+)
+def test_wrong_input_is_refused_and_leaves_nothing(run, couple, tmp_path, words, expected):
+    found = [str(w).format(tmp_path) for w in words]
+    out = [] if "--out" in found else ["--out", str(tmp_path / "a.trc")]
+    assert_refused(run("export", couple, *out, *found), expected)
+    assert [p.name for p in tmp_path.iterdir()] == ["s"]
+
+
+def test_what_cannot_be_written_leaves_nothing(run, couple, tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("app.export.export.os.replace", full)
+    result = run("export", couple, "--out", tmp_path / "a.mot", "--person", "ann")
+    assert_refused(result, [f"cannot write {tmp_path / 'a.mot'}: No space left on device", "choose a folder"])
+    assert [p.name for p in tmp_path.iterdir()] == ["s"]
+
+
+def test_a_session_without_poses(run, session, tmp_path):
+    result = run("export", session, "--out", tmp_path / "a.bvh")
+    assert_refused(result, ["expected poses of 'person', found none", "place the body in the page"])
+
+
+def test_help_lists_every_format(run):
+    status, out, _ = run("export", "--help")
+    assert status == 0
+    text = " ".join(out.replace("│", " ").split())
+    for one in FORMATS.values():
+        assert f"{one.name}: {one.title}" in text

@@ -1,0 +1,39 @@
+"""Progress of long work: the rate and the time left are those of a usual item."""
+
+from app.runtime.progress import Pace, Reporter, pace_text
+
+
+def paced(durations):
+    times = [0.0]
+    for d in durations:
+        times.append(times[-1] + d)
+    clock = iter(times)
+    pace = Pace(lambda: next(clock))
+    for _ in durations:
+        pace.tick()
+    return pace
+
+
+def test_time_left_ignores_compiling():
+    assert paced([90.0]).item_s is None
+    assert paced([90.0, 0.5]).item_s == 0.5
+    assert paced([90.0, 0.4, 0.6, 40.0, 0.5]).item_s == 0.5  # a search compiled its kernels later
+    assert pace_text(paced([90.0, 0.5, 0.5]), 100) == ", 2.0/s, 50 s left"
+    assert pace_text(paced([90.0, 2.0]), 300) == ", 0.5/s, 10 min left"
+    assert pace_text(paced([90.0]), 100) == ""
+    assert pace_text(paced([90.0, 0.5]), 0) == ", 2.0/s"
+
+
+def test_frames_that_are_hard_count():
+    """A few searched frames among quick ones are work like any other, unless they stand out by far."""
+    assert paced([90.0, *[0.5, 0.5, 2.0] * 5]).item_s == 1.0
+
+
+def test_lines_where_there_is_no_terminal(capsys, monkeypatch):
+    times = iter([0.0, 60.0, 60.5, 61.0])
+    monkeypatch.setattr(Pace.__init__, "__defaults__", (lambda: next(times),))
+    with Reporter().over(3, "tracking") as tick:
+        for _ in range(3):
+            tick()
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == ["tracking: 1 of 3", "tracking: 2 of 3, 2.0/s, 0 s left", "tracking: 3 of 3, 2.0/s"]

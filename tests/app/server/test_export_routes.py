@@ -1,0 +1,121 @@
+"""Exports that the page downloads."""
+
+import asyncio
+import io
+import tempfile
+import zipfile
+
+import aiohttp
+import pytest
+from bodies import MODELS
+from serving import listening
+from stored_motions import store_motion
+
+from app.export import formats
+from app.server import server
+from app.server.access import Access
+from app.server.export_routes import ExportRoutes
+
+
+class Nobody:
+    async def serve(self, socket):
+        pass
+
+
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    """The system's folder for temporary files."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+@pytest.fixture
+async def client(tmp_path, temporary):
+    folder = tmp_path / "dance"
+    store_motion(folder, [MODELS["gavrila22"]] * 2, gaps={(0, 3)})
+    app = server.create_app(Nobody(), tmp_path / "nobody", Access(token="secret"), server.static_folder())
+    ExportRoutes(folder).add_to(app)
+    async with listening(app) as port, aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session:
+        session.cookie_jar.update_cookies({f"quadrille_{port}": "secret"})
+        yield session
+
+
+async def test_files_are_made_sent_and_deleted(client, temporary):
+    async with client.get("/export") as response:
+        listed = await response.json()
+    assert [f["name"] for f in listed] == list(formats.FORMATS)
+    assert {f["name"]: f["axes"] for f in listed}["bvh"] == "y-up"
+    async with client.get("/export/trc?person=ann&frames=1:5&axes=y-up&units=mm") as response:
+        assert response.status == 200
+        assert response.headers["Content-Disposition"] == "attachment; filename*=UTF-8''dance.trc"
+        rows = (await response.text()).splitlines()
+    assert rows[2].split("\t")[4] == "mm"
+    assert [row.split("\t")[0] for row in rows[6:]] == ["2", "3", "4", "5"]
+    async with client.get("/export/mot?frames=0:2") as response:
+        archive = zipfile.ZipFile(io.BytesIO(await response.read()))
+    assert sorted(archive.namelist()) == ["dance_ann.mot", "dance_ann.osim", "dance_bob.mot", "dance_bob.osim"]
+    async with client.get("/export/progress") as response:
+        assert await response.json() == {"done": 0, "total": 0}
+    assert list(temporary.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "status", "expected"),
+    [
+        ("fbx", 404, "Expected a format of trc, csv"),
+        ("..%2F..%2Fetc%2Fpasswd", 404, "Expected a format"),
+        ("trc?person=..%2Fann", 400, "expected a person of ann, bob, found '../ann'"),
+        ("trc?frames=5:99", 400, "expected frames as A:B within 0:8"),
+        ("trc?frames=²:9", 400, "expected frames as A:B"),
+        ("trc?axes=up", 400, "expected --axes to be one of"),
+        ("mp4?view=%2Fdev%2Fzero", 400, "expected --view to be one of cam0, cam1, cam2"),
+        ("trc?frames=3:4&person=ann", 400, "expected poses of 'ann' in frames 3:4, found none"),
+        ("mp4", 400, "not found"),
+    ],
+)
+async def test_wrong_requests_are_answered_with_the_reason(client, temporary, path, status, expected):
+    async with client.get(f"/export/{path}") as response:
+        assert response.status == status
+        assert expected in await response.text()
+    assert list(temporary.iterdir()) == []
+
+
+async def test_strangers_and_foreign_pages_get_nothing(client):
+    async with client.get("/export/trc", headers={"Sec-Fetch-Site": "cross-site"}) as response:
+        assert response.status == 403
+    client.cookie_jar.clear()
+    for path in ("/export", "/export/progress", "/export/trc"):
+        async with client.get(path) as response:
+            assert response.status == 403
+
+
+async def test_one_runs_at_a_time_and_stops_when_the_page_goes(client, temporary, monkeypatch):
+    reached, go_on, ticks = asyncio.Event(), [], []
+    loop = asyncio.get_running_loop()
+
+    def slow(motion, options, paths, tick):
+        loop.call_soon_threadsafe(reached.set)
+        while not go_on:
+            tick()
+            ticks.append(1)
+            asyncio.run(asyncio.sleep(0.01))
+
+    one = formats.FORMATS["coco"]
+    monkeypatch.setitem(formats.FORMATS, "coco", formats.ExportFormat("coco", one.title, one.suffixes, slow))
+    try:
+        first = asyncio.create_task(client.get("/export/coco"))
+        await asyncio.wait_for(reached.wait(), 5)
+        async with client.get("/export/csv") as response:
+            assert response.status == 409
+            assert "Another export is in progress" in await response.text()
+        first.cancel()
+        async with asyncio.timeout(5):
+            while list(temporary.iterdir()):
+                await asyncio.sleep(0.02)
+        async with client.get("/export/csv") as response:
+            assert response.status == 200
+    finally:
+        go_on.append(True)
+    assert ticks

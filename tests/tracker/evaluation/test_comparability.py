@@ -1,0 +1,51 @@
+import re
+
+import numpy as np
+import pytest
+
+from tracker.evaluation.comparability import distance_note, length_note
+from tracker.evaluation.metrics import axes_matrix
+from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.formats.trc import MarkerTable
+from tracker.geometry import rigid
+
+
+def table(change=lambda points: points):
+    """Joints of a person who walks, moved by a change."""
+    rng = np.random.default_rng(1)
+    points = rng.normal(0, 0.3, (1, 12, 3)) + [2.0, 0.5, 1.0] + np.linspace(0, 1, 20)[:, None, None] * [0.0, 1.0, 0.0]
+    return MarkerTable(LIMB_JOINTS, np.arange(20), np.arange(20) / 30, change(points + 0.0), 30.0)
+
+
+def moved(points):
+    return rigid.apply(rigid.transform(rigid.so3_exp(np.array([0.3, 0.4, 1.0])), np.array([4.0, 5.0, 6.0])), points)
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda p: p @ axes_matrix("y,z,x"), "m from the poses .*with --axes y,z,x it would be 0[.]00 m"),
+        (lambda p: 1000 * p, "1000 times as large: correct the Units"),
+        (lambda p: p / 1000, "1000 times smaller: correct the Units"),
+        (moved, "say --align rigid-all"),
+        (lambda p: p[::-1, ::-1] * [1.0, -2.0, 1.5] + 4, "check that it is of this recording"),
+    ],
+)
+def test_a_reference_metres_away(change, expected):
+    note = distance_note(table(), table(change), range(20))
+    assert note is not None
+    assert re.search(expected, note), note
+
+
+def test_axes_are_said_with_respect_to_the_file():
+    """Read with wrong axes, the note names the right ones."""
+    wrong = table(lambda p: p @ axes_matrix("y,z,x") @ axes_matrix("-y,x,z").T)
+    assert "--axes y,z,x " in distance_note(table(), wrong, range(20), axes="-y,x,z")
+
+
+def test_a_reference_that_fits():
+    assert distance_note(table(), table(lambda p: p + 0.3), range(20)) is None
+    assert distance_note(table(), table(lambda p: p + np.nan), range(20)) is None
+    assert length_note(20, 20) is None
+    assert length_note(20, None) is None
+    assert "20 frames and the reference 25" in length_note(20, 25)

@@ -1,0 +1,289 @@
+"""Calibrations of many programs: the same cameras from each layout, and names for what is not read."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+import tomli_w
+
+from tracker.errors import CalibrationError
+from tracker.formats.anipose import read_calibration, write_calibration
+from tracker.formats.calibration import read_cameras
+from tracker.geometry import rigid
+from tracker.geometry.cameras import Camera
+
+K = np.array([[500.0, 0.0, 330.0], [0.0, 510.0, 235.0], [0.0, 0.0, 1.0]])
+DIST = np.array([-0.3, 0.1, 0.001, 0.002, 0.01])
+
+
+def looking(angle):
+    """A camera 4 m from the origin that looks at it."""
+    center = 4 * np.array([np.cos(angle), np.sin(angle), 0.3])
+    z = -center / np.linalg.norm(center)
+    x = np.cross([0.0, 0.0, -1.0], z)
+    x /= np.linalg.norm(x)
+    return rigid.transform(np.stack([x, np.cross(z, x), z], axis=1), center)
+
+
+CAMERAS = [Camera(f"cam{i}", (640, 480), K + 3 * i * (K > 99), DIST * (1 + i), looking(1.3 * i)) for i in range(3)]
+
+
+def opencv_rows(c):
+    """Key and value of one camera with OpenCV's words."""
+    R, t = c.T_camera_world[:3, :3], c.T_camera_world[:3, 3]
+    return {"K": c.K, "dist": c.distortion, "R": R, "rvec": rigid.so3_log(R), "t": t, "size": list(c.size)}
+
+
+def write_storage(path, values):
+    """Write nested values by OpenCV itself."""
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+
+    def write(name, value):
+        if isinstance(value, dict):
+            storage.startWriteStruct(name, cv2.FileNode_MAP)
+            for key, inner in value.items():
+                write(key, inner)
+            storage.endWriteStruct()
+        else:
+            storage.write(name, value)
+
+    for key, value in values.items():
+        write(key, value)
+    storage.release()
+    return path
+
+
+def write_json(path, data):
+    path.write_text(json.dumps(data, default=lambda a: a.tolist()))
+    return path
+
+
+def easymocap(folder, suffix="yml"):
+    """Intrinsics and poses in two files; the size is not stated."""
+    columns = {c.name: opencv_rows(c) for c in CAMERAS}
+    intri = {"names": list(columns)} | {f"K_{n}": r["K"] for n, r in columns.items()}
+    intri |= {f"dist_{n}": r["dist"][None] for n, r in columns.items()}
+    extri = {"names": list(columns)} | {f"R_{n}": r["rvec"][:, None] for n, r in columns.items()}
+    extri |= {f"Rot_{n}": r["R"] for n, r in columns.items()} | {f"T_{n}": r["t"][:, None] for n, r in columns.items()}
+    write_storage(folder / f"intri.{suffix}", intri)
+    return write_storage(folder / f"extri.{suffix}", extri)
+
+
+def opencv(suffix):
+    """One group for each camera, written by OpenCV."""
+
+    def make(folder):
+        names = {"K": "camera_matrix", "dist": "distortion_coefficients", "rvec": "rvec", "t": "tvec"}
+        groups = {
+            c.name: {names[k]: v for k, v in opencv_rows(c).items() if k in names} | {"width": 640, "height": 480}
+            for c in CAMERAS
+        }
+        return write_storage(folder / f"cameras.{suffix}", groups)
+
+    return make
+
+
+def panoptic(folder):
+    rows = [opencv_rows(c) | {"name": c.name} for c in CAMERAS]
+    cameras = [
+        {"name": r["name"], "type": "hd", "panel": 0, "node": i, "resolution": r["size"], "K": r["K"],
+         "distCoef": r["dist"], "R": r["R"], "t": 100 * r["t"][:, None]}
+        for i, r in enumerate(rows)
+    ]  # fmt: skip
+    return write_json(folder / "calibration_160422.json", {"calibDataSource": "x", "cameras": cameras})
+
+
+def kalibr(folder):
+    """A chain of cameras; the first one defines the world."""
+    lines, before = ["%YAML 1.2", "---"], None
+    for c in CAMERAS:
+        fx, _, cx, _, fy, cy = c.K.ravel()[:6]
+        lines += [f"{c.name}:", "  camera_model: pinhole", "  distortion_model: radtan", f"  rostopic: /{c.name}"]
+        lines += [f"  intrinsics: [{fx}, {fy}, {cx}, {cy}]", "  resolution: [640, 480]"]
+        lines += [f"  distortion_coeffs: {c.distortion[:4].tolist()}"]
+        if before is not None:
+            lines += ["  T_cn_cnm1:"]
+            lines += [f"  - {row}" for row in (c.T_camera_world @ before.T_world_camera).tolist()]
+        before = c
+    path = folder / "camchain.yaml"
+    path.write_text("\n".join(lines))
+    return path
+
+
+def rows_json(folder):
+    rows = [{"camera_name": c.name, **opencv_rows(c)} for c in CAMERAS]
+    return write_json(folder / "rows.json", [{k: v for k, v in r.items() if k != "rvec"} for r in rows])
+
+
+def halves_json(folder):
+    """Intrinsics and poses apart within each camera, the poses as 3x4 matrices, 14 coefficients of distortion."""
+    cameras = {
+        c.name: {
+            "intrinsics": {
+                "K": c.K,
+                "dist_coeffs": [*c.distortion, *[0.0] * 9],
+                "image_size": {"width": 640, "height": 480},
+            },
+            "extrinsics": {"RT": c.T_camera_world[:3]},
+        }
+        for c in CAMERAS
+    }
+    return write_json(folder / "halves.json", {"cameras": cameras})
+
+
+def flat_json(folder):
+    """Numbers apart."""
+    rows = {
+        c.name: {"fx": c.K[0, 0], "fy": c.K[1, 1], "cx": c.K[0, 2], "cy": c.K[1, 2], "w": 640, "h": 480,
+                 "k1": c.distortion[0], "k2": c.distortion[1], "p1": c.distortion[2], "p2": c.distortion[3],
+                 "k3": c.distortion[4], "rvec": opencv_rows(c)["rvec"], "tvec": opencv_rows(c)["t"]}
+        for c in CAMERAS
+    }  # fmt: skip
+    return write_json(folder / "flat.json", rows)
+
+
+def anipose(folder):
+    write_calibration(folder / "Calib.toml", CAMERAS)
+    return folder / "Calib.toml"
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        anipose,
+        easymocap,
+        opencv("yml"),
+        opencv("xml"),
+        opencv("json"),
+        panoptic,
+        kalibr,
+        rows_json,
+        halves_json,
+        flat_json,
+    ],
+    ids=lambda make: getattr(make, "__name__", "opencv"),
+)
+def test_the_same_cameras_from_every_layout(tmp_path, make):
+    path = make(tmp_path)
+    entries = read_cameras(path)
+    assert [e.name for e in entries] == [c.name for c in CAMERAS]
+    origin = CAMERAS[0].T_camera_world if make is kalibr else np.eye(4)
+    points = np.random.default_rng(0).uniform(-0.5, 0.5, (5, 3))
+    for entry, expected in zip(entries, CAMERAS, strict=True):
+        camera = entry.camera((640, 480))
+        distortion = expected.distortion[:4] if make is kalibr else expected.distortion
+        np.testing.assert_allclose(camera.distortion, distortion)
+        reference = Camera("", (640, 480), expected.K, distortion, expected.T_world_camera)
+        np.testing.assert_allclose(camera.project(rigid.apply(origin, points)), reference.project(points), atol=1e-6)
+    if make not in (easymocap,):
+        assert [e.size for e in entries] == [(640, 480)] * 3
+
+
+def test_size_from_the_footage_if_it_is_plausible(tmp_path):
+    (entry, *_) = read_cameras(easymocap(tmp_path))
+    assert entry.size is None
+    assert entry.camera((660, 470)).size == (660, 470)
+    with pytest.raises(
+        CalibrationError, match=r"'cam0': .*no image size.*330, 235 is not that of footage of 1920x1080"
+    ):
+        entry.camera((1920, 1080))
+    with pytest.raises(CalibrationError, match="the key 'size'"):
+        entry.camera()
+
+
+def test_units(tmp_path):
+    assert np.linalg.norm(read_cameras(panoptic(tmp_path))[0].T_world_camera[:3, 3]) == pytest.approx(4.176, abs=1e-3)
+    path = rows_json(tmp_path)
+    with pytest.raises(CalibrationError, match=r"read as centimetres.*look like metres"):
+        read_cameras(path, "cm")
+    with pytest.raises(CalibrationError, match=r"read as millimetres.*look like metres"):
+        read_cameras(path, "mm")
+
+
+def test_caliscope(data_folder):
+    entries = read_cameras(data_folder("board_real") / "camera_array.toml")
+    assert [e.name for e in entries] == ["cam_0", "cam_1", "cam_2", "cam_3"]
+    assert all(e.size == (1280, 720) and len(e.distortion) == 5 for e in entries)
+    with pytest.raises(CalibrationError, match="settings of a Caliscope project"):
+        read_cameras(data_folder("board_real") / "config.toml")
+
+
+def test_ignored_cameras_of_caliscope(tmp_path):
+    write_calibration(tmp_path / "c.toml", CAMERAS)
+    rows = read_calibration(tmp_path / "c.toml")
+    sections = {
+        str(i): {"cam_id": i, "ignore": i == 1, "size": c.size, "matrix": c.K.tolist(),
+                 "rotation": c.T_camera_world[:3, :3].tolist(), "translation": c.T_camera_world[:3, 3].tolist()}
+        for i, c in enumerate(rows)
+    }  # fmt: skip
+    (tmp_path / "camera_array.toml").write_text(tomli_w.dumps({"cameras": sections}))
+    assert [e.name for e in read_cameras(tmp_path / "camera_array.toml")] == ["cam_0", "cam_2"]
+
+
+def inverted(folder):
+    rows = {
+        c.name: {"K": c.K, "R": c.T_world_camera[:3, :3], "t": c.T_world_camera[:3, 3], "size": c.size} for c in CAMERAS
+    }
+    return write_json(folder / "inverted.json", rows)
+
+
+def fisheye(folder):
+    rows = {c.name: opencv_rows(c) | {"fisheye": True} for c in CAMERAS}
+    return write_json(folder / "fisheye.json", rows)
+
+
+def text(name, content):
+    def make(folder):
+        (folder / name).write_text(content)
+        return folder / name
+
+    return make
+
+
+QUALISYS = (
+    '<calibration created="2023"><cameras><camera active="1" serial="24821"><fov_video left="0"/>'
+    '<transform x="1" r11="1"/><intrinsic focalLengthU="1"/></camera></cameras></calibration>'
+)
+XCP = '<?xml version="1.0"?><Cameras><Camera DEVICEID="1"><KeyFrames><KeyFrame/></KeyFrames></Camera></Cameras>'
+LENS = "%YAML:1.0\n---\nimage_width: 640\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: "
+BOMB = "a: &a [1, 2]\nb: &b [*a, *a]\nc: [*b, *b]\n"
+ENTITIES = '<!DOCTYPE x [<!ENTITY a "aaaa">' + "".join(
+    f'<!ENTITY {chr(98 + i)} "{f"&{chr(97 + i)};" * 20}">' for i in range(8)
+) + "]><opencv_storage><x>&i;</x></opencv_storage>"  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("make", "expected"),
+    [
+        (text("a.qca.txt", QUALISYS), "Qualisys QTM or Theia; convert it with Pose2Sim"),
+        (text("a.xcp", XCP), r"Vicon \(XCP\); convert it with Pose2Sim"),
+        (text("a.xml", "<document><chunk/></document>"), "Metashape"),
+        (text("a.xml", "<scene/>"), "XML with <scene>"),
+        (text("a.pickle", "x"), "OpenCap"),
+        (text("a.mat", "x"), "MATLAB.*JSON"),
+        (text("t.json", '{"frames": [{"transform_matrix": []}]}'), "NeRF"),
+        (text("stereo.yml", "M1: 1\nD1: 1\nM2: 1\nD2: 1\n"), "stereo"),
+        (text("lens.yml", LENS + "[ 500., 0., 320., 0., 500., 240., 0., 0., 1. ]\n"), "the lens alone"),
+        (text("a.json", "{}"), "expected TOML of anipose.*found no camera"),
+        (text("a.json", "[1, 2"), "not valid JSON"),
+        (text("a.json", "[" * 100000), "not valid JSON"),
+        (text("a.yml", "a: [1, 2"), "not valid YAML.*line"),
+        (text("a.yml", "- just\n- words\n"), "found no camera"),
+        (text("a.yml", BOMB), "plain data, found references"),
+        (text("a.yml", "[" * 5000), "deep nesting|not valid YAML"),
+        (text("a.xml", "<a><b></a>"), "not valid XML"),
+        (text("a.xml", ENTITIES), "not valid XML"),
+        (text("a.xml", ""), "not valid XML"),
+        (text("a.toml", ""), "one section per camera"),
+        (text("a.json", '{"a": {"K": "no matrix", "R": [1, 2], "t": 3}}'), "'a': expected a list as 'rotation'|'a'"),
+        (text("a.json", '{"a": {"K": [[1e999]], "R": 1, "t": 3}}'), "not valid JSON|'a'"),
+        (inverted, "seem to map camera to world.*invert"),
+        (fisheye, "fisheye lens, which is not supported"),
+        (lambda folder: folder, "is a folder"),
+        (lambda folder: folder / "none.json", "none.json not found"),
+    ],
+)
+def test_what_is_not_read_is_named(tmp_path, make, expected):
+    with pytest.raises(CalibrationError, match=f"(?s){expected}"):
+        read_cameras(make(tmp_path))

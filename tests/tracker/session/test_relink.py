@@ -1,0 +1,138 @@
+"""Moved footage gets its new place; other footage is refused, and nothing is written then."""
+
+import shutil
+from contextlib import closing
+
+import cv2
+import numpy as np
+import pytest
+from clips import SIZE, encode
+
+from tracker.errors import RecordingError, SessionError
+from tracker.footage.proxy import FOLDER, Proxy
+from tracker.footage.video import open_footage
+from tracker.formats.anipose import write_calibration
+from tracker.geometry import rigid
+from tracker.geometry.cameras import Camera
+from tracker.session.assemble import NewSession, assemble
+from tracker.session.relink import Places, missing_files, relink, require_files
+from tracker.session.session import load_session
+
+K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])
+
+
+@pytest.fixture
+def room(tmp_path):
+    """A session in `s` whose footage, backgrounds and masks lie in `take1`."""
+    take = tmp_path / "take1"
+    (take / "empty").mkdir(parents=True)
+    cameras = [Camera(n, SIZE, K, np.zeros(0), rigid.transform(t=np.array([i, 0.0, 1.0]))) for i, n in enumerate("ab")]
+    write_calibration(take / "Calib.toml", cameras)
+    for name in "ab":
+        encode(take / f"{name}.mp4", n=9)
+        cv2.imwrite(str(take / "empty" / f"{name}.png"), np.zeros((*SIZE[::-1], 3), np.uint8))
+        (take / "masks" / name).mkdir(parents=True)
+        cv2.imwrite(str(take / "masks" / name / "000002.png"), np.zeros(SIZE[::-1], np.uint8))
+    videos, side = [take / "a.mp4", take / "b.mp4"], {"background": take / "empty", "masks": take / "masks"}
+    assemble(NewSession(tmp_path / "s" / "s", calibration=take / "Calib.toml", videos=videos, fps=90.0, **side))
+    return tmp_path
+
+
+def loaded(room):
+    return load_session(room / "s" / "s")
+
+
+def moved(room, to="disk/take1"):
+    (room / to).parent.mkdir(parents=True, exist_ok=True)
+    shutil.move(room / "take1", room / to)
+    return room / to
+
+
+def refuse(room, kind, expected, places):
+    before = (room / "s" / "s" / "session.toml").read_bytes()
+    with pytest.raises(kind, match=expected):
+        relink(loaded(room), places)
+    assert (room / "s" / "s" / "session.toml").read_bytes() == before
+
+
+def test_everything_is_found_by_a_search(room):
+    require_files(loaded(room))
+    moved(room)
+    session = loaded(room)
+    assert [(m.camera, m.kind) for m in missing_files(session)] == [
+        (camera, kind) for camera in "ab" for kind in ("footage", "background", "masks")
+    ]
+    with pytest.raises(
+        SessionError, match=r"'a': footage .*a\.mp4 and 5 more not found; .*quadrille relink .*--search"
+    ):
+        require_files(session)
+    session, found = relink(session, Places(search=[room / "disk"]))
+    assert len(found) == 6
+    again = loaded(room)
+    for at in (session, again):
+        assert missing_files(at) == ()
+        assert at.cameras[1].footage == room / "disk" / "take1" / "b.mp4"
+        assert at.cameras[1].masks == room / "disk" / "take1" / "masks" / "b"
+        assert (at.fps, at.cameras[1].declared_fps) == (90.0, 30.0)
+    assert relink(again, Places(search=[room / "disk"]))[1] == ()
+
+
+def test_of_equal_names_the_one_in_the_folder_of_the_same_name(room):
+    take = moved(room)
+    shutil.copytree(take, room / "disk" / "take2")
+    session, _ = relink(loaded(room), Places(search=[room / "disk"]))
+    assert {c.footage.parent.name for c in session.cameras} == {"take1"}
+
+
+def test_equal_names_in_strange_folders_are_left_to_the_user(room):
+    take = moved(room, "disk/x/one")
+    shutil.copytree(take, room / "disk" / "x" / "two")
+    refuse(room, SessionError, "'a': the footage may be .*(one|two).*--camera a=PATH", Places(search=[room / "disk"]))
+    session, _ = relink(loaded(room), Places(search=[room / "disk" / "x" / "two"]))
+    assert missing_files(session) == ()
+
+
+def test_other_footage_is_refused(room):
+    take = moved(room)
+    encode(take / "b.mp4", n=12)
+    refuse(room, RecordingError, "'b': expected 9 frames as in the session, found 12", Places(search=[take]))
+    encode(take / "b.mp4", n=9, rate=25)
+    refuse(room, RecordingError, "'b': expected 30 frames per second .*found 25", Places(search=[take]))
+    (take / "b.mp4").write_bytes(b"no video")
+    refuse(room, RecordingError, "'b'.*cannot be read", Places(search=[take]))
+
+
+def test_a_renamed_file_is_given(room):
+    take = moved(room)
+    (take / "b.mp4").rename(take / "other.mp4")
+    session, _ = relink(loaded(room), Places(search=[take]))
+    assert [(m.camera, m.kind) for m in missing_files(session)] == [("b", "footage")]
+    refuse(room, SessionError, "unknown camera 'c'", Places(camera_paths={"c": take / "other.mp4"}))
+    refuse(room, RecordingError, "'b'.*nowhere", Places(camera_paths={"b": take / "nowhere.mp4"}))
+    both = {"a": take / "other.mp4", "b": take / "other.mp4"}
+    refuse(room, SessionError, "'a' and 'b' would share", Places(camera_paths=both))
+    session, found = relink(loaded(room), Places(camera_paths={"b": take / "other.mp4"}))
+    assert (missing_files(session), len(found)) == ((), 1)
+
+
+def test_side_files_are_given_by_folder(room):
+    take = moved(room)
+    session, _ = relink(
+        loaded(room),
+        Places(camera_paths={n: take / f"{n}.mp4" for n in "ab"}, background=take / "empty", masks=take / "masks"),
+    )
+    assert missing_files(session) == ()
+    refuse(room, SessionError, "expected a folder as --search", Places(search=[room / "none"]))
+
+
+def test_a_proxy_follows_its_footage(room):
+    session = loaded(room)
+    footage = session.cameras[0].footage
+    proxy = Proxy(session.folder / FOLDER, "a")
+    with closing(open_footage(footage, "a")) as opened:
+        list(proxy.make(footage, opened))
+    take = moved(room)
+    assert proxy.follow(take / "a.mp4")
+    assert proxy.fits(take / "a.mp4")
+    assert not proxy.follow(take / "b.mp4")
+    assert not Proxy(session.folder / FOLDER, "b").follow(take / "b.mp4")

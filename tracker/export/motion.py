@@ -1,0 +1,165 @@
+"""Read the stored poses of a session that are exported."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tracker.body.model import BodyModel, PosedBody
+from tracker.errors import SessionError
+from tracker.formats.model_toml import format_model, parse_model
+from tracker.geometry.arrays import Array
+from tracker.motion.interpolation import interpolate_pose
+from tracker.posing.retarget import retarget_pose
+from tracker.session.session import Person, Session
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import SOURCES, PoseRecord
+
+
+@dataclass(frozen=True, eq=False)
+class StoredPose:
+    """A stored pose, in the body that it was made with."""
+
+    body: PosedBody
+    record: PoseRecord
+
+    @property
+    def source(self) -> str:
+        """The most manual source of its values."""
+        return min(self.record.sources, key=SOURCES.index)
+
+
+@dataclass(frozen=True, eq=False)
+class PersonMotion:
+    """The stored poses of one person."""
+
+    index: int
+    """Of the person in the session."""
+    person: Person
+    poses: Mapping[int, StoredPose]
+    """By frame; a frame may be missing."""
+
+    @cached_property
+    def model(self) -> BodyModel:
+        """The one body of files with a skeleton: that of all poses if they agree, else the person's present one."""
+        models = {id(p.body.model): p.body.model for p in self.poses.values()}
+        return next(iter(models.values())) if len(models) == 1 else self.person.model
+
+    @property
+    def n_refitted(self) -> int:
+        """Number of poses that belong to another body than `model`."""
+        return sum(p.body.model is not self.model for p in self.poses.values())
+
+    def in_one_body(self) -> dict[int, Array]:
+        """Return the poses in the body `model` by frame, (n_values,); those of other bodies are refitted to it."""
+        return {f: retarget_pose(p.body.values, p.body.model, self.model) for f, p in self.poses.items()}
+
+    def without_gaps(self, frames: range) -> Array:
+        """Return a pose of the body `model` for each frame, (n, n_values).
+
+        A gap is interpolated; before the first pose and after the last one the body stands still.
+        """
+        poses = self.in_one_body()
+        known = sorted(poses)
+        out = np.empty((len(frames), len(self.model.value_names)))
+        for i, frame in enumerate(frames):
+            at = int(np.searchsorted(known, frame))
+            if frame in poses:
+                out[i] = poses[frame]
+            elif at in (0, len(known)):
+                out[i] = poses[known[0 if at == 0 else -1]]
+            else:
+                first, last = known[at - 1], known[at]
+                share = np.array([(frame - first) / (last - first)])
+                out[i] = interpolate_pose(self.model, poses[first], poses[last], share)[0]
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class ExportedMotion:
+    """The poses of a session that are exported."""
+
+    session: Session
+    frames: range
+    people: tuple[PersonMotion, ...]
+    """All people of the session, because they occlude one another."""
+    chosen: tuple[int, ...]
+    """Indices of those who are exported; each has a pose."""
+    n_lost: int
+    """Number of poses of exported people whose status is lost; they are in `people` unless they were left out."""
+
+    @property
+    def exported(self) -> tuple[PersonMotion, ...]:
+        """The people who are exported."""
+        return tuple(self.people[i] for i in self.chosen)
+
+    @property
+    def n_missing(self) -> int:
+        """Number of frames without a pose, over the people who are exported."""
+        return sum(len(self.frames) - len(p.poses) for p in self.exported)
+
+    def time_s(self, frame: int) -> float:
+        """Return the time of a frame of the session, s."""
+        return frame / self.session.fps
+
+    def bodies(self, frame: int) -> list[tuple[PersonMotion, PosedBody]]:
+        """Return the people who have a pose in a frame, with their bodies."""
+        return [(p, p.poses[frame].body) for p in self.people if frame in p.poses]
+
+
+def read_motion(
+    session: Session, chosen: Sequence[int], frames: range | None = None, skip_lost: bool = False
+) -> ExportedMotion:
+    """Read the stored poses of a session.
+
+    Args:
+        session: the session; other programs may have it open.
+        chosen: indices of the people to export. Of several, those without a pose are left out.
+        frames: by default from the first to the last pose of these people.
+        skip_lost: treat poses whose status is lost as missing.
+
+    Raises:
+        SessionError: nobody has a pose in these frames.
+    """
+    within = range(session.n_frames) if frames is None else frames
+    people, n_lost = [], 0
+    for index, person in enumerate(session.people):
+        stored = _stored_poses(session, person, within)
+        lost = [frame for frame, pose in stored.items() if pose.record.status == "lost"]
+        n_lost += len(lost) * (index in chosen)
+        poses = {f: p for f, p in stored.items() if not skip_lost or p.record.status != "lost"}
+        people.append(PersonMotion(index, person, poses))
+    having = tuple(i for i in chosen if people[i].poses)
+    if not having:
+        names = " and ".join(f"'{session.people[i].name}'" for i in chosen)
+        where = "" if frames is None else f" in frames {frames.start}:{frames.stop}"
+        raise SessionError(
+            f"expected poses of {names}{where}, found none{' that is not lost' if n_lost else ''}; "
+            "place the body in the page, or use quadrille init and track"
+        )
+    if frames is None:
+        found = [frame for i in having for frame in people[i].poses]
+        within = range(min(found), max(found) + 1)
+    return ExportedMotion(session, within, tuple(people), having, n_lost)
+
+
+def _stored_poses(session: Session, person: Person, frames: range) -> dict[int, StoredPose]:
+    """Return the poses of a person by frame, each in the body of its model revision."""
+    if not session.annotations_path.exists():
+        return {}
+    models: dict[int, BodyModel] = {}
+    out = {}
+    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+        for row in store.frames(person.name, frames):
+            record = store.pose(person.name, row.frame)
+            if record is None:
+                continue  # another program has cleared it
+            if record.model_revision not in models:
+                toml = store.model_revision(record.model_revision).toml
+                where = f"of '{person.name}', revision {record.model_revision}"
+                is_present = toml == format_model(person.model)
+                models[record.model_revision] = person.model if is_present else parse_model(toml, where)
+            out[row.frame] = StoredPose(PosedBody(models[record.model_revision], record.values), record)
+    return out

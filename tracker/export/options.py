@@ -1,0 +1,55 @@
+"""Options of an export, and the axes of its files."""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
+from tracker.geometry.ground_plane import up_rotation
+from tracker.session.session import Session
+
+AxesName = Literal["calibration", "y-up"]
+AXES: tuple[AxesName, ...] = get_args(AxesName)
+UnitName = Literal["m", "mm"]
+UNITS: tuple[UnitName, ...] = get_args(UnitName)
+KeypointSet = Literal["all", "coco17", "body"]
+KEYPOINT_SETS: tuple[KeypointSet, ...] = get_args(KeypointSet)
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """Options of all formats; each format has some of them."""
+
+    axes: AxesName = "calibration"
+    """calibration: the world of the session; y-up: y points up from the floor."""
+    units: UnitName = "m"
+    """Unit of lengths."""
+    keypoints: KeypointSet = "all"
+    """COCO: the 17 keypoints of people, those of the body model, or both."""
+    view: str | None = None
+    """Overlay video: name of the camera; None for a grid of all."""
+
+    @property
+    def per_metre(self) -> float:
+        """Units per metre."""
+        return 1000.0 if self.units == "mm" else 1.0
+
+
+def file_from_world(session: Session, axes: AxesName) -> Array:
+    """Return the transform from the session's world to the axes of a file, (4, 4), metres.
+
+    In y-up axes, y is the height above the floor. A world in which z points up becomes (x, z, -y).
+    """
+    if axes == "calibration":
+        return np.eye(4)
+    R_world_up = up_rotation(session.up, session.floor)
+    origin_world = np.zeros(3) if session.floor is None else session.floor.origin_world
+    y_up = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+    return rigid.transform(y_up) @ rigid.inverse(rigid.transform(R_world_up, origin_world))
+
+
+def up_in_file(session: Session, axes: AxesName) -> Array:
+    """Return the unit vector that points up in the axes of a file, (3,)."""
+    return file_from_world(session, axes)[:3, :3] @ up_rotation(session.up, session.floor)[:, 2]

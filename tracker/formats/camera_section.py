@@ -1,0 +1,178 @@
+"""One camera of a calibration, as data of the anipose layout, and the checks of what it says.
+
+Other layouts are rewritten to this one (`camera_layouts`), so that all are checked by one declaration.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, TypeAlias
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from tracker.errors import CalibrationError
+from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import DISTORTION_COUNTS, Camera
+from tracker.validation import MAX_SIDE_PX, FileStem, Number, Vector, check, quoted
+
+Units = Literal["m", "cm", "mm"]
+METRES: dict[str, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+"""Metres per unit."""
+
+MAX_STUDIO_M = 100.0
+"""A camera read as metres and farther from the origin than this has translations in millimetres."""
+MIN_STUDIO_M = 0.05
+"""Cameras read as millimetres that are all nearer to the origin than this have translations in metres."""
+_ROTATION_TOLERANCE = 1e-3  # a rotation matrix printed with four digits still passes
+_CENTRAL = 0.25
+"""Share of the picture at each side in which no principal point lies."""
+
+_Pixels: TypeAlias = Annotated[float, Meta(ge=1, le=MAX_SIDE_PX, multiple_of=1)]
+_Size: TypeAlias = Annotated[
+    tuple[_Pixels, _Pixels], Meta(description="width and height in whole pixels, from 1 to 32767,")
+]
+_Focal: TypeAlias = Annotated[float, Meta(ge=1, le=1e9)]
+_Zero: TypeAlias = Annotated[float, Meta(ge=0, le=0)]
+_One: TypeAlias = Annotated[float, Meta(ge=1, le=1)]
+_Rodrigues: TypeAlias = Annotated[
+    tuple[Number, Number, Number], Meta(description="a Rodrigues vector of 3 values or a 3x3 matrix")
+]
+_RotationMatrix: TypeAlias = Annotated[
+    tuple[Vector, Vector, Vector], Meta(description="a Rodrigues vector of 3 values or a 3x3 matrix")
+]
+
+
+class _CameraSection(msgspec.Struct):
+    """The section of one camera; it may have other keys besides."""
+
+    size: (
+        Annotated[tuple[_Pixels, _Pixels], Meta(description="width and height in whole pixels, from 1 to 32767,")]
+        | None
+    )
+    matrix: Annotated[
+        tuple[tuple[_Focal, Number, Number], tuple[_Zero, _Focal, Number], tuple[_Zero, _Zero, _One]],
+        Meta(description="[[fx, skew, cx], [0, fy, cy], [0, 0, 1]] with positive fx and fy"),
+    ]
+    rotation: list[Any]
+    """`_Rodrigues` or `_RotationMatrix`."""
+    translation: Vector
+    distortions: list[Number] = []
+    name: FileStem | None = None
+    fisheye: bool = False
+
+    def __post_init__(self) -> None:
+        if self.fisheye:
+            raise ValueError(
+                "expected OpenCV's lens model with 4, 5 or 8 coefficients, found a fisheye lens, which is not "
+                "supported; undistort the footage first and calibrate it without fisheye"
+            )
+        if len(self.distortions) not in DISTORTION_COUNTS:
+            raise ValueError(f"expected 0, 4, 5 or 8 values as 'distortions', found {len(self.distortions)}")
+
+
+@dataclass(frozen=True, eq=False)
+class CameraEntry:
+    """A calibrated camera whose image size may be unknown."""
+
+    name: str
+    size: tuple[int, int] | None
+    """Image width and height, px; None if the file does not state it."""
+    K: Array
+    """Pinhole matrix, (3, 3), px."""
+    distortion: Array
+    """As in `Camera`."""
+    T_world_camera: Array
+    """Pose, (4, 4), metres."""
+
+    def camera(self, footage_size: tuple[int, int] | None = None) -> Camera:
+        """Return the camera; its size is that of the footage if the file does not state one.
+
+        Raises:
+            CalibrationError: the size is unknown, or the principal point lies far from the middle of the footage.
+        """
+        size = self.size or footage_size
+        if size is None:
+            raise CalibrationError(
+                f"camera '{self.name}': expected the key 'size' in the calibration, found none; add the width and "
+                "height of the pictures"
+            )
+        if self.size is None:
+            share = self.K[:2, 2] / np.array(size)
+            if np.any((share < _CENTRAL) | (share > 1 - _CENTRAL)):
+                raise CalibrationError(
+                    f"camera '{self.name}': the calibration states no image size, and its principal point "
+                    f"{self.K[0, 2]:.0f}, {self.K[1, 2]:.0f} is not that of footage of {size[0]}x{size[1]} pixels; "
+                    "calibrate at the size of the footage"
+                )
+        return Camera(self.name, size, self.K, self.distortion, self.T_world_camera)
+
+
+def read_entry(section: str, data: Any, where: str, metres_per_unit: float) -> CameraEntry:
+    """Check the section of one camera.
+
+    Args:
+        section: its name in the file, which is the camera's unless `data` has another.
+        data: keys and values of the anipose layout.
+        where: names the file in messages.
+        metres_per_unit: of the translation.
+
+    Raises:
+        CalibrationError: it describes no possible camera.
+    """
+    where = f"{where}, camera {quoted(section)}"
+    row: _CameraSection = check(data, _CameraSection, where, CalibrationError)
+    name = check(section, FileStem, where, CalibrationError) if row.name is None else row.name
+    translation = np.array(row.translation) * metres_per_unit
+    T_camera_world = rigid.transform(_rotation(row.rotation, where), translation)
+    size = None if row.size is None else (int(row.size[0]), int(row.size[1]))
+    K, distortion = np.array(row.matrix), np.array(row.distortions, dtype=np.float64)
+    return CameraEntry(name, size, K, distortion, rigid.inverse(T_camera_world))
+
+
+def _rotation(value: list[Any], where: str) -> Array:
+    """Convert a Rodrigues vector, or a matrix that is a rotation within rounding, to a rotation matrix (3, 3)."""
+    is_matrix = any(isinstance(row, list) for row in value)
+    rotation = np.array(
+        check(value, _RotationMatrix if is_matrix else _Rodrigues, f"{where}, rotation", CalibrationError)
+    )
+    if rotation.shape == (3,):
+        return rigid.so3_exp(rotation)
+    error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+    determinant = float(np.linalg.det(rotation))
+    if error > _ROTATION_TOLERANCE or determinant < 0:
+        raise CalibrationError(
+            f"{where}: 'rotation' is not a rotation: expected orthonormal rows and determinant 1, "
+            f"found rows off by {error:.2g} and determinant {determinant:.3g}; calibrate again"
+        )
+    # Use the nearest rotation: a rounded matrix would shear what it maps.
+    U, _, V = np.linalg.svd(rotation)
+    return U @ V
+
+
+def check_names_and_units(entries: Sequence[CameraEntry], where: str, units: Units) -> None:
+    """Check that each camera has a name of its own, and that the translations can have the unit.
+
+    Raises:
+        CalibrationError: two have one name, or the unit is another.
+    """
+    names = [c.name for c in entries]
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise CalibrationError(f"{where}: two cameras are named '{twice[0]}'; give each its own name")
+    distances = [float(np.linalg.norm(c.T_world_camera[:3, 3])) for c in entries]
+    farthest = max(distances)
+    if units == "m" and farthest > MAX_STUDIO_M:
+        name = names[distances.index(farthest)]
+        raise CalibrationError(
+            f"{where}: camera '{name}' would stand {farthest:.0f} m from the origin, so its translations "
+            "look like millimetres and metres were expected; say --units mm"
+        )
+    # All at the origin is one camera that defines the world, which has no scale to check.
+    if units != "m" and 0 < farthest < MIN_STUDIO_M * METRES[units] * 1000:
+        word = {"cm": "centimetres", "mm": "millimetres"}[units]
+        raise CalibrationError(
+            f"{where}: read as {word} all cameras would stand within {farthest * 1000:.2g} mm of the "
+            f"origin, so its translations look like metres; leave out --units {units}"
+        )

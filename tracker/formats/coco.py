@@ -1,0 +1,125 @@
+"""COCO keypoints: JSON with images, categories and, for each person in each image, an annotation.
+
+Keypoints are x, y, v triples in the pixels of the image as filmed, with pixel centres at integers. v is 2 for a visible
+point, 1 for an occluded one, and 0 (with x = y = 0) for a point outside the image or one that the body does not have.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from tracker.body.model import BodyModel
+from tracker.files import write_text_atomic
+from tracker.geometry.arrays import Array, IntArray
+
+_SIDES = ("left", "right")
+PERSON_KEYPOINTS = (
+    "nose",
+    *(f"{side}_{part}" for part in ("eye", "ear") for side in _SIDES),
+    *(f"{side}_{part}" for part in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in _SIDES),
+)
+"""The 17 keypoints of COCO's category `person`."""
+PERSON_SKELETON = (
+    (16, 14), (14, 12), (17, 15), (15, 13), (12, 13), (6, 12), (7, 13), (6, 7), (6, 8), (7, 9), (8, 10), (9, 11),
+    (2, 3), (1, 2), (1, 3), (2, 4), (3, 5), (4, 6), (5, 7),
+)  # fmt: skip
+"""COCO's own lines between them, counted from 1."""
+
+
+class CocoCategory(msgspec.Struct, frozen=True):
+    """A set of keypoints."""
+
+    id: int
+    name: str
+    keypoints: Sequence[str]
+    skeleton: Sequence[tuple[int, int]]
+    """Lines between keypoints, counted from 1."""
+    supercategory: str = "person"
+
+
+class CocoImage(msgspec.Struct, frozen=True):
+    """A frame of a camera."""
+
+    id: int
+    file_name: str
+    """`CAMERA/000012.jpg` for frame 12 of a video, counted from 0; the name of the image in a folder of images."""
+    width: int
+    height: int
+    camera: str
+    frame: int
+    """Frame of the session."""
+    video: str
+    """Name of the footage."""
+    video_frame: int
+    """Frame of the footage: that of the session plus the camera's offset."""
+
+
+class CocoAnnotation(msgspec.Struct, frozen=True):
+    """A person in an image, by the keypoints of one category."""
+
+    id: int
+    image_id: int
+    category_id: int
+    keypoints: Sequence[float]
+    """x, y, v of each keypoint."""
+    num_keypoints: int
+    """Number of keypoints with v > 0."""
+    bbox: tuple[float, float, float, float]
+    """x, y, width, height of the whole body within the image, whether occluded or not."""
+    area: float
+    """Area of the body's silhouette within the image, px^2, whether occluded or not."""
+    person: str
+    track_id: int
+    """Number of the person in the session, from 0."""
+    status: str
+    iscrowd: int = 0
+
+
+def person_category(id: int) -> CocoCategory:
+    """Return COCO's category of people."""
+    return CocoCategory(id, "person", PERSON_KEYPOINTS, PERSON_SKELETON)
+
+
+def body_category(id: int, model: BodyModel) -> CocoCategory:
+    """Return the category of all points of a body model, named after it."""
+    skeleton = [(model.point_names.index(a) + 1, model.point_names.index(b) + 1) for a, b in model.bones]
+    return CocoCategory(id, model.name, model.point_names, skeleton)
+
+
+def keypoint_triples(
+    names: Sequence[str], points_px: Array, visibility: IntArray, wanted: Sequence[str]
+) -> list[float]:
+    """Return x, y, v of some points by name.
+
+    Args:
+        names: of the points given, (n,).
+        points_px: (n, 2), original pixels.
+        visibility: COCO's v, (n,).
+        wanted: names of the keypoints, in order; v = 0 for those not given.
+    """
+    out: list[float] = []
+    for name in wanted:
+        v = int(visibility[names.index(name)]) if name in names else 0
+        x, y = points_px[names.index(name)] if v else (0.0, 0.0)
+        out += [round(float(x), 3), round(float(y), 3), v]
+    return out
+
+
+def write_coco(
+    path: str | Path,
+    description: str,
+    categories: Sequence[CocoCategory],
+    images: Sequence[CocoImage],
+    annotations: Sequence[CocoAnnotation],
+) -> None:
+    """Write a dataset."""
+    data: dict[str, Any] = {
+        "info": {"description": description, "version": "1.0"},
+        "licenses": [],
+        "categories": categories,
+        "images": images,
+        "annotations": annotations,
+    }
+    write_text_atomic(Path(path), msgspec.json.encode(data).decode() + "\n")

@@ -1,0 +1,229 @@
+"""OpenSim models (.osim): a body model whose coordinates are the angles of the poses.
+
+A joint of up to three rotations about independent axes becomes a CustomJoint with the same axes in the same order. A
+ball joint, and a joint whose axes OpenSim does not accept, turns by Euler angles about x, y and z. The root has
+translations along the world's axes besides. Each body has the shape's ellipsoid, and the mass of that ellipsoid at the
+density of water: enough for display and inverse kinematics, too rough for dynamics. A marker marks each point of the
+body under its name, as in a TRC file.
+"""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tracker.body.model import BodyModel
+from tracker.files import write_text_atomic
+from tracker.formats.file_names import identifier, identifiers
+from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
+from tracker.geometry.euler import Order, continuous_euler_angles
+
+GRAVITY = 9.80665
+_DENSITY = 1000.0
+_FREE_M, _FREE_RAD = 100.0, 100.0
+"""Range of a coordinate without limits, metres and rad."""
+_EULER: Order = "XYZ"
+
+
+@dataclass(frozen=True, eq=False)
+class CoordinateJoint:
+    """The coordinates of a joint in OpenSim."""
+
+    names: tuple[str, ...]
+    """Names of the coordinates: translations, then rotations."""
+    axes: tuple[tuple[float, float, float], ...]
+    """Axis of each rotation in the joint's frame, in order."""
+    ranges: tuple[tuple[float, float], ...]
+    """Range of each rotation, rad."""
+    is_free: bool
+    """Whether three translations come first."""
+    by_euler: bool
+    """Whether the rotations are Euler angles, computed from the rotation of the joint."""
+
+
+def coordinate_joints(model: BodyModel) -> list[CoordinateJoint]:
+    """Return the coordinates of each joint of a body, in the order of its joints."""
+    names = iter(identifiers([n.replace(".", "_") for joint in _joint_names(model) for n in joint]))
+    out = []
+    for joint, wanted in zip(model.joints, _joint_names(model), strict=True):
+        found = tuple(next(names) for _ in wanted)
+        if _turns_by_euler(model, joint.name):
+            axes: tuple[tuple[float, float, float], ...] = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
+            ranges: tuple[tuple[float, float], ...] = ((-_FREE_RAD, _FREE_RAD),) * 3
+        else:
+            axes = tuple(a.direction for a in joint.axes)
+            ranges = tuple((max(a.limits[0], -_FREE_RAD), min(a.limits[1], _FREE_RAD)) for a in joint.axes)
+        out.append(CoordinateJoint(found, axes, ranges, joint.free, _turns_by_euler(model, joint.name)))
+    return out
+
+
+def coordinate_values(model: BodyModel, poses: Array) -> Array:
+    """Return the coordinates of poses, (n, n_values), in the order of `coordinate_joints`, (n, c), metres and rad."""
+    columns = []
+    Ts = np.array([model.kinematics(p).Ts_world_part for p in poses]).reshape(len(poses), len(model.parts), 4, 4)
+    for i, joint in enumerate(coordinate_joints(model)):
+        dofs = np.flatnonzero(model.dof_joint == i)
+        if joint.is_free:
+            columns.append(poses[:, model.dof_value[dofs[:3]]])
+        if joint.by_euler:
+            R, parent = Ts[:, i, :3, :3], model.parents[i]
+            if parent >= 0:
+                R = np.swapaxes(Ts[:, parent, :3, :3], -1, -2) @ R
+            columns.append(continuous_euler_angles(R, _EULER))
+        else:
+            columns.append(poses[:, model.dof_value[dofs[3 * joint.is_free :]]])
+    return np.hstack(columns)
+
+
+def write_osim(path: str | Path, model: BodyModel, name: str, T_ground_world: Array, up: Sequence[float]) -> None:
+    """Write a body as an OpenSim model.
+
+    Args:
+        path: the file.
+        model: the body.
+        name: of the model in the file.
+        T_ground_world: pose of the poses' world in OpenSim's ground, (4, 4), metres.
+        up: unit vector against gravity, in the ground.
+    """
+    document = ET.Element("OpenSimDocument", Version="40000")
+    top = ET.SubElement(document, "Model", name=identifier(name))
+    _text(top, "gravity", _vector(-GRAVITY * np.asarray(up)))
+    _text(top, "length_units", "meters")
+    _text(top, "force_units", "N")
+    part_names, joint_names = identifiers([p.name for p in model.parts]), identifiers([j.name for j in model.joints])
+    bodies = _list(top, "BodySet", "bodyset")
+    for i, part in enumerate(part_names):
+        _body(bodies, model, i, part)
+    joints = _list(top, "JointSet", "jointset")
+    for i, coordinates in enumerate(coordinate_joints(model)):
+        _joint(joints, model, i, coordinates, joint_names[i], part_names, T_ground_world)
+    markers = _list(top, "MarkerSet", "markerset")
+    for i, point in enumerate(identifiers(model.point_names)):
+        marker = ET.SubElement(markers, "Marker", name=point)
+        _text(marker, "socket_parent_frame", f"/bodyset/{part_names[int(model.point_parts[i])]}")
+        _text(marker, "location", _vector(model.points_part[i]))
+        _text(marker, "fixed", "true")
+    ET.indent(document)
+    text = ET.tostring(document, encoding="unicode")
+    write_text_atomic(Path(path), f'<?xml version="1.0" encoding="UTF-8" ?>\n{text}\n')
+
+
+def _joint_names(model: BodyModel) -> list[list[str]]:
+    """Return the names of the coordinates of each joint before they are made unique."""
+    out = []
+    for joint in model.joints:
+        names = list(joint.dof_names)
+        if _turns_by_euler(model, joint.name):
+            names = [*names[: 3 * joint.free], *(f"{joint.name}.r{axis.lower()}" for axis in _EULER)]
+        out.append(names)
+    return out
+
+
+def _turns_by_euler(model: BodyModel, name: str) -> bool:
+    """Return whether a joint's rotations must become Euler angles."""
+    joint = next(j for j in model.joints if j.name == name)
+    axes = np.array([a.direction for a in joint.axes]).reshape(-1, 3)
+    return joint.kind == "ball" or (len(axes) > 0 and np.linalg.matrix_rank(axes, tol=1e-3) < len(axes))
+
+
+def _body(bodies: ET.Element, model: BodyModel, i: int, name: str) -> None:
+    half_axes, center = np.array(model.parts[i].half_axes) * model.height_m, model.centers_part[i]
+    mass = _DENSITY * 4 / 3 * np.pi * float(np.prod(half_axes))
+    a2, b2, c2 = half_axes**2
+    body = ET.SubElement(bodies, "Body", name=name)
+    components = ET.SubElement(body, "components")
+    frame = ET.SubElement(components, "PhysicalOffsetFrame", name="shape")
+    geometry = ET.SubElement(ET.SubElement(frame, "attached_geometry"), "Ellipsoid", name="ellipsoid")
+    _text(geometry, "socket_frame", "..")
+    appearance = ET.SubElement(geometry, "Appearance")
+    rgb = [int(model.parts[i].color[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    _text(appearance, "color", _vector(rgb))
+    _text(geometry, "radii", _vector(half_axes))
+    _text(frame, "socket_parent", "..")
+    _text(frame, "translation", _vector(center))
+    _text(frame, "orientation", "0 0 0")
+    _text(body, "mass", f"{mass:.9g}")
+    _text(body, "mass_center", _vector(center))
+    _text(body, "inertia", f"{_vector(mass / 5 * np.array([b2 + c2, a2 + c2, a2 + b2]))} 0 0 0")
+
+
+def _joint(
+    joints: ET.Element,
+    model: BodyModel,
+    i: int,
+    coordinates: CoordinateJoint,
+    name: str,
+    part_names: Sequence[str],
+    T_ground_world: Array,
+) -> None:
+    parent, offset = model.parents[i], np.array(model.joints[i].position) * model.height_m
+    T_parent_joint = rigid.transform(t=offset) if parent >= 0 else T_ground_world @ rigid.transform(t=offset)
+    joint = ET.SubElement(joints, "CustomJoint" if coordinates.names else "WeldJoint", name=name)
+    _text(joint, "socket_parent_frame", "parent_offset")
+    _text(joint, "socket_child_frame", "child_offset")
+    if coordinates.names:
+        _coordinates(joint, coordinates)
+    frames = ET.SubElement(joint, "frames")
+    parent_path = f"/bodyset/{part_names[parent]}" if parent >= 0 else "/ground"
+    for frame, path, T in (
+        ("parent_offset", parent_path, T_parent_joint),
+        ("child_offset", f"/bodyset/{part_names[i]}", np.eye(4)),
+    ):
+        row = ET.SubElement(frames, "PhysicalOffsetFrame", name=frame)
+        _text(row, "socket_parent", path)
+        _text(row, "translation", _vector(T[:3, 3]))
+        _text(row, "orientation", _vector(continuous_euler_angles(T[None, :3, :3], _EULER)[0]))
+    if coordinates.names:
+        _spatial_transform(joint, coordinates)
+
+
+def _coordinates(joint: ET.Element, coordinates: CoordinateJoint) -> None:
+    rows = ET.SubElement(joint, "coordinates")
+    ranges = ((-_FREE_M, _FREE_M),) * 3 * coordinates.is_free + coordinates.ranges
+    for name, limits in zip(coordinates.names, ranges, strict=True):
+        row = ET.SubElement(rows, "Coordinate", name=name)
+        _text(row, "range", _vector(limits))
+        _text(row, "clamped", "false")
+
+
+def _spatial_transform(joint: ET.Element, coordinates: CoordinateJoint) -> None:
+    found = ET.SubElement(joint, "SpatialTransform")
+    moved, turned = coordinates.names[: 3 * coordinates.is_free], coordinates.names[3 * coordinates.is_free :]
+    for i, axis in enumerate(_completed(coordinates.axes)):
+        _transform_axis(found, f"rotation{i + 1}", turned[i] if i < len(turned) else None, axis)
+    for i, axis in enumerate(np.eye(3)):
+        _transform_axis(found, f"translation{i + 1}", moved[i] if i < len(moved) else None, axis)
+
+
+def _transform_axis(parent: ET.Element, name: str, coordinate: str | None, axis: Array) -> None:
+    row = ET.SubElement(parent, "TransformAxis", name=name)
+    _text(row, "coordinates", coordinate or "")
+    _text(row, "axis", _vector(axis))
+    if coordinate is None:
+        _text(ET.SubElement(row, "Constant", name="function"), "value", "0")
+    else:
+        _text(ET.SubElement(row, "LinearFunction", name="function"), "coefficients", " 1 0")
+
+
+def _completed(axes: Sequence[tuple[float, float, float]]) -> Array:
+    """Return three independent axes, of which the first are given, (3, 3)."""
+    found = [np.array(a, dtype=np.float64) for a in axes]
+    while len(found) < 3:
+        across = np.linalg.svd(np.array(found).reshape(-1, 3))[2][len(found) :]  # orthogonal to all of them
+        found.append(across[0])
+    return np.array(found)
+
+
+def _list(parent: ET.Element, kind: str, name: str) -> ET.Element:
+    return ET.SubElement(ET.SubElement(parent, kind, name=name), "objects")
+
+
+def _text(parent: ET.Element, name: str, text: str) -> None:
+    ET.SubElement(parent, name).text = text
+
+
+def _vector(v: Sequence[float] | Array) -> str:
+    return " ".join(f"{x:.12g}" for x in np.asarray(v, dtype=np.float64).tolist())

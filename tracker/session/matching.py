@@ -1,0 +1,147 @@
+"""Match loose footage to calibrated cameras, and check that the footage of all cameras fits together."""
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from pathlib import Path
+
+from tracker.errors import RecordingError, SessionError
+from tracker.footage.image_folder import ImageFolder, missing_numbers
+from tracker.footage.video import Footage
+from tracker.validation import FrameRate, check
+
+RATE_TOLERANCE = 5e-4
+"""Relative difference above which two frame rates differ; 29.97 and 30 differ by twice as much."""
+
+
+def match_footage(
+    names: Sequence[str], videos: Sequence[Path], camera_paths: Mapping[str, Path], unused: Collection[str] = ()
+) -> dict[str, Path]:
+    """Find the footage of each camera: by the option, else by the name of the file or folder.
+
+    Args:
+        names: the cameras of the session.
+        videos: files and folders, each named after its camera.
+        camera_paths: footage by camera name.
+        unused: calibrated cameras that the session leaves out; their footage in `videos` is left out too.
+
+    Raises:
+        SessionError: footage without a camera, or a camera without footage or with two.
+    """
+    check_names(camera_paths, names, "camera", "--camera")
+    paths = dict(camera_paths)
+    for video in videos:
+        name = video.name if video.is_dir() else video.stem
+        if name in camera_paths or video in camera_paths.values() or name in unused:
+            continue
+        if name not in names:
+            raise SessionError(
+                f"video {video} belongs to no calibrated camera: expected one named {', '.join(names)}; "
+                f"rename it, leave it out or say --camera NAME={video}"
+            )
+        if name in paths:
+            raise SessionError(f"camera '{name}' has two videos, {paths[name]} and {video}; leave one out")
+        paths[name] = video
+    missing = [n for n in names if n not in paths]
+    if missing:
+        raise SessionError(
+            f"no video for camera {', '.join(missing)}; give a file named {missing[0]}.mp4, "
+            f"say --camera {missing[0]}=PATH, or choose other cameras with --cameras"
+        )
+    return paths
+
+
+def common_rate(footage: Mapping[str, Footage], fps: float | None) -> float:
+    """Return the frame rate of all cameras, 1/s.
+
+    Args:
+        footage: of each camera by name.
+        fps: rate that overrides what the videos declare, as for high-speed footage; None for none.
+
+    Raises:
+        RecordingError: a rate varies, or the rates differ, or none is known.
+    """
+    rates = {name: f.fps for name, f in footage.items() if f.fps is not None}
+    for name, f in footage.items():
+        if not f.has_constant_rate:
+            raise RecordingError(
+                f"camera '{name}': {f.path} has a variable frame rate, expected a constant one; "
+                "convert it to a constant rate with frames at the times of the other cameras"
+            )
+    wanted = fps if fps is not None else next(iter(rates.values()), None)
+    if wanted is None:
+        raise RecordingError("folders of images have no frame rate; give it with --fps RATE")
+    check(wanted, FrameRate, "--fps" if fps is not None else "footage", RecordingError)
+    if fps is None and any(not same_rate(rate, wanted) for rate in rates.values()):
+        found = ", ".join(f"'{name}' {rate:.6g}" for name, rate in rates.items())
+        raise RecordingError(
+            f"expected one frame rate for all cameras, found {found}; convert the videos to the same rate, or give the "
+            "rate at which all cameras filmed with --fps RATE"
+        )
+    return wanted
+
+
+def same_rate(rate: float, other: float) -> bool:
+    """Return whether two frame rates, 1/s, are equal within rounding."""
+    return abs(rate / other - 1) <= RATE_TOLERANCE
+
+
+def common_length(footage: Mapping[str, Footage], offsets: Mapping[str, int]) -> int:
+    """Return the number of frames that all cameras have; lengths may differ by the offsets alone.
+
+    Raises:
+        RecordingError: they differ otherwise.
+    """
+    rest = {name: f.n_frames - offsets.get(name, 0) for name, f in footage.items()}
+    if len({f.n_frames for f in footage.values()}) > 1 and len(set(rest.values())) > 1:
+        found = ", ".join(f"'{name}' {f.n_frames}" for name, f in footage.items())
+        raise RecordingError(
+            f"expected videos of the same number of frames, found {found}; "
+            "cut them to the same start and end, or say --offset CAM=N for a camera that began N frames earlier"
+        )
+    return min(rest.values())
+
+
+def check_image_numbers(footage: Mapping[str, Footage], offsets: Mapping[str, int]) -> None:
+    """Check that images with equal numbers are frames of the same instant, if the folders are numbered.
+
+    Args:
+        footage: of each camera by name.
+        offsets: shifts by camera name, set by the user; they replace the comparison between cameras.
+
+    Raises:
+        RecordingError: a number is missing in a folder, or in the folder of one camera only.
+    """
+    numbered = {
+        name: (f.path, f.numbers) for name, f in footage.items() if isinstance(f, ImageFolder) and f.numbers is not None
+    }
+    for name, (path, numbers) in numbered.items():
+        if gaps := missing_numbers(numbers):
+            raise RecordingError(
+                f"camera '{name}': {path} has no image with number {_listed(gaps)}, expected every number from "
+                f"{numbers[0]} to {numbers[-1]}; restore it, or number the images without a gap"
+            )
+    if offsets or len(numbered) < 2:
+        return
+    every = set().union(*(numbers for _, numbers in numbered.values()))
+    for name, (path, numbers) in numbered.items():
+        if gaps := sorted(every.difference(numbers)):
+            raise RecordingError(
+                f"camera '{name}': {path} has no image with number {_listed(gaps)}, which other cameras have; images "
+                "of one instant need equal numbers: restore it, delete that number in the other folders, or say "
+                "--offset CAM=N for a camera that began N images earlier"
+            )
+
+
+def check_names(given: Iterable[str], known: Sequence[str], what: str, option: str) -> None:
+    """Check that names which an option gives are known.
+
+    Raises:
+        SessionError: one is not; the message lists those that are.
+    """
+    unknown = [n for n in given if n not in known]
+    if unknown:
+        raise SessionError(f"{option} names an unknown {what} '{unknown[0]}'; expected one of {', '.join(known)}")
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    """List the first few numbers."""
+    return ", ".join(map(str, numbers[:4])) + (", ..." if len(numbers) > 4 else "")

@@ -1,0 +1,221 @@
+"""Find files of a session that have moved, and give them their new place; annotations stay as they are."""
+
+import os
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import chain
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from tracker.errors import RecordingError, SessionError, TrackerError
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.recording import check_size, read_background
+from tracker.footage.video import open_footage
+from tracker.session.assemble import check_side_files, find_background, find_masks
+from tracker.session.matching import check_names, same_rate
+from tracker.session.session import Session, save_cameras
+
+Kind = Literal["footage", "background", "masks"]
+KINDS: tuple[Kind, ...] = ("footage", "background", "masks")
+
+
+class MissingFile(NamedTuple):
+    """A file or folder that session.toml names and that is not there."""
+
+    camera: str
+    kind: Kind
+    path: Path
+
+
+class Relinked(NamedTuple):
+    """A file or folder with its new place."""
+
+    camera: str
+    kind: Kind
+    old: Path
+    new: Path
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where files of a session are now."""
+
+    search: Sequence[Path] = ()
+    """Folders in which missing files are searched by name, with all folders inside."""
+    camera_paths: Mapping[str, Path] = field(default_factory=dict)
+    """Footage by camera name, under any file name."""
+    background: Path | None = None
+    """Folder of CAM.png or CAM.mp4 of the empty scene."""
+    masks: Path | None = None
+    """Folder of CAM/%06d.png."""
+
+
+def missing_files(session: Session) -> tuple[MissingFile, ...]:
+    """Return what session.toml names and is not there, by camera."""
+    found = []
+    for source in session.cameras:
+        for kind in KINDS:
+            path: Path | None = getattr(source, kind)
+            if path is not None and not path.exists():
+                found.append(MissingFile(source.camera.name, kind, path))
+    return tuple(found)
+
+
+def require_files(session: Session) -> None:
+    """Check that all footage, backgrounds and masks are there.
+
+    Raises:
+        SessionError: some are not; the message says how to give them their new place.
+    """
+    if missing := missing_files(session):
+        first = missing[0]
+        more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+        raise SessionError(
+            f"camera '{first.camera}': {first.kind} {first.path}{more} not found; put it back, or run "
+            f"quadrille relink {session.folder} --search FOLDER"
+        )
+
+
+def relink(session: Session, places: Places) -> tuple[Session, tuple[Relinked, ...]]:
+    """Give files of a session their new place in session.toml. Nothing is written unless all that is found fits.
+
+    Files that are searched and not found stay missing (`missing_files` of the result).
+
+    Returns:
+        The session with the new places, and what has changed.
+
+    Raises:
+        SessionError: an unknown camera, a folder that is not there, or a name that is found in several places.
+        RecordingError: a file is unreadable, or not the footage that the session was made of.
+    """
+    check_names(places.camera_paths, [c.camera.name for c in session.cameras], "camera", "--camera")
+    found = _given(session, places)
+    asked = {(f.camera, f.kind) for f in found}
+    missing = [m for m in missing_files(session) if (m.camera, m.kind) not in asked]
+    if places.search:
+        named = _files_named({m.path.name for m in missing}, places.search)
+        for lost in missing:
+            new = _choose(lost, named.get(lost.path.name, []), partial(_check, session, lost.camera, lost.kind))
+            if new is not None:
+                found.append(Relinked(lost.camera, lost.kind, lost.path, new))
+    _check_once(found)
+    if not found:
+        return session, ()
+    changes: dict[str, dict[str, Path]] = {}
+    for f in found:
+        changes.setdefault(f.camera, {})[f.kind] = f.new
+    cameras = tuple(replace(c, **changes.get(c.camera.name, {})) for c in session.cameras)  # type: ignore[arg-type]
+    return save_cameras(session, cameras), tuple(found)
+
+
+def _given(session: Session, places: Places) -> list[Relinked]:
+    """Check the places that a user has given."""
+    found = []
+    for source in session.cameras:
+        name = source.camera.name
+        given: dict[Kind, Path] = {}
+        if name in places.camera_paths:
+            given["footage"] = places.camera_paths[name]
+        if places.background is not None and source.background is not None:
+            given["background"] = find_background(places.background, name)
+        if places.masks is not None and source.masks is not None:
+            given["masks"] = find_masks(places.masks, name)
+        for kind, path in given.items():
+            path = Path(os.path.abspath(path))
+            _check(session, name, kind, path)
+            found.append(Relinked(name, kind, getattr(source, kind), path))
+    return found
+
+
+def _files_named(names: Iterable[str], folders: Sequence[Path]) -> dict[str, list[Path]]:
+    """Find all files and folders with the given names below some folders."""
+    wanted, found = set(names), dict[str, list[Path]]()
+    for folder in folders:
+        if not folder.is_dir():
+            raise SessionError(f"expected a folder as --search, found {folder}, which is none; check the path")
+        root = Path(os.path.abspath(folder))
+        everything = ((Path(at), name) for at, inner, files in os.walk(root) for name in (*inner, *files))
+        for at, name in chain([(root.parent, root.name)], everything):
+            if name in wanted and at / name not in found.setdefault(name, []):
+                found[name].append(at / name)
+    return found
+
+
+def _choose(lost: MissingFile, candidates: Sequence[Path], check: Callable[[Path], None]) -> Path | None:
+    """Choose the candidate that fits and whose path ends most like the old one; None without candidates."""
+    fitting, refused = [], list[TrackerError]()
+    for path in candidates:
+        try:
+            check(path)
+            fitting.append(path)
+        except TrackerError as error:
+            refused.append(error)
+    if candidates and not fitting:
+        raise refused[0]
+    if not fitting:
+        return None
+    alike = [_common_tail(lost.path, path) for path in fitting]
+    best = [path for path, n in zip(fitting, alike, strict=True) if n == max(alike)]
+    if len(best) > 1:
+        option = f"--camera {lost.camera}=PATH" if lost.kind == "footage" else f"--{lost.kind} FOLDER"
+        raise SessionError(
+            f"camera '{lost.camera}': the {lost.kind} may be {best[0]} or {best[1]}; search a smaller folder, or say "
+            f"{option}"
+        )
+    return best[0]
+
+
+def _common_tail(a: Path, b: Path) -> int:
+    """Return how many names two paths share at their ends."""
+    n = 0
+    for x, y in zip(reversed(a.parts), reversed(b.parts), strict=False):
+        if x != y:
+            break
+        n += 1
+    return n
+
+
+def _check(session: Session, camera: str, kind: Kind, path: Path) -> None:
+    """Check that a file can take the place of one of the session.
+
+    Raises:
+        RecordingError: it cannot be read, or has another size, number of frames or frame rate.
+    """
+    source = next(c for c in session.cameras if c.camera.name == camera)
+    if kind == "background":
+        read_background(replace(source, background=path))
+    elif kind == "masks":
+        check_side_files(replace(source, background=None, masks=path))
+    else:
+        _check_footage(session, source, path)
+
+
+def _check_footage(session: Session, source: CameraSource, path: Path) -> None:
+    name, offsets = source.camera.name, [c.offset for c in session.cameras]
+    # Videos of one length lose frames at the end by the offsets of the others.
+    lengths = {session.n_frames + source.offset, session.n_frames + max(offsets)}
+    expected_fps = session.fps if source.declared_fps is None else source.declared_fps
+    with closing(open_footage(path, name)) as footage:
+        check_size(name, path, footage.size, source.camera.size)
+        if footage.n_frames not in lengths:
+            raise _other(name, path, " or ".join(map(str, sorted(lengths))) + " frames", str(footage.n_frames))
+        if footage.fps is not None and not same_rate(footage.fps, expected_fps):
+            raise _other(name, path, f"{expected_fps:g} frames per second", f"{footage.fps:g}")
+
+
+def _other(camera: str, path: Path, expected: str, found: str) -> RecordingError:
+    return RecordingError(
+        f"camera '{camera}': expected {expected} as in the session, found {found} in {path}; "
+        "it is other footage: give the one that the session was made of"
+    )
+
+
+def _check_once(found: Sequence[Relinked]) -> None:
+    """Check that no two cameras share a file."""
+    path, count = Counter(f.new for f in found).most_common(1)[0] if found else (Path(), 0)
+    if count > 1:
+        cameras = " and ".join(f"'{f.camera}'" for f in found if f.new == path)
+        raise SessionError(f"cameras {cameras} would share {path}; give each its own with --camera NAME=PATH")
