@@ -27,6 +27,8 @@ _GRID_PX = (1920, 1080)
 _HIDDEN_SHARE = 0.35
 """Opacity of occluded contours."""
 _SUBPIXEL_BITS = 4
+_FAR_PX = 30_000.0
+"""Pixels farther out are not drawn: OpenCV counts in 32 bits."""
 
 
 def write_overlay_video(
@@ -97,32 +99,32 @@ def _draw(image: Image, camera: Camera, paths: Sequence[overlays.Path]) -> None:
 
 
 def _as_filmed(camera: Camera, segments_px: FloatArray) -> Array:
-    """Map segments x0, y0, x1, y1 in undistorted px, (N, 4), to original px, (n, 2, 2), without those far outside.
-
-    There the polynomial of the distortion would fold them back into the image.
-    """
+    """Map segments x0, y0, x1, y1 in undistorted px, (N, 4), to original px, (n, 2, 2), where the lens shows them."""
     ends = segments_px.reshape(-1, 2, 2).astype(np.float64)
-    reach = np.array(camera.size)
-    ends = ends[((ends > -reach) & (ends < 2 * reach)).all(axis=(1, 2))]
-    if camera.is_pinhole or not len(ends):
-        return ends
-    filmed = camera.distort_points(ends)
-    back = camera.undistort_points(filmed)
-    return filmed[(np.abs(back - ends) < 1.0).all(axis=(1, 2))]
+    near = (np.abs(ends) < _FAR_PX).all(axis=(1, 2)) & camera.within_lens(ends).all(axis=1)
+    return camera.distort_points(ends[near])
 
 
 def _label(image: Image, text: str) -> None:
     """Write a line into the upper left corner, legible on any ground."""
-    scale = max(image.shape[:2]) / 1280
+    scale = max(image.shape[:2]) / 960
     at = (round(16 * scale), round(36 * scale))
-    for color, width in (((0, 0, 0), 5), ((255, 255, 255), 2)):
+    for color, width in (((0, 0, 0), 7), ((255, 255, 255), 2)):
         cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, scale, color, max(1, round(width * scale)), cv2.LINE_AA)
 
 
 def _grid(cameras: Sequence[Camera]) -> tuple[int, int]:
-    """Return the number of columns and rows of a grid of views."""
-    columns = int(np.ceil(np.sqrt(len(cameras))))
-    return columns, -(-len(cameras) // columns)
+    """Return the number of columns and rows in which the views are largest, with as few empty tiles as possible."""
+    grids = [(columns, -(-len(cameras) // columns)) for columns in range(1, len(cameras) + 1)]
+    return min(
+        grids, key=lambda grid: (-round(_share(cameras, grid), 6), grid[0] * grid[1], abs(grid[0] - grid[1]), -grid[0])
+    )
+
+
+def _share(cameras: Sequence[Camera], grid: tuple[int, int]) -> float:
+    """Return the scale, at most 1, at which views fit into a grid of columns and rows."""
+    width, height = max(c.width for c in cameras), max(c.height for c in cameras)
+    return min(1.0, _GRID_PX[0] / (grid[0] * width), _GRID_PX[1] / (grid[1] * height))
 
 
 def _tile_size(cameras: Sequence[Camera]) -> tuple[int, int]:
@@ -130,8 +132,7 @@ def _tile_size(cameras: Sequence[Camera]) -> tuple[int, int]:
     width, height = max(c.width for c in cameras), max(c.height for c in cameras)
     if len(cameras) == 1:
         return width, height
-    columns, rows = _grid(cameras)
-    share = min(1.0, _GRID_PX[0] / (columns * width), _GRID_PX[1] / (rows * height))
+    share = _share(cameras, _grid(cameras))
     return round(width * share) // 2 * 2, round(height * share) // 2 * 2
 
 

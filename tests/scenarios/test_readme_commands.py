@@ -43,6 +43,7 @@ def quadrille(folder, *words):
     return done.stdout
 
 
+@pytest.mark.slow
 def test_readme_takes_a_recording_from_videos_to_an_error(recording):
     found = [
         (command, shlex.split(rest.replace("\\\n", " ")))

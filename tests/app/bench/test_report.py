@@ -56,6 +56,7 @@ def test_differences_are_taken_in_turns(monkeypatch):
     assert timed.work_us == 2e6
 
 
+@pytest.mark.slow
 def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
     """Not how fast, only that they run and tell what they should."""
 

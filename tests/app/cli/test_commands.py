@@ -201,6 +201,7 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     assert (json.loads(out)["frames"], json.loads(out)["resumed_at"]) == (6, None)
 
 
+@pytest.mark.slow
 def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run, session, monkeypatch):
     """What the second pass finds better is in the store at once, in the one entry of the history."""
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")

@@ -248,6 +248,7 @@ def test_a_first_pose_tells_exchanged_footage(run, session, monkeypatch):
     assert "warning: the footage of 'BACK' and 'LEFT' seems to be exchanged: nothing differs" in out
 
 
+@pytest.mark.slow
 def test_a_busy_port(session):
     """In a process of its own, as it comes: nothing but the sentence, and no lock left behind."""
     with socket.create_server(("127.0.0.1", 0)) as server:

@@ -3,6 +3,7 @@
 import av
 import numpy as np
 import pytest
+from staging import cameras_around
 from stored_motions import distorted_cameras, random_poses
 
 from app.export import overlay_video
@@ -62,6 +63,21 @@ def test_a_grid_shows_all_views(session, tmp_path):
         for column in (0, 1):
             tile = image[row * height : (row + 1) * height, column * width : (column + 1) * width]
             assert np.count_nonzero(orange(tile)) > 150
+
+
+@pytest.mark.parametrize(
+    ("n", "size", "grid", "tile"),
+    [
+        (4, (640, 480), (2, 2), (640, 480)),
+        (4, (1080, 1920), (4, 1), (480, 852)),  # two rows would halve the views
+        (5, (1920, 1080), (3, 2), (640, 360)),
+        (1, (801, 601), (1, 1), (801, 601)),
+    ],
+)
+def test_the_views_of_a_grid_are_as_large_as_can_be(n, size, grid, tile):
+    cameras = cameras_around(n, size=size)
+    assert overlay_video._grid(cameras) == grid
+    assert overlay_video._tile_size(cameras) == tile
 
 
 def test_contours_are_drawn_where_the_lens_shows_them():

@@ -74,7 +74,9 @@ async def scene_bytes(url, patience_s=1.0, **options):
 
 
 @on_linux
-@pytest.mark.parametrize("options", [(), ("--host", "0.0.0.0", "--allow-host", "lab.example.org")])
+@pytest.mark.parametrize(
+    "options", [pytest.param((), marks=pytest.mark.slow), ("--host", "0.0.0.0", "--allow-host", "lab.example.org")]
+)
 async def test_no_port_of_the_program_gives_the_scene_to_a_stranger(session, options):
     with program(session, *options) as (process, address):
         ports = listening_ports(process.pid)

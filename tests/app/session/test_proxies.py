@@ -22,6 +22,7 @@ def test_index_makes_a_proxy_of_every_camera(run, session):
     assert '"stopped": false' in out
 
 
+@pytest.mark.slow
 def test_stopped_it_goes_on(run, session, monkeypatch):
     real, count = proxies.Proxy.make, []
 
@@ -87,6 +88,7 @@ def indexed(run, session):
     recording.close()
 
 
+@pytest.mark.slow
 def test_a_proxy_that_vanishes_is_replaced_by_the_footage(indexed, session):
     _, frames = indexed
     assert frames.images(31)[0] is not None

@@ -51,6 +51,7 @@ async def lift(page, point, px):
     await shows(page, f"quadrille.state.state.undo?.startsWith('drag {point.replace('_', ' ')}')")
 
 
+@pytest.mark.slow
 async def test_two_tabs_are_in_step_and_a_drag_is_seen_live(tabs):
     one, other = tabs
     await go_to(one, 4)
@@ -106,6 +107,7 @@ async def test_the_history_is_gone_along_also_after_a_restart(tabs, program):
     await shows(page, "quadrille.state.state.undo === 'drag left wrist, frame 6'")
 
 
+@pytest.mark.slow
 async def test_a_full_disk_is_said_and_nothing_is_lost(tabs, program):
     page, _ = tabs
     await page.bring_to_front()

@@ -4,6 +4,7 @@ import asyncio
 import shutil
 
 import numpy as np
+import pytest
 import pytest_asyncio
 from page_driver import handle_of, shows, state_of
 from program import ROOT, started, visited
@@ -97,6 +98,7 @@ async def test_a_run_is_watched_paused_looked_at_and_taken_back(live):
     await shows(live, f"Object.keys(quadrille.state.timeline).join() === '{START}'", 20)
 
 
+@pytest.mark.slow
 async def test_backward_to_the_first_frame_is_seen_frame_by_frame(live):
     await go_to(live, START)
     await live.locator("#track-backward").click()

@@ -9,6 +9,7 @@ from page_driver import handle_of, state_of
 from page_driver import shows as shows_within
 from program import ROOT, started, visit_again, visited
 
+pytestmark = pytest.mark.slow
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 
 

@@ -2,6 +2,7 @@
 
 import shutil
 
+import pytest
 import pytest_asyncio
 from page_driver import dragging, shows, state_of
 from program import ROOT, started, visited
@@ -22,6 +23,7 @@ async def go_to(page, frame):
     await shows(page, f"quadrille.state.shown.frame === {frame} && quadrille.state.overlay.frame === {frame}", 30)
 
 
+@pytest.mark.slow
 async def test_a_range_is_interpolated_reviewed_cleared_and_given_back(live):
     page, folder = live
     await page.keyboard.press("k")  # the draft as it stands

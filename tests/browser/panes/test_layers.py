@@ -32,20 +32,20 @@ async def set_slider(page, selector, value):
     await page.locator(selector).fill(str(value))
 
 
-@pytest.mark.parametrize("layer", PICTURES)
-async def test_a_picture_shows_vanishes_and_is_as_strong_as_its_slider_says(page, layer):
+async def test_a_picture_shows_vanishes_and_is_as_strong_as_its_slider_says(page):
     plain = await color_at(page)
     await page.keyboard.press("a")
-    await page.locator(f"[data-layer={layer}]").check()
-    await shows(page, f"'{layer} 0' in quadrille.state.shown.pictures")
-    for percent in (100, 40):
-        await set_slider(page, f"[data-opacity={layer}]", percent)
-        await shows(page, f"quadrille.state.layers.opacity.{layer} === {percent / 100}")
-        mixed = [a + percent / 100 * (b - a) for a, b in zip(plain, PICTURES[layer], strict=True)]
-        assert await color_at(page) == pytest.approx(mixed, abs=6)
-    await page.locator(f"[data-layer={layer}]").uncheck()
-    await shows(page, f"!('{layer} 0' in quadrille.state.shown.pictures)")
-    assert await color_at(page) == plain
+    for layer, color in PICTURES.items():
+        await page.locator(f"[data-layer={layer}]").check()
+        await shows(page, f"'{layer} 0' in quadrille.state.shown.pictures")
+        for percent in (100, 40):
+            await set_slider(page, f"[data-opacity={layer}]", percent)
+            await shows(page, f"quadrille.state.layers.opacity.{layer} === {percent / 100}")
+            mixed = [a + percent / 100 * (b - a) for a, b in zip(plain, color, strict=True)]
+            assert await color_at(page) == pytest.approx(mixed, abs=6)
+        await page.locator(f"[data-layer={layer}]").uncheck()
+        await shows(page, f"!('{layer} 0' in quadrille.state.shown.pictures)")
+        assert await color_at(page) == plain
 
 
 async def test_the_image_fades_into_black_in_either_theme(page):
@@ -171,7 +171,7 @@ async def test_the_corner_tells_how_the_selected_joint_is_seen(page, endpoint):
     await shows(page, "document.querySelector('.pane-joint').textContent.includes('outside')")
 
 
-@pytest.mark.parametrize("n_cameras", [1, 2, 3, 5, 8, 16])
+@pytest.mark.parametrize("n_cameras", [3, 16, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2, 5, 8))])
 class TestGrid:
     @pytest.fixture
     def endpoint(self, n_cameras):

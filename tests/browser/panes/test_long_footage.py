@@ -97,6 +97,7 @@ async def test_playing_shows_no_stand_ins(page, endpoint):
         await page.evaluate(GO, 5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["dark", "light"])
 @pytest.mark.endpoint(n_cameras=16, n_frames=100_000)
 async def test_the_mark_fits_a_narrow_pane(page, endpoint, scheme):

@@ -60,11 +60,12 @@ async def test_what_is_open_is_remembered(curves, endpoint):
     assert await curves.locator("#curves").is_visible()
 
 
-@pytest.mark.parametrize("height", [0.2, 0.7])
-async def test_a_click_goes_to_the_frame_whichever_curve_is_there(curves, endpoint, height):
-    await curves.mouse.click(*await place_of(curves, 77, height))
-    await shows(curves, "quadrille.state.shown.frame === 77")
-    assert endpoint.heard("seek") == [{"type": "seek", "frame": 77}]
+async def test_a_click_goes_to_the_frame_whichever_curve_is_there(curves, endpoint):
+    for frame, height in ((77, 0.2), (55, 0.7)):
+        endpoint.received.clear()
+        await curves.mouse.click(*await place_of(curves, frame, height))
+        await shows(curves, f"quadrille.state.shown.frame === {frame}")
+        assert endpoint.heard("seek") == [{"type": "seek", "frame": frame}]
 
 
 async def test_curves_and_timeline_share_their_axis(curves, endpoint):
@@ -138,6 +139,7 @@ async def test_they_fit_a_small_screen(curves):
 
 @pytest.mark.endpoint(n_frames=100_000)
 class TestLong:
+    @pytest.mark.slow
     async def test_a_hundred_thousand_frames_are_drawn_at_once(self, curves, endpoint):
         """A redraw traces a few points for each column of the screen, not one for each frame."""
         await endpoint.send_curves(np.arange(100_000), replace=True, shift=1.0)  # poses on all of them

@@ -67,7 +67,7 @@ async def played(page, endpoint, enough):
     return list(times), list(frames)
 
 
-@pytest.mark.parametrize("rate", ["0.25", "1", "2"])
+@pytest.mark.parametrize("rate", ["2", *(pytest.param(rate, marks=pytest.mark.slow) for rate in ("0.25", "1"))])
 async def test_a_clip_plays_at_its_rate(page, endpoint, rate):
     await page.locator("#rate").select_option(rate)
     times, frames = await played(page, endpoint, lambda f: len(f) > 1 and f[-1] - f[0] > 8)

@@ -114,9 +114,9 @@ async def test_a_range_is_marked_by_keys(page):
     await shows(page, "quadrille.state.range?.first === 12 && quadrille.state.range.last === 22")
 
 
-@pytest.mark.parametrize("dark", [True, False])
-async def test_statuses_differ_by_colour_and_by_height(page, dark):
-    await page.emulate_media(color_scheme="dark" if dark else "light")
+@pytest.mark.parametrize("scheme", ["dark", pytest.param("light", marks=pytest.mark.slow)])
+async def test_statuses_differ_by_colour_and_by_height(page, scheme):
+    await page.emulate_media(color_scheme=scheme)
     async with asyncio.timeout(20):
         while (await page.evaluate(STRIP, 15))[0] is None:  # drawn again in the colors of the theme
             await asyncio.sleep(0.05)

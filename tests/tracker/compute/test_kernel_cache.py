@@ -106,6 +106,7 @@ def clone(tmp_path):
     return Clone(tmp_path / "a", tmp_path / "cache")
 
 
+@pytest.mark.slow
 def test_kernels_are_compiled_again_only_if_their_text_changes(clone, tmp_path):
     twice, other, compiled = clone.run()
     assert (twice, other, compiled > 0) == (14, 3, True)

@@ -79,6 +79,18 @@ def test_joints_agree_within_a_tenth_of_a_millimetre(tmp_path, opensim, name, ax
             assert error < 1e-4, (frame, point, error)
 
 
+def test_coordinates_have_the_limits_of_the_joints(tmp_path, opensim):
+    session, _ = store_motion(tmp_path / "s", [MODELS["gavrila34"]], n_frames=2)
+    paths = [tmp_path / "a.mot", tmp_path / "a.osim"]
+    writers.write_person_opensim(read_motion(session, (0,)), ExportOptions("y-up"), paths, lambda: None)
+    model = opensim.Model(str(paths[1]))
+    for name, limits in {"left_elbow_extension": (0, 155), "right_hip_flexion": (-45, 140)}.items():
+        coordinate = model.getCoordinateSet().get(name)
+        found = np.degrees([coordinate.getRangeMin(), coordinate.getRangeMax()])
+        np.testing.assert_allclose(found, limits, atol=1e-6)
+        assert not coordinate.getDefaultClamped()
+
+
 def test_opensim_reads_a_trc_file_with_gaps(tmp_path, opensim):
     session, truth = store_motion(tmp_path / "s", [MODELS["gavrila34"]], gaps={(0, 3), (0, 7)})
     motion = read_motion(session, (0,), range(1, 8))

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from bodies import MODELS
 from pycocotools.coco import COCO
+from staging import cameras_around
 from stored_motions import FPS, distorted_cameras, store_motion
 
+from tracker.contours.label_image import part_labels
 from tracker.errors import SessionError
 from tracker.export import writers
-from tracker.export.keypoints import project_through_lens
+from tracker.export.keypoints import keypoints_in_views, project_through_lens
 from tracker.export.motion import read_motion
 from tracker.export.options import ExportOptions, file_from_world
 from tracker.formats.model_toml import format_model
@@ -183,14 +185,47 @@ def test_keypoints_beyond_the_lens_are_absent(tmp_path):
     assert 0 <= folded[0] < 640
 
 
+def test_the_area_is_that_of_the_silhouette(couple):
+    _, truth = couple
+    camera = cameras_around(3, size=(640, 480))[0]  # the label image has no distortion
+    for body in (truth[0][1], truth[1][1]):
+        ((seen,),) = keypoints_in_views([body], [camera])
+        rows, columns = np.nonzero(part_labels([body], camera))
+        assert seen.area_px == pytest.approx(len(rows), rel=0.04)
+        box = [columns.min(), rows.min(), np.ptp(columns), np.ptp(rows)]
+        np.testing.assert_allclose(seen.box_px, box, atol=3)
+
+
 @pytest.mark.parametrize(("keypoints", "names"), [("coco17", ["person"]), ("body", ["gavrila34"])])
 def test_one_set_of_keypoints_of_one_person_whom_others_occlude(tmp_path, couple, keypoints, names):
-    session, _ = couple
+    session, truth = couple
     motion = read_motion(session, (0,), range(1, 3))
     writers.write_keypoints(motion, ExportOptions(keypoints=keypoints), [tmp_path / "k.json"], no_tick)
     coco = COCO(str(tmp_path / "k.json"))
     assert [c["name"] for c in coco.loadCats(coco.getCatIds())] == names
-    assert {a["person"] for a in coco.loadAnns(coco.getAnnIds())} == {"ann"}
+    found = coco.loadAnns(coco.getAnnIds())
+    assert {a["person"] for a in found} == {"ann"}
+    cameras = [c.camera for c in session.cameras]
+    alone = [view[0] for f in (1, 2) for view in keypoints_in_views([truth[0][f]], cameras)]
+    n_visible = sum(v == 2 for a in found for v in a["keypoints"][2::3])
+    points = coco.loadCats(coco.getCatIds())[0]["keypoints"]
+    at = [truth[0][1].model.point_names.index(p) for p in points if p in truth[0][1].model.point_names]
+    assert 0 < n_visible < sum(np.count_nonzero(seen.visibility[at] == 2) for seen in alone)
+
+
+def test_images_are_named_as_the_footage_numbers_them(tmp_path, couple):
+    session, _ = couple
+    folder = tmp_path / "shots"
+    folder.mkdir()
+    for i in (1, 2, 9, 10):
+        cv2.imwrite(str(folder / f"shot{i}.png"), np.zeros((480, 640, 3), np.uint8))
+    cameras = (replace(session.cameras[0], footage=folder, offset=1), replace(session.cameras[1], offset=5))
+    motion = replace(read_motion(session, (0, 1), range(1, 3)), session=replace(session, cameras=cameras))
+    writers.write_keypoints(motion, ExportOptions(), [tmp_path / "k.json"], no_tick)
+    images = COCO(str(tmp_path / "k.json")).dataset["images"]
+    names = [i["file_name"] for i in images if i["frame"] == 2]
+    assert names == ["cam0/shot10.png", "cam1/000007.jpg"]
+    assert [i["video_frame"] for i in images if i["frame"] == 2] == [3, 7]
 
 
 def test_y_is_the_height_above_a_floor_that_was_set():

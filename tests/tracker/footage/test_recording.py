@@ -160,6 +160,7 @@ def test_malformed_masks(tmp_path, mask, expected):
         read_mask(source("a", tmp_path, masks=tmp_path), 0)
 
 
+@pytest.mark.slow
 def test_real_footage(data_folder):
     folder = data_folder("balance_real")
     cameras = [

@@ -120,6 +120,7 @@ def test_a_ball_joint_is_pinned_with_all_of_its_quaternion():
     assert not by_pins["elbow.bend"]
 
 
+@pytest.mark.slow
 def test_pins_and_edges_of_real_footage_come_below_45_mm(sample_folder):
     """Joints some 100 mm off, four of them pinned in two views with 3 px of noise; the bones are not the true ones."""
     session = load_session(sample_folder)

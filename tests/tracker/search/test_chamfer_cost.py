@@ -228,7 +228,7 @@ def test_a_limb_off_the_evidence_costs(real_frame, outliers):
             assert cost([model.retract(values, step)]).total_px > here + 0.05, (dof, angle)
 
 
-@pytest.mark.parametrize("n_poses", [30, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("n_poses", [8, pytest.param(200, marks=pytest.mark.slow)])
 def test_fast_cost_against_the_oracle(real_frame, n_poses):
     """Poses around the fitted one: each within 1% or 0.1 px of the slow, obvious cost.
 
@@ -253,7 +253,7 @@ def test_fast_cost_against_the_oracle(real_frame, n_poses):
     assert np.argmin(fast) == np.argmin(slow)
 
 
-@pytest.mark.parametrize("preset", ["gavrila22", "gavrila22_cones"])
+@pytest.mark.parametrize("preset", [pytest.param("gavrila22", marks=pytest.mark.slow), "gavrila22_cones"])
 def test_samples_twice_as_dense_say_the_same(real_frame, preset):
     """At 4 px between samples the cost is within 1% of that at 2 px, and the best candidate is the same."""
     _, values, views = real_frame

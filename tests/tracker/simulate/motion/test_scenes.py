@@ -54,7 +54,9 @@ def test_poses_keep_the_limits_and_move_smoothly(performances, true_model):
         assert np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1).max() < 0.09, (scene, seed)
 
 
-@pytest.mark.parametrize("scene", TOGETHER)
+@pytest.mark.parametrize(
+    "scene", [s if s in ("tango", "crowd_of_three") else pytest.param(s, marks=pytest.mark.slow) for s in TOGETHER]
+)
 def test_people_together_keep_the_limits_and_their_distance_and_move_smoothly(scene):
     cast = cast_of(scene, 3)
     models = [altered_model(load_model("gavrila22", role.height_m), role.build.bone_factors) for role in cast]

@@ -34,6 +34,7 @@ def test_every_ray_ends_within_the_room(backdrop):
     assert np.abs(points[:, :2]).max() < HALF_WIDTH_M + 1e-3
 
 
+@pytest.mark.slow
 def test_the_same_seed_furnishes_the_same_room_and_another_another():
     camera = make_cameras(4, SIZE, 0)[1]
     first, again, other = (see_room(camera, seed).image for seed in (0, 0, 1))

@@ -351,6 +351,7 @@ def test_a_real_recording(data_folder, tmp_path):
     assert (errors.frames, errors.missing_frames, errors.lost_frames) == (3, 0, 0)
 
 
+@pytest.mark.slow
 def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folder, tmp_path):
     """Without a background: an arm swings before a patterned picture and along a skirting board."""
     folder = data_folder("walk")
