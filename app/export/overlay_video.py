@@ -27,6 +27,8 @@ _GRID_PX = (1920, 1080)
 _HIDDEN_SHARE = 0.35
 """Opacity of occluded contours."""
 _SUBPIXEL_BITS = 4
+_FAR_PX = 30_000.0
+"""Pixels farther out are not drawn: OpenCV counts in 32 bits."""
 
 
 def write_overlay_video(
@@ -97,18 +99,10 @@ def _draw(image: Image, camera: Camera, paths: Sequence[overlays.Path]) -> None:
 
 
 def _as_filmed(camera: Camera, segments_px: FloatArray) -> Array:
-    """Map segments x0, y0, x1, y1 in undistorted px, (N, 4), to original px, (n, 2, 2), without those far outside.
-
-    There the polynomial of the distortion would fold them back into the image.
-    """
+    """Map segments x0, y0, x1, y1 in undistorted px, (N, 4), to original px, (n, 2, 2), where the lens shows them."""
     ends = segments_px.reshape(-1, 2, 2).astype(np.float64)
-    reach = np.array(camera.size)
-    ends = ends[((ends > -reach) & (ends < 2 * reach)).all(axis=(1, 2))]
-    if camera.is_pinhole or not len(ends):
-        return ends
-    filmed = camera.distort_points(ends)
-    back = camera.undistort_points(filmed)
-    return filmed[(np.abs(back - ends) < 1.0).all(axis=(1, 2))]
+    near = (np.abs(ends) < _FAR_PX).all(axis=(1, 2)) & camera.within_lens(ends).all(axis=1)
+    return camera.distort_points(ends[near])
 
 
 def _label(image: Image, text: str) -> None:

@@ -4,22 +4,20 @@ from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.contours.label_image import part_labels
 from tracker.contours.part_edges import points_occluded
-from tracker.geometry import rigid
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 
 ABSENT, OCCLUDED, VISIBLE = 0, 1, 2
 """COCO's visibility flags."""
-_RINGS, _SECTORS = 12, 16
-_SILHOUETTE_PX = 320
-"""Longer side of the image in which the area of a silhouette is counted, px."""
-_FOLD_PX = 1.0
+_RINGS, _SECTORS = 8, 12
+_SILHOUETTE_PX = 400
+"""Longer side of the mask in which the area of a silhouette is counted, px."""
 
 
 class Keypoints(NamedTuple):
@@ -55,36 +53,36 @@ def keypoints_in_views(bodies: Sequence[PosedBody], cameras: Sequence[Camera]) -
 
 
 def project_through_lens(camera: Camera, points_world: Array) -> Array:
-    """Project world points, (n, 3), to original pixels, (n, 2); NaN behind the camera and beyond the lens.
-
-    The polynomial of the distortion holds within the image only. Far outside it bends back, and would show points
-    inside the image that no lens shows there.
-    """
+    """Project world points, (n, 3), to original pixels, (n, 2); NaN behind the camera and where no lens shows them."""
     ideal_px = camera.pinhole.project(points_world)
-    points_px = camera.project(points_world)
-    if camera.is_pinhole:
-        return points_px
-    known = np.isfinite(points_px).all(axis=-1)
-    back_px = np.full_like(points_px, np.inf)
-    back_px[known] = camera.undistort_points(points_px[known])
-    with np.errstate(invalid="ignore"):
-        folded = ~np.asarray((np.abs(back_px - ideal_px) < _FOLD_PX).all(axis=-1))
-    return np.where(folded[:, None], np.nan, points_px)
+    return np.where(camera.within_lens(ideal_px)[:, None], camera.distort_points(ideal_px), np.nan)
 
 
 def _keypoints(body: PosedBody, camera: Camera, points_px: Array, occluded: NDArray[np.bool_]) -> Keypoints:
     visibility = np.where(occluded, OCCLUDED, VISIBLE)
     visibility[~_within(points_px, camera)] = ABSENT
-    surface_px = project_through_lens(camera, _surface_world(body))
-    surface_px = surface_px[np.isfinite(surface_px).all(axis=-1)]
-    if not len(surface_px) or not _within(surface_px, camera).any():
+    surface, ends = _surface_world(body)
+    surface_px = project_through_lens(camera, surface)
+    known = np.isfinite(surface_px).all(axis=-1)
+    if not _within(surface_px, camera).any():
         return Keypoints(points_px, visibility, None, 0.0)
-    low = np.maximum(surface_px.min(axis=0), -0.5)
-    high = np.minimum(surface_px.max(axis=0), np.array(camera.size) - 0.5)
+    low = np.maximum(surface_px[known].min(axis=0), -0.5)
+    high = np.minimum(surface_px[known].max(axis=0), np.array(camera.size) - 0.5)
     box = (float(low[0]), float(low[1]), float(high[0] - low[0]), float(high[1] - low[1]))
-    small = camera.pinhole.scaled(min(1.0, _SILHOUETTE_PX / max(camera.size)))
-    share = np.count_nonzero(part_labels([body], small)) / (small.width * small.height)
-    return Keypoints(points_px, visibility, box, max(1.0, float(share * camera.width * camera.height)))
+    parts = zip(np.split(surface_px, ends), np.split(known, ends), strict=True)
+    return Keypoints(points_px, visibility, box, _area([px[shown] for px, shown in parts], box))
+
+
+def _area(part_points_px: Sequence[Array], box: tuple[float, float, float, float]) -> float:
+    """Return the area of parts within a box, px^2. Parts are convex, so each covers the hull of its points, (n, 2)."""
+    x, y, width, height = box
+    scale = _SILHOUETTE_PX / max(width, height, 1.0)
+    mask = np.zeros((max(1, round(height * scale)), max(1, round(width * scale))), np.uint8)
+    for points in part_points_px:
+        if len(points):
+            at = (points - (x, y)) * scale - 0.5
+            cv2.fillConvexPoly(mask, cv2.convexHull(np.round(16 * at).astype(np.int32)), (1,), shift=4)
+    return max(1.0, float(cv2.countNonZero(mask)) / mask.size * width * height)
 
 
 def _within(points_px: Array, camera: Camera) -> NDArray[np.bool_]:
@@ -93,14 +91,17 @@ def _within(points_px: Array, camera: Camera) -> NDArray[np.bool_]:
         return np.asarray(((points_px >= -0.5) & (points_px < np.array(camera.size) - 0.5)).all(axis=-1))
 
 
-def _surface_world(body: PosedBody) -> Array:
-    """Return points of the surface of a body, (n, 3), metres."""
-    Ts = body.kinematics.Ts_world_part
-    return np.concatenate([rigid.apply(T, p) for T, p in zip(Ts, _surface_parts(body.model), strict=True)])
+def _surface_world(body: PosedBody) -> tuple[Array, IntArray]:
+    """Return points of the surface of a body, (n, 3), metres, and where those of each part but the last end."""
+    points_part, owners, ends = _surface(body.model)
+    Ts = body.kinematics.Ts_world_part[owners]
+    return np.einsum("nij,nj->ni", Ts[:, :3, :3], points_part) + Ts[:, :3, 3], ends
 
 
 @lru_cache(maxsize=8)
-def _surface_parts(model: BodyModel) -> tuple[Array, ...]:
-    """Return points of the surface of each part in the part's frame, (n, 3) each, metres."""
+def _surface(model: BodyModel) -> tuple[Array, IntArray, IntArray]:
+    """Return points of the surface of a body in their parts' frames, (n, 3), metres, their parts, and these ends."""
     shapes = zip(model.shapes, model.centers_part, strict=True)
-    return tuple(shape.triangles(_RINGS, _SECTORS)[0] + center for shape, center in shapes)
+    parts = [shape.triangles(_RINGS, _SECTORS).vertices + center for shape, center in shapes]
+    counts = [len(points) for points in parts]
+    return np.concatenate(parts), np.repeat(np.arange(len(parts)), counts), np.cumsum(counts)[:-1]

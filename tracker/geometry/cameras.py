@@ -14,6 +14,9 @@ from tracker.geometry.arrays import Array
 
 DISTORTION_COUNTS = (0, 4, 5, 8)
 
+_MAX_LENS_RADIUS = 20.0
+"""Tangent of the widest angle from the optical axis at which the distortion is examined: 87 degrees."""
+
 Region = tuple[int, int, int, int]
 """A box in an image, px: first column, first row, column after the last, row after the last."""
 
@@ -148,6 +151,25 @@ class Camera:
         if self.is_pinhole:
             return np.asarray(points_px, dtype=np.float64)
         return self._normalized_to_px(self.pinhole._px_to_normalized(np.asarray(points_px, dtype=np.float64)))
+
+    def within_lens(self, points_px: Array) -> NDArray[np.bool_]:
+        """Return whether undistorted pixels, `(..., 2)`, lie where the model of the distortion holds; False for NaN.
+
+        Farther out, the polynomial bends back: it maps points that no lens shows to pixels within the image.
+        """
+        if self.is_pinhole:
+            return np.asarray(np.isfinite(points_px).all(axis=-1))
+        radius = np.linalg.norm(self.pinhole._px_to_normalized(points_px), axis=-1)
+        return np.asarray(radius < self._lens_radius)
+
+    @cached_property
+    def _lens_radius(self) -> float:
+        """Distance from the axis, at depth 1, up to which the distorted distance grows; infinite if it always does."""
+        radii = np.linspace(0.0, _MAX_LENS_RADIUS, 4001)
+        points = np.stack([radii, np.zeros_like(radii)], axis=-1)
+        steps = np.diff(self._normalized_to_px(points)[:, 0])
+        falls = np.flatnonzero(steps <= 0)
+        return float(radii[falls[0]]) if len(falls) else np.inf
 
     def undistort_image(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Resample an image as filmed, `(H, W[, C])`, to undistorted pixels of the same size."""

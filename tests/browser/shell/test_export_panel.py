@@ -33,6 +33,8 @@ async def test_a_format_is_chosen_and_its_file_downloaded(fresh_page):
     await shows(page, "document.querySelector('#export-panel').matches(':popover-open')")
     labels = page.locator("#export-panel label:visible")
     assert await labels.all_inner_texts() == ["Format", "People", "Frames", "Axes", "Units", "Leave out lost poses"]
+    untitled = "(all) => all.filter((one) => !one.title && !one.labels?.[0]?.title).map((one) => one.outerHTML)"
+    assert await page.eval_on_selector_all("#export-panel :is(button, input, select)", untitled) == []
     assert await page.input_value("#export-axes") == "calibration"
     await page.select_option("#export-format", "bvh")
     assert await page.input_value("#export-axes") == "y-up"

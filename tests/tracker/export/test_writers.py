@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from bodies import MODELS
 from pycocotools.coco import COCO
+from staging import cameras_around
 from stored_motions import FPS, distorted_cameras, store_motion
 
+from tracker.contours.label_image import part_labels
 from tracker.errors import SessionError
 from tracker.export import writers
 from tracker.export.keypoints import keypoints_in_views, project_through_lens
@@ -181,6 +183,17 @@ def test_keypoints_beyond_the_lens_are_absent(tmp_path):
     assert np.isnan(px[1]).all()
     folded = camera.project(outside[:3])
     assert 0 <= folded[0] < 640
+
+
+def test_the_area_is_that_of_the_silhouette(couple):
+    _, truth = couple
+    camera = cameras_around(3, size=(640, 480))[0]  # the label image has no distortion
+    for body in (truth[0][1], truth[1][1]):
+        ((seen,),) = keypoints_in_views([body], [camera])
+        rows, columns = np.nonzero(part_labels([body], camera))
+        assert seen.area_px == pytest.approx(len(rows), rel=0.04)
+        box = [columns.min(), rows.min(), np.ptp(columns), np.ptp(rows)]
+        np.testing.assert_allclose(seen.box_px, box, atol=3)
 
 
 @pytest.mark.parametrize(("keypoints", "names"), [("coco17", ["person"]), ("body", ["gavrila34"])])

@@ -228,3 +228,19 @@ def test_cameras_of_the_points_are_projected_one_by_one():
         one_px, one_J = c.project_with_jacobian(point[None])
         np.testing.assert_allclose(one_px[0], px)
         np.testing.assert_allclose(one_J[0], by_point)
+
+
+@pytest.mark.parametrize(
+    ("distortion", "radius"),
+    [((-0.3, 0.0, 0.0, 0.0), np.sqrt(1 / 0.9)), ((0.1, 0.0, 0.0, 0.0), np.inf), ((-0.2, 0.05, 0.0, 0.0), np.inf)],
+)
+def test_the_lens_shows_points_up_to_where_its_polynomial_turns(distortion, radius):
+    K = np.array([[500.0, 0.0, 319.5], [0.0, 480.0, 239.5], [0.0, 0.0, 1.0]])
+    camera = Camera("c", (640, 480), K, np.array(distortion), np.eye(4))
+    reach = np.array([0.1, 0.99 * radius, 1.01 * radius, 5.0] if np.isfinite(radius) else [0.1, 5.0, 15.0, 19.0])
+    for axis in ((1.0, 0.0), (0.0, -1.0), (0.6, 0.8)):
+        px = K[[0, 1], [0, 1]] * reach[:, None] * axis + K[:2, 2]
+        expected = reach < radius
+        assert camera.within_lens(px).tolist() == expected.tolist()
+    assert not camera.within_lens(np.array([np.nan, 3.0]))
+    assert camera.pinhole.within_lens(np.array([[1e5, 3.0], [np.nan, 3.0]])).tolist() == [True, False]
