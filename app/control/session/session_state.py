@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import Unpack
 
@@ -206,17 +206,18 @@ class SessionState:
         self.show_frame(self.state.frame)
         self.refresh_saving()
 
-    def save(self, label: str, source: str, gesture: object = None) -> None:
+    def save(self, label: str, source: str, gesture: object = None, vouched: Collection[int] | None = None) -> None:
         """Save the shown poses.
 
         Args:
             label: of the entry of the history.
             source: of the values that changed.
             gesture: successive saves of one gesture make one entry; None makes an entry for this save.
+            vouched: indices of the people whom the edit is about, as for `Saver.save`; None for all.
         """
         goes_on = gesture is not None and (self.open_edit_owner is gesture or self.open_edit_owner == gesture)
         amend = self._edit if goes_on else None
-        self._edit = self.saver.save(self.state, label, source, amend)
+        self._edit = self.saver.save(self.state, label, source, amend, vouched)
         self.open_edit_owner, self.last_save = gesture, time.monotonic()
         self.note_stored()
         self.refresh_saving()
