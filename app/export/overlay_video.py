@@ -10,7 +10,7 @@ import numpy as np
 
 from app.drawing import overlays
 from app.drawing.pictures import placeholder
-from app.runtime.user_folders import frame_index_folder
+from app.session.footage_indices import footage_indices
 from app.state.page_view import View
 from app.state.people import ShownPose
 from app.state.state import State
@@ -53,7 +53,7 @@ def write_overlay_video(
     size = (columns * tile[0], rows * tile[1])
     even = (size[0] + size[0] % 2, size[1] + size[1] % 2)  # as H.264 requires
     with ExitStack() as stack:
-        recording = stack.enter_context(Recording(session.cameras, indices=frame_index_folder()))
+        recording = stack.enter_context(Recording(session.cameras, indices=footage_indices()))
         writer = stack.enter_context(VideoWriter(path, even, session.fps))
         for frame in motion.frames:
             picture = np.zeros((even[1], even[0], 3), np.uint8)

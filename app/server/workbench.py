@@ -12,7 +12,6 @@ from typing import Any
 
 from app.control.controller import Controller
 from app.page.socket import PaneSocket
-from app.runtime.user_folders import frame_index_folder
 from app.scene3d.gizmos import Gizmos
 from app.scene3d.panels import Panels
 from app.scene3d.scene import SceneView
@@ -21,6 +20,7 @@ from app.server.export_routes import ExportRoutes
 from app.server.private_viser import PrivateViser
 from app.server.server import create_app, serve_forever, static_folder
 from app.session import proxies
+from app.session.footage_indices import footage_indices
 from app.session.frame_cache import FrameCache
 from app.storage import rescue
 from app.storage.saver import Saver
@@ -61,10 +61,8 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
     require_files(session)
     access = access_for(serving.host, serving.allow_hosts, serving.token)
     static = static_folder()
-    with (
-        SessionLock(session.folder),
-        Recording(session.cameras, indices=frame_index_folder(), in_background=True) as recording,
-    ):
+    indices = footage_indices()
+    with SessionLock(session.folder), Recording(session.cameras, indices=indices, in_background=True) as recording:
         store = AnnotationStore(session.annotations_path)
         if store.backup_error is not None:
             say(store.backup_error)

@@ -1,7 +1,7 @@
 """Read and write the annotations of an open session: poses, pins, settings, history."""
 
 from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -154,7 +154,9 @@ class Saver:
                 found.append(PointObservation(pin.point, camera, (float(u), float(v))))
         return tuple(found)
 
-    def save(self, state: State, label: str, source: str, amend: int | None) -> int | None:
+    def save(
+        self, state: State, label: str, source: str, amend: int | None, vouched: Collection[int] | None = None
+    ) -> int | None:
         """Write the pins of a state, and its poses that differ from the stored ones; drafts are left out.
 
         Args:
@@ -162,6 +164,8 @@ class Saver:
             label: of the entry of the history.
             source: of the values that changed, unless the shown pose has sources of its own.
             amend: the entry of the history to add to; None makes a new one.
+            vouched: indices of the people whom the edit is about; None for all. Of the others only the values change:
+                they become no keyframes, and doubts about them stay.
 
         Returns:
             The entry that later calls can amend; None if there was nothing to write. If writing fails, `error` says
@@ -186,6 +190,8 @@ class Saver:
                 settings=asdict(state.settings) if source in ("searched", "fitted") else {},
                 view_costs_px=state.view_costs_px,
             )
+            if vouched is not None and person not in vouched:
+                record = _with_marks_of(stored, record)
             changes.append(PoseChange(self._session.people[person].name, state.frame, record))
         return self.write(f"{label}, frame {state.frame}", changes, amend, by_program=False)
 
@@ -335,6 +341,15 @@ class Saver:
         self.retry()
         if self.error is not None:
             raise SessionError(f"the history cannot move while an edit is not saved: {self.error}")
+
+
+def _with_marks_of(stored: PoseRecord | None, record: PoseRecord) -> PoseRecord:
+    """Return a new record with the marks and doubts of the stored one."""
+    if stored is None:
+        return replace(record, keyframe=False)
+    return replace(
+        record, keyframe=stored.keyframe, status=stored.status, remark=stored.remark, reviewed=stored.reviewed
+    )
 
 
 def _is_same(stored: PoseRecord, shown: ShownPose, revision: int) -> bool:

@@ -65,8 +65,8 @@ class PersonMotion:
         other = next((m for m in self.models if m.value_names != self.model.value_names), None)
         if other is not None:
             raise SessionError(
-                f"expected poses of '{self.person.name}' with the degrees of freedom of '{self.model.name}', found some "
-                f"of '{other.name}'; give frames of one body as --frames, or another format"
+                f"expected poses of '{self.person.name}' with the degrees of freedom of '{self.model.name}', found "
+                f"some of '{other.name}'; give frames of one body as --frames, or another format"
             )
         return {f: retarget_pose(p.body.values, p.body.model, self.model) for f, p in self.poses.items()}
 

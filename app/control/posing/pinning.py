@@ -1,7 +1,7 @@
 """Set, move and remove pins, and fit people to them. Each gesture is one entry of the history."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,7 +101,7 @@ class Pinning:
             if pins == self._session_state.state.pins:
                 return  # a click only sets it
             if drag.live:
-                self._show_fit([drag.person], drag.people, pins)
+                self._show_fit([drag.person], [drag.person], drag.people, pins)
             else:
                 self._session_state.set(pins=pins)
             if time.monotonic() - self._session_state.last_save > _CHECKPOINT_S:
@@ -151,6 +151,8 @@ class Pinning:
     def fit(self, frame: int, person: int | None = None) -> None:
         """Fit people to pins and edges together.
 
+        It vouches for those with pins on the frame; without any, for the selected person.
+
         Args:
             frame: the frame that the user saw.
             person: index of the only person to fit; by default the selected person and all who have a pose or pins on
@@ -174,15 +176,19 @@ class Pinning:
                     "set pins, or try again in a moment"
                 )
             people = sorted(meant) if views is not None else pinned
-            self._show_fit(people, state.people, state.pins)
+            vouched = people if person is not None else pinned or [state.person]
+            self._show_fit(people, vouched, state.people, state.pins)
             evidence = " and ".join([*(["pins"] if pinned else []), *(["edges"] if views is not None else [])])
-            self._session_state.save(f"fit to {evidence}", "fitted")
+            self._session_state.save(f"fit to {evidence}", "fitted", vouched=vouched)
 
-    def _show_fit(self, fitted: Iterable[int], start: tuple[ShownPose, ...], pins: Pins) -> None:
+    def _show_fit(
+        self, fitted: Iterable[int], vouched: Sequence[int], start: tuple[ShownPose, ...], pins: Pins
+    ) -> None:
         """Fit some people, with all others fixed, and show them.
 
         Args:
             fitted: indices of the people to fit.
+            vouched: indices of those whom the fit is about. Doubts about others stay.
             start: from which the fit starts, all people.
             pins: of all people.
         """
@@ -203,7 +209,9 @@ class Pinning:
         people = list(start)
         for person in fitted:
             sources = tuple("pinned" if by_pin else "fitted" for by_pin in found.pinned[person])
-            people[person] = ShownPose(found.poses[person], "pinned" if pins[person] else "fitted", sources=sources)
+            doubt = ("", "") if person in vouched else (start[person].status, start[person].remark)
+            source = "pinned" if pins[person] else "fitted"
+            people[person] = ShownPose(found.poses[person], source, *doubt, sources=sources)
         costs = session_state.costs(tuple(p.values for p in people))
         session_state.set(people=tuple(people), pins=pins, **costs)
 

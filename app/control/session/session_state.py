@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import Unpack
 
@@ -20,6 +20,7 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.triangulation import PointObservation
 from tracker.posing.default_pose import default_pose
+from tracker.posing.grab import Constraints
 from tracker.posing.retarget import retarget_pose
 from tracker.session.locked_dofs import active_dofs
 from tracker.session.session import Session
@@ -79,6 +80,17 @@ class SessionState:
     def active_dofs(self, person: int) -> NDArray[np.bool_]:
         """Return which degrees of freedom of a person are not locked, (n_dofs,)."""
         return active_dofs(self.present[person], self.state.locked[person])
+
+    def drag_constraints(self, person: int) -> Constraints:
+        """Return what a drag of a person leaves alone: locks, held points, the vertical."""
+        here = [h for h in self.state.held if (h.frame, h.person) == (self.state.frame, person)]
+        cameras = self.session.cameras
+        held = {
+            point: [cameras[h.camera].camera for h in here if h.point == point and h.camera is not None]
+            for point in {h.point for h in here}
+        }
+        x, y, z = (float(c) for c in self._R_world_up[:, 2])
+        return Constraints(self.active_dofs(person), held, (x, y, z))
 
     def within_locks(self, poses: Sequence[Array]) -> tuple[Array, ...]:
         """Return poses, (n_values,) each, with locked degrees of freedom as in the shown poses."""
@@ -194,17 +206,18 @@ class SessionState:
         self.show_frame(self.state.frame)
         self.refresh_saving()
 
-    def save(self, label: str, source: str, gesture: object = None) -> None:
+    def save(self, label: str, source: str, gesture: object = None, vouched: Collection[int] | None = None) -> None:
         """Save the shown poses.
 
         Args:
             label: of the entry of the history.
             source: of the values that changed.
             gesture: successive saves of one gesture make one entry; None makes an entry for this save.
+            vouched: indices of the people whom the edit is about, as for `Saver.save`; None for all.
         """
         goes_on = gesture is not None and (self.open_edit_owner is gesture or self.open_edit_owner == gesture)
         amend = self._edit if goes_on else None
-        self._edit = self.saver.save(self.state, label, source, amend)
+        self._edit = self.saver.save(self.state, label, source, amend, vouched)
         self.open_edit_owner, self.last_save = gesture, time.monotonic()
         self.note_stored()
         self.refresh_saving()

@@ -8,6 +8,7 @@ from tracker.errors import TrackerError
 from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.posing import pinned_fit
 from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange, PoseRecord
 
 RIGHT, BACK = 1, 2
 
@@ -277,3 +278,23 @@ def test_pins_belong_to_the_frame_that_a_tracker_shows(placed, tracker):
     assert pins_of(controller) == {}
     controller.navigation.seek(2)
     assert pins_of(controller) == {("head", FRONT): (100.0, 100.0)}
+
+
+def test_fit_vouches_for_the_pinned_and_leaves_doubts_about_others(couple, session, opened):
+    store = AnnotationStore(session / "annotations.sqlite")
+    doubtful = {"status": "doubtful", "remark": "left arm relocated"}
+    rows = [
+        PoseChange(name, 0, PoseRecord(values, ("tracked",) * len(values), revision, **doubtful))
+        for name, values, revision in zip(("ann", "bob"), couple.state.poses, couple.state.revisions, strict=True)
+    ]
+    store.commit("track", rows)
+    store.close()
+    controller = opened()
+    pin(controller, "left_wrist", pixel_of(controller, "left_wrist") + 3.0)
+    controller.pinning.fit(0)
+    store = AnnotationStore(session / "annotations.sqlite", read_only=True)
+    ann, bob = store.pose("ann", 0), store.pose("bob", 0)
+    store.close()
+    assert (ann.keyframe, ann.status) == (True, "")
+    assert (bob.keyframe, bob.status, bob.remark) == (False, "doubtful", "left arm relocated")
+    assert (controller.state.people[1].source, controller.state.people[1].status) == ("fitted", "doubtful")
