@@ -11,16 +11,21 @@ if TYPE_CHECKING:
     from tracker.store.records import FrameRow
 
 
-def command(session: SessionArg, /, json: bool = False) -> None:
+def command(session: SessionArg, /, check: bool = True, json: bool = False) -> None:
     """Show the contents of a session.
 
     Args:
         session: session folder.
+        check: look at a few frames, whether the footage of two cameras is exchanged.
         json: print one JSON object.
     """
+    from app.cli.camera_check import exchange_note
     from tracker.session.session import load_session
 
-    summary = summarize(load_session(session))
+    loaded = load_session(session)
+    summary = summarize(loaded)
+    is_complete = not any(c["missing"] for c in summary["cameras"])
+    summary["warning"] = exchange_note(loaded) if check and is_complete else None
     print(format_json(summary) if json else _format(summary))
 
 
@@ -78,5 +83,8 @@ def _format(summary: dict[str, Any]) -> str:
         body = f"{p['model']} of {p['height_m']:.2f} m, {p['dofs']} degrees of freedom"
         lines.append(f"  person {p['name']}: {body}, {p['poses']} poses, {p['keyframes']} keyframes")
     if any(c["missing"] for c in summary["cameras"]):
-        lines.append(f"files are missing: put them back, or run quadrille relink {summary['folder']} --search FOLDER")
+        command = f"quadrille relink {summary['folder']} --search FOLDER"
+        lines.append(f"warning: files are missing: put them back, or run {command}")
+    if summary["warning"] is not None:
+        lines.append(f"warning: {summary['warning']}")
     return "\n".join(lines)

@@ -80,6 +80,7 @@ def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None
     seeing = [name for name, view in found["views"].items() if view["n_inside"]]
     if len(seeing) == 1 < len(found["views"]):
         lines.append(f"note: only '{seeing[0]}' has the body in its picture: check --axes and the world of the file")
+    lines += [] if found["warning"] is None else [f"warning: {found['warning']}"]
     print(format_json(found) if arguments.json else "\n".join(lines))
 
 
@@ -117,7 +118,7 @@ def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool)
     if sizes:
         person = replace(person, model=fit_sizes(person.model, joints))
     fit = fit_to_points(person.model, limbs)
-    views = _views(session, person, fit.pose)
+    where = _where(session, person, fit.pose, frame)
     with SessionLock(session.folder):
         if sizes:
             people = tuple(person if i == index else p for i, p in enumerate(session.people))
@@ -126,7 +127,7 @@ def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool)
     fitted = dict(zip(person.model.point_names, person.model.points_world(fit.pose), strict=True))
     residuals = {n: float(1000 * np.linalg.norm(fitted[n] - p)) for n, p in limbs.items()}
     mean = float(np.mean(list(residuals.values())))
-    return {"person": person.name, "frame": frame, "residual_mm": residuals, "mean_mm": mean, "views": views}
+    return {"person": person.name, "frame": frame, "residual_mm": residuals, "mean_mm": mean, **where}
 
 
 def init_from_poses(at: Target, frame: int, table: "PoseTable") -> dict[str, Any]:
@@ -156,28 +157,31 @@ def init_from_poses(at: Target, frame: int, table: "PoseTable") -> dict[str, Any
     row = np.flatnonzero(table.frames == frame)
     if not len(row):
         raise TrackerError(f"expected a pose of frame {frame}, found frames {table.frames.tolist()[:8]} in the table")
-    views = _views(session, person, values[row[0]])
+    where = _where(session, person, values[row[0]], frame)
     with SessionLock(session.folder):
         _store_keyframe(session, person, frame, values[row[0]], "poses")
-    return {"person": person.name, "frame": frame, "views": views}
+    return {"person": person.name, "frame": frame, **where}
 
 
-def _views(session: "Session", person: "Person", pose: "Array") -> dict[str, Any]:
-    """Return the place of a body in the view of each camera.
+def _where(session: "Session", person: "Person", pose: "Array", frame: int) -> dict[str, Any]:
+    """Return the place of a body in the view of each camera, `views`, and a `warning` if two cameras seem exchanged.
 
     Raises:
         TrackerError: it is in no picture.
     """
+    from app.cli.camera_check import body_exchange_note
     from tracker.geometry.framing import framings
 
-    found = framings([c.camera for c in session.cameras], person.model.points_world(pose))
+    points_world = person.model.points_world(pose)
+    found = framings([c.camera for c in session.cameras], points_world)
     if not any(f.n_inside for f in found):
         listed = "; ".join(f"'{f.camera}' {f.text}" for f in found)
         raise TrackerError(
             f"expected '{person.name}' in the picture of a camera, found nobody there ({listed}); check --axes, the "
             "units of the file, and that it is in the world of the calibration"
         )
-    return {f.camera: {**f._asdict(), "text": f.text} for f in found}
+    views = {f.camera: {**f._asdict(), "text": f.text} for f in found}
+    return {"views": views, "warning": body_exchange_note(session, frame, points_world)}
 
 
 def _differences(found: Sequence[str], expected: Sequence[str]) -> str:

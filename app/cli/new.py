@@ -1,5 +1,6 @@
 """`quadrille new`: make a session from videos and a calibration."""
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -45,6 +46,7 @@ class NewArguments:
 
 def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
     """Make a session from videos and a calibration."""
+    from app.cli.camera_check import exchange_note
     from tracker.session.assemble import DEFAULT_MODEL, NewSession, assemble
 
     made = assemble(
@@ -68,3 +70,5 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
     print(f"made {made.folder}: {len(made.cameras)} cameras, {made.n_frames} frames at {made.fps:g} per second")
     if declared := {f"{c.declared_fps:g}" for c in made.cameras if c.declared_fps is not None}:
         print(f"the videos declare {' or '.join(sorted(declared))} frames per second")
+    if note := exchange_note(made):
+        print(f"warning: {note}", file=sys.stderr)

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from platformdirs import user_cache_path
-
 from app.control.controller import Controller
 from app.page.socket import PaneSocket
 from app.scene3d.gizmos import Gizmos
@@ -22,6 +20,7 @@ from app.server.export_routes import ExportRoutes
 from app.server.private_viser import PrivateViser
 from app.server.server import create_app, serve_forever, static_folder
 from app.session import proxies
+from app.session.footage_indices import footage_indices
 from app.session.frame_cache import FrameCache
 from app.storage import rescue
 from app.storage.saver import Saver
@@ -62,7 +61,8 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
     require_files(session)
     access = access_for(serving.host, serving.allow_hosts, serving.token)
     static = static_folder()
-    with SessionLock(session.folder), Recording(session.cameras, indices=_indices(), in_background=True) as recording:
+    indices = footage_indices()
+    with SessionLock(session.folder), Recording(session.cameras, indices=indices, in_background=True) as recording:
         store = AnnotationStore(session.annotations_path)
         if store.backup_error is not None:
             say(store.backup_error)
@@ -109,11 +109,6 @@ def _keep_unsaved(saver: Saver, folder: Path) -> str | None:
     except TrackerError as error:
         return f"edits are lost: {saver.error}; {error}"
     return f"edits are not saved: {saver.error}; they are kept in {path}, and 'quadrille restore {folder}' writes them"
-
-
-def _indices() -> Path:
-    """Return the folder that stores the frame indices of videos between openings."""
-    return user_cache_path("quadrille", appauthor=False) / "footage"
 
 
 async def _until_interrupted(serving: Coroutine[Any, Any, None]) -> None:

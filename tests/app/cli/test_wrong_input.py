@@ -13,6 +13,7 @@ import pytest
 import tomli_w
 from command_line import SAMPLE, assert_refused, stored
 
+from tracker.evidence.camera_exchange import CameraExchange
 from tracker.formats.anipose import write_calibration
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
@@ -227,6 +228,24 @@ def test_a_session_open_already(run, session):
             assert_refused(run(*words), ["open"])
         assert run("info", session)[0] == 0  # looking is allowed
     assert stored(session) == {} if (session / "annotations.sqlite").exists() else True
+
+
+def test_exchanged_footage_is_told(run, room, monkeypatch):
+    found = CameraExchange(("front", "left"), 0.2, 0.9)
+    monkeypatch.setattr("tracker.evidence.camera_exchange.find_exchange", lambda *_: found)
+    status, out, err = run(*new(room))
+    assert (status, out) == (0, f"made {room / 's'}: 2 cameras, 6 frames at 25 per second\n")
+    assert err.startswith("warning: the footage of 'front' and 'left' seems to be exchanged: ")
+    assert "20% of what moves in the views, and 90% with the two exchanged" in err
+    assert run("info", room / "s")[1].splitlines()[-1] == err.strip()
+    assert json.loads(run("info", room / "s", "--json")[1])["warning"] == found.text
+    assert "warning" not in run("info", room / "s", "--no-check")[1]
+
+
+def test_a_first_pose_tells_exchanged_footage(run, session, monkeypatch):
+    monkeypatch.setattr("tracker.evidence.camera_exchange.find_body_exchange", lambda *_: ("BACK", "LEFT"))
+    out = run("init", session, "--joints", SAMPLE / "truth.trc")[1]
+    assert "warning: the footage of 'BACK' and 'LEFT' seems to be exchanged: nothing differs" in out
 
 
 @pytest.mark.slow

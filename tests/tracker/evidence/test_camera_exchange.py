@@ -1,0 +1,68 @@
+"""Two cameras with each other's footage are noticed by what moves, whatever the background is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from command_line import SAMPLE
+
+from tracker.evidence.camera_exchange import find_body_exchange, find_exchange
+from tracker.formats.trc import read_trc
+from tracker.session.session import load_session
+
+NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
+
+
+class Frames:
+    """The frames of a recording, read once, as those of cameras in any order."""
+
+    def __init__(self, frames, order=range(4)):
+        self.frames, self.order, self.n_frames = frames, tuple(order), 50
+
+    def read(self, k):
+        nearest = min(self.frames, key=lambda known: abs(known - k))
+        return [self.frames[nearest][i] for i in self.order]
+
+
+@pytest.fixture(scope="module")
+def frames():
+    from tracker.footage.recording import Recording
+
+    with Recording(load_session(SAMPLE).cameras) as recording:
+        return {k: recording.read(k) for k in (0, 16, 32, 49)}
+
+
+def exchanged(i, j, sources=None, side=True):
+    """The order of the footage with two exchanged, and the cameras with their backgrounds."""
+    order = [j if k == i else i if k == j else k for k in range(4)]
+    sources = list(load_session(SAMPLE).cameras if sources is None else sources)
+    if side:
+        sources = [replace(s, background=sources[k].background) for s, k in zip(sources, order, strict=True)]
+    return order, sources
+
+
+def test_the_right_assignment_passes(frames):
+    sources = load_session(SAMPLE).cameras
+    damaged = {k: [None, *views[1:]] if k == 16 else views for k, views in frames.items()}
+    assert find_exchange(sources, Frames(damaged)) is None
+    assert find_exchange(sources[:1], Frames(frames)) is None
+
+
+@pytest.mark.parametrize(("pair", "side"), [((0, 3), True), ((1, 2), False)])
+def test_exchanged_footage_is_named(frames, pair, side):
+    order, sources = exchanged(*pair, side=side)
+    found = find_exchange(sources, Frames(frames, order))
+    assert found is not None
+    assert set(found.cameras) == {NAMES[i] for i in pair}
+    assert found.exchanged_coverage > found.coverage + 0.1
+    assert "seems to be exchanged" in found.text
+
+
+def test_a_body_that_is_seen_only_with_two_exchanged(frames):
+    points_world = read_trc(SAMPLE / "truth.trc").points[0]
+    sources = load_session(SAMPLE).cameras
+    assert find_body_exchange(sources, Frames(frames), 0, points_world) is None
+    order, exchanged_sources = exchanged(1, 3, side=False)
+    assert find_body_exchange(exchanged_sources, Frames(frames, order), 0, points_world) == ("RIGHT", "LEFT")
+    beside = points_world + np.array([0.8, 0.3, 0.0])  # the other views do not confirm it
+    assert find_body_exchange(sources, Frames(frames), 0, beside) is None
