@@ -12,6 +12,7 @@ from tracker.body.kinematics import Kinematics
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import (
+    AT_LIMIT,
     Fit,
     NormalEquations,
     PosePrior,
@@ -62,8 +63,8 @@ _KEPT_M, _UNMOVED_M = 0.002, 1e-5
 
 QUICK: _Solving = {"max_iterations": 15, "tolerance": 1e-4}
 """Solver settings of a move: dozens a second, each from the result of the last one."""
-_BENT: _Solving = {"max_iterations": 6, "tolerance": 1e-4}
-"""Solver settings of a test whether a bent limb comes nearer."""
+_BENT: _Solving = {"max_iterations": 6, "tolerance": 1e-3}
+"""Solver settings of a test whether a bent limb, or its other side, comes nearer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,9 +128,10 @@ def reach(
     active = active_dofs | (beyond & grabbed.unlocked_dofs)
     blocks: list[ResidualBlock] = [
         PointerTarget(grabbed, target_world, depth_weight),
-        holds.scaled(HOLD_WEIGHT),
         _rest_prior(model, grabbed.pose),
     ]
+    if len(holds.points):
+        blocks.append(holds.scaled(HOLD_WEIGHT))
 
     def is_done(found: Array) -> bool:
         return _has_reached(grabbed, found, target_world) or _is_stretched(grabbed, found, active_dofs, target_world)
@@ -139,14 +141,19 @@ def reach(
         return fit.pose
     # Descent along the view does not cross between the two depths at which a limb is seen, nor around a limit. A first
     # solution in space does, from here or from the limb at rest.
-    in_space = [PointerTarget(grabbed, target_world, 1.0), *blocks[1:]]
     at_rest = np.where(value_mask(model, active & model.limb_dofs), _relaxed(model), pose)
-    for start in (pose, at_rest):
-        nearer = solve(model, start, in_space, active, **_BENT).pose
-        other = solve(model, nearer, blocks, active, **QUICK)
-        if other.cost < _OTHER_SIDE * fit.cost:
-            fit = other
-    return fit.pose
+    depths_m = grabbed.camera.depths(np.stack([grabbed.point_world(fit.pose), target_world]))
+    if abs(depths_m[0] - depths_m[1]) > _NEAR_M:
+        starts = [pose, at_rest]
+    else:
+        starts = [at_rest] if _is_at_limit(model, fit.pose, active) else []
+    best = fit
+    for start in starts:
+        in_space = solve(model, start, [PointerTarget(grabbed, target_world, 1.0), *blocks[1:]], active, **_BENT)
+        other = solve(model, in_space.pose, blocks, active, **_BENT)
+        if other.cost < min(_OTHER_SIDE * fit.cost, best.cost):
+            best = other
+    return best.pose if best is fit else solve(model, best.pose, blocks, active, **QUICK).pose
 
 
 def as_other_views_placed(grabbed: Grab, target_world: Array) -> tuple[Array, float]:
@@ -231,6 +238,13 @@ def _solve_bending(
         if bent.cost < fit.cost:
             fit = solve(model, bent.pose, blocks, active_dofs=active_dofs, **QUICK)
     return fit
+
+
+def _is_at_limit(model: BodyModel, pose: Array, active_dofs: NDArray[np.bool_]) -> bool:
+    """Return whether a limb's joint that turns about several axes is at a limit."""
+    several = np.array([len(joint.axes) > 1 for joint in model.joints])[model.dof_joint] & active_dofs & model.limb_dofs
+    values, (low, high) = pose[model.dof_value[several]], model.limits[several].T
+    return bool(np.any((values <= low + AT_LIMIT) | (values >= high - AT_LIMIT)))
 
 
 @lru_cache(maxsize=32)

@@ -36,6 +36,8 @@ FRONT, RIGHT = 0, 1
 MOST_ACTIONS = 25
 NEAR_ENOUGH = 5
 """What is nearer than this on the screen, CSS px, nobody drags."""
+FINE_DEG = 2.0
+"""Nobody corrects a slider by less."""
 FURTHER = {"shoulder": ("elbow", "wrist"), "elbow": ("wrist",), "hip": ("knee", "ankle"), "knee": ("ankle",)}
 
 
@@ -202,6 +204,8 @@ async def test_a_body_is_placed_by_torso_drags_and_sliders(live, folder, record_
     ]
     while hands.actions < MOST_ACTIONS:
         _, by, joint, name = max((*best(dof, joints), joint, name) for dof, joint, name, joints in sliders)
+        if abs(by) < FINE_DEG:
+            break
         await hands.slide(joint, name, by)
     by_hand_mm = user.error_mm(hands.values)
     before = hands.values
