@@ -16,6 +16,7 @@ from app.control.posing.alternatives import Alternatives
 from app.control.posing.body_sizes import BodySizeEditing
 from app.control.posing.dof_locks import DofLocks
 from app.control.posing.dragging import Dragging
+from app.control.posing.held_points import HeldPoints
 from app.control.posing.pinning import Pinning
 from app.control.posing.pose_edits import PoseEdits
 from app.control.search.cost_landscape import CostLandscapes
@@ -67,6 +68,8 @@ class Controller:
         """Interpolates, clears, marks and tracks ranges of frames."""
         self.dragging = Dragging(session_state, activities)
         """Drags points and parts."""
+        self.held_points = HeldPoints(session_state, activities)
+        """Holds points in place during drags."""
         self.pinning = Pinning(session_state, activities)
         """Sets pins, and fits people to them."""
         self.replay = Replay(session_state, runs, activities)

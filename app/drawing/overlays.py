@@ -2,11 +2,13 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
+from app.drawing.facing import facing_arrow
 from app.state.page_view import View
+from app.state.people import DragState
 from app.state.state import State
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours, part_edges
@@ -30,13 +32,29 @@ PART_EDGE_COLOR = "#9aa3ad"
 EPIPOLAR_COLOR = "#ffd54a"
 ACCEPTED_COLOR = "#35e0c8"
 REJECTED_COLOR = "#ff4fa3"
-_PERSON_KINDS = ("model", "hidden", "candidate", "ghost")
+_PERSON_KINDS = ("model", "hidden", "facing", "facing_away", "candidate", "ghost")
 """Kinds of lines that belong to a person, and are left out when the person is hidden."""
+_SHORT_M = 0.01
+"""Smallest distance from the pointer's line of sight that counts as out of reach, metres."""
 _EDGE_STRIDE_PX = 3
 """Spacing of the edge pixels drawn. More would show only at high zoom, and cost the browser much."""
 
 
-PathKind = Literal["model", "hidden", "candidate", "ghost", "part_edge", "epipolar", "accepted", "rejected", "floor"]
+PathKind = Literal[
+    "model",
+    "hidden",
+    "facing",
+    "facing_away",
+    "candidate",
+    "ghost",
+    "part_edge",
+    "epipolar",
+    "accepted",
+    "rejected",
+    "floor",
+]
+Side = Literal["left", "right", ""]
+SIDES: tuple[Side, ...] = get_args(Side)
 
 
 class Path(NamedTuple):
@@ -48,6 +66,25 @@ class Path(NamedTuple):
     color: str
     segments_px: FloatArray
     """x0, y0, x1, y1, (N, 4), undistorted px."""
+    side: Side = ""
+    """Side of the body that they belong to."""
+
+
+@dataclass(frozen=True)
+class OutOfReach:
+    """A dragged point that stays behind the pointer."""
+
+    camera: int
+    person: int
+    point: str
+    u: float
+    """Where the pointer wants it, undistorted px."""
+    v: float
+    point_u: float
+    """Where it is."""
+    point_v: float
+    distance_m: float
+    """Distance of the point from the line of sight."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +98,10 @@ class Handle:
     v: float
     visible: bool
     """False for an occluded joint."""
+    held: bool
+    """Whether it stays in place while others are dragged."""
+    side: Side
+    """Side of the body."""
 
 
 def paths(session: Session, state: State, view: View, views: Sequence[ViewEvidence] | None) -> list[Path]:
@@ -82,6 +123,8 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         camera = session.cameras[index].camera.pinhole
         if not view.layers.isdisjoint(("contours", "hidden")):
             out += _model(session, bodies, camera, index, view)
+        if "contours" in view.layers:
+            out += _facing(session, bodies, camera, index)
         if state.draft is not None:
             out += _ghosts({state.draft.person}, drafted, camera, index, PREVIEW_COLOR)
         if others:
@@ -110,13 +153,31 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
     for (index, camera), hidden in zip(seen.items(), hidden_by_view, strict=True):
         first = 0
         for person, body in enumerate(bodies):
-            px = camera.project(points[person])
+            px, held = camera.project(points[person]), state.held_points(person)
             for i, name in enumerate(body.model.point_names):
                 if person not in state.visibility.hidden and np.all(np.isfinite(px[i])):
                     u, v = float(px[i, 0]), float(px[i, 1])
-                    out.append(Handle(index, person, name, u, v, not hidden[first + i]))
+                    out.append(Handle(index, person, name, u, v, not hidden[first + i], name in held, side_of(name)))
             first += len(px)
     return out
+
+
+def out_of_reach(session: Session, state: State) -> OutOfReach | None:
+    """Describe a dragged point that does not reach the pointer; None if it does."""
+    drag = state.drag
+    if drag is None or drag.wanted_px is None or drag.short_m < _SHORT_M:
+        return None
+    camera = session.cameras[drag.camera].camera.pinhole
+    u, v = (float(c) for c in camera.project(_dragged_place(session, state, drag)))
+    if not np.isfinite([u, v]).all():
+        return None
+    return OutOfReach(drag.camera, drag.person, drag.point, *drag.wanted_px, u, v, drag.short_m)
+
+
+def side_of(name: str) -> Side:
+    """Return the side of the body that a part or a point belongs to, by its name."""
+    side = name.partition("_")[0]
+    return "left" if side == "left" else "right" if side == "right" else ""
 
 
 def part_colors(people: Sequence[Person]) -> list[str]:
@@ -140,7 +201,17 @@ def _model(session: Session, bodies: Sequence[PosedBody], camera: Camera, index:
         if layer in view.layers and view.by_part:
             out += _by_part(session, bodies, contour, pieces, index, kind)
         elif layer in view.layers:
-            out += _by_person(bodies, contour, pieces, index, kind, [p.color for p in session.people])
+            out += _by_side(session, bodies, contour, pieces, index, kind)
+    return out
+
+
+def _facing(session: Session, bodies: Sequence[PosedBody], camera: Camera, index: int) -> list[Path]:
+    """Draw where the heads face."""
+    out = []
+    for person, body in enumerate(bodies):
+        segments, is_away = facing_arrow(body, camera)
+        kind: PathKind = "facing_away" if is_away else "facing"
+        out.append(Path(index, person, kind, session.people[person].color, segments))
     return out
 
 
@@ -190,13 +261,36 @@ def _by_person(
     ]
 
 
+def _by_side(
+    session: Session, bodies: Sequence[PosedBody], contour: Contour, chosen: Mask, index: int, kind: PathKind
+) -> list[Path]:
+    """Return some pieces of a contour as one path per person and side of the body."""
+    models = tuple(b.model for b in bodies)
+    people = surfaces_of(models).people[contour.parts]
+    sides = np.array([side_of(part.name) for model in models for part in model.parts])[contour.parts]
+    return [
+        Path(index, i, kind, person.color, contour.pieces_px[chosen & (people == i) & (sides == side)], side)
+        for i, person in enumerate(session.people)
+        for side in SIDES
+    ]
+
+
 def _by_part(
     session: Session, bodies: Sequence[PosedBody], contour: Contour, chosen: Mask, index: int, kind: PathKind
 ) -> list[Path]:
     """Return some pieces of a contour as one path per part that has any."""
-    people, colors = surfaces_of(tuple(b.model for b in bodies)).people, part_colors(session.people)
+    models = tuple(b.model for b in bodies)
+    people, colors = surfaces_of(models).people, part_colors(session.people)
+    sides = [side_of(part.name) for model in models for part in model.parts]
     return [
-        Path(index, int(people[part]), kind, colors[part], contour.pieces_px[chosen & (contour.parts == part)])
+        Path(
+            index,
+            int(people[part]),
+            kind,
+            colors[part],
+            contour.pieces_px[chosen & (contour.parts == part)],
+            sides[part],
+        )
         for part in np.unique(contour.parts[chosen])
     ]
 
@@ -225,14 +319,18 @@ def _segments(bodies: Sequence[PosedBody], view: ViewEvidence, index: int, shown
     ]
 
 
+def _dragged_place(session: Session, state: State, drag: DragState) -> Array:
+    """Return the dragged place, (3,), metres."""
+    T_world_part = session.people[drag.person].model.kinematics(state.poses[drag.person]).Ts_world_part[drag.part]
+    return rigid.apply(T_world_part, np.array(drag.place_part))
+
+
 def _epipolar_lines(session: Session, state: State) -> list[Path]:
     """Draw the line of sight of the dragged point in the other views."""
     drag = state.drag
     assert drag is not None
-    model = session.people[drag.person].model
     source = session.cameras[drag.camera].camera.pinhole
-    T_world_part = model.kinematics(state.poses[drag.person]).Ts_world_part[drag.part]
-    point_world: Array = rigid.apply(T_world_part, np.array(drag.place_part))
+    point_world = _dragged_place(session, state, drag)
     out = []
     for index, target in enumerate(session.cameras):
         if index != drag.camera:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from platformdirs import user_cache_path
 
 from app.drawing import overlays
 from app.drawing.pictures import placeholder
+from app.session.footage_indices import footage_indices
 from app.state.page_view import View
 from app.state.people import ShownPose
 from app.state.state import State
@@ -52,9 +52,8 @@ def write_overlay_video(
     columns, rows = _grid(cameras)
     size = (columns * tile[0], rows * tile[1])
     even = (size[0] + size[0] % 2, size[1] + size[1] % 2)  # as H.264 requires
-    indices = user_cache_path("quadrille", appauthor=False) / "footage"
     with ExitStack() as stack:
-        recording = stack.enter_context(Recording(session.cameras, indices=indices))
+        recording = stack.enter_context(Recording(session.cameras, indices=footage_indices()))
         writer = stack.enter_context(VideoWriter(path, even, session.fps))
         for frame in motion.frames:
             picture = np.zeros((even[1], even[0], 3), np.uint8)

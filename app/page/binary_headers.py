@@ -7,7 +7,7 @@ docstring of each header describes its payload.
 from typing import Literal, TypeAlias, Union, get_args
 
 from app.drawing.curves import CurveGroup
-from app.drawing.overlays import Handle, PathKind
+from app.drawing.overlays import Handle, OutOfReach, PathKind, Side
 from app.drawing.pin_marks import PinMark, PinTriangulation
 from app.page.message_types import Message, Part, Status
 from app.state.page_view import PictureLayer
@@ -34,6 +34,8 @@ class Path(Part, frozen=True):
     person: int
     kind: PathKind
     color: str
+    side: Side
+    """Side of the body that the lines belong to; empty for its middle and for lines of no body."""
     first: int
     count: int
 
@@ -61,6 +63,8 @@ class OverlayHeader(Message, frozen=True, tag="overlay"):
     paths: tuple[Path, ...]
     outlines: tuple[Outline, ...]
     handles: tuple[Handle, ...]
+    out_of_reach: OutOfReach | None
+    """Null while the dragged point follows the pointer."""
     pins: tuple[PinMark, ...]
     triangulation: PinTriangulation | None
     """Of the pins of the joint worked on."""

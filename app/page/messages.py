@@ -19,7 +19,7 @@ from app.state.search import ReplayState, SearchState
 from app.state.state import State
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import FloatArray
-from tracker.posing.drag import minor_points
+from tracker.posing.grab import heading_points, minor_points
 from tracker.session.session import Person, Session
 from tracker.store.records import SOURCES, STATUSES, FramePose, HistoryEntry
 
@@ -53,6 +53,7 @@ def _person(person: Person) -> wire.PersonInfo:
         "height_m": model.height_m,
         "points": list(model.point_names),
         "minor": list(minor_points(model)),
+        "heading": list(heading_points(model)),
         "bones": model.bones,
         "parts": [part.name for part in model.parts],
         **dof_labels.described(model),
@@ -118,7 +119,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         *floor_lines(session, state),
     ]:
         count = len(path.segments_px)
-        rows.append(Path(path.camera, path.person, path.kind, path.color, first, count))
+        rows.append(Path(path.camera, path.person, path.kind, path.color, path.side, first, count))
         segments.append(path.segments_px)
         first += count
     for hull in part_outlines.part_hulls(session, state, view):
@@ -135,6 +136,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         paths=tuple(rows),
         outlines=tuple(hulls),
         handles=tuple(handles),
+        out_of_reach=overlays.out_of_reach(session, state),
         pins=tuple(pin_marks.pin_marks(session, state)),
         triangulation=pin_marks.pin_triangulation(session, state),
     )

@@ -43,6 +43,11 @@ def _lock(controller: Controller, _: int, message: wire.LockDofs) -> None:
     controller.dof_locks.set(message.person, message.dofs, message.locked)
 
 
+def _hold(controller: Controller, _: int, message: wire.HoldPoint) -> None:
+    _check_point(controller, message.person, message.point)
+    controller.held_points.set(message.person, message.point, message.held, message.frame)
+
+
 POSE_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.SetDof: _set,
     wire.TurnDof: _turn,
@@ -53,6 +58,7 @@ POSE_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.TakeAlternative: lambda controller, _, m: controller.alternatives.take_alternative(m.person, m.frame),
     wire.ResetLimb: _reset,
     wire.LockDofs: _lock,
+    wire.HoldPoint: _hold,
 }
 
 

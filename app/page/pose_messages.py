@@ -6,7 +6,7 @@ from msgspec import Meta
 
 from app.page.message_types import Command, Frame, GesturePhase, Index, Name, Number
 
-DragMode: TypeAlias = Literal["move", "turn", "push"]
+DragMode: TypeAlias = Literal["move", "turn", "push", "bend"]
 
 
 class _PointerGesture(Command, frozen=True):
@@ -118,8 +118,20 @@ class LockDofs(_PoseEdit, frozen=True, tag="pose"):
     locked: bool
 
 
+class HoldPoint(_PoseEdit, frozen=True, tag="pose"):
+    """Hold a point in place while others are dragged, or release it. A drag holds the point that it placed.
+
+    Holds last until the program ends, and are no entry of the history.
+    """
+
+    action: Literal["hold"]
+    held: bool
+    point: Name | None = None
+    """Null for all points of the person."""
+
+
 PoseEdit: TypeAlias = Union[  # noqa: UP007
-    SetDof, TurnDof, Nudge, Mirror, CopyFrame, CopyPerson, TakeAlternative, ResetLimb, LockDofs
+    SetDof, TurnDof, Nudge, Mirror, CopyFrame, CopyPerson, TakeAlternative, ResetLimb, LockDofs, HoldPoint
 ]
 
 

@@ -27,6 +27,7 @@ _PLAIN = {int: "number", float: "number", str: "string", bool: "boolean", type(N
 
 _LITERALS = (
     "PictureLayer", "Layer", "Status", "CurveGroup", "RangeAction", "DragMode", "GesturePhase", "PathKind", "RunState",
+    "Side",
 )  # fmt: skip
 """Literal types with a name of their own in the page."""
 

@@ -56,6 +56,8 @@ class PersonInfo(Part, frozen=True):
     """Names of the joints and landmarks."""
     minor: tuple[str, ...]
     """Points that give way to others where they crowd."""
+    heading: tuple[str, ...]
+    """Points that turn the body about the vertical: shoulders and hips."""
     bones: tuple[tuple[str, str], ...]
     """Pairs of points that the stick figure connects."""
     parts: tuple[str, ...]

@@ -2,10 +2,13 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 import viser
 
+from app.drawing.facing import nose
+from app.drawing.overlays import Side, side_of
 from app.state.view_3d import View3d
-from tracker.body.model import PosedBody
+from tracker.body.model import BodyModel, PosedBody
 from tracker.contours.occluding_contours import part_poses
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
@@ -13,6 +16,8 @@ from tracker.session.session import Session
 
 _DIMMED = 0.2
 """Opacity of dimmed people, as a share of that of the others."""
+_LIGHTER, _DARKER = 0.45, 0.5
+"""How far left limbs are lightened towards white, and the share of its brightness that a right limb keeps."""
 
 
 class PeopleMeshes:
@@ -40,16 +45,13 @@ class PeopleMeshes:
             [
                 server.scene.add_mesh_simple(
                     f"{root}/{person.name}/{part.name}",
-                    shape.triangles().vertices + center,
-                    shape.triangles().faces,
+                    *_mesh(person.model, index),
                     color=color or _rgb(part.color),
                     opacity=opacity,
                     cast_shadow=False,
                     receive_shadow=False,
                 )
-                for part, shape, center in zip(
-                    person.model.parts, person.model.shapes, person.model.centers_part, strict=True
-                )
+                for index, part in enumerate(person.model.parts)
             ]
             for person in self._people
         ]
@@ -86,9 +88,26 @@ class PeopleMeshes:
         for index, (person, handles) in enumerate(zip(self._people, self.handles, strict=True)):
             opacity = _DIMMED * view.opacity if index in dimmed else view.opacity
             for part, handle in zip(person.model.parts, handles, strict=True):
-                handle.color = _rgb(part.color if view.colors == "parts" else person.color)
+                handle.color = _rgb(part.color) if view.colors == "parts" else shaded(person.color, side_of(part.name))
                 handle.opacity = None if opacity >= 1 else opacity
             _set_visible(handles, view.bodies and index not in hidden)
+
+
+def _mesh(model: BodyModel, part: int) -> tuple[Array, Array]:
+    """Return the vertices, (n, 3), metres, and triangles, (m, 3), of a part; a head has a nose."""
+    triangles = model.shapes[part].triangles()
+    vertices, (extra, faces) = triangles.vertices + model.centers_part[part], nose(model, part)
+    return np.vstack([vertices, extra]), np.vstack([triangles.faces, faces + len(vertices)])
+
+
+def shaded(color: str, side: Side) -> tuple[int, int, int]:
+    """Return a person's colour for a side of the body: lighter on the left, darker on the right."""
+    red, green, blue = _rgb(color)
+    if side == "left":
+        return tuple(round(c + _LIGHTER * (255 - c)) for c in (red, green, blue))  # type: ignore[return-value]
+    if side == "right":
+        return tuple(round(_DARKER * c) for c in (red, green, blue))  # type: ignore[return-value]
+    return red, green, blue
 
 
 def _set_visible(handles: Sequence[viser.MeshHandle], visible: bool) -> None:

@@ -12,7 +12,7 @@ from app.state.floor_picking import FloorState
 from app.state.state import State
 from app.state.view_3d import MAX_TRAIL_FRAMES
 from tracker.errors import TrackerError
-from tracker.posing.drag import minor_points
+from tracker.posing.grab import minor_points
 
 _FREE = "free"
 _COLORS = {"parts": "parts", "people": "people"}

@@ -1,6 +1,7 @@
 """How people are shown and handled: their poses, a drag, a draft of sizes, who is visible."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
@@ -45,7 +46,23 @@ class DragState:
     by_surface: bool = False
     """Whether the surface of the part is dragged, not a point."""
     mode: str = "move"
-    """`move`, `turn` or `push`, see `tracker.posing.drag`."""
+    """`move`, `turn`, `push` or `bend`, see `tracker.posing.drag`."""
+    short_m: float = 0.0
+    """Distance between the dragged place and the line of sight that it should be on, metres."""
+    wanted_px: tuple[float, float] | None = None
+    """Where the dragged place should be in the view, undistorted px; None before the first move."""
+
+
+class HeldPoint(NamedTuple):
+    """A point that was placed by hand, and that stays in place while others are dragged."""
+
+    frame: int
+    person: int
+    """Index of the person."""
+    point: str
+    """Name of the point."""
+    camera: int | None
+    """Index of a view in which it was placed; None where it was held by command."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from typing import TypedDict
 import numpy as np
 
 from app.state.floor_picking import FloorState
-from app.state.people import DragState, ShownPose, SizeDraft, Visibility
+from app.state.people import DragState, HeldPoint, ShownPose, SizeDraft, Visibility
 from app.state.progress import FootageState, RangeState, TrackState
 from app.state.search import CostLandscape, SearchState, SearchView
 from app.state.view_3d import View3d
@@ -59,6 +59,8 @@ class State:
     """The pins of each person on the frame, by point and camera."""
     is_pin_held: bool = False
     """Whether a pin is being dragged."""
+    held: frozenset[HeldPoint] = frozenset()
+    """Points that stay in place during drags, on all frames; until the program ends or they are released."""
     drag: DragState | None = None
     drag_seqs: tuple[tuple[int, int], ...] = ()
     """For each page that drags: its number, and the sequence number of its last applied drag message."""
@@ -115,6 +117,10 @@ class State:
             drag=None,
         )
 
+    def held_points(self, person: int) -> frozenset[str]:
+        """Return the names of the points of a person, given by index, that are held on the shown frame."""
+        return frozenset(h.point for h in self.held if (h.frame, h.person) == (self.frame, person))
+
     @property
     def poses(self) -> tuple[Array, ...]:
         """Pose of each person, (n_values,) each."""
@@ -163,6 +169,7 @@ class StateChanges(TypedDict, total=False):
     inconsistent_frames: tuple[int, ...]
     pins: tuple[tuple[PointObservation, ...], ...]
     is_pin_held: bool
+    held: frozenset[HeldPoint]
     drag: DragState | None
     drag_seqs: tuple[tuple[int, int], ...]
     pages_pausing_3d: frozenset[int]

@@ -9,11 +9,12 @@
  * @typedef {"arms" | "torso" | "legs" | "cost"} CurveGroup
  * @typedef {"track_forward" | "track_backward" | "interpolate" | "clear" | "keyframe" | "reviewed" | "unreviewed" |
  *   "none"} RangeAction
- * @typedef {"move" | "turn" | "push"} DragMode
+ * @typedef {"move" | "turn" | "push" | "bend"} DragMode
  * @typedef {"start" | "move" | "end" | "cancel"} GesturePhase
- * @typedef {"model" | "hidden" | "candidate" | "ghost" | "part_edge" | "epipolar" | "accepted" | "rejected" | "floor"}
- *   PathKind
+ * @typedef {"model" | "hidden" | "facing" | "facing_away" | "candidate" | "ghost" | "part_edge" | "epipolar" |
+ *   "accepted" | "rejected" | "floor"} PathKind
  * @typedef {"running" | "paused" | "over"} RunState
+ * @typedef {"left" | "right" | ""} Side
  * @typedef {{type: "seek", frame: number}} Seek
  * @typedef {{type: "select", person: number, point?: string | null}} Select
  * @typedef {{type: "view", layers: Layer[], reductions: number[], by_part: boolean}} SetView
@@ -36,6 +37,8 @@
  * @typedef {{type: "pose", frame: number, person: number, action: "alternative"}} TakeAlternative
  * @typedef {{type: "pose", frame: number, person: number, action: "reset", point?: string | null}} ResetLimb
  * @typedef {{type: "pose", frame: number, person: number, action: "lock", dofs: number[], locked: boolean}} LockDofs
+ * @typedef {{type: "pose", frame: number, person: number, action: "hold", held: boolean, point?: string | null}}
+ *   HoldPoint
  * @typedef {{type: "pin", phase: GesturePhase, frame: number, camera: number, person: number, point: string, u: number,
  *   v: number, live: boolean}} DragPin
  * @typedef {{type: "unpin", frame: number, person: number, point: string | null, camera: number | null}} RemovePins
@@ -70,9 +73,9 @@
  * @typedef {{name: string, width: number, height: number}} CameraInfo
  * @typedef {{joint: string, name: string, unit: "deg" | "cm", low: number | null, high: number | null}} DofInfo
  * @typedef {{name: string, dofs: number[]}} Limb
- * @typedef {{name: string, color: string, model: string, height_m: number, points: string[], minor: string[], bones:
- *   [string, string][], parts: string[], dofs: DofInfo[], point_dofs: Record<string, number[]>, point_limbs:
- *   Record<string, Limb>}} PersonInfo
+ * @typedef {{name: string, color: string, model: string, height_m: number, points: string[], minor: string[], heading:
+ *   string[], bones: [string, string][], parts: string[], dofs: DofInfo[], point_dofs: Record<string, number[]>,
+ *   point_limbs: Record<string, Limb>}} PersonInfo
  * @typedef {{type: "session", name: string, fps: number, n_frames: number, cameras: CameraInfo[], people:
  *   PersonInfo[]}} SessionMessage
  * @typedef {{source: string | null, status: Status, shown: boolean, alternatives: number}} PersonState
@@ -113,16 +116,20 @@
  * @typedef {{type: "search_runs", runs: SearchRun[], replay: Replay | null, compared: number | null}} SearchRunsMessage
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number, limit_px:
  *   number | null}} ImageHeader
- * @typedef {{camera: number, person: number, kind: PathKind, color: string, first: number, count: number}} Path
+ * @typedef {{camera: number, person: number, kind: PathKind, color: string, side: Side, first: number, count: number}}
+ *   Path
  * @typedef {{camera: number, person: number, part: number, depth: number, first: number, count: number}} Outline
- * @typedef {{camera: number, person: number, point: string, u: number, v: number, visible: boolean}} Handle
+ * @typedef {{camera: number, person: number, point: string, u: number, v: number, visible: boolean, held: boolean,
+ *   side: Side}} Handle
+ * @typedef {{camera: number, person: number, point: string, u: number, v: number, point_u: number, point_v: number,
+ *   distance_m: number}} OutOfReach
  * @typedef {{camera: number, person: number, point: string, u: number, v: number, model_u: number | null, model_v:
  *   number | null}} PinMark
  * @typedef {{camera: number, u: number, v: number, error_px: number | null}} TriangulationMark
  * @typedef {{person: number, point: string, pins: number, error_px: number | null, why: string, marks:
  *   TriangulationMark[]}} PinTriangulation
  * @typedef {{type: "overlay", frame: number, seq: number, job: boolean, paths: Path[], outlines: Outline[], handles:
- *   Handle[], pins: PinMark[], triangulation: PinTriangulation | null}} OverlayHeader
+ *   Handle[], out_of_reach: OutOfReach | null, pins: PinMark[], triangulation: PinTriangulation | null}} OverlayHeader
  * @typedef {{type: "cells", person: number | null, replace: boolean, count: number, sources: string[], statuses:
  *   Status[], remarks: Record<string, string>}} CellsHeader
  * @typedef {{title: string, unit: "deg" | "cm" | "px", labels: string[]}} Plot
@@ -133,14 +140,14 @@
  *   number}} SearchCandidatesHeader
  * @typedef {{type: "landscape", person: number, dof: number, names: string[], unit: "rad" | "m", current: number,
  *   current_px: number | null, count: number}} LandscapeHeader
- * @typedef {SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative | ResetLimb | LockDofs}
- *   PoseEdit
+ * @typedef {SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative | ResetLimb | LockDofs |
+ *   HoldPoint} PoseEdit
  * @typedef {Seek | Select | SetView | ShowPerson | Solo | ShowCurves | WatchTab | ShowHistory | LookThrough | Pause3d |
  *   Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative | ResetLimb | LockDofs |
- *   DragPin | RemovePins | FitPose | RunSearch | RepeatSearch | SetSearchSpeed | SetSearchSettings | ReplayStep |
- *   CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape | SetLandscapeDof | StartTracking | ControlTracking |
- *   EditRange | StopRange | ToggleMark | FollowTracking | EditFloor | MarkFloor | Undo | Redo | GoTo | Save}
- *   ClientMessage
+ *   HoldPoint | DragPin | RemovePins | FitPose | RunSearch | RepeatSearch | SetSearchSpeed | SetSearchSettings |
+ *   ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape | SetLandscapeDof | StartTracking |
+ *   ControlTracking | EditRange | StopRange | ToggleMark | FollowTracking | EditFloor | MarkFloor | Undo | Redo | GoTo
+ *   | Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
  *   SearchSetupMessage | SearchRunsMessage} TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |

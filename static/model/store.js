@@ -7,6 +7,8 @@ import { defaultLayers } from "./layers.js";
 
 /**
  * @typedef {{camera: number, person: number, point: string}} Joint
+ * @typedef {Joint & {overlapping?: {person: number, point: string}[]}} HoveredJoint overlapping: the joints at the same
+ *   place, itself included
  * @typedef {{frame: number, pictures: import("./pictures.js").Pictures}} Shown
  *
  * @typedef {Map<string, {bitmap: OffscreenCanvas, limitPx: null}>} PlaceholderPictures like `Pictures`, of images only
@@ -35,7 +37,7 @@ import { defaultLayers } from "./layers.js";
  * @property {Shown | null} shown the pictures that are displayed
  * @property {Placeholder | null} placeholder what is shown until the requested frame arrives
  * @property {import("./protocol.js").Overlay | null} overlay the overlay that is displayed
- * @property {Joint | null} hover the joint under the pointer
+ * @property {HoveredJoint | null} hover the joint under the pointer
  * @property {{camera: number, person: number, part: number} | null} hoverPart the part under the pointer, if no joint is
  * @property {boolean} dragging whether a joint or pin is being dragged
  * @property {number | null} active the camera whose pane the pointer was in last; arrow keys move parallel to its image

@@ -6,8 +6,9 @@
 
 /** @type {Record<import("../model/protocol.js").DragMode, string>} */
 const HINTS = {
-  move: "Shift or Alt: turn · Ctrl: depth",
+  move: "Shift: turn or tilt · Ctrl: depth · Alt or Ctrl+Shift: bend the trunk",
   turn: "Turning about the line of sight",
+  bend: "Bending the trunk: the other limbs stay in place",
   push: "Depth: drag up to move away",
 };
 
@@ -51,6 +52,9 @@ export class DragHint {
  * @returns {import("../model/protocol.js").DragMode}
  */
 export function modeOf(event) {
-  if (event.ctrlKey || event.metaKey) return "push";
-  return event.altKey || event.shiftKey ? "turn" : "move";
+  const isControl = event.ctrlKey || event.metaKey;
+  // Some window managers move windows by Alt and the pointer.
+  if (event.altKey || (isControl && event.shiftKey)) return "bend";
+  if (isControl) return "push";
+  return event.shiftKey ? "turn" : "move";
 }

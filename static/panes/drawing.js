@@ -1,7 +1,5 @@
 /** Draw a pane: pictures, and vectors over them. All sizes on the screen are CSS pixels. */
 
-import { displayName } from "../widgets/text.js";
-
 /**
  * @typedef {import("../model/protocol.js").Overlay} Overlay
  * @typedef {import("../model/protocol.js").Handle} Handle
@@ -17,6 +15,15 @@ const BEHIND_IMAGES = "#000";
 const JOINT_RADIUS = 3.5;
 const TORSO_HALF_SIDE = 5.5;
 const TORSO = "torso";
+/** Half diagonal of the diamonds of right joints. */
+const DIAMOND_RADIUS = 4.75;
+const LABEL_LINE_PX = 16;
+const HELD_RADIUS = 8.5;
+/** Height of the labels in the upper corners of a pane. */
+const CORNERS_PX = 44;
+const REACH_DASH = [3, 3];
+/** Dashes of right limbs: sides differ in line, people in colour. */
+const RIGHT_DASH = [9, 4];
 /** Opacity of dimmed people. */
 const DIMMED = 0.3;
 
@@ -30,6 +37,8 @@ const DIMMED = 0.3;
 const LINE_STYLES = {
   model: { width: 1.75, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
   hidden: { width: 1.25, dash: [4, 4], layer: "hidden", hasHalo: false, ofPerson: true },
+  facing: { width: 2.25, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
+  facing_away: { width: 2.25, dash: [3, 4], layer: "contours", hasHalo: true, ofPerson: true },
   candidate: { width: 1.25, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
   ghost: { width: 1.5, dash: [5, 4], layer: null, hasHalo: true, ofPerson: true },
   part_edge: { width: 1, dash: [], layer: "part_edges", hasHalo: true },
@@ -108,7 +117,7 @@ export function drawPaths(context, view, overlay, camera, layers, isDimmed) {
     const line = tracePath(view, overlay.segments, path.first, path.count);
     const isFaint = style.ofPerson && isDimmed(path.person);
     context.globalAlpha = (style.layer ? layers.opacity[style.layer] : 1) * (isFaint ? DIMMED : 1);
-    context.setLineDash(style.dash);
+    context.setLineDash(path.kind === "model" && path.side === "right" ? RIGHT_DASH : style.dash);
     stroke(context, line, path.color, style.width, style.hasHalo && !isFaint);
   }
   context.setLineDash([]);
@@ -182,33 +191,37 @@ export function drawPart(context, view, overlay, outline, color) {
 export function drawSkeleton(context, placed, people, opacity) {
   people.forEach((person, index) => {
     const joints = new Map(placed.filter((p) => p.handle.person === index).map((p) => [p.handle.point, p]));
-    const line = new Path2D();
+    const [solid, dashed] = [new Path2D(), new Path2D()];
     for (const [from, to] of person.bones) {
       const [a, b] = [joints.get(from), joints.get(to)];
       if (!a || !b) continue;
+      const line = b.handle.side === "right" ? dashed : solid;
       line.moveTo(a.x, a.y);
       line.lineTo(b.x, b.y);
     }
     context.globalAlpha = opacity;
-    stroke(context, line, BONE, 1.25);
+    stroke(context, solid, BONE, 1.25);
+    context.setLineDash(RIGHT_DASH);
+    stroke(context, dashed, BONE, 1.25);
+    context.setLineDash([]);
     context.globalAlpha = 1;
   });
 }
 
 /**
+ * Draw a joint: a square for the torso, a diamond on the right of the body, else a disc. A ring marks a held joint.
+ *
  * @param {CanvasRenderingContext2D} context
  * @param {PlacedHandle} placed
  * @param {string} color
  * @param {"plain" | "selected" | "hovered"} emphasis
  */
 export function drawHandle(context, { handle, x, y }, color, emphasis) {
-  const grown = emphasis === "hovered" ? 1.5 : 0;
-  const outline = new Path2D();
-  if (handle.point === TORSO) {
-    const half = TORSO_HALF_SIDE + grown;
-    outline.roundRect(x - half, y - half, 2 * half, 2 * half, 2);
-  } else {
-    outline.arc(x, y, JOINT_RADIUS + grown, 0, 2 * Math.PI);
+  const outline = handleOutline(handle, x, y, emphasis === "hovered" ? 1.5 : 0);
+  if (handle.held) {
+    const ring = new Path2D();
+    ring.arc(x, y, HELD_RADIUS, 0, 2 * Math.PI);
+    stroke(context, ring, color, 2);
   }
   // Hidden joints are rings in the person's colour, visible joints discs with a white ring.
   context.strokeStyle = HALO;
@@ -224,22 +237,70 @@ export function drawHandle(context, { handle, x, y }, color, emphasis) {
 }
 
 /**
- * Draw the name of a joint beside it, on the side with more room.
+ * @param {{point: string, side: import("../model/protocol.js").Side}} handle
+ * @param {number} x
+ * @param {number} y
+ * @param {number} grown by how much it is larger than usual
+ */
+function handleOutline({ point, side }, x, y, grown) {
+  const outline = new Path2D();
+  if (point === TORSO) {
+    const half = TORSO_HALF_SIDE + grown;
+    outline.roundRect(x - half, y - half, 2 * half, 2 * half, 2);
+  } else if (side === "right") {
+    const radius = DIAMOND_RADIUS + grown;
+    outline.moveTo(x, y - radius);
+    for (const [dx, dy] of [[radius, 0], [0, radius], [-radius, 0]]) outline.lineTo(x + dx, y + dy);
+    outline.closePath();
+  } else {
+    outline.arc(x, y, JOINT_RADIUS + grown, 0, 2 * Math.PI);
+  }
+  return outline;
+}
+
+/**
+ * Draw a dragged joint that stays behind the pointer: its handle at the pointer, a line to the limb, and the distance.
  *
  * @param {CanvasRenderingContext2D} context
- * @param {PlacedHandle} placed
+ * @param {PaneView} view
+ * @param {import("../model/protocol.js").OutOfReach} outOfReach
+ * @param {Handle | undefined} handle none for a part held by its surface
+ * @param {string} color
  * @param {number} paneWidth
  */
-export function drawName(context, { handle, x, y }, paneWidth) {
-  const text = displayName(handle.point) + (handle.visible ? "" : " (hidden)");
+export function drawOutOfReach(context, view, outOfReach, handle, color, paneWidth) {
+  const wanted = view.toScreen(outOfReach.u, outOfReach.v);
+  const reached = view.toScreen(outOfReach.point_u, outOfReach.point_v);
+  const line = new Path2D();
+  line.moveTo(wanted.x, wanted.y);
+  line.lineTo(reached.x, reached.y);
+  context.setLineDash(REACH_DASH);
+  stroke(context, line, "#fff", 1.75);
+  context.setLineDash([]);
+  const outline = handleOutline(handle ?? { point: "", side: "" }, wanted.x, wanted.y, 1.5);
+  stroke(context, outline, color, 2.25);
+  drawLabel(context, [`out of reach by ${Math.round(100 * outOfReach.distance_m)} cm`], { x: wanted.x, y: Math.max(wanted.y, CORNERS_PX) }, paneWidth);
+}
+
+/**
+ * Draw lines of text beside a position, on the side with more room. The first line is bright.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {string[]} lines
+ * @param {{x: number, y: number}} at
+ * @param {number} paneWidth
+ */
+export function drawLabel(context, lines, { x, y }, paneWidth) {
   context.font = "500 12px system-ui, sans-serif";
   context.textBaseline = "middle";
-  const width = context.measureText(text).width + 12;
-  const left = x + 12 + width < paneWidth ? x + 12 : x - 12 - width;
+  const width = Math.max(...lines.map((text) => context.measureText(text).width)) + 12;
+  const left = x + 14 + width < paneWidth ? x + 14 : x - 14 - width;
   context.fillStyle = "rgba(12, 13, 15, 0.85)";
   context.beginPath();
-  context.roundRect(left, y - 10, width, 20, 4);
+  context.roundRect(left, y - 10, width, 4 + LABEL_LINE_PX * lines.length, 4);
   context.fill();
-  context.fillStyle = "#fff";
-  context.fillText(text, left + 6, y + 0.5);
+  lines.forEach((text, index) => {
+    context.fillStyle = index === 0 ? "#fff" : "#c3c7cf";
+    context.fillText(text, left + 6, y + 0.5 + LABEL_LINE_PX * index);
+  });
 }

@@ -8,12 +8,10 @@
 const DRAG_THRESHOLD = 3;
 /** Minimum interval of messages. Some mice report moves a thousand times a second. */
 const MIN_INTERVAL_MS = 12;
-/** Penalty on the distance to joints of other people, so that the active person's joints win where people touch. */
-const OTHER_PERSON_PENALTY_PX = 4;
 
 import { isDimmed } from "../model/selectors.js";
-import { GRAB_RADIUS } from "./declutter.js";
 import { DragHint, modeOf } from "./drag_hint.js";
+import { JointPicking } from "./joint_picking.js";
 import { partAt } from "./part_hit.js";
 
 /**
@@ -35,6 +33,9 @@ export class Gestures {
    */
   #pan = null;
   #hint = new DragHint();
+  #picking = new JointPicking();
+  /** @type {{pane: import("./pane.js").Pane, camera: number, at: {x: number, y: number}} | null} the pointer over a pane */
+  #pointer = null;
   #seq = 0;
   #movesSent = -Infinity;
 
@@ -76,6 +77,7 @@ export class Gestures {
     surface.addEventListener("pointerup", (event) => this.#up(event));
     surface.addEventListener("pointercancel", () => this.cancel());
     surface.addEventListener("pointerleave", () => {
+      this.#pointer = null;
       if (!this.#drag && (this.#store.facts.hover || this.#store.facts.hoverPart)) this.#store.set({ hover: null, hoverPart: null });
     });
     // Prevent scrolling, and pasting on some systems.
@@ -91,23 +93,21 @@ export class Gestures {
   }
 
   /**
-   * The joint nearest to the pointer, within the picking radius.
+   * The joint under the pointer that a press takes, and those that overlap it.
    *
    * @param {import("./pane.js").Pane} pane
    * @param {{x: number, y: number}} at
-   * @returns {PlacedHandle | null}
    */
   #hit(pane, at) {
     const { layers, state } = this.#store.facts;
     if (!this.#store.isSettled || !layers.shown.joints || state?.floor) return null;
-    let nearest = null;
-    let reach = GRAB_RADIUS;
-    for (const placed of pane.graspableHandles()) {
-      const penalty = placed.handle.person === state?.person ? 0 : OTHER_PERSON_PENALTY_PX;
-      const distance = Math.hypot(placed.x - at.x, placed.y - at.y) + penalty;
-      if (distance <= reach) [nearest, reach] = [placed, distance];
-    }
-    return nearest;
+    return this.#picking.pick(pane.graspableHandles(), at, state?.person ?? 0);
+  }
+
+  /** Offer the next of the joints that overlap under the pointer. */
+  offerNext() {
+    if (!this.#pointer || this.#drag || !this.#picking.next()) return;
+    this.#hoverAt(this.#pointer.pane, this.#pointer.camera, this.#pointer.at);
   }
 
   /**
@@ -150,7 +150,7 @@ export class Gestures {
   #down(event, pane, camera) {
     if (this.#drag || this.#pan || event.button > 1) return;
     const at = pane.locate(event);
-    const hit = event.button === 0 ? (this.#hit(pane, at) ?? this.#hitPart(pane, camera, at)) : null;
+    const hit = event.button === 0 ? (this.#hit(pane, at)?.meant ?? this.#hitPart(pane, camera, at)) : null;
     pane.surface.setPointerCapture(event.pointerId);
     if (!hit) {
       const start = { x: event.clientX, y: event.clientY };
@@ -226,6 +226,11 @@ export class Gestures {
     const pointer = this.#drag?.pointer ?? this.#pan?.pointer;
     if (event.pointerId !== pointer) return;
     if (this.#drag?.begun) this.#message("end", this.#drag.at);
+    // A click selects; the next press at the same place takes the other of an overlapping pair.
+    else if (this.#drag && this.#drag.part === null) {
+      if (event.shiftKey) this.#toggleHold(this.#drag);
+      else this.#picking.next();
+    }
     const pan = this.#pan;
     if (pan?.person != null && Math.hypot(event.clientX - pan.start.x, event.clientY - pan.start.y) < DRAG_THRESHOLD) {
       this.#send({ type: "select", person: pan.person, point: null });
@@ -239,7 +244,9 @@ export class Gestures {
    * @param {{x: number, y: number}} at
    */
   #hoverAt(pane, camera, at) {
-    const hit = this.#hit(pane, at);
+    this.#pointer = { pane, camera, at };
+    const found = this.#hit(pane, at);
+    const hit = found?.meant ?? null;
     const { hover, hoverPart } = this.#store.facts;
     const part = hit ? null : this.#hitPart(pane, camera, at);
     pane.surface.classList.toggle("is-over-joint", hit !== null);
@@ -249,8 +256,13 @@ export class Gestures {
     }
     if (!hit) {
       if (hover) this.#store.set({ hover: null });
-    } else if (hover?.camera !== camera || hover.person !== hit.handle.person || hover.point !== hit.handle.point) {
-      this.#store.set({ hover: { camera, person: hit.handle.person, point: hit.handle.point } });
+    } else {
+      const { person, point } = hit.handle;
+      const overlapping = found?.overlapping.map(({ handle }) => ({ person: handle.person, point: handle.point })) ?? [];
+      const isSame = hover?.camera === camera && hover.person === person && hover.point === point;
+      if (!isSame || hover.overlapping?.length !== overlapping.length) {
+        this.#store.set({ hover: { camera, person, point, overlapping } });
+      }
     }
   }
 
@@ -264,6 +276,14 @@ export class Gestures {
     this.#seq += 1;
     this.#send({ type: "drag", phase, frame, camera, person, point, part, mode, u, v, seq: this.#seq });
     return this.#seq;
+  }
+
+  /** @param {Drag} drag */
+  #toggleHold({ frame, camera, person, point }) {
+    const handle = this.#store.facts.overlay?.handles.find(
+      (one) => one.camera === camera && one.person === person && one.point === point,
+    );
+    this.#send({ type: "pose", action: "hold", frame, person, point, held: !handle?.held });
   }
 
   #release() {

@@ -28,5 +28,5 @@ export function mount({ store, send, latency, layers, imageTones, recentImages }
   grid.addPointerTarget(gestures);
   new PlaceholderFrames(store, recentImages);
   new ViewRequest(store, send);
-  return { grid, gestures, bindings: paneBindings({ grid, layers, layersMenu }) };
+  return { grid, gestures, bindings: paneBindings({ grid, gestures, layers, layersMenu }) };
 }

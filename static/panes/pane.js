@@ -3,6 +3,7 @@
 import * as drawing from "./drawing.js";
 import { drawPins } from "./pin_drawing.js";
 import { decluttered } from "./declutter.js";
+import { jointLabel } from "./joint_label.js";
 import { isDimmed } from "../model/selectors.js";
 import { PICTURE_LAYERS } from "../model/layers.js";
 import { isPlain } from "../model/image_tone.js";
@@ -210,7 +211,7 @@ export class Pane {
    * @param {import("../model/protocol.js").PersonInfo[]} people
    */
   #drawJoints(context, state, people) {
-    const { hover, layers } = this.#store.facts;
+    const { hover, layers, overlay } = this.#store.facts;
     if (layers.shown.skeleton) {
       const undimmed = this.#placedHandles().filter(({ handle }) => !isDimmed(state, handle.person));
       drawing.drawSkeleton(context, undimmed, people, layers.opacity.skeleton);
@@ -220,15 +221,47 @@ export class Pane {
     /** @type {drawing.PlacedHandle | null} */
     let named = null;
     context.globalAlpha = layers.opacity.joints;
-    for (const one of this.graspableHandles()) {
-      const isHovered = hover?.person === one.handle.person && hover.point === one.handle.point;
+    const isMeant = (/** @type {drawing.PlacedHandle} */ { handle }) =>
+      hover?.person === handle.person && hover.point === handle.point;
+    // The joint that a press takes is drawn over the joints that overlap it.
+    for (const one of this.graspableHandles().sort((a, b) => Number(isMeant(a)) - Number(isMeant(b)))) {
+      const isHovered = isMeant(one);
       const isSelected = state.person === one.handle.person && state.point === one.handle.point;
-      if (isHovered && hover.camera === this.#camera) named = one;
+      if (isHovered && hover?.camera === this.#camera) named = one;
       const color = people[one.handle.person]?.color ?? "#fff";
       drawing.drawHandle(context, one, color, isHovered ? "hovered" : isSelected ? "selected" : "plain");
     }
     context.globalAlpha = 1;
-    if (named) drawing.drawName(context, named, this.#size.width);
+    if (named && !overlay?.out_of_reach) drawing.drawLabel(context, this.#labelOf(named, people), named, this.#size.width);
+    this.#drawOutOfReach(context, people);
+  }
+
+  /**
+   * @param {drawing.PlacedHandle} named the joint under the pointer
+   * @param {import("../model/protocol.js").PersonInfo[]} people
+   */
+  #labelOf(named, people) {
+    const { hover, dragging } = this.#store.facts;
+    const offered = (dragging ? null : hover?.overlapping) ?? [];
+    const overlapping = this.graspableHandles().filter(({ handle }) =>
+      offered.some(({ person, point }) => person === handle.person && point === handle.point),
+    );
+    return jointLabel(named, overlapping, people);
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {import("../model/protocol.js").PersonInfo[]} people
+   */
+  #drawOutOfReach(context, people) {
+    const { overlay } = this.#store.facts;
+    const short = overlay?.out_of_reach;
+    if (!overlay || short?.camera !== this.#camera) return;
+    const handle = overlay.handles.find(
+      ({ camera, person, point }) => camera === short.camera && person === short.person && point === short.point,
+    );
+    const color = people[short.person]?.color ?? "#fff";
+    drawing.drawOutOfReach(context, this.view, short, handle, color, this.#size.width);
   }
 
   /**

@@ -59,7 +59,7 @@ export class PaneCorner {
     this.#scale.append("0", bar, this.#limit);
     this.#scale.title = "Distance image: distance to the nearest edge, in image pixels";
     this.#scale.hidden = true;
-    this.#fit = toolButton("Fit", "Show the whole image (0)", `Show the whole image of ${name}`);
+    this.#fit = toolButton("Whole", "Show the whole image (0)", `Show the whole image of ${name}`);
     this.#fit.classList.add("pane-reset");
     this.#fit.addEventListener("click", () => {
       this.#fit.blur();

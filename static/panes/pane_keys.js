@@ -1,13 +1,13 @@
 /** Keys of the camera panes and their layers. */
 
 import { BY_KEY } from "../model/layers.js";
-import { inArea, plain } from "../widgets/key_matching.js";
+import { alt, inArea, plain } from "../widgets/key_matching.js";
 
 /**
- * @param {{grid: import("./pane_grid.js").PaneGrid, layers: import("../model/layers.js").Layers,
+ * @param {{grid: import("./pane_grid.js").PaneGrid, gestures: import("./gestures.js").Gestures, layers: import("../model/layers.js").Layers,
  *   layersMenu: import("./layers_menu.js").LayersMenu}} parts
  */
-export function paneBindings({ grid, layers, layersMenu }) {
+export function paneBindings({ grid, gestures, layers, layersMenu }) {
   return inArea("Views", [
     { keys: ["A"], label: "Layers", matches: plain("a"), run: () => layersMenu.toggle() },
     {
@@ -30,6 +30,12 @@ export function paneBindings({ grid, layers, layersMenu }) {
       label: "Show the whole image",
       matches: plain("0"),
       run: () => grid.typeCamera(0) || grid.resetViews(),
+    },
+    {
+      keys: ["Alt O"],
+      label: "Take the next of the joints that overlap under the pointer",
+      matches: alt("KeyO", false),
+      run: () => gestures.offerNext(),
     },
   ]);
 }

@@ -212,6 +212,23 @@ export class Posing {
     return dofs.length > 0 && dofs.every((dof) => locked.includes(dof));
   }
 
+  /** Hold the joint in place while others are dragged, or release it. */
+  toggleHold() {
+    const { point } = this;
+    if (point) this.#edit({ ...this.#head(), action: "hold", point, held: !this.#isHeld(point) });
+  }
+
+  /** Release all held joints of the active person on the frame. */
+  releaseAll() {
+    this.#edit({ ...this.#head(), action: "hold", point: null, held: false });
+  }
+
+  /** @param {string} point */
+  #isHeld(point) {
+    const { overlay, state } = this.#store.facts;
+    return overlay?.handles.some((one) => one.person === state?.person && one.point === point && one.held) ?? false;
+  }
+
   /** Fields of every edit: the active person and the frame that is shown. */
   #head() {
     const { shown, state } = this.#store.facts;

@@ -39,6 +39,18 @@ export function posingBindings(posing, inspector, why) {
       matches: plain("o", undefined, true),
       run: () => posing.toggleLock(posing.limb.dofs),
     },
+    {
+      keys: ["Alt H"],
+      label: "Hold the joint in place while others are dragged, or release it",
+      matches: alt("KeyH", false),
+      run: () => posing.toggleHold(),
+    },
+    {
+      keys: ["Alt Shift H"],
+      label: "Release all held joints of the person on this frame",
+      matches: alt("KeyH", true),
+      run: () => posing.releaseAll(),
+    },
     { keys: ["M"], label: "Mirror the pose left to right", matches: plain("m"), run: () => posing.mirror() },
     {
       keys: ["Shift X"],

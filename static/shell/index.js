@@ -6,7 +6,7 @@
 
 import { button, byId } from "../widgets/elements.js";
 import { makeSplitter } from "../widgets/splitter.js";
-import { watchTyping } from "../widgets/typing.js";
+import { leaveFields, watchTyping } from "../widgets/typing.js";
 import { Announcer } from "./announcer.js";
 import { ExportPanel } from "./export_panel.js";
 import { FirstSteps } from "./first_steps.js";
@@ -83,6 +83,7 @@ function obeyKeys({ store, notify }, table, frame) {
   const isDragging = () => store.facts.dragging;
   const say = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
   watchTyping(document);
+  leaveFields(document);
   listen(document, table, { viser: false, isDragging, say });
   frame.addEventListener("load", () => {
     if (!frame.contentDocument) return;

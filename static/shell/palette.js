@@ -71,7 +71,8 @@ export class Palette {
     this.#found = shown.map(({ command }) => command);
     this.#list.replaceChildren(...shown.map(({ command, isRecent }, index) => option(command, isRecent, index)));
     this.#list.scrollTop = 0;
-    this.#show(0);
+    // Enter by itself must not change a pose: without a query nothing is chosen yet.
+    this.#show(query.trim() ? 0 : -1);
     if (!shown.length) this.#why.textContent = `No results for “${query}”. Enter a number to go to that frame.`;
   }
 
@@ -81,7 +82,7 @@ export class Palette {
     const page = 8;
     const to = {
       ArrowDown: (this.#at + 1) % Math.max(1, count),
-      ArrowUp: (this.#at - 1 + count) % Math.max(1, count),
+      ArrowUp: (Math.max(this.#at, 0) - 1 + count) % Math.max(1, count),
       PageDown: Math.min(count - 1, this.#at + page),
       PageUp: Math.max(0, this.#at - page),
     }[event.key];
@@ -101,7 +102,7 @@ export class Palette {
     now?.setAttribute("aria-selected", "true");
     now?.scrollIntoView({ block: "nearest" });
     this.#input.setAttribute("aria-activedescendant", now?.id ?? "");
-    this.#why.textContent = this.#found[index]?.why() ?? "";
+    this.#why.textContent = index < 0 ? "Type a few letters, or choose with ↑ and ↓." : (this.#found[index]?.why() ?? "");
   }
 
   /** @param {number} index */

@@ -1,4 +1,4 @@
-/** Text field for one number: Enter applies, Esc restores, arrows step, and invalid input is refused with a message. */
+/** Text field for one number: Enter applies and leaves it, Esc restores, arrows step, and invalid input is refused with a message. */
 
 /**
  * @typedef {object} NumberField
@@ -50,7 +50,7 @@ export function numberField({ name, take, refuse, step }) {
   element.addEventListener("keydown", (event) => {
     if (event.key === "Enter") {
       event.preventDefault();
-      if (apply()) element.select();
+      apply();
     } else if (event.key === "Escape") {
       // Esc must not also stop a running search.
       event.preventDefault();

@@ -1,4 +1,4 @@
-/** Track fields with unapplied text. In those, undo and redo belong to the field. */
+/** Fields: undo and redo belong to those with unapplied text, and keys to the page once a field is done. */
 
 /** @type {WeakSet<Element>} fields with unapplied text */
 const unfinished = new WeakSet();
@@ -16,6 +16,31 @@ export function watchTyping(target) {
     else unfinished.delete(/** @type {Element} */ (field));
   };
   for (const type of ["input", "change", "focusin"]) target.addEventListener(type, note, true);
+}
+
+/**
+ * Give the keys back to the page: a field loses the focus after Enter, a list after a choice by the pointer. Fields with
+ * refused text and those of dialogs keep it.
+ *
+ * @param {Document} target
+ */
+export function leaveFields(target) {
+  /** @type {EventTarget | null} the list that the pointer has opened */
+  let opened = null;
+  target.addEventListener("pointerdown", (event) => (opened = event.target), true);
+  target.addEventListener("keydown", (event) => {
+    opened = null;
+    if (event.key === "Enter") leave(event.target, "input:not([aria-invalid])");
+  });
+  target.addEventListener("change", (event) => event.target === opened && leave(event.target, "select"));
+}
+
+/**
+ * @param {EventTarget | null} field
+ * @param {string} selector of the fields that are left
+ */
+function leave(field, selector) {
+  if (field instanceof HTMLElement && field.matches(selector) && !field.closest("dialog, [role=dialog]")) field.blur();
 }
 
 /**

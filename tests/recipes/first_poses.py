@@ -20,7 +20,8 @@ from tracker.contours.part_edges import points_occluded
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
 from tracker.posing.default_pose import default_pose
-from tracker.posing.drag import drag, grab
+from tracker.posing.drag import drag
+from tracker.posing.grab import grab
 from tracker.session.session import load_session
 
 FRAME = 0

@@ -43,6 +43,7 @@ BONES = [
     ("l_shoulder", "l_elbow"), ("l_elbow", "l_wrist"), ("r_shoulder", "r_elbow"), ("r_elbow", "r_wrist"),
     ("l_hip", "l_knee"), ("r_hip", "r_knee"), ("torso", "head"), ("l_shoulder", "r_shoulder"), ("l_hip", "r_hip"),
 ]  # fmt: skip
+SIDES = {"l_": "left", "r_": "right"}
 SCALE = 150.0
 HIDDEN_LINE = np.column_stack([np.arange(100, 300), np.full(200, 60), np.arange(101, 301), np.full(200, 60)])
 """What the layer of hidden contours shows: a line of short pieces, px."""
@@ -119,7 +120,9 @@ class FakeEndpoint:
 
     def __post_init__(self):
         self.pose = {(p, name): np.add(at, (0.9 * p, 0, 0)) for p in range(self.n_people) for name, at in REST.items()}
-        self.before_drag = None
+        self.before_drag = self.out_of_reach = None
+        self.held_joints = set()
+        self.sides_line = False  # whether there is a line of each side
         self.seq = 0
         self.epipolar_of = None
         self.set_numbers = itertools.count(1)
@@ -189,22 +192,27 @@ class FakeEndpoint:
                 await self.send_frame()
             case "drag":
                 await self.drag(message)
+            case "pose" if message["action"] == "hold":
+                await self.hold(message)
             case "search":
                 await self.search(message["action"])
             case "track":
                 await self.track(message["action"], message.get("until"))
-            case "follow":
-                self.state["follow"] = message["follow"]
+            case "follow" | "snap":
+                is_follow = message["type"] == "follow"
+                self.state |= {"follow": message["follow"]} if is_follow else {"snapped": message["camera"]}
                 await self.broadcast(self.state)
             case "curves":
                 self.curves_group = message["group"]
                 if self.curves_group:
                     await self.send_curves(np.arange(self.n_frames), replace=True)
-            case "snap":
-                self.state["snapped"] = message["camera"]
-                await self.broadcast(self.state)
             case "undo" | "redo":
                 await self.broadcast(self.state)
+
+    async def hold(self, message):
+        change = self.held_joints.add if message["held"] else self.held_joints.discard
+        change((message["person"], message["point"]))
+        await self.send_overlay()
 
     async def cast(self, message):
         if message["action"] == "solo":
@@ -342,6 +350,7 @@ class FakeEndpoint:
                 "height_m": 1.7,
                 "points": list(REST),
                 "minor": ["waist"],
+                "heading": [name for name in REST if name.endswith(("shoulder", "hip"))],
                 "bones": BONES,
                 "parts": PARTS,
                 "dofs": DOFS,
@@ -415,16 +424,19 @@ class FakeEndpoint:
     async def send_overlay(self, sockets=None, candidate=None):
         paths, segments, handles = [], [], []
 
-        def add(camera, person, kind, color, lines):
+        def add(camera, person, kind, color, lines, side=""):
             paths.append({
-                "camera": camera, "person": person, "kind": kind, "color": color, "first": sum(map(len, segments)),
-                "count": len(lines),
+                "camera": camera, "person": person, "kind": kind, "color": color, "side": side,
+                "first": sum(map(len, segments)), "count": len(lines),
             })  # fmt: skip
             segments.append(lines)
 
         for camera in range(self.n_cameras):
             for person in range(self.n_people):
                 add(camera, person, "model", COLORS[person], self.outline(camera, person, 0.0))
+                if self.sides_line:
+                    add(camera, person, "model", COLORS[person], HIDDEN_LINE - (0, 20, 0, 20), "left")
+                    add(camera, person, "model", COLORS[person], HIDDEN_LINE, "right")
                 if "hidden" in self.views[-1]["layers"]:
                     add(camera, person, "hidden", COLORS[person], HIDDEN_LINE)
                 if candidate is not None:
@@ -434,13 +446,17 @@ class FakeEndpoint:
                         continue
                     ((u, v),) = project(at[None], camera)
                     visible = (name.startswith("l_"), name.startswith("r_"))[camera % 2] or name in ("torso", "head")
-                    handles.append({"camera": camera, "person": p, "point": name, "u": u, "v": v, "visible": visible})
+                    handles.append({
+                        "camera": camera, "person": p, "point": name, "u": u, "v": v, "visible": visible,
+                        "held": (p, name) in self.held_joints, "side": SIDES.get(name[:2], ""),
+                    })  # fmt: skip
             if self.epipolar_of and self.epipolar_of[0] != camera:
                 v = HEIGHT / 2 + 20 - SCALE * self.epipolar_of[1]
                 add(camera, 0, "epipolar", "#ff5d8f", np.array([[0, v, WIDTH - 1, v]]))
         header = {
             "type": "overlay", "frame": self.state["frame"], "seq": self.seq, "job": candidate is not None,
             "paths": paths, "outlines": [], "handles": handles, "pins": [], "triangulation": None,
+            "out_of_reach": self.out_of_reach,
         }  # fmt: skip
         await self.send_binary(header, np.concatenate(segments).astype("<f4").tobytes(), sockets)
 

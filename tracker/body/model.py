@@ -131,6 +131,11 @@ class BodyModel:
         return np.array(rows, dtype=np.float64)
 
     @cached_property
+    def limb_dofs(self) -> NDArray[np.bool_]:
+        """Whether a degree of freedom bends a limb freely, (n_dofs,): neither of the root nor with a spread."""
+        return (self.dof_joint != 0) & ~np.isfinite(self.spreads)
+
+    @cached_property
     def moves(self) -> NDArray[np.bool_]:
         """Whether a degree of freedom moves a part, (n_dofs, n_parts)."""
         ancestors = np.zeros((len(self.parts), len(self.parts)), dtype=bool)  # [joint, part]

@@ -44,8 +44,12 @@ class PersonMotion:
     @cached_property
     def model(self) -> BodyModel:
         """The one body of files with a skeleton: that of all poses if they agree, else the person's present one."""
-        models = {id(p.body.model): p.body.model for p in self.poses.values()}
-        return next(iter(models.values())) if len(models) == 1 else self.person.model
+        return self.models[0] if len(self.models) == 1 else self.person.model
+
+    @cached_property
+    def models(self) -> list[BodyModel]:
+        """The bodies of all poses, each once, in the order of frames."""
+        return list({id(p.body.model): p.body.model for p in self.poses.values()}.values())
 
     @property
     def n_refitted(self) -> int:
@@ -53,7 +57,17 @@ class PersonMotion:
         return sum(p.body.model is not self.model for p in self.poses.values())
 
     def in_one_body(self) -> dict[int, Array]:
-        """Return the poses in the body `model` by frame, (n_values,); those of other bodies are refitted to it."""
+        """Return the poses in the body `model` by frame, (n_values,); those of other sizes are refitted to it.
+
+        Raises:
+            SessionError: some poses are of a body with other degrees of freedom.
+        """
+        other = next((m for m in self.models if m.value_names != self.model.value_names), None)
+        if other is not None:
+            raise SessionError(
+                f"expected poses of '{self.person.name}' with the degrees of freedom of '{self.model.name}', found "
+                f"some of '{other.name}'; give frames of one body as --frames, or another format"
+            )
         return {f: retarget_pose(p.body.values, p.body.model, self.model) for f, p in self.poses.items()}
 
     def without_gaps(self, frames: range) -> Array:

@@ -38,12 +38,13 @@ Tick = Callable[[], None]
 def write_person_trc(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
     """Write the points of one person as TRC; a frame without a pose is a row of empty cells."""
     (person,) = motion.exported
-    names = person.model.point_names
+    names = list(dict.fromkeys(name for model in person.models for name in model.point_names))
     points = np.full((len(motion.frames), len(names), 3), np.nan)
     T_file_world = file_from_world(motion.session, options.axes)
     for i, frame in enumerate(motion.frames):
         if frame in person.poses:
-            points[i] = rigid.apply(T_file_world, person.poses[frame].body.points_world)
+            body = person.poses[frame].body
+            points[i, [names.index(n) for n in body.model.point_names]] = rigid.apply(T_file_world, body.points_world)
         tick()
     write_trc(
         paths[0], names, points, motion.session.fps, frames=motion.frames, units=options.units, from_frame_0=False
@@ -54,7 +55,7 @@ def write_tables(motion: ExportedMotion, options: ExportOptions, paths: Sequence
     """Write the points of all people to the first CSV file, and the values of their poses to the second."""
     cameras = [c.camera.name for c in motion.session.cameras]
     T_file_world, per_metre = file_from_world(motion.session, options.axes), options.per_metre
-    models = {id(p.body.model): p.body.model for person in motion.exported for p in person.poses.values()}.values()
+    models = [model for person in motion.exported for model in person.models]
     points = list(dict.fromkeys(name for model in models for name in model.point_names))
     units = {v: _unit(unit, options) for m in models for v, unit in zip(m.value_names, value_units(m), strict=True)}
     joints: list[MotionRow] = []
@@ -109,7 +110,7 @@ def write_keypoints(motion: ExportedMotion, options: ExportOptions, paths: Seque
     if options.keypoints != "body":
         categories.append(person_category(1))
     if options.keypoints != "coco17":
-        for model in {p.model.name: p.model for p in motion.exported}.values():
+        for model in {m.name: m for p in motion.exported for m in p.models}.values():
             categories.append(body_category(len(categories) + 1, model))
     cameras = [c.camera for c in motion.session.cameras]
     names = [_FileNames(source) for source in motion.session.cameras]

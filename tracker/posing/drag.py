@@ -1,36 +1,16 @@
-"""Drag a point of a body in one view: the point follows the pointer, and its kinematic chain follows the point."""
-
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import NamedTuple, TypedDict
+"""Drag a grabbed point: it follows the pointer, turns its part, goes nearer or farther, or bends the trunk as well."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import Kinematics
-from tracker.body.model import BodyModel, PosedBody
-from tracker.errors import TrackerError
-from tracker.fitting.gauss_newton import NormalEquations, PosePrior, ResidualBlock, normal_equations, solve
+from tracker.body.limbs import limbs
+from tracker.body.model import BodyModel
+from tracker.fitting.gauss_newton import solve
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import NEAR_PLANE_M, Camera
+from tracker.geometry.arrays import Array, IntArray
+from tracker.posing.grab import Grab, Holds, limb_points
 from tracker.posing.orient import orient
-from tracker.posing.picking import point_on_part
-
-
-class _Solving(TypedDict):
-    max_iterations: int
-    tolerance: float
-
-
-_REST_WEIGHT = 0.003
-"""Weight of keeping the chain at its pose at the grab, per rad, against 1 per metre for the dragged point. It
-determines what the pointer does not, and holds the point back by some 0.1 mm."""
-_STIFF_WEIGHT = 0.015
-"""The same for joints that bend little, such as the waist: a drag of the trunk turns the body before it bends it."""
-_DEPTH_WEIGHT = 0.1
-"""Weight of keeping the point's depth, against 1 for being under the pointer. If the limb's lengths allow only one of
-the two, the point follows the pointer."""
+from tracker.posing.reaching import HOLD_WEIGHT, QUICK, PointerTarget, as_other_views_placed, reach, restore_held
 
 _ON_JOINT_PX = 8.0
 """Largest distance of a grabbed point from its joint at which turning works like a knob, px."""
@@ -43,200 +23,15 @@ _PUSH_DEPTH_WEIGHT = 0.5
 _MIN_PUSH_DEPTH_M = 0.3
 """Smallest depth of a pushed point, metres."""
 
-_REACHED_M, _REACHED_DEPTH_M = 0.002, 0.02
-"""Tolerances across the line of sight and along it within which a point has reached its target, metres. The pull to the
-rest pose holds a point back in depth by some 4 mm."""
-_BEND_RAD = 0.35
-"""Angle by which the last joint of a chain is bent to leave the singularity of a straight limb, rad."""
-_STRETCHED = 0.999
-"""Share of the full length of a chain from which it counts as stretched; an elbow then bends by 5 degrees."""
-
-_QUICK: _Solving = {"max_iterations": 15, "tolerance": 1e-4}
-"""Solver settings of a move: dozens a second, each from the result of the last one."""
-_BENT: _Solving = {"max_iterations": 6, "tolerance": 1e-4}
-"""Solver settings of a test whether a bent limb comes nearer."""
-
-
-@dataclass(frozen=True, eq=False)
-class Grab:
-    """A grabbed point of a body in one view, from press to release."""
-
-    model: BodyModel
-    camera: Camera
-    """View of the drag; positions are in its undistorted pixels."""
-    part: int
-    """Index of the part that carries the point."""
-    point_part: Array
-    """The point in the frame of that part, (3,), metres."""
-    pose: Array
-    """Pose at the grab, (n_values,)."""
-    pointer_px: Array
-    """Pointer at the grab, (2,), px."""
-    depth_m: float
-    """Depth of the point along the optical axis, kept during the drag, metres."""
-    offset_px: Array
-    """From the pointer to the point at the grab, (2,), px; kept, so that the point does not jump."""
-    active_dofs: NDArray[np.bool_]
-    """Degrees of freedom that follow the point, (n_dofs,)."""
-    unlocked_dofs: NDArray[np.bool_]
-    """Degrees of freedom that may change at all, (n_dofs,)."""
-    moves_body: bool
-    """Whether the whole body moves parallel to the image."""
-
-    def point_world(self, pose: Array) -> Array:
-        """Return the grabbed point in a pose, (3,), metres."""
-        return rigid.apply(self.model.kinematics(pose).Ts_world_part[self.part], self.point_part)
-
-
-class _Handle(NamedTuple):
-    """A point that can be grabbed."""
-
-    part: int
-    """Index of the part that carries it."""
-    point_part: Array
-    """The point in the frame of that part, (3,), metres."""
-    movers: NDArray[np.bool_]
-    """Degrees of freedom that move it, (n_dofs,)."""
-    moves_body: bool
-    """Whether it moves the whole body."""
-    name: str
-    """Name for messages."""
-
-
-def minor_points(model: BodyModel) -> tuple[str, ...]:
-    """Return the joints that a user rarely drags: rigid ones, and those that bend the trunk a little (waist, neck,
-    collarbones).
-
-    Dragging them turns the body about its root, like hips, shoulders and head, and also bends these joints.
-    """
-    stiff = [np.all(np.isfinite(model.spreads[model.dof_joint == i])) for i in range(len(model.joints))]
-    return tuple(j.name for j, is_stiff in zip(model.joints, stiff, strict=True) if is_stiff)
-
-
-def grab(
-    model: BodyModel,
-    pose: Array,
-    camera: Camera,
-    point: str,
-    pointer_px: Array,
-    active_dofs: NDArray[np.bool_] | None = None,
-) -> Grab:
-    """Grab a point of a body.
-
-    The root point moves the whole body. A point of a limb moves that limb alone, and a head on a bending neck its neck.
-    A point of the trunk, a shoulder or a hip turns the body about its root and bends the trunk.
-
-    Args:
-        model: the body.
-        pose: its pose, (n_values,).
-        camera: the view.
-        point: name of the point.
-        pointer_px: position of the pointer, undistorted px, (2,).
-        active_dofs: degrees of freedom that may change, (n_dofs,); all by default.
-
-    Raises:
-        TrackerError: everything that moves the point is locked.
-    """
-    index = model.point_names.index(point)
-    movers = model.moves[:, model.point_parts[index]].copy()
-    if index < len(model.joints):
-        movers &= model.dof_joint != index  # a joint's own rotation does not move it
-    handle = _Handle(int(model.point_parts[index]), model.points_part[index], movers, index == 0, point)
-    return _grab_handle(model, pose, camera, handle, pointer_px, active_dofs)
-
-
-def grab_part(
-    model: BodyModel,
-    pose: Array,
-    camera: Camera,
-    part: int,
-    pointer_px: Array,
-    active_dofs: NDArray[np.bool_] | None = None,
-) -> Grab:
-    """Grab a part of a body where the pointer touches its surface.
-
-    The root part moves the whole body. Any other part follows by the touched point.
-
-    Args:
-        model: the body.
-        pose: its pose, (n_values,).
-        camera: the view.
-        part: index of the part.
-        pointer_px: position of the pointer, undistorted px, (2,).
-        active_dofs: degrees of freedom that may change, (n_dofs,); all by default.
-
-    Raises:
-        TrackerError: everything that moves the part is locked.
-    """
-    point_part = point_on_part(PosedBody(model, pose), camera, part, pointer_px)
-    handle = _Handle(part, point_part, model.moves[:, part], part == 0, model.parts[part].name)
-    return _grab_handle(model, pose, camera, handle, pointer_px, active_dofs)
-
-
-def _grab_handle(
-    model: BodyModel,
-    pose: Array,
-    camera: Camera,
-    handle: _Handle,
-    pointer_px: Array,
-    active_dofs: NDArray[np.bool_] | None,
-) -> Grab:
-    """Choose the degrees of freedom that follow a handle."""
-    point_world = rigid.apply(model.kinematics(pose).Ts_world_part[handle.part], handle.point_part)
-    unlocked = np.ones(model.n_dofs, dtype=bool) if active_dofs is None else active_dofs
-    of_root = model.dof_joint == 0
-    own = handle.movers & ~of_root
-    carries_others = handle.part in model.parents
-    if handle.moves_body:
-        follows = of_root & model.dof_is_length
-    elif np.any(own & ~np.isfinite(model.spreads)):
-        follows = own & ~np.isfinite(model.spreads)
-    elif np.any(own) and not carries_others:
-        follows = own
-    else:
-        follows = handle.movers & ~model.dof_is_length
-    follows = follows & unlocked
-    # If the whole limb is locked, nothing else moves in its place: the lock is meant to hold the dragged point too.
-    if not np.any(follows):
-        raise TrackerError(
-            f"expected a point that something moves, found {handle.name} with all of that locked; unlock it"
-        )
-    pointer_px = np.asarray(pointer_px, dtype=np.float64)
-    return Grab(
-        model, camera.pinhole, handle.part, handle.point_part, np.array(pose), pointer_px,
-        float(camera.depths(point_world)), camera.pinhole.project(point_world) - pointer_px, follows, unlocked,
-        handle.moves_body,
-    )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class _PointerTarget:
-    """Residuals of the grabbed point: across the line of sight and, with less weight, in depth; see `ResidualBlock`."""
-
-    grabbed: Grab
-    target_world: Array
-    """Target of the point, (3,), metres: under the pointer, at the depth."""
-    depth_weight: float = _DEPTH_WEIGHT
-
-    def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
-        """See `ResidualBlock`."""
-        grabbed, (target_px, m_per_px, depth_axis) = self.grabbed, self._image
-        point_world = rigid.apply(kinematics.Ts_world_part[grabbed.part], grabbed.point_part)
-        points_px, px_by_point = grabbed.camera.project_with_jacobian(point_world[None])
-        r, by_point = np.empty(3), np.empty((3, 3))
-        r[:2], by_point[:2] = m_per_px @ (points_px[0] - target_px), m_per_px @ px_by_point[0]
-        r[2], by_point[2] = depth_axis @ (point_world - self.target_world), depth_axis
-        J_world = model.point_jacobian(kinematics, np.array([grabbed.part]), point_world[None])[0]  # (3, n_dofs)
-        return normal_equations(r, by_point @ J_world)
-
-    @cached_property
-    def _image(self) -> tuple[Array, Array, Array]:
-        """Target in the image, (2,), px; metres per pixel at the depth of the grab, (2, 2); weighted depth axis,
-        (3,)."""
-        camera = self.grabbed.camera
-        target_px = camera.project_with_jacobian(self.target_world[None])[0][0]
-        m_per_px = np.asarray(self.grabbed.depth_m * np.linalg.inv(camera.K[:2, :2]), dtype=np.float64)
-        return target_px, m_per_px, self.depth_weight * camera.T_camera_world[2, :3]
+_HEADINGS_RAD = (np.radians(np.arange(-90.0, 91.0)), np.radians(np.linspace(-1.0, 1.0, 41)))
+"""Turns about the vertical that one move tries, against the last move, coarse and fine."""
+_NEAR_HEADING_M, _SAME_SIDE_M = 0.03, 0.01
+"""Distances in the view that outweigh one radian of turn from the grab and from the last move, metres. A shoulder at
+the outline turns far for little: the first keeps an aim that is slightly off from turning the body. Of two headings
+that look alike the second takes the nearer."""
+_NEAR_SIDE_M = 3e-4
+"""Squared distance in the view that outweighs one metre of depth, metres. It decides which way a shoulder at the
+outline is drawn inwards: towards the camera."""
 
 
 def drag(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
@@ -248,72 +43,43 @@ def drag(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
         pose: pose after the last move, (n_values,).
 
     Returns:
-        The new pose, (n_values,), the nearest that limits and lengths allow.
+        The new pose, (n_values,), the nearest that limits and lengths allow. Held points stay in place.
+    """
+    return _follow(grabbed, grabbed.target_world(pointer_px), pose, None)
+
+
+def bend(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
+    """Let the grabbed point follow the pointer with the help of the trunk.
+
+    A limb also bends the trunk, and the other limbs stay where they are in space. A shoulder or a hip leans the body
+    and bends the trunk. Any other point does what `drag` does.
+
+    Args:
+        grabbed: from `grab` or `grab_part`.
+        pointer_px: position of the pointer, undistorted px, (2,).
+        pose: pose after the last move, (n_values,).
     """
     model = grabbed.model
-    target = grabbed.camera.back_project(np.asarray(pointer_px) + grabbed.offset_px, grabbed.depth_m)
-    if grabbed.moves_body:
-        return _moved_body(grabbed, target)
-    blocks: list[ResidualBlock] = [
-        _PointerTarget(grabbed, target),
-        _rest_prior(grabbed),
-    ]
-    fit = solve(model, pose, blocks, active_dofs=grabbed.active_dofs, **_QUICK)
-    joint, first = model.dof_joint[grabbed.active_dofs][[-1, 0]]
-    if (
-        joint == first
-        or _has_reached(grabbed, fit.pose, target)
-        or _is_stretched(grabbed, fit.pose, int(first), target)
-    ):
-        return fit.pose
-    # At a straight limb the gradient of bending is 0: restart with its joint bent, either way.
-    for bend in (_BEND_RAD, -_BEND_RAD):
-        start = model.clip(model.retract(pose, np.where(grabbed.active_dofs & (model.dof_joint == joint), bend, 0.0)))
-        bent = solve(model, start, blocks, active_dofs=grabbed.active_dofs, **_BENT)
-        if bent.cost < fit.cost:
-            fit = solve(model, bent.pose, blocks, active_dofs=grabbed.active_dofs, **_QUICK)
-    return fit.pose
-
-
-def _has_reached(grabbed: Grab, pose: Array, target_world: Array) -> bool:
-    """Return whether the grabbed point is at its target, within visible tolerances."""
-    seen = rigid.apply(grabbed.camera.T_camera_world, np.stack([grabbed.point_world(pose), target_world]))
-    across = grabbed.depth_m * np.diff(seen[:, :2] / np.maximum(seen[:, 2:], NEAR_PLANE_M), axis=0)
-    return bool(np.linalg.norm(across) < _REACHED_M and abs(seen[1, 2] - seen[0, 2]) < _REACHED_DEPTH_M)
-
-
-def _is_stretched(grabbed: Grab, pose: Array, first: int, target_world: Array) -> bool:
-    """Return whether the chain from a joint on has its full length and its target is farther away."""
-    model, part = grabbed.model, grabbed.part
-    places = [grabbed.point_world(pose)]
-    Ts_world_part = model.kinematics(pose).Ts_world_part
-    while part != first:
-        places.append(Ts_world_part[part, :3, 3])
-        part = int(model.parents[part])
-    places.append(Ts_world_part[first, :3, 3])
-    length = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
-    return bool(min(np.linalg.norm(p - places[-1]) for p in (places[0], target_world)) > _STRETCHED * length)
-
-
-def regrab(grabbed: Grab, pose: Array, pointer_px: Array) -> Grab:
-    """Return the same grab of the same point in another pose, (n_values,), with the pointer elsewhere, (2,)."""
-    place = grabbed.point_world(pose)
-    return replace(
-        grabbed,
-        pose=np.array(pose),
-        pointer_px=np.asarray(pointer_px, dtype=np.float64),
-        depth_m=float(grabbed.camera.depths(place)),
-        offset_px=grabbed.camera.project(place) - pointer_px,
-    )
+    if grabbed.role not in ("limb", "heading"):
+        return drag(grabbed, pointer_px, pose)
+    active, holds = grabbed.active_dofs | (model.moves[:, grabbed.part] & np.isfinite(model.spreads)), grabbed.holds
+    if grabbed.role == "limb":
+        trunk, bases = _trunk_beyond(model, grabbed.part)
+        if np.any(trunk):  # an arm: the chest leans, and hips stay below it
+            active |= trunk | ((model.dof_joint == 0) & ~model.dof_is_length)
+        holds = _held_at(grabbed, np.concatenate([_of_other_limbs(model, grabbed.part), bases]))
+    bent = reach(grabbed, grabbed.target_world(pointer_px), pose, active & grabbed.unlocked_dofs, holds)
+    return restore_held(model, bent, holds, grabbed.unlocked_dofs)
 
 
 def turn(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
     """Turn the grabbed part about the line of sight through its joint by the angle that the pointer goes round the
     joint.
 
-    The turned joint is the active one next to the grabbed point; if the whole body is grabbed, the body turns. With the
-    pointer on the joint itself, the part turns like a knob by the pointer's motion to the right. A joint that cannot
-    turn about the line of sight turns so that the point comes near to its target.
+    The turned joint is the active one next to the grabbed point. The body turns if it is grabbed as a whole, or by a
+    shoulder or a hip; that tilts it. With the pointer on the joint itself, the part turns like a knob by the pointer's
+    motion to the right. A joint that cannot turn about the line of sight turns so that the point comes near to its
+    target.
 
     Args:
         grabbed: from `grab` or `grab_part`.
@@ -323,7 +89,7 @@ def turn(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
     model, camera = grabbed.model, grabbed.camera
     part = (
         0
-        if grabbed.moves_body
+        if grabbed.role in ("body", "heading")
         else int(model.dof_joint[np.flatnonzero(grabbed.active_dofs & ~model.dof_is_length)[-1]])
     )
     T_world_part = model.kinematics(grabbed.pose).Ts_world_part[part]
@@ -342,7 +108,7 @@ def turn(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
     if model.joints[part].kind == "ball" or np.count_nonzero(own) >= 3:
         return orient(model, pose, part, R_turn @ T_world_part[:3, :3], grabbed.unlocked_dofs)
     target = T_world_part[:3, 3] + R_turn @ (grabbed.point_world(grabbed.pose) - T_world_part[:3, 3])
-    return solve(model, pose, [_PointerTarget(grabbed, target)], active_dofs=own, **_QUICK).pose
+    return solve(model, pose, [PointerTarget(grabbed, target)], active_dofs=own, **QUICK).pose
 
 
 def push(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
@@ -354,23 +120,94 @@ def push(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
         pointer_px: position of the pointer, undistorted px, (2,).
         pose: pose after the last move, (n_values,).
     """
-    model, camera = grabbed.model, grabbed.camera
+    camera = grabbed.camera
     up_m = float(grabbed.pointer_px[1] - np.asarray(pointer_px)[1]) * grabbed.depth_m / camera.K[1, 1]
     depth = max(_MIN_PUSH_DEPTH_M, grabbed.depth_m + _PUSH_GAIN * up_m)
     target = camera.back_project(grabbed.pointer_px + grabbed.offset_px, depth)
-    if grabbed.moves_body:
-        return _moved_body(grabbed, target)
-    blocks: list[ResidualBlock] = [_PointerTarget(grabbed, target, _PUSH_DEPTH_WEIGHT), _rest_prior(grabbed)]
-    return solve(model, pose, blocks, active_dofs=grabbed.active_dofs, **_QUICK).pose
+    return _follow(grabbed, target, pose, _PUSH_DEPTH_WEIGHT)
 
 
-def _moved_body(grabbed: Grab, target_world: Array) -> Array:
-    """Return the pose at the grab, translated so that the grabbed point comes to a position, (3,), metres."""
+def _follow(grabbed: Grab, target_world: Array, pose: Array, depth_weight: float | None) -> Array:
+    """Return the pose in which the grabbed point is nearest to a target, by the joints of its role.
+
+    Args:
+        grabbed: the grab.
+        target_world: target of the point, (3,), metres.
+        pose: pose after the last move, (n_values,).
+        depth_weight: weight of the target's depth, against 1 across the line of sight; None: the usual one.
+    """
+    match grabbed.role:
+        case "limb":
+            return reach(grabbed, target_world, pose, grabbed.active_dofs, grabbed.holds, depth_weight)
+        case "body":
+            placed = target_world if depth_weight else as_other_views_placed(grabbed, target_world)[0]
+            moved = _moved_body(grabbed, placed, pose)
+        case "heading":
+            moved = _turned_about_vertical(grabbed, target_world, pose, depth_weight or 0.0)
+        case _:
+            moved = reach(grabbed, target_world, pose, grabbed.active_dofs, grabbed.holds, depth_weight)
+    return restore_held(grabbed.model, moved, grabbed.holds, grabbed.unlocked_dofs)
+
+
+def _moved_body(grabbed: Grab, target_world: Array, pose: Array) -> Array:
+    """Return a pose, (n_values,), translated so that the grabbed point comes to a position, (3,), metres."""
     step = np.zeros(grabbed.model.n_dofs)
-    step[:3] = target_world - grabbed.point_world(grabbed.pose)
-    return grabbed.model.retract(grabbed.pose, np.where(grabbed.active_dofs, step, 0.0))
+    step[:3] = target_world - grabbed.point_world(pose)
+    return grabbed.model.retract(pose, np.where(grabbed.active_dofs, step, 0.0))
 
 
-def _rest_prior(grabbed: Grab) -> PosePrior:
-    """Return the prior that keeps the chain near its pose at the grab."""
-    return PosePrior(grabbed.pose, np.where(np.isfinite(grabbed.model.spreads), _STIFF_WEIGHT, _REST_WEIGHT))
+def _turned_about_vertical(grabbed: Grab, target_world: Array, pose: Array, depth_weight: float) -> Array:
+    """Return a pose with the body turned about the vertical through its root, so that the point is nearest to a target.
+
+    The point runs on a level circle, which has two places for most positions in the view. Continuity decides between
+    them; at the outline of the circle, the side that the camera sees.
+    """
+    model, camera, up = grabbed.model, grabbed.camera, grabbed.up_world
+    kinematics = model.kinematics(grabbed.pose)
+    T_root = kinematics.Ts_world_part[0]
+    R_last = model.kinematics(pose).Ts_world_part[0, :3, :3] @ T_root[:3, :3].T
+    angle = last = float(rigid.so3_log(R_last) @ up)
+    placed = grabbed.holds.of(~grabbed.holds.moved_by(model, model.limb_dofs))
+    if grabbed.placed_elsewhere is not None:
+        placed = placed.joined(grabbed.placed_elsewhere)
+    placed = placed.scaled(HOLD_WEIGHT)
+    arms = np.vstack([grabbed.point_world(grabbed.pose), placed.targets_world]) - T_root[:3, 3]
+    level, across = arms - (arms @ up)[:, None] * up, np.cross(up, arms)
+    target = rigid.apply(camera.T_camera_world, target_world)
+    for turns in _HEADINGS_RAD:
+        tried = angle + turns
+        c, s = np.cos(tried)[:, None, None] - 1, np.sin(tried)[:, None, None]
+        moves = c * level + s * across  # (n_tried, 1 + n_placed, 3)
+        seen = rigid.apply(camera.T_camera_world, T_root[:3, 3] + arms[0] + moves[:, 0])
+        missed = grabbed.depth_m * (seen[:, :2] / seen[:, 2:] - target[:2] / target[2])
+        cost = np.sum(missed**2, axis=1) + (depth_weight * (seen[:, 2] - target[2])) ** 2
+        cost += np.sum(np.einsum("nij,tnj->tni", placed.weights, moves[:, 1:]) ** 2, axis=(1, 2))
+        cost += (_NEAR_HEADING_M * tried) ** 2 + _NEAR_SIDE_M * seen[:, 2] + (_SAME_SIDE_M * (tried - last)) ** 2
+        angle = float(tried[np.argmin(cost)])
+    return orient(model, pose, 0, rigid.so3_exp(angle * up) @ T_root[:3, :3], grabbed.unlocked_dofs)
+
+
+def _trunk_beyond(model: BodyModel, part: int) -> tuple[NDArray[np.bool_], IntArray]:
+    """Return the degrees of freedom of the trunk that do not move a part, (n_dofs,), and the joints that hang on it.
+
+    For a forearm these are spine and waist, and the hips.
+    """
+    in_limbs = {int(p) for limb in limbs(model) for p in limb.parts}
+    beyond = [p for p in range(1, len(model.parts)) if p not in in_limbs]
+    dofs = np.isin(model.dof_joint, beyond) & ~model.moves[:, part]
+    if not np.any(dofs):
+        return dofs, np.zeros(0, dtype=np.int64)
+    return dofs, np.array([i for i, parent in enumerate(model.parents) if parent in beyond and i in in_limbs])
+
+
+def _of_other_limbs(model: BodyModel, part: int) -> IntArray:
+    """Return the points that can be held, by index, of all limbs but that of a part."""
+    own = next(limb.parts for limb in limbs(model) if part in limb.parts)
+    points = np.array([model.point_names.index(name) for name in limb_points(model)], dtype=np.int64)
+    return points[~np.isin(model.point_parts[points], own)]
+
+
+def _held_at(grabbed: Grab, points: IntArray) -> Holds:
+    """Return points, given by index, held where they are at the grab, in all directions."""
+    places = grabbed.model.points_at(grabbed.model.kinematics(grabbed.pose), points)
+    return Holds(points, places, np.tile(np.eye(3), (len(points), 1, 1)))

@@ -8,15 +8,19 @@ import numpy as np
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.runtime.jobs import LatestWinsWorker
-from app.state.people import DragState
+from app.state.people import DragState, HeldPoint
 from app.state.state import State
 from tracker.body.limbs import display_name
-from tracker.posing import drag as posing
+from tracker.geometry.arrays import Array
+from tracker.posing import drag as modes
+from tracker.posing.grab import Grab, grab, grab_part, holdable_points, regrab
 
 _CHECKPOINT_S = 1.0
 """A long drag is saved at least this often."""
 _REST_S, _HEAD_START_S = 0.15, 0.02
 """Time between two scorings of a dragged pose, and the delay of each: poses must reach the page first."""
+
+_MODES = {"move": modes.drag, "turn": modes.turn, "push": modes.push, "bend": modes.bend}
 
 
 class Dragging:
@@ -30,8 +34,8 @@ class Dragging:
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities
-        self._gesture_grab: posing.Grab | None = None  # at the start of the gesture
-        self._mode_grab: posing.Grab | None = None  # at the start of its present mode
+        self._gesture_grab: Grab | None = None  # at the start of the gesture
+        self._mode_grab: Grab | None = None  # at the start of its present mode
         self._page = 0
         self._scores_moves = False  # whether the dragged pose is still to be scored in the background
         activities.add_gesture(self.finish)
@@ -78,23 +82,24 @@ class Dragging:
             session_state.go_to(frame)
             values = session_state.state.poses[person]
             view, pointer = cameras[camera].camera, np.array(pointer_px)
-            active = session_state.active_dofs(person)
+            constraints = session_state.drag_constraints(person)
             if part is None:
-                grab = posing.grab(model, values, view, point, pointer, active)
+                grabbed = grab(model, values, view, point, pointer, constraints)
                 selected, name = point, point
             else:
-                grab = posing.grab_part(model, values, view, part, pointer, active)
+                grabbed = grab_part(model, values, view, part, pointer, constraints)
                 selected, name = model.joints[part].name, model.parts[part].name
-            self._gesture_grab = self._mode_grab = grab
+            self._gesture_grab = self._mode_grab = grabbed
             self._page, session_state.last_save = page, time.monotonic()
-            x, y, z = (float(c) for c in grab.point_part)
-            drag = DragState(camera, person, name, pointer_px, grab.part, (x, y, z), part is not None)
+            x, y, z = (float(c) for c in grabbed.point_part)
+            drag = DragState(camera, person, name, pointer_px, grabbed.part, (x, y, z), part is not None)
             session_state.set(person=person, point=selected, drag=drag)
 
     def move(
         self, page: int, pointer_px: tuple[float, float], seq: int, mode: str = "move", is_last: bool = False
     ) -> None:
-        """Move the grabbed point to the pointer, turn its part, or push it in depth (see `tracker.posing.drag`).
+        """Move the grabbed point to the pointer, turn its part, push it in depth, or bend the trunk as well (see
+        `tracker.posing.drag`).
 
         A change of mode grabs the point again at the last pointer position, so that nothing jumps.
 
@@ -102,10 +107,9 @@ class Dragging:
             page: number of the page.
             pointer_px: undistorted px.
             seq: sequence number of the page's message.
-            mode: `move`, `turn` or `push`.
+            mode: `move`, `turn`, `push` or `bend`.
             is_last: whether the drag ends here. Its pose is not scored now, because `end` scores it.
         """
-        modes = {"move": posing.drag, "turn": posing.turn, "push": posing.push}
         session_state = self._session_state
         with session_state.lock:
             drag = session_state.state.drag
@@ -113,12 +117,17 @@ class Dragging:
                 return
             before = session_state.state.poses[drag.person]
             if mode != drag.mode:
-                self._mode_grab = posing.regrab(self._mode_grab, before, np.array(drag.pointer_px))
+                self._mode_grab = regrab(self._mode_grab, before, np.array(drag.pointer_px))
                 drag = replace(drag, mode=mode)
-            values = modes[mode](self._mode_grab, np.array(pointer_px), before)
+            values = _MODES[mode](self._mode_grab, np.array(pointer_px), before)
+            short_m, wanted_px = _shortfall(self._mode_grab, np.array(pointer_px), values, mode)
             seqs = (*(s for s in session_state.state.drag_seqs if s[0] != page), (page, seq))[-16:]
             people = session_state.people_with_pose(drag.person, values)
-            session_state.set(people=people, drag=replace(drag, pointer_px=pointer_px), drag_seqs=seqs)
+            session_state.set(
+                people=people,
+                drag=replace(drag, pointer_px=pointer_px, short_m=short_m, wanted_px=wanted_px),
+                drag_seqs=seqs,
+            )
             self._scores_moves = not is_last
             if not is_last:
                 self._costs.offer(session_state.state)
@@ -149,10 +158,18 @@ class Dragging:
         has_moved = not np.array_equal(grab.pose, session_state.state.poses[drag.person])
         if has_moved or session_state.open_edit_owner is grab:
             session_state.save(f"drag {display_name(drag.point)}", "manual", grab)
+            self._hold(drag)
         elif not session_state.is_shown_stored(session_state.state):
             session_state.show_frame(session_state.state.frame)  # moved back: the pose has its former source
         self._gesture_grab = self._mode_grab = session_state.open_edit_owner = None
         session_state.set(drag=None, **session_state.costs(session_state.state.poses))
+
+    def _hold(self, drag: DragState) -> None:
+        """Hold the point that was placed in a view."""
+        state = self._session_state.state
+        if not drag.by_surface and drag.point in holdable_points(self._session_state.models[drag.person]):
+            placed = HeldPoint(state.frame, drag.person, drag.point, drag.camera)
+            self._session_state.set(held=state.held | {placed})
 
     def _score(self, _: State) -> None:
         """Score the dragged pose, unless it has changed meanwhile or the drag is over."""
@@ -166,3 +183,14 @@ class Dragging:
         with session_state.lock:
             if session_state.state.drag is not None and session_state.state.people is scored.people:
                 session_state.set(**costs)
+
+
+def _shortfall(grabbed: Grab, pointer_px: Array, values: Array, mode: str) -> tuple[float, tuple[float, float] | None]:
+    """Return by how many metres a grabbed point stays behind the pointer, and where it should be, px.
+
+    A body that turns about the vertical, or about a line of sight, is not meant to be under the pointer.
+    """
+    if mode not in ("move", "bend") or (grabbed.role == "heading" and mode == "move"):
+        return 0.0, None
+    u, v = (float(c) for c in pointer_px + grabbed.offset_px)
+    return grabbed.miss_m(pointer_px, values), (u, v)

@@ -12,7 +12,8 @@ from tracker.body.limbs import display_name, limb_display_name
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
-from tracker.posing import drag
+from tracker.posing import grab as grabbing
+from tracker.posing.drag import drag
 from tracker.posing.edits import copy_dofs, copy_joint_angles, limb_of, mirror_pose
 from tracker.posing.orient import orient
 from tracker.posing.retarget import retarget_pose
@@ -89,9 +90,9 @@ class PoseEdits:
                 raise TrackerError(
                     f"expected {display_name(name)} before {view.name}, found it behind; choose another view"
                 )
-            hand = drag.grab(model, values, view, name, start, self._session_state.active_dofs(person))
+            hand = grabbing.grab(model, values, view, name, start, self._session_state.drag_constraints(person))
             label = f"nudge {display_name(name)}"
-            self._apply(person, drag.drag(hand, end, values), label, ("nudge", name, camera))
+            self._apply(person, drag(hand, end, values), label, ("nudge", name, camera))
 
     def place_part(self, person: int, part: int, R_world: Array, position_world: Array | None, gesture: object) -> None:
         """Turn a part to an orientation, as far as its joint allows; the root also moves to a position.

@@ -20,6 +20,7 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.triangulation import PointObservation
 from tracker.posing.default_pose import default_pose
+from tracker.posing.grab import Constraints
 from tracker.posing.retarget import retarget_pose
 from tracker.session.locked_dofs import active_dofs
 from tracker.session.session import Session
@@ -79,6 +80,17 @@ class SessionState:
     def active_dofs(self, person: int) -> NDArray[np.bool_]:
         """Return which degrees of freedom of a person are not locked, (n_dofs,)."""
         return active_dofs(self.present[person], self.state.locked[person])
+
+    def drag_constraints(self, person: int) -> Constraints:
+        """Return what a drag of a person leaves alone: locks, held points, the vertical."""
+        here = [h for h in self.state.held if (h.frame, h.person) == (self.state.frame, person)]
+        cameras = self.session.cameras
+        held = {
+            point: [cameras[h.camera].camera for h in here if h.point == point and h.camera is not None]
+            for point in {h.point for h in here}
+        }
+        x, y, z = (float(c) for c in self._R_world_up[:, 2])
+        return Constraints(self.active_dofs(person), held, (x, y, z))
 
     def within_locks(self, poses: Sequence[Array]) -> tuple[Array, ...]:
         """Return poses, (n_values,) each, with locked degrees of freedom as in the shown poses."""

@@ -80,6 +80,12 @@ def test_segments_lie_in_undistorted_pixels_of_the_whole_image(controller):
     assert {type(p) for p in paths} == {Path}
 
 
+def rows_sorted(segments_px):
+    """Pieces of several paths in one order."""
+    rows = np.concatenate(segments_px)
+    return rows[np.lexsort(rows.T)]
+
+
 def test_visible_and_hidden_contours_are_what_the_tracing_says(controller):
     state, session = controller.state, controller.session
     traced = occluding_contours.trace(
@@ -88,19 +94,60 @@ def test_visible_and_hidden_contours_are_what_the_tracing_says(controller):
     assert 0 < traced.occluded.sum() < len(traced.occluded)
     paths = drawn(controller, state, view=view_of("contours", "hidden"))
     for kind, those in (("hidden", traced.occluded), ("model", ~traced.occluded)):
-        (path,) = kinds_of(paths, kind, camera=1)
-        np.testing.assert_array_equal(path.segments_px, traced.pieces_px[those])
-        assert path.color == session.people[0].color
+        found = kinds_of(paths, kind, camera=1)
+        np.testing.assert_array_equal(
+            rows_sorted([p.segments_px for p in found]), rows_sorted([traced.pieces_px[those]])
+        )
+        assert {p.color for p in found} == {session.people[0].color}
     assert {p.kind for p in drawn(controller, state, view=view_of("hidden"))} == {"hidden"}
 
 
 def test_contours_by_part_are_the_same_pieces_in_the_parts_colours(controller):
     state, parts = controller.state, controller.session.people[0].model.parts
-    (whole,) = kinds_of(drawn(controller, state, view=view_of("contours")), "model")
+    by_person = kinds_of(drawn(controller, state, view=view_of("contours")), "model")
     by_part = kinds_of(drawn(controller, state, view=view_of("contours", by_part=True)), "model")
-    np.testing.assert_array_equal(np.concatenate([p.segments_px for p in by_part]), whole.segments_px)
+    pieces = [rows_sorted([p.segments_px for p in paths]) for paths in (by_person, by_part)]
+    np.testing.assert_array_equal(*pieces)
     assert len(by_part) > 5
     assert {p.color for p in by_part} <= {part.color for part in parts}
+
+
+@pytest.mark.parametrize("by_part", [False, True])
+def test_each_contour_names_its_side(controller, by_part):
+    state, session = controller.state, controller.session
+    traced = occluding_contours.trace(
+        [PosedBody(session.people[0].model, state.poses[0])], session.cameras[1].camera.pinhole
+    )
+    names = np.array([part.name for part in session.people[0].model.parts])[traced.parts[~traced.occluded]]
+    paths = kinds_of(drawn(controller, state, view=view_of("contours", by_part=by_part)), "model", camera=1)
+    for side in ("left", "right"):
+        expected = traced.pieces_px[~traced.occluded][[name.startswith(side) for name in names]]
+        found = [p.segments_px for p in paths if p.side == side]
+        np.testing.assert_array_equal(rows_sorted(found), rows_sorted([expected]))
+    handles = overlays.handles(session, state, [1])
+    assert {h.point: h.side for h in handles if h.point.endswith("knee")} == {
+        "left_knee": "left",
+        "right_knee": "right",
+    }
+
+
+def test_the_head_shows_where_it_faces(controller):
+    """The sample's person faces the first camera: the arrow comes towards it, and points away from the one behind."""
+    state, session = controller.state, controller.session
+    body = PosedBody(session.people[0].model, state.poses[0])
+    forward = body.kinematics.Ts_world_part[body.model.part_index["head"], :3, 0]
+    paths = drawn(controller, state, view=view_of("contours"))
+    kinds = set()
+    for index, source in enumerate(session.cameras):
+        (arrow,) = [p for p in paths if p.camera == index and p.kind.startswith("facing")]
+        is_away = forward @ source.camera.T_world_camera[:3, 2] > 0
+        assert arrow.kind == ("facing_away" if is_away else "facing")
+        kinds.add(arrow.kind)
+        shaft = np.diff(arrow.segments_px[0].reshape(2, 2), axis=0)[0]
+        head = body.points_world[body.model.point_names.index("head")]
+        seen = source.camera.pinhole.project(np.stack([head, head + 0.01 * forward]))
+        assert shaft @ (seen[1] - seen[0]) > 0
+    assert kinds == {"facing", "facing_away"}
 
 
 def test_only_the_views_that_a_page_sees_are_drawn(controller):

@@ -1,6 +1,6 @@
 """Keys, top bar and timeline against `fake_endpoint`: what they send and what they say."""
 
-from page_driver import shows, state_of, until
+from page_driver import handle_of, shows, state_of, to_client, until
 from playwright.async_api import expect
 
 
@@ -34,6 +34,24 @@ async def test_keys_send_one_message(page, endpoint):
         await page.keyboard.press(key)
         await until(lambda: endpoint.received)
         assert endpoint.received == [message], key
+
+
+async def test_a_field_that_is_done_gives_the_keys_back(page, endpoint):
+    rate = page.locator("#rate")
+    await rate.dispatch_event("pointerdown")
+    await rate.focus()
+    await rate.select_option("2")
+    await page.keyboard.press("f")
+    await until(lambda: [m["action"] for m in endpoint.heard("search")] == ["frame"])
+    await page.mouse.click(*await to_client(page, 0, *await handle_of(page, 0, "l_elbow")))
+    field = page.locator("#inspector .number-field").first
+    await field.fill("40")
+    await page.keyboard.press("Enter")
+    await page.keyboard.press("Home")
+    await shows(page, "quadrille.state.shown.frame === 0")
+    await field.fill("far")
+    await page.keyboard.press("Enter")
+    assert await page.evaluate("document.activeElement.value") == "far"  # refused: to be corrected
 
 
 async def test_keys_written_into_the_frame_number_go_there(page, endpoint):

@@ -56,9 +56,15 @@ async def test_it_says_why_not(page, endpoint):
     assert not endpoint.received
 
 
-async def test_what_was_used_lately_comes_first(page):
+async def test_what_was_used_lately_comes_first_and_enter_alone_does_nothing(page, endpoint):
     await open_palette(page)
     first = await found(page)
+    assert await page.locator("#palette-list [aria-selected=true]").count() == 0
+    await page.keyboard.press("Enter")
+    assert await page.locator("#palette").is_visible()
+    assert endpoint.received == []
+    await page.keyboard.press("ArrowUp")
+    assert await page.locator("#palette-list > :last-child").get_attribute("aria-selected") == "true"
     await page.keyboard.type("curves")
     await page.keyboard.press("Enter")
     await shows(page, "quadrille.state.drawer !== null")

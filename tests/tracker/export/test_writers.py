@@ -253,6 +253,27 @@ def test_lost_poses_are_left_out_on_request_and_nobody_is_refused(couple):
     assert read_motion(session, (0, 1), range(1)).chosen == (0,)
 
 
+def test_poses_of_another_body_are_tabled_but_give_no_skeleton(tmp_path):
+    session, _ = store_motion(tmp_path / "s", [MODELS["gavrila34"]], n_frames=2)
+    other = MODELS["gavrila22"]
+    store = AnnotationStore(session.annotations_path)
+    revision = store.add_model_revision("ann", format_model(other))
+    values = other.neutral()
+    store.commit("Other", [PoseChange("ann", 1, PoseRecord(values, ("manual",) * len(values), revision))])
+    store.close()
+    motion = read_motion(session, (0,))
+    writers.write_person_trc(motion, ExportOptions(), [tmp_path / "a.trc"], no_tick)
+    table = read_trc(tmp_path / "a.trc")
+    found = {name: table.points[:, i] for i, name in enumerate(table.names)}
+    places = dict(zip(other.point_names, other.points_world(values), strict=True))
+    np.testing.assert_allclose(found["left_wrist"][1], places["left_wrist"], atol=1e-6)
+    assert np.isnan(found["waist"][:, 0]).tolist() == [False, True]
+    writers.write_keypoints(motion, ExportOptions(), [tmp_path / "k.json"], no_tick)
+    assert {c["name"] for c in COCO(str(tmp_path / "k.json")).dataset["categories"]} > {"gavrila34", "gavrila22"}
+    with pytest.raises(SessionError, match="of 'gavrila34', found some of 'gavrila22'; give frames of one body"):
+        writers.write_person_bvh(motion, ExportOptions(), [tmp_path / "a.bvh"], no_tick)
+
+
 def test_poses_of_earlier_sizes_are_refitted_for_a_skeleton(tmp_path):
     session, truth = store_motion(tmp_path / "s", [MODELS["gavrila22"]], n_frames=3)
     taller = session.people[0].model.with_height(1.9)

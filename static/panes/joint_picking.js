@@ -1,0 +1,61 @@
+/** Which joint a press takes where several lie under the pointer. All distances are CSS pixels. */
+
+import { GRAB_RADIUS } from "./declutter.js";
+
+/** @typedef {import("./drawing.js").PlacedHandle} PlacedHandle */
+
+/** Penalty on the distance to joints of other people, so that the active person's joints win where people touch. */
+const OTHER_PERSON_PENALTY_PX = 4;
+/** Joints nearer to each other than this overlap: they are offered together. */
+const OVERLAP_PX = 8;
+
+export class JointPicking {
+  /** The joints that overlap under the pointer, by name. @type {string[]} */
+  #offered = [];
+  /** The joint that a press takes; null: the nearest. @type {string | null} */
+  #chosen = null;
+  /** @type {string | null} the joint meant last */
+  #meant = null;
+
+  /**
+   * The joint that a press takes, and the joints that overlap it, itself included; null if none is near.
+   *
+   * @param {PlacedHandle[]} placed
+   * @param {{x: number, y: number}} at
+   * @param {number} person the active person
+   * @returns {{meant: PlacedHandle, overlapping: PlacedHandle[]} | null}
+   */
+  pick(placed, at, person) {
+    const distance = (/** @type {PlacedHandle} */ one) =>
+      Math.hypot(one.x - at.x, one.y - at.y) + (one.handle.person === person ? 0 : OTHER_PERSON_PENALTY_PX);
+    const near = placed.filter((one) => distance(one) <= GRAB_RADIUS).sort((a, b) => distance(a) - distance(b));
+    if (near.length === 0) {
+      this.forget();
+      return null;
+    }
+    const overlapping = near.filter((one) => Math.hypot(one.x - near[0].x, one.y - near[0].y) <= OVERLAP_PX);
+    const names = overlapping.map(nameOf).sort();
+    if (names.join(" ") !== this.#offered.join(" ")) [this.#offered, this.#chosen] = [names, null];
+    const meant = overlapping.find((one) => nameOf(one) === this.#chosen) ?? overlapping[0];
+    this.#meant = nameOf(meant);
+    return { meant, overlapping };
+  }
+
+  /** Take the next of the overlapping joints. Returns whether there is another. */
+  next() {
+    if (this.#offered.length < 2) return false;
+    const index = this.#offered.indexOf(this.#meant ?? "");
+    this.#chosen = this.#offered[(index + 1) % this.#offered.length];
+    return true;
+  }
+
+  /** Offer the nearest joint again. */
+  forget() {
+    [this.#offered, this.#chosen, this.#meant] = [[], null, null];
+  }
+}
+
+/** @param {PlacedHandle} placed */
+function nameOf({ handle }) {
+  return `${handle.person}:${handle.point}`;
+}

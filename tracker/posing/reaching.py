@@ -1,0 +1,277 @@
+"""Inverse kinematics of a dragged point: damped least squares towards the pointer, with held points and a rest pose."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.body.kinematics import Kinematics
+from tracker.body.limbs import limbs
+from tracker.body.model import BodyModel
+from tracker.fitting.gauss_newton import (
+    Fit,
+    NormalEquations,
+    PosePrior,
+    ResidualBlock,
+    normal_equations,
+    solve,
+    value_mask,
+)
+from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import NEAR_PLANE_M
+from tracker.posing.grab import Grab, Holds
+
+
+class _Solving(TypedDict):
+    max_iterations: int
+    tolerance: float
+
+
+HOLD_WEIGHT = 0.5
+"""Weight of keeping a held point of the dragged limb, against 1 per metre for being under the pointer."""
+_DEPTH_WEIGHT = 0.1
+"""Weight of keeping the dragged point's depth. If the limb's lengths allow only one of the two, the point follows the
+pointer."""
+_HELD_DEPTH_WEIGHT = 0.02
+"""The same if the limb has a held point: that point knows the depth better than the view of the drag."""
+_REST_WEIGHT = 0.003
+"""Weight of keeping the chain at its pose at the grab, per rad. It determines what the pointer does not, and holds the
+point back by some 0.1 mm."""
+_STIFF_WEIGHT = 0.015
+"""The same for joints that bend little, such as the waist: a drag of the trunk turns the body before it bends it."""
+
+_AGREE_M = 0.1
+"""Distance between lines of sight of a point in two views at which the earlier one counts by half, metres."""
+
+_REACHED_M, _REACHED_DEPTH_M = 0.002, 0.02
+"""Tolerances across the line of sight and along it within which a point has reached its target, metres. The pull to the
+rest pose holds a point back in depth by some 4 mm."""
+_NEAR_M, _OTHER_SIDE = 0.05, 0.8
+"""Distance in space from the target beyond which the other sides of a limb are tried, metres; and share of the cost
+below which it goes there."""
+_BEND_RAD = 0.35
+"""Angle by which the last joint of a chain is bent to leave the singularity of a straight limb, rad."""
+_STRETCHED = 0.999
+"""Share of the full length of a chain from which it counts as stretched; an elbow then bends by 5 degrees."""
+_KEPT_M, _UNMOVED_M = 0.002, 1e-5
+"""Distances up to which a held point counts as brought back, and as never moved, metres."""
+
+QUICK: _Solving = {"max_iterations": 15, "tolerance": 1e-4}
+"""Solver settings of a move: dozens a second, each from the result of the last one."""
+_BENT: _Solving = {"max_iterations": 6, "tolerance": 1e-4}
+"""Solver settings of a test whether a bent limb comes nearer."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointerTarget:
+    """Residuals of the grabbed point: across the line of sight and, with less weight, in depth; see `ResidualBlock`."""
+
+    grabbed: Grab
+    target_world: Array
+    """Target of the point, (3,), metres: under the pointer, at the depth."""
+    depth_weight: float = _DEPTH_WEIGHT
+
+    def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
+        """See `ResidualBlock`."""
+        grabbed, (target_px, m_per_px, depth_axis) = self.grabbed, self._image
+        point_world = rigid.apply(kinematics.Ts_world_part[grabbed.part], grabbed.point_part)
+        points_px, px_by_point = grabbed.camera.project_with_jacobian(point_world[None])
+        r, by_point = np.empty(3), np.empty((3, 3))
+        r[:2], by_point[:2] = m_per_px @ (points_px[0] - target_px), m_per_px @ px_by_point[0]
+        r[2], by_point[2] = depth_axis @ (point_world - self.target_world), depth_axis
+        J_world = model.point_jacobian(kinematics, np.array([grabbed.part]), point_world[None])[0]  # (3, n_dofs)
+        return normal_equations(r, by_point @ J_world)
+
+    @cached_property
+    def _image(self) -> tuple[Array, Array, Array]:
+        """Target in the image, (2,), px; metres per pixel at the depth of the grab, (2, 2); weighted depth axis,
+        (3,)."""
+        camera = self.grabbed.camera
+        target_px = camera.project_with_jacobian(self.target_world[None])[0][0]
+        m_per_px = np.asarray(self.grabbed.depth_m * np.linalg.inv(camera.K[:2, :2]), dtype=np.float64)
+        return target_px, m_per_px, self.depth_weight * camera.T_camera_world[2, :3]
+
+
+def reach(
+    grabbed: Grab,
+    target_world: Array,
+    pose: Array,
+    active_dofs: NDArray[np.bool_],
+    holds: Holds,
+    depth_weight: float | None = None,
+) -> Array:
+    """Let the chain of the grabbed point follow it to a target.
+
+    Held points of the moved limb stay as far as the target allows: with a held wrist, an elbow turns about the line
+    from shoulder to wrist; with a held elbow, a wrist turns about it.
+
+    Args:
+        grabbed: the grab.
+        target_world: target of the point, (3,), metres.
+        pose: pose after the last move, (n_values,).
+        active_dofs: degrees of freedom that follow the point, (n_dofs,).
+        holds: points that are held.
+        depth_weight: weight of the target's depth, against 1 across the line of sight; None: the usual one.
+    """
+    model = grabbed.model
+    holds = holds.of(holds.moved_by(model, active_dofs))
+    if depth_weight is None:
+        target_world, depth_weight = as_other_views_placed(grabbed, target_world)
+        depth_weight = max(depth_weight, _HELD_DEPTH_WEIGHT if len(holds.points) else _DEPTH_WEIGHT)
+    # For a held wrist to stay while the elbow is dragged, the elbow must bend: joints beyond the point follow too.
+    beyond = np.any(model.moves[:, model.point_parts[holds.points]], axis=1) & model.limb_dofs
+    active = active_dofs | (beyond & grabbed.unlocked_dofs)
+    blocks: list[ResidualBlock] = [
+        PointerTarget(grabbed, target_world, depth_weight),
+        holds.scaled(HOLD_WEIGHT),
+        _rest_prior(model, grabbed.pose),
+    ]
+
+    def is_done(found: Array) -> bool:
+        return _has_reached(grabbed, found, target_world) or _is_stretched(grabbed, found, active_dofs, target_world)
+
+    fit = _solve_bending(model, pose, blocks, active, is_done)
+    if _is_near(grabbed, fit.pose, active_dofs, target_world):
+        return fit.pose
+    # Descent along the view does not cross between the two depths at which a limb is seen, nor around a limit. A first
+    # solution in space does, from here or from the limb at rest.
+    in_space = [PointerTarget(grabbed, target_world, 1.0), *blocks[1:]]
+    at_rest = np.where(value_mask(model, active & model.limb_dofs), _relaxed(model), pose)
+    for start in (pose, at_rest):
+        nearer = solve(model, start, in_space, active, **_BENT).pose
+        other = solve(model, nearer, blocks, active, **QUICK)
+        if other.cost < _OTHER_SIDE * fit.cost:
+            fit = other
+    return fit.pose
+
+
+def as_other_views_placed(grabbed: Grab, target_world: Array) -> tuple[Array, float]:
+    """Return the target at the depth at which other views see the grabbed point where they placed it.
+
+    That is the point of the pointer's line of sight nearest to those of the other views. The farther these pass, the
+    less they count: the point then moves away from where they saw it.
+
+    Args:
+        grabbed: the grab.
+        target_world: target under the pointer, (3,), metres.
+
+    Returns:
+        The target, (3,), metres, and the weight of its depth; 0 where no other view placed the point.
+    """
+    own = grabbed.placed_elsewhere
+    if own is None:
+        return target_world, 0.0
+    sight = target_world - grabbed.camera.center_world
+    sight = sight / np.linalg.norm(sight)
+    across, off = own.weights[0] @ sight, own.weights[0] @ (target_world - own.targets_world[0])
+    information = float(across @ across)
+    step = -float(across @ off) / (information + _DEPTH_WEIGHT**2)
+    trust = 1 / (1 + (float(np.linalg.norm(off + step * across)) / _AGREE_M) ** 2)
+    return target_world + trust * step * sight, HOLD_WEIGHT * trust * information**0.5
+
+
+def restore_held(model: BodyModel, pose: Array, holds: Holds, unlocked_dofs: NDArray[np.bool_]) -> Array:
+    """Return a pose whose limbs bring held points back to their positions, as far as they reach.
+
+    Args:
+        model: the body.
+        pose: pose in which the trunk has moved, (n_values,).
+        holds: the held points.
+        unlocked_dofs: degrees of freedom that may change, (n_dofs,).
+    """
+    for limb in limbs(model):
+        own = limb.dofs & model.limb_dofs
+        of_limb = holds.of(holds.moved_by(model, own))
+        if not len(of_limb.points) or not np.any(own & unlocked_dofs):
+            continue
+
+        def is_done(found: Array, of_limb: Holds = of_limb) -> bool:
+            return bool(np.all(of_limb.distances(model, found) < _KEPT_M))
+
+        if np.any(of_limb.distances(model, pose) > _UNMOVED_M):
+            blocks: list[ResidualBlock] = [of_limb, _rest_prior(model, pose)]
+            pose = _solve_bending(model, pose, blocks, own & unlocked_dofs, is_done).pose
+    return pose
+
+
+def _rest_prior(model: BodyModel, pose: Array) -> PosePrior:
+    """Return the prior that keeps the chain near a pose, (n_values,)."""
+    return PosePrior(pose, np.where(np.isfinite(model.spreads), _STIFF_WEIGHT, _REST_WEIGHT))
+
+
+def _solve_bending(
+    model: BodyModel,
+    pose: Array,
+    blocks: Sequence[ResidualBlock],
+    active_dofs: NDArray[np.bool_],
+    is_done: Callable[[Array], bool],
+) -> Fit:
+    """Solve, and solve again with the last joint of the chain bent if that comes nearer.
+
+    At a straight limb the gradient of bending is 0.
+
+    Args:
+        model: the body.
+        pose: initial pose, (n_values,).
+        blocks: the residuals.
+        active_dofs: degrees of freedom of the chain, (n_dofs,).
+        is_done: whether a pose needs no second solution.
+    """
+    fit = solve(model, pose, blocks, active_dofs=active_dofs, **QUICK)
+    joint, first = model.dof_joint[active_dofs][[-1, 0]]
+    if joint == first or is_done(fit.pose):
+        return fit
+    for bend in (_BEND_RAD, -_BEND_RAD):
+        start = model.clip(model.retract(pose, np.where(active_dofs & (model.dof_joint == joint), bend, 0.0)))
+        bent = solve(model, start, blocks, active_dofs=active_dofs, **_BENT)
+        if bent.cost < fit.cost:
+            fit = solve(model, bent.pose, blocks, active_dofs=active_dofs, **QUICK)
+    return fit
+
+
+@lru_cache(maxsize=32)
+def _relaxed(model: BodyModel) -> Array:
+    """Return the neutral pose with elbows and knees slightly bent, (n_values,)."""
+    hinges = np.array([len(joint.axes) == 1 for joint in model.joints])[model.dof_joint]
+    return model.clip(model.retract(model.neutral(), np.where(hinges, _BEND_RAD, 0.0)))
+
+
+def _is_near(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_], target_world: Array) -> bool:
+    """Return whether the grabbed point is so near its target that no other side of the limb is tried.
+
+    A target beyond the chain's full length counts at that length.
+    """
+    places = _chain(grabbed, pose, active_dofs)
+    length = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    way = target_world - places[-1]
+    reachable = places[-1] + min(1.0, length / max(float(np.linalg.norm(way)), 1e-9)) * way
+    return float(np.linalg.norm(places[0] - reachable)) < _NEAR_M
+
+
+def _chain(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_]) -> Array:
+    """Return the positions of the grabbed point and of the joints up to the first that follows it, (n, 3), metres."""
+    model, part, first = grabbed.model, grabbed.part, int(grabbed.model.dof_joint[active_dofs][0])
+    places = [grabbed.point_world(pose)]
+    Ts_world_part = model.kinematics(pose).Ts_world_part
+    while part != first:
+        places.append(Ts_world_part[part, :3, 3])
+        part = int(model.parents[part])
+    return np.array([*places, Ts_world_part[first, :3, 3]])
+
+
+def _has_reached(grabbed: Grab, pose: Array, target_world: Array) -> bool:
+    """Return whether the grabbed point is at its target, within visible tolerances."""
+    seen = rigid.apply(grabbed.camera.T_camera_world, np.stack([grabbed.point_world(pose), target_world]))
+    across = grabbed.depth_m * np.diff(seen[:, :2] / np.maximum(seen[:, 2:], NEAR_PLANE_M), axis=0)
+    return bool(np.linalg.norm(across) < _REACHED_M and abs(seen[1, 2] - seen[0, 2]) < _REACHED_DEPTH_M)
+
+
+def _is_stretched(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_], target_world: Array) -> bool:
+    """Return whether the chain of the point has its full length and its target is farther away."""
+    places = _chain(grabbed, pose, active_dofs)
+    length = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    return bool(min(np.linalg.norm(p - places[-1]) for p in (places[0], target_world)) > _STRETCHED * length)
