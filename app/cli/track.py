@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import SessionArg
+from app.cli.arguments import OptionalName, OptionalNumber, OptionalRange, SessionArg
 from app.cli.json_output import format_json
 from app.cli.target import Target, load_target, parse_frames
 from app.runtime.progress import Reporter
@@ -27,13 +27,13 @@ class TrackArguments:
     """session folder."""
     method: Literal["chamfer"] = "chamfer"
     """chamfer: edges; predicted, refined by Gauss-Newton, and searched if that does not suffice."""
-    frames: str | None = None
+    frames: OptionalRange = None
     """A:B, half open; all by default."""
-    person: str | None = None
+    person: OptionalName = None
     """name of the person to track; all people by default."""
     backward: bool = False
     """from the last frame of the range to the first."""
-    theta: float | None = None
+    theta: OptionalNumber = None
     """outlier distance in pixels; 3% of the longer side of the image by default."""
     order: int = 1
     """degree of the motion model: 0 stays, 1 constant velocity, 2 constant acceleration."""
@@ -95,8 +95,8 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
         progress: shows how far it is.
 
     Returns:
-        A summary. `stopped_at` is the frame where it was interrupted, else None; `improved_backward` is the number of poses
-        that the backward pass improved.
+        A summary. `stopped_at` is the frame where it was interrupted, else None; `improved_backward` is the number of
+        poses that the backward pass improved.
 
     Raises:
         SessionError: a person has no pose at or before the first frame.
@@ -163,7 +163,7 @@ def _work(run: "TrackSession", progress: Reporter) -> None:
 
 
 def _format(found: dict[str, Any]) -> str:
-    resumed = "" if found["resumed_at"] is None else f", going on from frame {found['resumed_at']}"
+    resumed = "" if found["resumed_at"] is None else f", resumed at frame {found['resumed_at']}"
     lines = [f"tracked {', '.join(found['people'])} over {found['frames']} frames{resumed}"]
     if found["mean_cost_px"] is not None:
         lines[0] += f", mean cost {found['mean_cost_px']:.2f} px"
@@ -171,9 +171,7 @@ def _format(found: dict[str, Any]) -> str:
         counts = [f"{statuses[s]} {s}" for s in ("good", "doubtful", "lost") if statuses.get(s)]
         lines.append(f"{name}: {', '.join(counts)}")
     if found["improved_backward"]:
-        lines.append(
-            f"{found['improved_backward']} poses of frames in which somebody was lost are from the backward pass"
-        )
+        lines.append(f"the backward pass replaced {found['improved_backward']} poses of frames with lost people")
     if found["stopped_at"] is not None:
         lines.append(f"stopped before frame {found['stopped_at']}; run it again to resume")
     return "\n".join(lines)

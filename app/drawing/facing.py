@@ -8,7 +8,7 @@ from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 
 _HEAD = "head"
-_LENGTH, _BARB = 0.075, 0.026
+_LENGTH, _BARB = 0.1, 0.028
 """Length of the arrow from the face, and of its barbs forwards and sidewards, fractions of the body height."""
 _NOSE = (0.034, 0.016)
 """Length and half width of the nose of the 3-D view, fractions of the body height."""

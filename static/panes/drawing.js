@@ -19,6 +19,8 @@ const TORSO = "torso";
 const DIAMOND_RADIUS = 4.75;
 const LABEL_LINE_PX = 16;
 const HELD_RADIUS = 8.5;
+/** Height of the labels in the upper corners of a pane. */
+const CORNERS_PX = 44;
 const REACH_DASH = [3, 3];
 /** Dashes of right limbs: sides differ in line, people in colour. */
 const RIGHT_DASH = [9, 4];
@@ -277,7 +279,7 @@ export function drawOutOfReach(context, view, outOfReach, handle, color, paneWid
   context.setLineDash([]);
   const outline = handleOutline(handle ?? { point: "", side: "" }, wanted.x, wanted.y, 1.5);
   stroke(context, outline, color, 2.25);
-  drawLabel(context, [`out of reach by ${Math.round(100 * outOfReach.distance_m)} cm`], wanted, paneWidth);
+  drawLabel(context, [`out of reach by ${Math.round(100 * outOfReach.distance_m)} cm`], { x: wanted.x, y: Math.max(wanted.y, CORNERS_PX) }, paneWidth);
 }
 
 /**

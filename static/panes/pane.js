@@ -221,10 +221,13 @@ export class Pane {
     /** @type {drawing.PlacedHandle | null} */
     let named = null;
     context.globalAlpha = layers.opacity.joints;
-    for (const one of this.graspableHandles()) {
-      const isHovered = hover?.person === one.handle.person && hover.point === one.handle.point;
+    const isMeant = (/** @type {drawing.PlacedHandle} */ { handle }) =>
+      hover?.person === handle.person && hover.point === handle.point;
+    // The joint that a press takes is drawn over the joints that overlap it.
+    for (const one of this.graspableHandles().sort((a, b) => Number(isMeant(a)) - Number(isMeant(b)))) {
+      const isHovered = isMeant(one);
       const isSelected = state.person === one.handle.person && state.point === one.handle.point;
-      if (isHovered && hover.camera === this.#camera) named = one;
+      if (isHovered && hover?.camera === this.#camera) named = one;
       const color = people[one.handle.person]?.color ?? "#fff";
       drawing.drawHandle(context, one, color, isHovered ? "hovered" : isSelected ? "selected" : "plain");
     }

@@ -122,6 +122,7 @@ class FakeEndpoint:
         self.pose = {(p, name): np.add(at, (0.9 * p, 0, 0)) for p in range(self.n_people) for name, at in REST.items()}
         self.before_drag = self.out_of_reach = None
         self.held_joints = set()
+        self.sides_line = False  # whether there is a line of each side
         self.seq = 0
         self.epipolar_of = None
         self.set_numbers = itertools.count(1)
@@ -423,9 +424,9 @@ class FakeEndpoint:
     async def send_overlay(self, sockets=None, candidate=None):
         paths, segments, handles = [], [], []
 
-        def add(camera, person, kind, color, lines):
+        def add(camera, person, kind, color, lines, side=""):
             paths.append({
-                "camera": camera, "person": person, "kind": kind, "color": color, "side": "",
+                "camera": camera, "person": person, "kind": kind, "color": color, "side": side,
                 "first": sum(map(len, segments)), "count": len(lines),
             })  # fmt: skip
             segments.append(lines)
@@ -433,6 +434,9 @@ class FakeEndpoint:
         for camera in range(self.n_cameras):
             for person in range(self.n_people):
                 add(camera, person, "model", COLORS[person], self.outline(camera, person, 0.0))
+                if self.sides_line:
+                    add(camera, person, "model", COLORS[person], HIDDEN_LINE - (0, 20, 0, 20), "left")
+                    add(camera, person, "model", COLORS[person], HIDDEN_LINE, "right")
                 if "hidden" in self.views[-1]["layers"]:
                     add(camera, person, "hidden", COLORS[person], HIDDEN_LINE)
                 if candidate is not None:

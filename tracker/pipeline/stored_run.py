@@ -88,7 +88,7 @@ def stored_run(session: Session, store: AnnotationStore, observer: Observer, tas
 
 
 def _frames_left(store: AnnotationStore, task: TrackTask) -> Sequence[int]:
-    """Return the frames still to track: all, or the rest of an interrupted run; none if that was in its backward pass."""
+    """Return the frames still to track: all, or the rest of an interrupted run; none in its backward pass."""
     unfinished, frames = store.setting(_UNFINISHED), task.frames
     if unfinished is None or not _same_task(unfinished["task"], task.record()):
         return frames

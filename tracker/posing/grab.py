@@ -247,9 +247,9 @@ def _grab_handle(
         raise TrackerError(
             f"expected a point that something moves, found {handle.name} with all of that locked; unlock it"
         )
-    holds = _holds(model, kinematics, {n: views for n, views in constraints.held.items() if n != handle.name})
+    holds = holds_at(model, pose, {n: views for n, views in constraints.held.items() if n != handle.name})
     others = [v for v in constraints.held.get(handle.name, ()) if not _is_same_view(v, camera)]
-    elsewhere = _holds(model, kinematics, {handle.name: others}) if others else None
+    elsewhere = holds_at(model, pose, {handle.name: others}) if others else None
     pointer_px = np.asarray(pointer_px, dtype=np.float64)
     return Grab(
         model, camera.pinhole, handle.part, handle.point_part, np.array(pose), pointer_px,
@@ -258,11 +258,12 @@ def _grab_handle(
     )  # fmt: skip
 
 
-def _holds(model: BodyModel, kinematics: Kinematics, held: Mapping[str, Sequence[Camera]]) -> Holds:
-    """Return held points at their present positions."""
+def holds_at(model: BodyModel, pose: Array, held: Mapping[str, Sequence[Camera]]) -> Holds:
+    """Return points, given by name with the views in which they were placed, held where they are in a pose,
+    (n_values,)."""
     names = [name for name in holdable_points(model) if name in held]
     points = np.array([model.point_names.index(name) for name in names], dtype=np.int64)
-    places = model.points_at(kinematics, points)
+    places = model.points_at(model.kinematics(pose), points)
     weights = [
         _across(held[name], place) if held[name] else np.eye(3) for name, place in zip(names, places, strict=True)
     ]

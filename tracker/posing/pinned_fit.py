@@ -18,6 +18,7 @@ from tracker.fitting.pins import PinBlock, pin_block
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.geometry.triangulation import PointObservation
+from tracker.posing.grab import Constraints, holds_at
 from tracker.tracking.chamfer.settings import TrackSettings, prior_blocks
 
 _REACHES = (2.0, 1.0)
@@ -28,6 +29,8 @@ it."""
 _LIMB_RAD, _TRUNK_RAD, _PLACE_M = 0.3, 0.05, 0.02
 """Standard deviations for pins alone: joints, the body's rotation, its position. One pin moves a limb, several the
 body."""
+_HELD_M = 0.02
+"""Standard deviation of a point that was placed by hand, where edges are fitted: bodies differ in size, metres."""
 _ITERATIONS, _TOLERANCE = 30, 1e-3
 
 
@@ -48,7 +51,7 @@ def fit_frame(
     views: Sequence[ViewEvidence] | None,
     settings: TrackSettings,
     people: Iterable[int],
-    active_dofs: Sequence[NDArray[np.bool_]] | None = None,
+    constraints: Sequence[Constraints] | None = None,
 ) -> FrameFit:
     """Fit some of the people on a frame to their pins and to the edges; the others are fixed.
 
@@ -59,11 +62,13 @@ def fit_frame(
         views: evidence of each view. Without it only pins count, and people without pins stay.
         settings: settings of the contour residuals.
         people: indices of the people to fit.
-        active_dofs: degrees of freedom of each person that may change, (n_dofs,); all by default.
+        constraints: locked degrees of freedom and held points of each person; none by default. Edges move a held point
+            by some centimetres at most. A pin of a point overrules it.
     """
     people = list(people)
     models, now = [b.model for b in bodies], [np.array(b.values) for b in bodies]
-    active = [None] * len(models) if active_dofs is None else list(active_dofs)
+    constraints = constraints or [Constraints()] * len(models)
+    active = [c.active_dofs for c in constraints]
     blocks = [pin_block(m, cameras, p) if p else None for m, p in zip(models, pins, strict=True)]
     pinned = [np.zeros(len(m.value_names), dtype=bool) for m in models]
     for person in people:
@@ -71,6 +76,10 @@ def fit_frame(
         if block is not None:
             sigma = np.where(model.dof_is_length, _PLACE_M, np.where(model.dof_joint == 0, _TRUNK_RAD, _LIMB_RAD))
             now[person], pinned[person] = _fit_one(model, now[person], block, [], sigma, active[person])
+    holds = [
+        holds_at(m, v, {n: seen for n, seen in c.held.items() if n not in {pin.point for pin in p}}).scaled(1 / _HELD_M)
+        for m, v, c, p in zip(models, now, constraints, pins, strict=True)
+    ]
     for reach in _REACHES if views is not None else ():
         for person in people:
             assert views is not None
@@ -80,7 +89,9 @@ def fit_frame(
                 theta_px = reach * (theta_px or float(np.median([v.theta_px / v.scale for v in views])))
             match = ContourResiduals(views, posed, person, settings.match, theta_px, everywhere=True)
             sigma = np.where(model.dof_is_length, _TRUST_M, _TRUST_RAD)
-            now[person], pinned[person] = _fit_one(model, now[person], blocks[person], [match], sigma, active[person])
+            now[person], pinned[person] = _fit_one(
+                model, now[person], blocks[person], [match, holds[person]], sigma, active[person]
+            )  # fmt: skip
     return FrameFit(tuple(now), tuple(pinned))
 
 

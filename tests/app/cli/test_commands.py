@@ -189,9 +189,9 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     assert not (session / "lock.json").exists()
     monkeypatch.undo()
     done = {k: stored(session)[k].time for k in (1, 2)}
-    status, out, _ = run("track", session, "--frames", "0:6")  # the same call goes on
+    status, out, _ = run("track", session, "--frames", "0:6")  # run again to resume
     assert status == 0
-    assert "tracked person over 3 frames, going on from frame 3" in out
+    assert "tracked person over 3 frames, resumed at frame 3" in out
     found = stored(session)
     assert sorted(found) == [0, 1, 2, 3, 4, 5]
     assert {k: found[k].time for k in (1, 2)} == done
@@ -243,7 +243,7 @@ def test_a_backward_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(r
         raise AssertionError("the first pass is done")
 
     monkeypatch.setattr(ChamferTracker, "estimates", never)
-    summary = json.loads(run(*words)[1])  # the same call goes on with the backward pass alone
+    summary = json.loads(run(*words)[1])  # run again: the backward pass alone
     assert (summary["frames"], summary["stopped_at"], summary["improved_backward"]) == (0, None, 2)
     assert [f.frame for f in offered[1]] == [0, 1, 2, 3, 4]
     assert [f.statuses for f in offered[1]] == [("good",)] * 3 + [("lost",), ("good",)]

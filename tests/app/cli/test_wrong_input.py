@@ -124,6 +124,8 @@ joints = [{ name = "root", child = "trunk", free = true }, { name = "hinge", par
     ("more", "expected"),
     [
         (["--camera", "front"], ["--camera as NAME=VALUE", "'front'"]),
+        (["--camera", "front="], ["--camera as NAME=VALUE", "'front='"]),
+        (["--cameras", "front", "top"], ["unknown camera 'top'", "front, left"]),
         (["--camera", "top=x.mp4"], ["unknown camera 'top'"]),
         (["--camera", "left=missing.mp4"], ["'left'", "missing.mp4"]),
         (["--offset", "left=one"], ["--offset as NAME=VALUE", "'left=one'"]),

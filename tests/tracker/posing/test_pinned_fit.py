@@ -13,6 +13,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.geometry.triangulation import PointObservation
+from tracker.posing.grab import Constraints
 from tracker.posing.pinned_fit import fit_frame
 from tracker.session.session import load_session
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -88,6 +89,27 @@ def test_who_is_not_asked_for_stays(two_people):
     assert off_m(GAVRILA, found.poses[1], truth[1]).mean() < 0.5 * off_m(GAVRILA, start[1], truth[1]).mean()
 
 
+def test_edges_leave_points_that_were_placed_near_their_places(two_people):
+    """The body of the fit is 6% too tall, so edges draw its limbs away; a pin overrules what was placed."""
+    truth, views, _ = two_people
+    tall = GAVRILA.with_height(1.06 * GAVRILA.height_m)
+    bodies = [PosedBody(tall, truth[0]), PosedBody(GAVRILA, truth[1])]
+    names = ("left_wrist", "right_ankle")
+    places = {n: p for n, p in zip(tall.point_names, tall.points_world(truth[0]), strict=True) if n in names}
+
+    def moved_m(held, pins=()):
+        constraints = [Constraints(held=held), Constraints()]
+        found = fit_frame(bodies, [list(pins), []], CAMERAS, views, SETTINGS, [0], constraints).poses[0]
+        points = dict(zip(tall.point_names, tall.points_world(found), strict=True))
+        return [float(np.linalg.norm(points[n] - places[n])) for n in names]
+
+    free, held = moved_m({}), moved_m(dict.fromkeys(names, CAMERAS))
+    assert max(free) > 0.03
+    assert np.all(np.array(held) < 0.9 * np.array(free))
+    pins = seen(GAVRILA, truth[0], ["left_wrist"], CAMERAS)
+    assert moved_m(dict.fromkeys(names, CAMERAS), pins)[0] > held[0]
+
+
 def test_what_is_locked_stays_to_the_last_bit(two_people):
     truth, views, start = two_people
     rng = np.random.default_rng(0)
@@ -96,7 +118,7 @@ def test_what_is_locked_stays_to_the_last_bit(two_people):
     knee = GAVRILA.dof_names.index("left_knee.extension")
     begin[0][knee], free[knee] = -0.3, False  # beyond its limit: it was locked there, or imported
     pins = [seen(GAVRILA, truth[0], ["left_wrist"], CAMERAS), []]
-    masks = [free, np.ones(GAVRILA.n_dofs, dtype=bool)]
+    masks = [Constraints(free), Constraints()]
     found = fit_frame([PosedBody(GAVRILA, p) for p in begin], pins, CAMERAS, views, SETTINGS, [0], masks)
     np.testing.assert_array_equal(found.poses[0][~free], begin[0][~free])
     assert np.any(found.poses[0][free] != begin[0][free])

@@ -1,0 +1,64 @@
+"""Points that a drag placed are held, until they are released; what does not reach the pointer is said."""
+
+import numpy as np
+import pytest
+from gestures import FRONT, PAGE, drag, pixel_of
+
+from app.drawing import overlays
+from app.state.people import HeldPoint
+from tracker.errors import TrackerError
+
+RIGHT = 1
+
+
+def world_of(controller, point):
+    return controller.models[0].points_world(controller.state.poses[0])[controller.models[0].point_names.index(point)]
+
+
+def test_a_drag_holds_the_point_it_placed_on_its_frame_until_it_is_released(opened):
+    controller = opened()
+    drag(controller, "left_wrist", (25.0, -25.0))
+    drag(controller, "left_wrist", (5.0, 5.0), RIGHT)
+    assert controller.state.held == {HeldPoint(0, 0, "left_wrist", camera) for camera in (FRONT, RIGHT)}
+    before = world_of(controller, "left_wrist")
+    drag(controller, "torso", (3.0, 0.0))
+    assert np.linalg.norm(world_of(controller, "left_wrist") - before) < 0.01
+    held = {h.point for h in overlays.handles(controller.session, controller.state, [FRONT]) if h.held}
+    assert held == {"left_wrist", "torso"}
+    controller.navigation.seek(1)
+    assert controller.state.held_points(0) == frozenset()
+    controller.held_points.set(0, "left_wrist", False, frame=0)
+    assert controller.state.held_points(0) == {"torso"}
+    before = world_of(controller, "left_wrist")
+    drag(controller, "torso", (8.0, 0.0))
+    assert np.linalg.norm(world_of(controller, "left_wrist") - before) > 0.02
+    controller.held_points.set(0, None, False)
+    assert controller.state.held == frozenset()
+
+
+def test_what_did_not_move_is_not_held_and_a_spine_cannot_be(opened):
+    controller = opened()
+    controller.dragging.begin(PAGE, FRONT, 0, "left_wrist", tuple(pixel_of(controller, "left_wrist")))
+    controller.dragging.end(PAGE)
+    assert controller.state.held == frozenset()
+    controller.held_points.set(0, "left_knee", True)
+    assert controller.state.held == {HeldPoint(0, 0, "left_knee", None)}
+    with pytest.raises(TrackerError, match="a point that can be held"):
+        controller.held_points.set(0, "neck", True)
+
+
+def test_a_point_out_of_reach_says_by_how_much(opened):
+    controller = opened()
+    start = pixel_of(controller, "left_wrist")
+    controller.dragging.begin(PAGE, FRONT, 0, "left_wrist", tuple(start))
+    controller.dragging.move(PAGE, tuple(start + np.array([15.0, -15.0])), 1)
+    assert overlays.out_of_reach(controller.session, controller.state) is None
+    controller.dragging.move(PAGE, tuple(start + np.array([200.0, 0.0])), 2)
+    short = overlays.out_of_reach(controller.session, controller.state)
+    assert (short.u, short.v) == pytest.approx(tuple(start + np.array([200.0, 0.0])))
+    assert (short.point_u, short.point_v) == pytest.approx(tuple(pixel_of(controller, "left_wrist")), abs=0.01)
+    camera = controller.session.cameras[FRONT].camera.pinhole
+    far_m = 200 * float(camera.depths(world_of(controller, "left_wrist"))) / camera.K[0, 0]
+    assert 0.2 * far_m < short.distance_m < far_m
+    controller.dragging.end(PAGE)
+    assert overlays.out_of_reach(controller.session, controller.state) is None

@@ -1,0 +1,95 @@
+"""Which joint a press takes, which joints are held, and how sides and limbs out of reach are drawn."""
+
+import numpy as np
+from fake_endpoint import project
+from page_driver import dragging, handle_of, shows, to_client, until
+
+PIXELS = """(places) => {
+  const canvas = document.querySelector(".pane-overlay");
+  const [box, context] = [canvas.getBoundingClientRect(), canvas.getContext("2d")];
+  return places.map(([x, y]) => {
+    const at = [Math.round((x - box.left) * devicePixelRatio), Math.round((y - box.top) * devicePixelRatio)];
+    return [...context.getImageData(...at, 1, 1).data];
+  });
+}"""
+"""JavaScript: the colours of the first pane at places of the window."""
+
+
+async def pixels(page, places):
+    return np.array(await page.evaluate(PIXELS, [[float(x), float(y)] for x, y in places]))
+
+
+def is_orange(colors):
+    return colors[:, 0] > colors[:, 2] + 60
+
+
+async def test_overlapping_joints_are_both_offered(page, endpoint):
+    endpoint.pose[0, "r_knee"] = endpoint.pose[0, "l_knee"] + (0.01, 0.0, 0.0)
+    await endpoint.send_overlay()
+    places = project(np.stack([endpoint.pose[0, "r_knee"], endpoint.pose[0, "l_knee"]]), 0)
+    at = await to_client(page, 0, *places.mean(axis=0))
+    await shows(page, f"quadrille.state.overlay.handles.some((h) => h.point === 'r_knee' && h.camera === 0 && "
+                f"Math.abs(h.u - {places[0, 0]}) < 0.01)")  # fmt: skip
+    await page.mouse.move(at[0] + 0.4, at[1])
+    await shows(page, "quadrille.state.hover?.overlapping.length === 2")
+    first = (await page.evaluate("quadrille.state.hover"))["point"]
+    (other,) = {"l_knee", "r_knee"} - {first}
+    await page.keyboard.press("Alt+o")
+    await shows(page, f"quadrille.state.hover.point === '{other}'")
+    await page.mouse.down()
+    await page.mouse.up()
+    await until(lambda: endpoint.heard("select")[-1]["point"] == other)
+    # A click goes on to the next one, and so does the press after it.
+    await page.mouse.down()
+    await page.mouse.move(at[0] + 15, at[1])
+    await page.mouse.up()
+    await until(lambda: endpoint.heard("drag") and endpoint.heard("drag")[-1]["phase"] == "end")
+    assert {m["point"] for m in endpoint.heard("drag")} == {first}
+    # Away from the pair the nearest joint is meant again.
+    await page.mouse.move(*await to_client(page, 0, *await handle_of(page, 0, "l_wrist")))
+    await shows(page, "quadrille.state.hover?.point === 'l_wrist'")
+
+
+async def test_a_held_joint_has_a_ring_and_is_released_by_shift_and_a_click(page, endpoint):
+    x, y = await to_client(page, 0, *await handle_of(page, 0, "l_wrist"))
+    ring = [(x + 8.5 * np.cos(a), y + 8.5 * np.sin(a)) for a in np.linspace(0, 2 * np.pi, 16)]
+    assert np.mean(is_orange(await pixels(page, ring))) < 0.5
+    await page.mouse.move(x, y)
+    for held in (True, False):
+        await page.keyboard.down("Shift")
+        await page.mouse.down()
+        await page.mouse.up()
+        await page.keyboard.up("Shift")
+        wanted = {"type": "pose", "action": "hold", "frame": 12, "person": 0, "point": "l_wrist", "held": held}
+        await until(lambda wanted=wanted: endpoint.heard("pose") and endpoint.heard("pose")[-1] == wanted)
+        held_in_page = "quadrille.state.overlay.handles.some((h) => h.point === 'l_wrist' && h.held)"
+        await shows(page, held_in_page if held else f"!{held_in_page}")
+        await page.wait_for_timeout(60)
+        assert (np.mean(is_orange(await pixels(page, ring))) > 0.8) == held
+    await page.keyboard.press("Alt+h")
+    await until(lambda: endpoint.heard("pose")[-1]["held"])
+    await page.keyboard.press("Alt+Shift+h")
+    await until(lambda: endpoint.heard("pose")[-1] == {**wanted, "point": None, "held": False})
+    assert endpoint.heard("drag") == []
+
+
+async def test_right_limbs_are_dashed_and_a_joint_out_of_reach_stays_at_the_pointer(page, endpoint):
+    endpoint.sides_line = True
+    await endpoint.send_overlay()
+    await shows(page, "quadrille.state.overlay.paths.some((path) => path.side === 'right')")
+    for side, v, is_solid in (("left", 40, True), ("right", 60, False)):
+        along = [await to_client(page, 0, u, v) for u in range(110, 290, 2)]
+        drawn = is_orange(await pixels(page, along))
+        assert drawn.mean() > 0.4, side
+        assert drawn.all() == is_solid, side
+    endpoint.out_of_reach = {
+        "camera": 0, "person": 0, "point": "l_wrist", "u": 560.0, "v": 60.0, "point_u": 455.0, "point_v": 155.0,
+        "distance_m": 0.041,
+    }  # fmt: skip
+    async with dragging(page, 0, "l_wrist", (20, -20), (60, -60)):
+        await shows(page, "quadrille.state.overlay.out_of_reach !== null")
+        wanted, reached = await to_client(page, 0, 560, 60), await to_client(page, 0, 455, 155)
+        line = np.linspace(wanted, reached, 60)[10:-10]
+        assert np.mean((await pixels(page, line))[:, :3].min(axis=1) > 200) > 0.15
+        ring = [(wanted[0] + 5 * np.cos(a), wanted[1] + 5 * np.sin(a)) for a in np.linspace(0, 2 * np.pi, 12)]
+        assert np.mean(is_orange(await pixels(page, ring))) > 0.6
