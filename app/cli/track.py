@@ -41,7 +41,7 @@ class TrackArguments:
     """past frames that the motion is estimated from."""
     paper: bool = False
     """as Gavrila and Davis 1996: best-first search alone, in one pass, outliers rejected."""
-    second_pass: bool = True
+    backward_pass: bool = True
     """at the end, track lost people backward from the first trusted poses after the loss."""
     json: bool = False
     """print one JSON object."""
@@ -74,7 +74,7 @@ def _chamfer_settings(arguments: TrackArguments) -> "TrackSettings":
         search=SearchSettings(passes=(1.0,) if paper else SearchSettings().passes),
         theta_px=arguments.theta,
         outliers="paper" if paper else "truncated",
-        second_pass=arguments.second_pass and not paper,
+        backward_pass=arguments.backward_pass and not paper,
     )
 
 
@@ -95,8 +95,8 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
         progress: shows how far it is.
 
     Returns:
-        A summary. `stopped_at` is the frame where it was interrupted, else None; `followed_back` is the number of poses
-        that the second pass improved.
+        A summary. `stopped_at` is the frame where it was interrupted, else None; `improved_backward` is the number of
+        poses that the backward pass improved.
 
     Raises:
         SessionError: a person has no pose at or before the first frame.
@@ -135,7 +135,7 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
         "frames": len(run.costs_px),
         "resumed_at": None if len(left) == len(frames) else left[0] if left else frames[-1],
         "stopped_at": stopped_at if stopped else None,
-        "followed_back": run.n_improved,
+        "improved_backward": run.n_improved,
         "people": [session.people[i].name for i in at.people],
         "mean_cost_px": float(np.mean(costs)) if costs else None,
         "statuses": {session.people[i].name: dict(statuses[i]) for i in at.people},
@@ -150,7 +150,7 @@ def _work(run: "TrackSession", progress: Reporter) -> None:
                 run.take(estimate)
                 tick()
     run.save()
-    steps = run.second_pass()
+    steps = run.backward_pass()
     first = next(steps, None)
     if first is None:
         return
@@ -170,8 +170,8 @@ def _format(found: dict[str, Any]) -> str:
     for name, statuses in found["statuses"].items():
         counts = [f"{statuses[s]} {s}" for s in ("good", "doubtful", "lost") if statuses.get(s)]
         lines.append(f"{name}: {', '.join(counts)}")
-    if found["followed_back"]:
-        lines.append(f"{found['followed_back']} poses of frames in which somebody was lost are from the second pass")
+    if found["improved_backward"]:
+        lines.append(f"the backward pass replaced {found['improved_backward']} poses of frames with lost people")
     if found["stopped_at"] is not None:
         lines.append(f"stopped before frame {found['stopped_at']}; run it again to resume")
     return "\n".join(lines)
