@@ -85,8 +85,8 @@ _SETTINGS: Mapping[str, "Callable[[TrackArguments], TrackerSettings]"] = {"chamf
 def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progress: Reporter) -> dict[str, Any]:
     """Track people and store their poses as one entry of the history.
 
-    Keyframes and locked degrees of freedom keep their values. An interrupted run keeps its poses; the same call again
-    resumes it.
+    Keyframes and locked degrees of freedom keep their values. An interrupted run keeps its poses; run it again
+    to resume.
 
     Args:
         at: the session and the people to track.
