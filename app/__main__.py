@@ -28,9 +28,20 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "simulate": simulate.command,
     "bench": bench.command,
 }
-_app = tyro.extras.SubcommandApp()
-for _name, _command in _COMMANDS.items():
-    _app.command(name=_name)(_command)
+_HELP = ("-h", "--help")
+_ABOUT = """Model-based human motion capture from several calibrated cameras.
+
+Without a command, the page opens with a bundled sample; quadrille SESSION opens a session. quadrille COMMAND --help
+describes a command, quadrille --version prints the version."""
+
+
+def _command_line(words: list[str]) -> tyro.extras.SubcommandApp:
+    """Register the commands. The list of all shows the first line of each."""
+    app = tyro.extras.SubcommandApp()
+    for name, command in _COMMANDS.items():
+        summary = (command.__doc__ or "").partition("\n")[0]
+        app.command(name=name, help=summary if words[0] in _HELP else None)(command)
+    return app
 
 
 def main() -> None:
@@ -39,10 +50,12 @@ def main() -> None:
     if words[:1] == ["--version"]:
         print(f"quadrille {_version()}")
         return
-    if not words or (words[0] not in _COMMANDS and words[0] not in ("-h", "--help")):
+    if not words or (words[0] not in _COMMANDS and words[0] not in _HELP):
         words = ["open", *words]
     try:
-        _app.cli(prog="quadrille", args=words)
+        _command_line(words).cli(
+            prog="quadrille", description=_ABOUT, args=words, config=(tyro.conf.FlagCreatePairsOff,)
+        )
         sys.stdout.flush()
     except TrackerError as error:
         Console(stderr=True).print(

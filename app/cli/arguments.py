@@ -1,4 +1,4 @@
-"""Arguments that several commands share: SESSION, and words of the form NAME=VALUE."""
+"""Arguments that several commands share: SESSION, options that may be left out, and words such as NAME=VALUE."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -12,6 +12,16 @@ T = TypeVar("T")
 
 SessionArg = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION", help="session folder")]
 
+OptionalPath = Annotated[Path | None, tyro.conf.arg(metavar="PATH", help_behavior_hint="")]
+OptionalName = Annotated[str | None, tyro.conf.arg(metavar="NAME", help_behavior_hint="")]
+OptionalRange = Annotated[str | None, tyro.conf.arg(metavar="A:B", help_behavior_hint="")]
+OptionalNumber = Annotated[float | None, tyro.conf.arg(metavar="NUMBER", help_behavior_hint="")]
+Paths = Annotated[tuple[Path, ...], tyro.conf.arg(metavar="PATH ...", help_behavior_hint="")]
+Names = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...", help_behavior_hint="")]
+NamedPaths = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=PATH ...", help_behavior_hint="")]
+NamedValues = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE ...", help_behavior_hint="")]
+CommonOrNamed = Annotated[tuple[str, ...], tyro.conf.arg(metavar="VALUE | NAME=VALUE ...", help_behavior_hint="")]
+
 
 def parse_pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> dict[str, T]:
     """Parse NAME=VALUE words."""
@@ -19,7 +29,7 @@ def parse_pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> 
     for word in words:
         name, equals, value = word.partition("=")
         try:
-            if not equals or not name:
+            if not (name and equals and value):
                 raise ValueError
             out[name] = kind(value)
         except ValueError:

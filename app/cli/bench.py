@@ -1,13 +1,15 @@
 """`quadrille bench`: measure the tracker's speed and compare it with a baseline."""
 
 import sys
-from pathlib import Path
 
+from app.cli.arguments import OptionalPath
 from app.cli.json_output import format_json
 from app.runtime.progress import Reporter
 
 
-def command(json: bool = False, baseline: Path | None = None, save: Path | None = None, tolerance: float = 0.4) -> None:
+def command(
+    json: bool = False, baseline: OptionalPath = None, save: OptionalPath = None, tolerance: float = 0.4
+) -> None:
     """Measure the tracker's speed on this machine and compare it with a baseline; status 1 if it became slower.
 
     Args:

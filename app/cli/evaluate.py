@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import SessionArg
+from app.cli.arguments import OptionalName, OptionalPath, OptionalRange, SessionArg
 from app.cli.json_output import format_json
 from app.cli.target import Target, load_target, parse_frames
 from tracker.errors import SessionError
@@ -24,12 +24,12 @@ class EvaluateArguments:
     """session folder."""
     reference: Path
     """TRC file, pose table (CSV; its body in NAME_model.toml beside it) or session folder."""
-    frames: str | None = None
+    frames: OptionalRange = None
     """A:B, half open; from the first to the last pose by default."""
-    person: str | None = None
+    person: OptionalName = None
     """name; needed in a session of several people."""
-    joint_map: Path | None = None
-    """TOML file that maps the file's joint names to the body's."""
+    joint_map: OptionalPath = None
+    """TOML file with a line such as left_shoulder = "LSHO" for each joint, if the file has other names."""
     axes: str = "x,y,z"
     """the file's axes in the session's order, such as x,-z,y."""
     align: Literal["none", "rigid-all"] = "none"

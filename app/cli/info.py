@@ -77,7 +77,7 @@ def _format(summary: dict[str, Any]) -> str:
     for c in summary["cameras"]:
         extras = "".join(f", {name}" for name in ("background", "masks") if c[name])
         shift = f", offset {c['offset']}" if c["offset"] else ""
-        missing = f", {' and '.join(c['missing'])} missing" if c["missing"] else ""
+        missing = f"; missing: {', '.join(c['missing'])}" if c["missing"] else ""
         lines.append(f"  camera {c['name']}: {c['size'][0]}x{c['size'][1]}, {c['footage']}{extras}{shift}{missing}")
     for p in summary["people"]:
         body = f"{p['model']} of {p['height_m']:.2f} m, {p['dofs']} degrees of freedom"

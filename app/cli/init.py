@@ -4,14 +4,13 @@ import sys
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import SessionArg
+from app.cli.arguments import OptionalName, OptionalPath, SessionArg
 from app.cli.json_output import format_json
-from app.cli.target import Target, load_target, parse_frames
+from app.cli.target import Target, load_target
 from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
@@ -31,20 +30,20 @@ class InitArguments:
 
     session: SessionArg
     """session folder."""
-    joints: Path | None = None
+    joints: OptionalPath = None
     """TRC file of 3-D joints."""
-    poses: Path | None = None
+    poses: OptionalPath = None
     """table of poses (CSV), as `simulate` writes it."""
     method: Literal["joints", "poses"] = "joints"
     """joints fits the pose to known joints; poses copies it from a table."""
     frame: int = 0
     """frame to set."""
-    person: str | None = None
+    person: OptionalName = None
     """name; needed in a session of several people."""
     fit_sizes: bool = False
     """measure the body's segment lengths from the joints of all frames too."""
-    joint_map: Path | None = None
-    """TOML file that maps the file's joint names to the body's."""
+    joint_map: OptionalPath = None
+    """TOML file with a line such as left_shoulder = "LSHO" for each joint, if the file has other names."""
     axes: str = "x,y,z"
     """the file's axes in the session's order, such as x,-z,y."""
     json: bool = False
@@ -58,7 +57,9 @@ def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None
 
     method, frame = arguments.method, arguments.frame
     at = load_target(arguments.session, arguments.person, several=False)
-    parse_frames(f"{frame}:{frame + 1}", at.session)
+    if not 0 <= frame < at.session.n_frames:
+        n = at.session.n_frames
+        raise TrackerError(f"expected --frame within 0:{n} (from 0 to {n - 1}), found {frame}; correct it")
     path = arguments.joints if method == "joints" else arguments.poses
     if path is None:
         raise TrackerError(f"expected --{method} FILE, found none; say where the {method} are")

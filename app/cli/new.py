@@ -7,40 +7,50 @@ from typing import Annotated, Literal
 
 import tyro
 
-from app.cli.arguments import SessionArg, parse_common_or_pairs, parse_pairs
+from app.cli.arguments import (
+    CommonOrNamed,
+    NamedPaths,
+    NamedValues,
+    Names,
+    OptionalNumber,
+    OptionalPath,
+    Paths,
+    parse_common_or_pairs,
+    parse_pairs,
+)
 
 
 @dataclass(frozen=True)
 class NewArguments:
     """Arguments of `quadrille new`."""
 
-    session: SessionArg
+    session: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION", help="folder to make")]
     """folder to make."""
     calibration: Path
     """file of the cameras: TOML of anipose, Pose2Sim or Caliscope, or JSON, YAML or XML with K, R and t of each."""
-    videos: tuple[Path, ...] = ()
+    videos: Paths = ()
     """video files or image folders, each named after its camera; images are paired by their numbers."""
-    camera: tuple[str, ...] = ()
+    camera: NamedPaths = ()
     """NAME=PATH: footage of a camera, under any file name."""
-    cameras: tuple[str, ...] = ()
+    cameras: Names = ()
     """names of the calibrated cameras to use, in this order; all by default."""
-    background: Path | None = None
+    background: OptionalPath = None
     """folder of CAM.png or CAM.mp4 of the empty scene."""
-    masks: Path | None = None
+    masks: OptionalPath = None
     """folder of CAM/%06d.png by video frame; 0 is background."""
-    offset: tuple[str, ...] = ()
+    offset: NamedValues = ()
     """CAM=N: frame k of the session is frame k + N of this camera."""
-    people: tuple[str, ...] = ("person",)
+    people: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("person",)
     """names of the people."""
-    model: tuple[str, ...] = ()
+    model: CommonOrNamed = ()
     """body model of all people, or NAME=MODEL."""
-    height: tuple[str, ...] = ()
+    height: CommonOrNamed = ()
     """body height in metres of all people, or NAME=METRES."""
-    fps: float | None = None
+    fps: OptionalNumber = None
     """rate at which the cameras filmed, if the videos declare another one (high-speed) or all footage is images."""
     up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
     """world axis that points up."""
-    units: Literal["m", "cm", "mm"] | None = None
+    units: Annotated[Literal["m", "cm", "mm"] | None, tyro.conf.arg(metavar="{m,cm,mm}", help_behavior_hint="")] = None
     """unit of the calibration's translations; by default the one that its layout fixes, else metres."""
 
 

@@ -5,18 +5,21 @@ from typing import Annotated
 
 import tyro
 
+from app.cli.arguments import Names, OptionalName
 from tracker.errors import TrackerError
+
+_SessionOrSample = Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION", help_behavior_hint="")]
 
 
 def command(
-    session: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION")] = None,
+    session: _SessionOrSample = None,
     /,
     host: str = "127.0.0.1",
     port: int = 8080,
-    allow_host: tuple[str, ...] = (),
+    allow_host: Names = (),
     browser: bool = True,
     token: bool = True,
-    sample: str | None = None,
+    sample: OptionalName = None,
     start_again: bool = False,
 ) -> None:
     """Open a session in the page; without SESSION, a working copy of a bundled sample.

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli.arguments import SessionArg, parse_pairs
+from app.cli.arguments import NamedPaths, OptionalPath, Paths, SessionArg, parse_pairs
 from app.cli.json_output import format_json
 from tracker.errors import SessionError
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 def command(
     session: SessionArg,
     /,
-    search: tuple[Path, ...] = (),
-    camera: tuple[str, ...] = (),
-    background: Path | None = None,
-    masks: Path | None = None,
+    search: Paths = (),
+    camera: NamedPaths = (),
+    background: OptionalPath = None,
+    masks: OptionalPath = None,
     json: bool = False,
 ) -> None:
     """Give moved or renamed footage of a session its new place.
@@ -84,6 +84,8 @@ def _row(camera: str, kind: str) -> dict[str, str]:
 
 
 def _format(found: dict[str, Any]) -> str:
+    if not found["relinked"] and not found["missing"]:
+        return f"{found['folder']}: nothing is missing"
     lines = [f"{found['folder']}: {len(found['relinked'])} files have a new place, {len(found['missing'])} are missing"]
     lines += [f"  camera {f['camera']}: {f['kind']} {f['new']}" for f in found["relinked"]]
     lines += [f"  camera {m['camera']}: {m['kind']} {m['path']}, missing" for m in found["missing"]]

@@ -1,11 +1,11 @@
-"""`quadrille restore`: go back to a backup of damaged annotations, and write edits that a rescue file holds."""
+"""`quadrille restore`: go back to a backup of damaged annotations, and write the edits of a rescue file."""
 
 import os
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli.arguments import SessionArg
+from app.cli.arguments import OptionalName, SessionArg
 from app.cli.json_output import format_json
 from tracker.errors import DamagedStoreError, SessionError
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tracker.store.backups import Restored
 
 
-def command(session: SessionArg, /, backup: str | None = None, json: bool = False) -> None:
+def command(session: SessionArg, /, backup: OptionalName = None, json: bool = False) -> None:
     """Go back to a backup of damaged annotations, and write edits that could not be written when the program ended.
 
     Each opening that finds the annotations as they were written keeps a backup of them in the folder `backups` of the

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import SessionArg
+from app.cli.arguments import OptionalName, OptionalNumber, OptionalRange, SessionArg
 from app.cli.json_output import format_json
 from app.cli.target import Target, load_target, parse_frames
 from app.runtime.progress import Reporter
@@ -27,13 +27,13 @@ class TrackArguments:
     """session folder."""
     method: Literal["chamfer"] = "chamfer"
     """chamfer: edges; predicted, refined by Gauss-Newton, and searched if that does not suffice."""
-    frames: str | None = None
+    frames: OptionalRange = None
     """A:B, half open; all by default."""
-    person: str | None = None
+    person: OptionalName = None
     """name of the person to track; all people by default."""
     backward: bool = False
     """from the last frame of the range to the first."""
-    theta: float | None = None
+    theta: OptionalNumber = None
     """outlier distance in pixels; 3% of the longer side of the image by default."""
     order: int = 1
     """degree of the motion model: 0 stays, 1 constant velocity, 2 constant acceleration."""
@@ -41,7 +41,7 @@ class TrackArguments:
     """past frames that the motion is estimated from."""
     paper: bool = False
     """as Gavrila and Davis 1996: best-first search alone, in one pass, outliers rejected."""
-    second_pass: bool = True
+    backward_pass: bool = True
     """at the end, track lost people backward from the first trusted poses after the loss."""
     json: bool = False
     """print one JSON object."""
@@ -74,7 +74,7 @@ def _chamfer_settings(arguments: TrackArguments) -> "TrackSettings":
         search=SearchSettings(passes=(1.0,) if paper else SearchSettings().passes),
         theta_px=arguments.theta,
         outliers="paper" if paper else "truncated",
-        second_pass=arguments.second_pass and not paper,
+        backward_pass=arguments.backward_pass and not paper,
     )
 
 
@@ -85,8 +85,8 @@ _SETTINGS: Mapping[str, "Callable[[TrackArguments], TrackerSettings]"] = {"chamf
 def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progress: Reporter) -> dict[str, Any]:
     """Track people and store their poses as one entry of the history.
 
-    Keyframes and locked degrees of freedom keep their values. An interrupted run keeps its poses; the same call again
-    resumes it.
+    Keyframes and locked degrees of freedom keep their values. An interrupted run keeps its poses; run it again
+    to resume.
 
     Args:
         at: the session and the people to track.
@@ -95,8 +95,8 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
         progress: shows how far it is.
 
     Returns:
-        A summary. `stopped_at` is the frame where it was interrupted, else None; `followed_back` is the number of poses
-        that the second pass improved.
+        A summary. `stopped_at` is the frame where it was interrupted, else None; `improved_backward` is the number of
+        poses that the backward pass improved.
 
     Raises:
         SessionError: a person has no pose at or before the first frame.
@@ -135,7 +135,7 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
         "frames": len(run.costs_px),
         "resumed_at": None if len(left) == len(frames) else left[0] if left else frames[-1],
         "stopped_at": stopped_at if stopped else None,
-        "followed_back": run.n_improved,
+        "improved_backward": run.n_improved,
         "people": [session.people[i].name for i in at.people],
         "mean_cost_px": float(np.mean(costs)) if costs else None,
         "statuses": {session.people[i].name: dict(statuses[i]) for i in at.people},
@@ -150,7 +150,7 @@ def _work(run: "TrackSession", progress: Reporter) -> None:
                 run.take(estimate)
                 tick()
     run.save()
-    steps = run.second_pass()
+    steps = run.backward_pass()
     first = next(steps, None)
     if first is None:
         return
@@ -163,15 +163,15 @@ def _work(run: "TrackSession", progress: Reporter) -> None:
 
 
 def _format(found: dict[str, Any]) -> str:
-    resumed = "" if found["resumed_at"] is None else f", going on from frame {found['resumed_at']}"
+    resumed = "" if found["resumed_at"] is None else f", resumed at frame {found['resumed_at']}"
     lines = [f"tracked {', '.join(found['people'])} over {found['frames']} frames{resumed}"]
     if found["mean_cost_px"] is not None:
         lines[0] += f", mean cost {found['mean_cost_px']:.2f} px"
     for name, statuses in found["statuses"].items():
         counts = [f"{statuses[s]} {s}" for s in ("good", "doubtful", "lost") if statuses.get(s)]
         lines.append(f"{name}: {', '.join(counts)}")
-    if found["followed_back"]:
-        lines.append(f"{found['followed_back']} poses of frames in which somebody was lost are from the second pass")
+    if found["improved_backward"]:
+        lines.append(f"the backward pass replaced {found['improved_backward']} poses of frames with lost people")
     if found["stopped_at"] is not None:
         lines.append(f"stopped before frame {found['stopped_at']}; run it again to resume")
     return "\n".join(lines)

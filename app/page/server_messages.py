@@ -135,7 +135,7 @@ class Track(Part, frozen=True):
     lost: int
     """Frames with status `lost`."""
     back: bool
-    """Whether the run is in its second pass."""
+    """Whether the run is in its backward pass."""
     message: str
     """Result of the last run, or empty."""
 

@@ -8,8 +8,9 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.text import Text
 
-_OUTLIER = 8.0
-"""An item that takes longer than this many times the median compiled kernels or waited for a disk."""
+_OUTLIER, _COMPILING_S = 8.0, 1.0
+"""An item compiled kernels, or waited for a disk, if it takes longer than this many times the upper quartile of all,
+and longer than this many seconds. Items come in bursts, so that many take almost no time."""
 
 
 class Pace:
@@ -34,7 +35,8 @@ class Pace:
         durations = sorted(self._durations_s[1:])
         if not durations:
             return None
-        usual = [d for d in durations if d <= _OUTLIER * durations[(len(durations) - 1) // 2]]
+        most = max(_COMPILING_S, _OUTLIER * durations[3 * (len(durations) - 1) // 4])
+        usual = [d for d in durations if d <= most] or durations
         return max(1e-6, sum(usual) / len(usual))
 
 

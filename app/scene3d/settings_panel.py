@@ -50,7 +50,7 @@ _FOLDERS: dict[str, tuple[_Control, ...]] = {
             "recover", "search lost limbs", "Search for a limb that is not where the edges and colours are"
         ),
         _Control(
-            "second_pass", "second pass",
+            "backward_pass", "backward pass",
             "At the end of a run, track lost people backward from the first trusted poses after the loss",
         ),
     ),
@@ -129,7 +129,7 @@ def shown_of(settings: TrackSettings) -> dict[str, Any]:
         "order": _ORDERS[predict.order],
         "window": predict.window,
         "recover": settings.recover is not None,
-        "second_pass": settings.second_pass,
+        "backward_pass": settings.backward_pass,
         "bound_deg": round(float(np.degrees(search.bound_rad)), 6),
         "bound_cm": round(100 * search.bound_m, 6),
         "step_deg": round(float(np.degrees(search.step_rad)), 6),
@@ -166,7 +166,7 @@ def settings_of(value: dict[str, Any], before: TrackSettings) -> TrackSettings:
         estimate=next(key for key, label in _METHODS.items() if label == value["method"]),
         predict=predict,
         recover=(before.recover or RecoverSettings()) if value["recover"] else None,
-        second_pass=bool(value["second_pass"]),
+        backward_pass=bool(value["backward_pass"]),
         search=search,
         theta_px=value["theta_px"] or None,
         outliers=value["outliers"],

@@ -25,7 +25,7 @@ class TrackState:
     lost: int = 0
     """Number of lost frames."""
     back: bool = False
-    """Whether the run is in its second pass, tracking lost people backward; `done` and `total` count that pass."""
+    """Whether the run is in its backward pass, tracking lost people backward; `done` and `total` count that pass."""
     message: str = ""
     """How the last run ended."""
     failed: bool = False

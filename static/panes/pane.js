@@ -92,6 +92,20 @@ export class Pane {
   }
 
   /**
+   * Zoom to some joints; without any, show the whole image.
+   *
+   * @param {{u: number, v: number}[]} joints
+   */
+  frame(joints) {
+    const us = joints.map(({ u }) => u);
+    const vs = joints.map(({ v }) => v);
+    if (joints.length) {
+      this.view.frame({ left: Math.min(...us), top: Math.min(...vs), right: Math.max(...us), bottom: Math.max(...vs) });
+    } else this.view.reset();
+    this.#redraw();
+  }
+
+  /**
    * @param {number} dx
    * @param {number} dy
    */

@@ -105,6 +105,17 @@ export class PaneGrid {
     for (const pane of under.length ? under : this.panes) pane.reset();
   }
 
+  /** Zoom every view to the people in it; with Solo, to the selected person. */
+  framePeople() {
+    const { overlay, state, session } = this.#store.facts;
+    this.panes.forEach((pane, camera) => {
+      const { width, height } = session?.cameras[camera] ?? { width: 0, height: 0 };
+      const isSeen = (/** @type {{u: number, v: number}} */ { u, v }) => u >= 0 && v >= 0 && u < width && v < height;
+      const isMeant = (/** @type {{person: number}} */ { person }) => !state?.solo || person === state.person;
+      pane.frame((overlay?.handles ?? []).filter((h) => h.camera === camera && isMeant(h) && isSeen(h)));
+    });
+  }
+
   /**
    * Window position of an undistorted pixel.
    *

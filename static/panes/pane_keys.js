@@ -32,6 +32,12 @@ export function paneBindings({ grid, gestures, layers, layersMenu }) {
       run: () => grid.typeCamera(0) || grid.resetViews(),
     },
     {
+      keys: ["Shift 0"],
+      label: "Zoom all views to the people",
+      matches: (event) => plain("", event.code, true)(event) && event.code === "Digit0",
+      run: () => grid.framePeople(),
+    },
+    {
       keys: ["Alt O"],
       label: "Take the next of the joints that overlap under the pointer",
       matches: alt("KeyO", false),

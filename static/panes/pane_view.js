@@ -7,6 +7,9 @@
 
 const MIN_ZOOM = 0.25;
 const MAX_ZOOM = 40;
+/** Size of what is framed with its margin, in sizes of its box: joints lie within the body. */
+const FRAME_MARGIN = 1.4;
+const MAX_FRAME_ZOOM = 8;
 
 export class PaneView {
   /** 1 if the whole image fits the pane. */
@@ -104,6 +107,20 @@ export class PaneView {
   reset() {
     this.zoom = 1;
     this.#center = this.#middle();
+  }
+
+  /**
+   * Fill the pane with a box of the image and a margin around it.
+   *
+   * @param {{left: number, top: number, right: number, bottom: number}} box image positions
+   */
+  frame({ left, top, right, bottom }) {
+    const { width, height } = this.#pane;
+    const scale = Math.min(width / Math.max(1, right - left), height / Math.max(1, bottom - top)) / FRAME_MARGIN;
+    this.zoom = 1;
+    this.zoom = Math.max(1, Math.min(MAX_FRAME_ZOOM, scale / this.scale));
+    this.#center = this.#middle();
+    if (this.zoom > 1) this.#moveCenter((left + right) / 2 - this.#center.u, (top + bottom) / 2 - this.#center.v);
   }
 
   /**

@@ -123,7 +123,7 @@ def section(clips: Sequence[Clip], rows: Mapping[str, Sequence[tuple[float, int,
         "frames (a limb joint off by more than 150 mm) / frames per second. Frames: "
         + ", ".join(f"{c.name} {len(c.frames)}" for c in clips)
         + ". All start from the pose fitted to the reference joints of frame 0, with the same settings but for what "
-        "the row says, and without the second pass.",
+        "the row says, and without the backward pass.",
         "",
     ]
     told = {name: [f"{mm:.0f} / {lost} / {fps:.0f}" for mm, lost, fps in cells] for name, cells in rows.items()}

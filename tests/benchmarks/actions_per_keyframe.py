@@ -1,6 +1,6 @@
 """How many actions a keyframe costs where the tracker does the rest: `python tests/benchmarks/actions_per_keyframe.py`.
 
-A user by rule (tests/support/scripted_user.py) annotates `walk`: places the body on frame 0 from 40 cm and 30 degrees
+A scripted user (tests/support/scripted_user.py) annotates `walk`: places the body on frame 0 from 40 cm and 30 degrees
 away, fits, tracks to the next keyframe, looks at it in two views, drags what is off by more than the eye forgives,
 fits, verifies it, tracks on. An action is one press to release, or one key. `--data DIR` says where `walk` is.
 """

@@ -27,7 +27,7 @@ class FakeTracker:
         self.last = {}
         """What was found last on each frame."""
         self.back = None
-        """Makes the steps of the second pass from what was tracked; None: there is nothing to follow back."""
+        """Makes the steps of the backward pass from what was tracked; None: there is nothing to follow back."""
 
     def let_go(self, frames):
         """Let it track so many frames more."""
@@ -62,6 +62,6 @@ class FakeTracker:
             )  # fmt: skip
             yield self.last[frame]
 
-    def second_pass(self, run, tracked):
-        if self.back is not None and self.settings.second_pass:
+    def backward_pass(self, run, tracked):
+        if self.back is not None and self.settings.backward_pass:
             yield from self.back(tracked)

@@ -1,4 +1,4 @@
-"""A user by rule: sees where the joints truly are in two views, some pixels off, and nothing else."""
+"""Scripted user with 3 px noise: sees the true joints in two views, some pixels off, and nothing else."""
 
 import numpy as np
 from scipy.optimize import least_squares

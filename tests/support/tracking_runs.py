@@ -13,6 +13,6 @@ def track(observer, models, start, frames, settings=None, **subjects):
 
 
 def track_back(observer, models, found, settings=None, **subjects):
-    """The steps of the second pass; keywords as of `Subjects.of`."""
+    """The steps of the backward pass; keywords as of `Subjects.of`."""
     run = TrackingRun(observer, Subjects.of(models, **subjects), (), ())
-    return ChamferTracker(settings or TrackSettings()).second_pass(run, found)
+    return ChamferTracker(settings or TrackSettings()).backward_pass(run, found)

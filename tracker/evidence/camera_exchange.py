@@ -32,8 +32,9 @@ _COARSE, _FINE = 20, 30
 _ROOM = 0.7
 """Half the side of the room, as a share of the cameras' mean distance from the point at which they look."""
 _MIN_GAIN, _MIN_COVERAGE = 0.1, 0.45
-"""An exchange is reported if it raises the coverage by this much, to this much. On seven recordings the right
-assignment has 0.02 to 0.5 more than any exchange."""
+"""An exchange is reported if it raises the coverage by this much, to this much. On seven recordings, with four cameras
+and with three of them, no right assignment is reported. Of 38 exchanges of two of four cameras with backgrounds, 36 are
+named; of the two others, in a square, the pair across is named."""
 _ABSENT, _PRESENT = 0.4, 0.6
 """Share of a body's points on the foreground below which it is not there, and above which it is."""
 _MAX_CAMERAS = 8

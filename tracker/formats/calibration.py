@@ -61,6 +61,8 @@ def read_cameras(path: str | Path, units: Units | None = None) -> tuple[CameraEn
     text = read_text(path, KIND)
     layout = _layout_of(text, path.suffix.lower())
     if layout == "toml":
+        if path.suffix.lower() != ".toml" and not re.search(r"^\s*\[[^\]\n]+\]\s*$", text, re.MULTILINE):
+            raise _named(path, "another kind of file", "export the calibration in one of these layouts")
         entries = anipose.parse_calibration(text, str(path), units or "m")
     else:
         entries = _of_data(_plain_data(text, path, layout), path, units)

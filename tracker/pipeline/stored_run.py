@@ -25,6 +25,8 @@ _SAVE_FRAMES = 10
 """Frames after which a run is saved."""
 _MOTION_FRAMES = 4
 """Frames before the first one from which its motion, and that of the frame before, is predicted."""
+_RENAMED = {"second_pass": "backward_pass"}
+"""Settings whose names have changed since sessions store them."""
 _UNFINISHED = "unfinished track"
 """Setting of the store: the task that was interrupted and its next frame."""
 
@@ -86,7 +88,7 @@ def stored_run(session: Session, store: AnnotationStore, observer: Observer, tas
 
 
 def _frames_left(store: AnnotationStore, task: TrackTask) -> Sequence[int]:
-    """Return the frames still to track: all, or the rest of an interrupted run; none if that was in its second pass."""
+    """Return the frames still to track: all, or the rest of an interrupted run; none in its backward pass."""
     unfinished, frames = store.setting(_UNFINISHED), task.frames
     if unfinished is None or not _same_task(unfinished["task"], task.record()):
         return frames
@@ -96,9 +98,10 @@ def _frames_left(store: AnnotationStore, task: TrackTask) -> Sequence[int]:
 
 
 def _same_task(stored: list[Any], task: list[Any]) -> bool:
-    """Return whether two records are of the same task, settings without a method included."""
+    """Return whether two records are of the same task, also one that an older version stored."""
     *what, settings = stored
-    return [*what, {**settings, "method": recorded_method(settings)}] == task
+    renamed = {_RENAMED.get(name, name): value for name, value in settings.items()}
+    return [*what, {**renamed, "method": recorded_method(settings)}] == task
 
 
 def _tracked_before(

@@ -53,7 +53,7 @@ class StoreSink:
 class TrackSession:
     """One run of a tracker and its results so far.
 
-    `first_pass` and `second_pass` do the work, and may be drained by another thread than the one that reads results.
+    `first_pass` and `backward_pass` do the work, and may be drained by another thread than the one that reads results.
     Each step is handed to `take` before the next one is asked for: its caller holds whatever lock guards the results
     and the sink. A run stops where its steps are no longer asked for, and goes on where they are again.
     """
@@ -86,9 +86,9 @@ class TrackSession:
         self.costs_px: dict[int, float] = {}
         """Cost of each frame that this run has tracked, px."""
         self.n_improved = 0
-        """Number of poses that the second pass has replaced."""
+        """Number of poses that the backward pass has replaced."""
         self.visited: int | None = None
-        """The frame that the second pass visited last; None before it."""
+        """The frame that the backward pass visited last; None before it."""
         self.finished = False
         """Whether both passes are done."""
         self._waiting: list[PoseEstimate] = []
@@ -97,22 +97,22 @@ class TrackSession:
     def steps(self) -> Iterator[Step]:
         """Run both passes."""
         yield from self.first_pass()
-        yield from self.second_pass()
+        yield from self.backward_pass()
 
     def first_pass(self) -> Iterator[PoseEstimate]:
         """Track the frames."""
         if self.run.frames:
             yield from self.tracker.estimates(self.run)
 
-    def second_pass(self) -> Iterator[BackwardStep]:
+    def backward_pass(self) -> Iterator[BackwardStep]:
         """Improve frames on which people were lost, in this run or before it was interrupted."""
-        yield from self.tracker.second_pass(self.run, list(self.tracked.values()))
+        yield from self.tracker.backward_pass(self.run, list(self.tracked.values()))
         self.finished = True
 
     def take(self, step: Step) -> None:
         """Keep the results of a step.
 
-        What the second pass improves is saved at once: a whole interval or nothing of it.
+        What the backward pass improves is saved at once: a whole interval or nothing of it.
         """
         if isinstance(step, BackwardStep):
             self._take_improved(step)

@@ -113,6 +113,9 @@ def relink(session: Session, places: Places) -> tuple[Session, tuple[Relinked, .
 
 def _given(session: Session, places: Places) -> list[Relinked]:
     """Check the places that a user has given."""
+    for given_kind, noun in (("background", "a background"), ("masks", "masks")):
+        if getattr(places, given_kind) is not None and all(getattr(c, given_kind) is None for c in session.cameras):
+            raise SessionError(f"no camera of {session.folder} has {noun} to relink; leave out --{given_kind}")
     found = []
     for source in session.cameras:
         name = source.camera.name
@@ -136,6 +139,8 @@ def _files_named(names: Iterable[str], folders: Sequence[Path]) -> dict[str, lis
     for folder in folders:
         if not folder.is_dir():
             raise SessionError(f"expected a folder as --search, found {folder}, which is none; check the path")
+        if not wanted:
+            continue
         root = Path(os.path.abspath(folder))
         everything = ((Path(at), name) for at, inner, files in os.walk(root) for name in (*inner, *files))
         for at, name in chain([(root.parent, root.name)], everything):

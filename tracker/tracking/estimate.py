@@ -1,4 +1,4 @@
-"""Results that every tracker returns: the poses of a frame, and the steps of a second pass."""
+"""Results that every tracker returns: the poses of a frame, and the steps of a backward pass."""
 
 from typing import NamedTuple
 
@@ -44,7 +44,7 @@ class PoseEstimate(NamedTuple):
 
 
 class TrackedFrame(NamedTuple):
-    """What a second pass needs to know of a tracked frame. Tuples are indexed by person."""
+    """What a backward pass needs to know of a tracked frame. Tuples are indexed by person."""
 
     frame: int
     poses: tuple[Array, ...]
@@ -56,13 +56,13 @@ class TrackedFrame(NamedTuple):
 
     @classmethod
     def of(cls, estimate: PoseEstimate) -> "TrackedFrame":
-        """Return the part of an estimate that a second pass needs; the whole holds much more."""
+        """Return the part of an estimate that a backward pass needs; the whole holds much more."""
         alternatives = tuple(tuple(a.values for a in of_one) for of_one in estimate.alternatives)
         return cls(estimate.frame, estimate.poses, estimate.statuses, alternatives)
 
 
 class BackwardStep(NamedTuple):
-    """A step of a second pass: one visit to one frame of a lost interval."""
+    """A step of a backward pass: one visit to one frame of a lost interval."""
 
     frame: int
     person: int

@@ -1,4 +1,4 @@
-"""The interface of a tracker: settings, a generator of pose estimates, and an optional second pass."""
+"""The interface of a tracker: settings, a generator of pose estimates, and an optional backward pass."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class Tracker(Protocol):
     def estimates(self, run: TrackingRun) -> Iterator[PoseEstimate]:
         """Track all frames in order. Yields the poses of each frame as soon as they are found."""
 
-    def second_pass(self, run: TrackingRun, tracked: Sequence[TrackedFrame]) -> Iterator[BackwardStep]:
+    def backward_pass(self, run: TrackingRun, tracked: Sequence[TrackedFrame]) -> Iterator[BackwardStep]:
         """Improve frames on which people were lost. Yields nothing where there is nothing to improve.
 
         Args:

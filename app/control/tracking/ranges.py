@@ -36,6 +36,8 @@ class _Run:
     job: Job[Sequence[Change]] = field(init=False)
     edit: int | None = None
     """Entry of the history; None before the first frames are written."""
+    written: dict[str, set[int]] = field(default_factory=dict)
+    """The frames written so far by the person's name."""
 
 
 class Ranges:
@@ -193,6 +195,8 @@ class Ranges:
             if run is not self._run:
                 return
             run.edit = session_state.saver.write(run.label, piece, run.edit, run.by_program)
+            for change in piece:
+                run.written.setdefault(change.person, set()).add(change.frame)
             done = session_state.state.ranges
             done = replace(done, done=done.done + len(piece))
             if any(c.frame == session_state.state.frame for c in piece):
@@ -208,8 +212,12 @@ class Ranges:
 
     def _end(self, run: _Run, how: str) -> None:
         state = self._session_state.state.ranges
-        frames = "1 frame" if state.done == 1 else f"{state.done} frames"
-        did = f"{run.did} {frames}" if how == "done" else f"{how}: {run.did} {frames} of {state.total}"
+        n_people, n_frames = len(run.written), len(set().union(*run.written.values()))
+        frames = "1 frame" if n_frames == 1 else f"{n_frames} frames"
+        did = f"{run.did} {frames}" + (f" of {n_people} people" if n_people > 1 else "")
+        if how != "done":
+            unit = "frames" if n_people < 2 else "poses"
+            did = f"{how}: {run.did} {state.done} of {state.total} {unit}"
         self._run = None
         self._session_state.refresh_saving()
         self._session_state.set(ranges=RangeState(message=did))

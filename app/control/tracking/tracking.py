@@ -187,7 +187,7 @@ class Tracking:
                     self._show_tracked(run, step, seconds)
 
     def _show_improved(self, run: _Run, step: BackwardStep, seconds: float) -> None:
-        """Show the progress of the second pass, and what it improved at the end of an interval."""
+        """Show the progress of the backward pass, and what it improved at the end of an interval."""
         session_state, tracked = self._session_state, run.session.tracked
         track = session_state.state.track
         if step.better:  # not at every step: there may be many frames

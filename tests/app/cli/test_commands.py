@@ -189,9 +189,9 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     assert not (session / "lock.json").exists()
     monkeypatch.undo()
     done = {k: stored(session)[k].time for k in (1, 2)}
-    status, out, _ = run("track", session, "--frames", "0:6")  # the same call goes on
+    status, out, _ = run("track", session, "--frames", "0:6")  # run again to resume
     assert status == 0
-    assert "tracked person over 3 frames, going on from frame 3" in out
+    assert "tracked person over 3 frames, resumed at frame 3" in out
     found = stored(session)
     assert sorted(found) == [0, 1, 2, 3, 4, 5]
     assert {k: found[k].time for k in (1, 2)} == done
@@ -202,8 +202,8 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run, session, monkeypatch):
-    """What the second pass finds better is in the store at once, in the one entry of the history."""
+def test_a_backward_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run, session, monkeypatch):
+    """What the backward pass finds better is in the store at once, in the one entry of the history."""
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
     estimates, offered = {}, []
     original = ChamferTracker.estimates
@@ -230,7 +230,7 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
     words = ("track", session, "--frames", "0:5", "--json")
     status, out, _ = run(*words)
     summary = json.loads(out)
-    assert (status, summary["frames"], summary["stopped_at"], summary["followed_back"]) == (130, 5, 1, 1)
+    assert (status, summary["frames"], summary["stopped_at"], summary["improved_backward"]) == (130, 5, 1, 1)
     assert summary["statuses"] == {"person": {"good": 4, "lost": 1}}
     found = stored(session)
     np.testing.assert_array_equal(found[1].values, estimates[1].poses[0] + 0.01)
@@ -243,8 +243,8 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
         raise AssertionError("the first pass is done")
 
     monkeypatch.setattr(ChamferTracker, "estimates", never)
-    summary = json.loads(run(*words)[1])  # the same call goes on with the second pass alone
-    assert (summary["frames"], summary["stopped_at"], summary["followed_back"]) == (0, None, 2)
+    summary = json.loads(run(*words)[1])  # run again: the backward pass alone
+    assert (summary["frames"], summary["stopped_at"], summary["improved_backward"]) == (0, None, 2)
     assert [f.frame for f in offered[1]] == [0, 1, 2, 3, 4]
     assert [f.statuses for f in offered[1]] == [("good",)] * 3 + [("lost",), ("good",)]
     for k, f in enumerate(offered[1]):
@@ -257,8 +257,8 @@ def test_a_second_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(run
         assert [store.undo() for _ in range(3)] == ["track frames 0:5"] * 3
         assert [row.frame for row in store.frames("person")] == [0]
     offered.clear()
-    assert json.loads(run(*words, "--no-second-pass")[1])["followed_back"] == 0
-    assert json.loads(run(*words, "--paper")[1])["followed_back"] == 0
+    assert json.loads(run(*words, "--no-backward-pass")[1])["improved_backward"] == 0
+    assert json.loads(run(*words, "--paper")[1])["improved_backward"] == 0
     assert offered == []
 
 

@@ -124,6 +124,8 @@ joints = [{ name = "root", child = "trunk", free = true }, { name = "hinge", par
     ("more", "expected"),
     [
         (["--camera", "front"], ["--camera as NAME=VALUE", "'front'"]),
+        (["--camera", "front="], ["--camera as NAME=VALUE", "'front='"]),
+        (["--cameras", "front", "top"], ["unknown camera 'top'", "front, left"]),
         (["--camera", "top=x.mp4"], ["unknown camera 'top'"]),
         (["--camera", "left=missing.mp4"], ["'left'", "missing.mp4"]),
         (["--offset", "left=one"], ["--offset as NAME=VALUE", "'left=one'"]),
@@ -207,7 +209,7 @@ def test_a_session_whose_video_is_gone(run, session):
     before = stored(session)
     cameras = json.loads(run("info", session, "--json")[1])["cameras"]
     assert [c["name"] for c in cameras if c["missing"] == ["footage"]] == ["BACK"]
-    assert "BACK.mp4, background, footage missing" in run("info", session)[1]
+    assert "BACK.mp4, background; missing: footage" in run("info", session)[1]
     assert_refused(run("relink", session), ["'BACK'", "--search FOLDER"])
     status, out, _ = run("relink", session, "--search", session / "models", "--json")
     assert (status, json.loads(out)["relinked"], len(json.loads(out)["missing"])) == (1, [], 1)

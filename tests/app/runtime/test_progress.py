@@ -29,6 +29,12 @@ def test_frames_that_are_hard_count():
     assert paced([90.0, *[0.5, 0.5, 2.0] * 5]).item_s == 1.0
 
 
+def test_items_that_come_in_bursts():
+    """A tracker that works ahead gives several frames at once."""
+    assert paced([90.0, 0.25, 0.0]).item_s == 0.125
+    assert paced([90.0, *[0.5, 0.0, 0.0, 0.0] * 6, 30.0]).item_s == 0.125
+
+
 def test_lines_where_there_is_no_terminal(capsys, monkeypatch):
     times = iter([0.0, 60.0, 60.5, 61.0])
     monkeypatch.setattr(Pace.__init__, "__defaults__", (lambda: next(times),))

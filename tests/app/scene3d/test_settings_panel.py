@@ -10,7 +10,7 @@ from tracker.tracking.chamfer.settings import TrackSettings
 SHOWN = {
     "method": "search alone (paper)", "order": "constant acceleration", "window": 5, "recover": False,
     "bound_deg": 30.0, "bound_cm": 12.0, "step_deg": 4.0, "step_cm": 3.0, "passes": "1, 0.5", "patience": 7,
-    "theta_px": 25.0, "outliers": "paper", "second_pass": False,
+    "theta_px": 25.0, "outliers": "paper", "backward_pass": False,
 }  # fmt: skip
 
 
@@ -22,7 +22,7 @@ def test_all_that_is_shown_is_taken_over():
     assert found.search.bound_rad == pytest.approx(np.pi / 6)
     assert (found.search.bound_m, found.search.step_m) == (pytest.approx(0.12), pytest.approx(0.03))
     assert (found.search.passes, found.search.patience) == ((1.0, 0.5), 7)
-    assert not found.second_pass
+    assert not found.backward_pass
     assert found.trust_rad == 0.3  # not shown, so it stays
 
 

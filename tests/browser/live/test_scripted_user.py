@@ -1,4 +1,4 @@
-"""How many actions it takes to place a body by hand: a user by rule, on the bundled samples, in the page.
+"""Actions that it takes to place a body by hand: a scripted user with 3 px noise, on the bundled samples.
 
 An action is one press to release of the mouse, or one key. The user aims at the true joints, 3 px off, in two views,
 one view for each drag; it begins 40 cm and 30 degrees away, with the arms down. The body has other bones than the

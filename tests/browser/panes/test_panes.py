@@ -264,3 +264,19 @@ class TestPeople:
         await page.locator("#people input").nth(1).check(force=True)
         await until(lambda: endpoint.heard("select"))
         assert endpoint.heard("select") == [{"type": "select", "person": 1, "point": None}]
+
+
+async def test_all_views_are_framed_on_the_people_by_a_key(page):
+    await page.keyboard.press("Shift+0")
+    await shows(page, "quadrille.state.views.every((view) => view.zoom > 1.05)")
+    for camera in range(4):
+        pane = await page.locator(".pane").nth(camera).bounding_box()
+        handles = [h for h in (await state_of(page))["overlay"]["handles"] if h["camera"] == camera]
+        places = [await to_client(page, camera, h["u"], h["v"]) for h in handles]
+        for x, y in places:
+            assert pane["x"] < x < pane["x"] + pane["width"]
+            assert pane["y"] < y < pane["y"] + pane["height"]
+        assert max(y for _, y in places) - min(y for _, y in places) > 0.5 * pane["height"]
+    await page.mouse.move(0, 0)
+    await page.keyboard.press("0")
+    await shows(page, "quadrille.state.views.every((view) => view.zoom === 1)")

@@ -187,7 +187,7 @@ async def test_work_that_waits_for_kernels_says_so(page, endpoint):
         await expect(figures).to_have_text(text)
 
 
-async def test_the_second_pass_is_told_from_the_first(page, endpoint):
+async def test_the_backward_pass_is_told_from_the_first(page, endpoint):
     track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "at": 30, "lost": 2}
     for back, text in ((False, "Tracked 4 of 9"), (True, "Followed 4 of 9")):
         endpoint.state["track"] = track | {"back": back, "done": 4, "total": 9}

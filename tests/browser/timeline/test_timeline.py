@@ -242,7 +242,7 @@ async def test_a_range_is_worked_on_from_its_bar(page, endpoint):
     assert await page.locator("#range-clear").is_disabled()
     await page.locator("#range-stop").click()
     await until(lambda: endpoint.heard("stop_range"))
-    endpoint.state["range"] |= {"running": False, "message": "stopped: interpolated 500 frames of 12000"}
+    endpoint.state["range"] |= {"running": False, "message": "stopped: interpolated 500 of 12000 frames"}
     await endpoint.broadcast(endpoint.state)
     await shows(page, "document.querySelector('#range-work').textContent.startsWith('stopped: ')")
     await page.keyboard.press("Escape")

@@ -1,12 +1,16 @@
 """Two cameras with each other's footage are noticed by what moves, whatever the background is."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 from command_line import SAMPLE
 
 from tracker.evidence.camera_exchange import find_body_exchange, find_exchange
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.recording import Recording
+from tracker.formats.calibration import read_cameras
 from tracker.formats.trc import read_trc
 from tracker.session.session import load_session
 
@@ -26,8 +30,6 @@ class Frames:
 
 @pytest.fixture(scope="module")
 def frames():
-    from tracker.footage.recording import Recording
-
     with Recording(load_session(SAMPLE).cameras) as recording:
         return {k: recording.read(k) for k in (0, 16, 32, 49)}
 
@@ -66,3 +68,26 @@ def test_a_body_that_is_seen_only_with_two_exchanged(frames):
     assert find_body_exchange(exchanged_sources, Frames(frames, order), 0, points_world) == ("RIGHT", "LEFT")
     beside = points_world + np.array([0.8, 0.3, 0.0])  # the other views do not confirm it
     assert find_body_exchange(sources, Frames(frames), 0, beside) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["walk", "balance_real", "two_people", "fast_arms", "board_real"])
+def test_recordings(data_folder, name):
+    """No right assignment is reported, with all cameras or three; an exchange of the first two is."""
+    folder = data_folder(name)
+    entries = read_cameras(folder / ("camera_array.toml" if name == "board_real" else "Calib.toml"))
+    backgrounds = {p.stem: p for p in (folder / "background").glob("*.png")}
+    sources = [CameraSource(e.camera(), folder / f"{e.name}.mp4", backgrounds.get(e.name)) for e in entries]
+    for some in (sources, *combinations(sources, 3)):
+        with Recording(some) as recording:
+            assert find_exchange(some, recording) is None
+    a, b = sources[:2]
+    files = [
+        replace(a, footage=b.footage, background=b.background),
+        replace(b, footage=a.footage, background=a.background),
+    ]
+    with Recording([*files, *sources[2:]]) as recording:
+        found = find_exchange([*files, *sources[2:]], recording)
+    assert found is not None
+    # In a square the exchange across is the same arrangement, turned.
+    assert set(found.cameras) in ({e.name for e in entries[:2]}, {e.name for e in entries[2:]})

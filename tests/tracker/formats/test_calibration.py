@@ -276,6 +276,8 @@ ENTITIES = '<!DOCTYPE x [<!ENTITY a "aaaa">' + "".join(
         (text("a.xml", ENTITIES), "not valid XML"),
         (text("a.xml", ""), "not valid XML"),
         (text("a.toml", ""), "one section per camera"),
+        (text("points.csv", "frame,x,y\n1,2,3\n"), "found another kind of file"),
+        (text("camera_without_suffix", "[cam]\nname = 1\n"), "'cam'"),
         (text("a.json", '{"a": {"K": "no matrix", "R": [1, 2], "t": 3}}'), "'a': expected a list as 'rotation'|'a'"),
         (text("a.json", '{"a": {"K": [[1e999]], "R": 1, "t": 3}}'), "not valid JSON|'a'"),
         (inverted, "seem to map camera to world.*invert"),

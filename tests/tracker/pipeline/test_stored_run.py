@@ -24,7 +24,7 @@ SETTINGS = TrackSettings()
 
 @dataclass
 class Walker:
-    """Stands for a tracker: walks along x; frame 3 is lost, and the second pass finds it."""
+    """Stands for a tracker: walks along x; frame 3 is lost, and the backward pass finds it."""
 
     settings: TrackSettings
 
@@ -35,7 +35,7 @@ class Walker:
                 poses[i] = run.subjects.keyframes_at(frame).get(i, poses[i] + STEP_M * (np.arange(len(poses[i])) == 0))
             yield self.estimate(frame, poses, "lost" if frame == 3 else "good")
 
-    def second_pass(self, run, tracked):
+    def backward_pass(self, run, tracked):
         (lost,) = (f for f in tracked if "lost" in f.statuses)
         yield BackwardStep(lost.frame, 0, 1, 2)
         better = self.estimate(lost.frame, [p + STEP_M for p in lost.poses], "good")
@@ -138,8 +138,9 @@ def test_what_a_former_version_interrupted_goes_on_or_begins_again(session, stor
         track(run, 2)
     key = "unfinished track"
     unfinished = json.loads(json.dumps(store.setting(key)))
-    method = unfinished["task"][-1].pop("method")
-    assert method == "chamfer"
+    settings = unfinished["task"][-1]
+    assert settings.pop("method") == "chamfer"
+    settings["second_pass"] = settings.pop("backward_pass")  # as it was called before
     store.set_setting(key, unfinished)
     with run_of(session, store) as run:
         assert list(run.run.frames) == [2, 3, 4, 5]
@@ -150,7 +151,7 @@ def test_what_a_former_version_interrupted_goes_on_or_begins_again(session, stor
             assert list(run.run.frames) == list(range(6))
 
 
-def test_a_cleared_frame_ends_what_the_second_pass_may_use(session, store):
+def test_a_cleared_frame_ends_what_the_backward_pass_may_use(session, store):
     with run_of(session, store) as run:
         track(run, 5)
     store.commit("clear", [PoseChange("person", 2, None)])

@@ -2,6 +2,7 @@
 
 import shutil
 from contextlib import closing
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -122,6 +123,12 @@ def test_side_files_are_given_by_folder(room):
         Places(camera_paths={n: take / f"{n}.mp4" for n in "ab"}, background=take / "empty", masks=take / "masks"),
     )
     assert missing_files(session) == ()
+    bare = replace(session, cameras=tuple(replace(c, masks=None) for c in session.cameras))
+    with pytest.raises(SessionError, match=r"no camera of .* has masks to relink"):
+        relink(bare, Places(masks=take / "masks"))
+
+
+def test_a_search_needs_a_folder(room):
     refuse(room, SessionError, "expected a folder as --search", Places(search=[room / "none"]))
 
 

@@ -92,7 +92,7 @@ class TrackSettings:
     """Whether people occlude each other and edges are assigned; else each is tracked as if alone."""
     rounds: int = 2
     """Largest number of rounds in which all people are refined again with the others where they were found."""
-    second_pass: bool = True
+    backward_pass: bool = True
     """Whether people are tracked backward through intervals in which they were lost, see `backward_pass`."""
     apart: float = 1.0
     """Weight of the term against people passing through each other; 0 leaves it out."""

@@ -20,8 +20,8 @@ class ChamferTracker:
         """See `Tracker.estimates`."""
         return track_forward(run, self.settings)
 
-    def second_pass(self, run: TrackingRun, tracked: Sequence[TrackedFrame]) -> Iterator[BackwardStep]:
-        """See `Tracker.second_pass`; nothing where the settings switch it off."""
-        if not self.settings.second_pass:
+    def backward_pass(self, run: TrackingRun, tracked: Sequence[TrackedFrame]) -> Iterator[BackwardStep]:
+        """See `Tracker.backward_pass`; nothing where the settings switch it off."""
+        if not self.settings.backward_pass:
             return iter(())
         return track_lost_backward(run, tracked, self.settings)

@@ -180,3 +180,12 @@ def test_a_frame_that_jumps_is_named_and_no_longer_once_it_is_mended(two_keys):
     assert set(two_keys.state.inconsistent_frames) <= {6, 7, 8}
     two_keys.history.undo()
     wait_for(lambda: not two_keys.state.inconsistent_frames)
+
+
+def test_what_is_done_for_several_people_counts_frames_and_people(couple):
+    for frame in (0, 6):
+        couple.navigation.seek(frame)
+        for person in (0, 1):
+            couple.pose_edits.set_dof(person, 3, 0.1 * frame)
+    couple.ranges.interpolate(0, 6)
+    assert couple.state.ranges.message == "interpolated 5 frames of 2 people"

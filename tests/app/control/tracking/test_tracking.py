@@ -298,8 +298,8 @@ def test_a_run_survives_a_restart(placed, tracker, opened):
     assert set(controller.stored_poses.timeline()) == {2}
 
 
-def followed_back(tracker, steps):
-    """Has the tracker's second pass find frame 7 better, in so many steps; what it is offered."""
+def improved_backward(tracker, steps):
+    """Has the tracker's backward pass find frame 7 better, in so many steps; what it is offered."""
     offered = []
 
     def back(found):
@@ -308,15 +308,15 @@ def followed_back(tracker, steps):
             better = ()
             if i == steps - 1:
                 poses = tuple(p + STEP_M * (np.arange(len(p)) == 1) for p in found[4].poses)
-                better = (tracker.last[7]._replace(poses=poses, statuses=("good",), notes=("followed back",)),)
+                better = (tracker.last[7]._replace(poses=poses, statuses=("good",), notes=("re-initialized",)),)
             yield BackwardStep(7, 0, i + 1, steps, better)
 
     tracker.back = back
     return offered
 
 
-def test_the_second_pass_takes_the_place_of_what_was_lost(placed, tracker):
-    offered = followed_back(tracker, 3)
+def test_the_backward_pass_takes_the_place_of_what_was_lost(placed, tracker):
+    offered = improved_backward(tracker, 3)
     placed.tracking.start(backward=False, until=9)
     tracker.let_go(7)
     wait_for(lambda: placed.state.track.message)
@@ -326,16 +326,16 @@ def test_the_second_pass_takes_the_place_of_what_was_lost(placed, tracker):
     assert placed.state.frame == 9  # nobody is taken elsewhere
     placed.navigation.seek(7)
     shown = placed.state.people[0]
-    assert (shown.source, shown.status, shown.remark) == ("tracked", "good", "followed back")
+    assert (shown.source, shown.status, shown.remark) == ("tracked", "good", "re-initialized")
     np.testing.assert_array_equal(placed.state.poses[0], found[4].poses[0] + STEP_M * (np.arange(22) == 1))
     placed.history.undo()
     assert set(placed.stored_poses.timeline()) == {2}  # one entry with the first pass
 
 
-def test_a_frame_that_is_looked_at_shows_what_the_second_pass_found(placed, tracker):
+def test_a_frame_that_is_looked_at_shows_what_the_backward_pass_found(placed, tracker):
     seen = []
     placed.subscribe(lambda state: seen.append(state.track))
-    followed_back(tracker, 2)
+    improved_backward(tracker, 2)
     placed.tracking.start(backward=False, until=8)
     tracker.let_go(5)
     wait_for(at(placed, 7))
@@ -348,9 +348,9 @@ def test_a_frame_that_is_looked_at_shows_what_the_second_pass_found(placed, trac
     assert {(t.done, t.total) for t in seen if t.back} == {(1, 2), (2, 2)}
 
 
-def test_the_second_pass_can_be_switched_off(placed, tracker):
-    offered = followed_back(tracker, 1)
-    placed.search.set_settings(replace(placed.state.settings, second_pass=False))
+def test_the_backward_pass_can_be_switched_off(placed, tracker):
+    offered = improved_backward(tracker, 1)
+    placed.search.set_settings(replace(placed.state.settings, backward_pass=False))
     placed.tracking.start(backward=False, until=9)
     tracker.let_go(7)
     wait_for(lambda: placed.state.track.message)

@@ -1,4 +1,4 @@
-"""What was lost is followed back: which frames, what is kept of them, and what stays as it is."""
+"""What was lost is re-initialized: which frames, what is kept of them, and what stays as it is."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def off_m(model, values, truth):
 
 
 @pytest.mark.parametrize("backward", [False, True])
-def test_a_lost_arm_is_followed_back_from_where_it_is_trusted_again(scene, backward):
+def test_a_lost_arm_is_improved_backward_from_where_it_is_trusted_again(scene, backward):
     model, truth, views, first = scene
     assert min(off_m(model, first[k], truth[k]) for k in LOST) > 0.25
     found = tracked(first)[:: -1 if backward else 1]
@@ -125,7 +125,7 @@ def test_the_others_stay_as_they_were_found(scene):
         assert (estimate.notes[0], estimate.statuses[0]) == ("", "doubtful")
 
 
-def test_what_an_end_of_the_run_leaves_open_is_followed_back_from_the_last_frame_that_is_not_lost(scene):
+def test_what_an_end_of_the_run_leaves_open_is_improved_backward_from_the_last_frame_that_is_not_lost(scene):
     model, _, views, first = scene
     found = [f._replace(statuses=("lost" if f.frame in LOST else "doubtful" if f.frame > 4 else "good",))
              for f in tracked(first)]  # fmt: skip
