@@ -2,7 +2,7 @@
 
 A browser lets any page on the internet send requests to this machine, so listening on loopback alone protects nothing.
 Every request must name the server by an expected name (against DNS rebinding). If it has an Origin, that must have the
-same name and port. Every account of this machine reaches loopback, so a request must also have the token of this start.
+same name and port. Every account of this machine reaches loopback, so a request must also have the token.
 """
 
 import ipaddress
@@ -11,8 +11,10 @@ import re
 import secrets
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from urllib.parse import urlsplit
 
+from app.server.token_file import kept_token
 from tracker.errors import TrackerError
 
 _LOG = logging.getLogger(__name__)
@@ -91,13 +93,15 @@ class Invitation:
         return not was_used
 
 
-def access_for(host: str, allow_hosts: Iterable[str] = (), token: bool = True) -> Access:
+def access_for(host: str, allow_hosts: Iterable[str] = (), token: bool = True, tokens: Path | None = None) -> Access:
     """Return the checks for a server that listens at `host`.
 
     Args:
         host: address to listen at.
         allow_hosts: names by which browsers may call this machine.
-        token: whether requests need the token that is made here.
+        token: whether requests need a token.
+        tokens: private folder that keeps the token of loopback servers between starts, so that open tabs connect
+            again; None makes a new one.
 
     Raises:
         TrackerError: `host` is not loopback and `allow_hosts` is empty or no token is wanted, or a name is malformed.
@@ -119,7 +123,10 @@ def access_for(host: str, allow_hosts: Iterable[str] = (), token: bool = True) -
             f"listening on '{host}' needs the names by which browsers may call this machine, found none; "
             "add --allow-host NAME, or use --host 127.0.0.1 and an SSH tunnel"
         )
-    return Access(names, secrets.token_urlsafe(32), Invitation()) if token else Access(names)
+    if not token:
+        return Access(names)
+    kept = None if tokens is None or not is_loopback(host) or names else kept_token(tokens)
+    return Access(names, kept or secrets.token_urlsafe(32), Invitation())
 
 
 def is_loopback(name: str) -> bool:

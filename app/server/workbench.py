@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from platformdirs import user_state_path
+
 from app.control.controller import Controller
 from app.page.socket import PaneSocket
 from app.scene3d.gizmos import Gizmos
@@ -59,7 +61,8 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
     """
     session = load_session(folder)
     require_files(session)
-    access = access_for(serving.host, serving.allow_hosts, serving.token)
+    tokens = user_state_path("quadrille", appauthor=False)
+    access = access_for(serving.host, serving.allow_hosts, serving.token, tokens)
     static = static_folder()
     indices = footage_indices()
     with SessionLock(session.folder), Recording(session.cameras, indices=indices, in_background=True) as recording:
