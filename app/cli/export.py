@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import SessionArg
+from app.cli.arguments import OptionalName, OptionalRange, SessionArg
 from app.cli.json_output import format_json
 from app.cli.target import load_target, parse_frames
 from app.export.formats import FORMATS, ExportFormat, find_format
@@ -16,7 +16,11 @@ from tracker.errors import TrackerError
 if TYPE_CHECKING:
     from tracker.export.motion import ExportedMotion
 
-_FORMATS_HELP = "; ".join(f"{f.name}: {f.title}" for f in FORMATS.values()) + ". By default as --out ends."
+_FORMATS_HELP = "; ".join(f"{f.name}: {f.title}" for f in FORMATS.values())
+
+
+def _choice(words: str) -> Any:
+    return tyro.conf.arg(metavar=words, help_behavior_hint="")
 
 
 @dataclass(frozen=True)
@@ -27,20 +31,18 @@ class ExportArguments:
     """session folder."""
     out: Path
     """file to write, or a folder that exists, for a file named after the session."""
-    format: Annotated[str | None, tyro.conf.arg(help=f"{_FORMATS_HELP}. By default as --out ends.", metavar="NAME")] = (
-        None
-    )
-    person: str | None = None
+    format: Annotated[OptionalName, tyro.conf.arg(help=f"{_FORMATS_HELP}. By default as --out ends.")] = None
+    person: OptionalName = None
     """name; all people by default. In trc, mot and bvh each of several people has a file: OUT_NAME.trc."""
-    frames: str | None = None
+    frames: OptionalRange = None
     """A:B, half open; from the first to the last pose by default."""
-    axes: Literal["calibration", "y-up"] | None = None
+    axes: Annotated[Literal["calibration", "y-up"] | None, _choice("calibration|y-up")] = None
     """trc, csv, mot, bvh: calibration, the session's world (default of trc and csv); y-up, with the floor at y = 0."""
-    units: Literal["m", "mm"] | None = None
+    units: Annotated[Literal["m", "mm"] | None, _choice("m|mm")] = None
     """trc, csv, bvh: unit of lengths; m by default."""
-    view: str | None = None
+    view: OptionalName = None
     """mp4: name of the camera; a grid of all views by default."""
-    keypoints: Literal["all", "coco17", "body"] | None = None
+    keypoints: Annotated[Literal["all", "coco17", "body"] | None, _choice("all|coco17|body")] = None
     """coco: the 17 keypoints of people, all points of the body, or both, which is the default."""
     skip_lost: bool = False
     """treat poses whose status is lost as missing."""
