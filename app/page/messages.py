@@ -1,5 +1,6 @@
 """Messages to a page as pure functions of the state (docs/protocol.md)."""
 
+import secrets
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
@@ -26,6 +27,7 @@ from tracker.store.records import SOURCES, STATUSES, FramePose, HistoryEntry
 _FEW_CELLS = 2000
 """Largest number of timeline cells sent by name. More are sent as columns, which take a tenth of the bytes and time."""
 _NO_POSE = 255
+_START = secrets.token_hex(8)
 _NO_CELL: dict[str, Any] = {
     "source": "",
     "cost_px": None,
@@ -41,7 +43,7 @@ def session(session: Session) -> wire.SessionMessage:
     """Describe the session."""
     cameras = tuple(wire.CameraInfo(c.camera.name, c.camera.width, c.camera.height) for c in session.cameras)
     people = tuple(_person(p) for p in session.people)
-    return wire.SessionMessage(session.name, session.fps, session.n_frames, cameras, people)
+    return wire.SessionMessage(session.name, session.fps, session.n_frames, cameras, people, _START)
 
 
 def _person(person: Person) -> wire.PersonInfo:

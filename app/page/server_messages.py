@@ -77,6 +77,8 @@ class SessionMessage(Message, frozen=True, tag="session"):
     n_frames: int
     cameras: tuple[CameraInfo, ...]
     people: tuple[PersonInfo, ...]
+    start: str
+    """Identifies the start of the program. After another start a page goes back to the frame and person it showed."""
 
 
 # --- state ---------------------------------------------------------------------------------------------------------

@@ -29,10 +29,10 @@ export function mount() {
   /** @type {((notice: NoticeMessage) => void)[]} */
   const noticeListeners = [];
   const notify = (/** @type {NoticeMessage} */ notice) => noticeListeners.forEach((listener) => listener(notice));
-  const receiver = new Receiver(store, notify, recentImages);
   /** @type {Connection | null} */
   let connection = null;
   const send = (/** @type {ClientMessage} */ message) => connection?.send(message);
+  const receiver = new Receiver(store, notify, send, recentImages);
   return {
     store,
     send,

@@ -76,8 +76,8 @@
  * @typedef {{name: string, color: string, model: string, height_m: number, points: string[], minor: string[], heading:
  *   string[], bones: [string, string][], parts: string[], dofs: DofInfo[], point_dofs: Record<string, number[]>,
  *   point_limbs: Record<string, Limb>}} PersonInfo
- * @typedef {{type: "session", name: string, fps: number, n_frames: number, cameras: CameraInfo[], people:
- *   PersonInfo[]}} SessionMessage
+ * @typedef {{type: "session", name: string, fps: number, n_frames: number, cameras: CameraInfo[], people: PersonInfo[],
+ *   start: string}} SessionMessage
  * @typedef {{source: string | null, status: Status, shown: boolean, alternatives: number}} PersonState
  * @typedef {{running: boolean, kind: string | null, stage: string | null, stages: string[], evaluations: number,
  *   per_second: number, best_px: number | null, message: string}} Job

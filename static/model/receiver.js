@@ -11,19 +11,24 @@ const MAX_EARLY = 8;
 export class Receiver {
   #store;
   #notify;
+  #send;
   #recent;
   /** @type {PictureAssembler | null} */
   #pictures = null;
   /** @type {Map<number, import("./protocol.js").Overlay>} overlays that arrived before the images of their frame */
   #early = new Map();
+  /** @type {{frame: number, person: number} | null} what was shown before the program was started again */
+  #before = null;
 
   /**
    * @param {import("./store.js").Store} store
    * @param {(notice: import("./protocol.js").NoticeMessage) => void} notify
+   * @param {(message: import("./protocol.js").ClientMessage) => void} send
    * @param {import("./recent_images.js").RecentImages} recent caches the images of recent frames
    */
-  constructor(store, notify, recent) {
+  constructor(store, notify, send, recent) {
     this.#store = store;
+    this.#send = send;
     this.#recent = recent;
     this.#notify = notify;
     store.subscribe((changed) => {
@@ -44,6 +49,7 @@ export class Receiver {
         break;
       case "state":
         this.#store.set({ state: message });
+        this.#goBack(message);
         break;
       case "timeline":
         this.#mergeTimeline(message);
@@ -125,9 +131,24 @@ export class Receiver {
     this.#pictures = new PictureAssembler((frame, pictures) => this.#show(frame, pictures));
     this.#early.clear();
     this.#recent.clear(); // the footage may have changed while disconnected
-    const previous = this.#store.facts.session?.cameras;
+    const { session: previous, state } = this.#store.facts;
+    const isStartedAgain = previous?.name === session.name && previous.start !== session.start;
+    this.#before = isStartedAgain && state ? { frame: state.frame, person: state.person } : null;
     this.#store.set({ session, lanes: [] });
-    if (JSON.stringify(previous) !== JSON.stringify(session.cameras)) this.#store.set({ shown: null, overlay: null });
+    if (JSON.stringify(previous?.cameras) !== JSON.stringify(session.cameras)) this.#store.set({ shown: null, overlay: null });
+  }
+
+  /**
+   * Go back to what was shown before the program was started again, unless another page has gone elsewhere since.
+   *
+   * @param {import("./protocol.js").StateMessage} state of the new start
+   */
+  #goBack({ frame, person, point }) {
+    const before = this.#before;
+    this.#before = null;
+    if (!before || frame !== 0) return;
+    if (before.person !== person) this.#send({ type: "select", person: before.person, point });
+    if (before.frame !== 0) this.#send({ type: "seek", frame: before.frame });
   }
 
   /**

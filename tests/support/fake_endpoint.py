@@ -117,6 +117,8 @@ class FakeEndpoint:
     sizes: tuple = ((WIDTH, HEIGHT),)
     """Of the cameras' images, px; in turn, where there are more cameras."""
     sockets: set = field(default_factory=set)
+    start: str = "first"
+    """Identifies the start of the pretended program."""
 
     def __post_init__(self):
         self.pose = {(p, name): np.add(at, (0.9 * p, 0, 0)) for p in range(self.n_people) for name, at in REST.items()}
@@ -363,7 +365,7 @@ class FakeEndpoint:
         ]
         await socket.send_str(encoded({
             "type": "session", "name": "elbow_rotation", "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
-            "people": people,
+            "people": people, "start": self.start,
         }))  # fmt: skip
         await socket.send_str(encoded(self.state))
         sources = ["manual", "searched", "searched", "tracked", "tracked", "tracked", "interpolated", "smoothed"]

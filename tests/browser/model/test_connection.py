@@ -4,12 +4,29 @@ import asyncio
 
 import pytest
 from aiohttp import ClientSession, WSServerHandshakeError
+from fake_endpoint import FakeEndpoint
 from page_driver import dragging, shows, until
 from serving import listening
 
 from app.server.access import Access
 from app.server.private_viser import PrivateViser
 from app.server.server import create_app, static_folder
+
+
+async def test_after_another_start_the_page_goes_back_to_its_frame_and_person(browser, blank_viser):
+    first = FakeEndpoint(n_people=2)
+    first.state |= {"frame": 31, "person": 1}
+    page = await (await browser.new_context()).new_page()
+    async with listening(create_app(first, blank_viser, Access(), static_folder())) as port:
+        await page.goto(f"http://127.0.0.1:{port}/")
+        await shows(page, "window.quadrille?.state.shown.frame === 31")
+    await shows(page, "!quadrille.state.connected")
+    second = FakeEndpoint(n_people=2, start="second")
+    second.state |= {"frame": 0}
+    async with listening(create_app(second, blank_viser, Access(), static_folder()), port):
+        await shows(page, "quadrille.state.connected && quadrille.state.shown.frame === 31")
+        assert (second.state["frame"], second.state["person"]) == (31, 1)
+    await page.context.close()
 
 
 async def test_a_lost_connection_is_said_and_mended_with_the_true_state(browser, endpoint, blank_viser):
