@@ -56,8 +56,8 @@ async def searched(page):
 
 
 async def drawn(page, kind):
-    """Segments of a kind over the first view, as last drawn."""
-    return np.array(
+    """Segments of a kind over the first view, as last drawn, (N, 4); in one order, as a body is drawn side by side."""
+    rows = np.array(
         await page.evaluate(
             """(kind) => {
               const { paths, segments } = quadrille.state.overlay;
@@ -66,7 +66,8 @@ async def drawn(page, kind):
             }""",
             kind,
         )
-    )
+    ).reshape(-1, 4)
+    return rows[np.lexsort(rows.T)]
 
 
 async def test_a_search_goes_stage_by_stage_and_the_tree_marks_where_it_is(page):
