@@ -132,7 +132,7 @@ class Dragging:
             if not is_last:
                 self._costs.offer(session_state.state)
             if time.monotonic() - session_state.last_save > _CHECKPOINT_S:
-                session_state.save(f"drag {display_name(drag.point)}", "manual", self._gesture_grab)
+                session_state.save(f"drag {display_name(drag.point)}", "manual", self._gesture_grab, drag.person)
 
     def end(self, page: int) -> None:
         """Release the point; the gesture is one entry of the history, on disk when this returns."""
@@ -157,7 +157,7 @@ class Dragging:
         self._scores_moves = False
         has_moved = not np.array_equal(grab.pose, session_state.state.poses[drag.person])
         if has_moved or session_state.open_edit_owner is grab:
-            session_state.save(f"drag {display_name(drag.point)}", "manual", grab)
+            session_state.save(f"drag {display_name(drag.point)}", "manual", grab, drag.person)
             self._hold(drag)
         elif not session_state.is_shown_stored(session_state.state):
             session_state.show_frame(session_state.state.frame)  # moved back: the pose has its former source

@@ -146,7 +146,7 @@ class Pinning:
                 return
             self._session_state.set(pins=tuple(pins))
             what = "remove all pins" if point is None else f"remove pin {display_name(point)}{self._in(camera)}"
-            self._session_state.save(what, "manual")
+            self._session_state.save(what, "manual", None, person)
 
     def fit(self, frame: int, person: int | None = None) -> None:
         """Fit people to pins and edges together.
@@ -179,7 +179,7 @@ class Pinning:
             vouched = people if person is not None else pinned or [state.person]
             self._show_fit(people, vouched, state.people, state.pins)
             evidence = " and ".join([*(["pins"] if pinned else []), *(["edges"] if views is not None else [])])
-            self._session_state.save(f"fit to {evidence}", "fitted", vouched=vouched)
+            self._session_state.save(f"fit to {evidence}", "fitted", None, person, vouched)
 
     def _show_fit(
         self, fitted: Iterable[int], vouched: Sequence[int], start: tuple[ShownPose, ...], pins: Pins
@@ -221,7 +221,7 @@ class Pinning:
         if drag.pins == self._session_state.state.pins and self._session_state.open_edit_owner is not drag:
             return
         what = f"{'move' if had else 'set'} pin {display_name(drag.point)}{self._in(drag.camera)}"
-        self._session_state.save(what, "fitted", drag)
+        self._session_state.save(what, "fitted", drag, drag.person)
 
     def _in(self, camera: int | None) -> str:
         return "" if camera is None else f" in {self._session_state.session.cameras[camera].camera.name}"

@@ -204,4 +204,4 @@ class PoseEdits:
             not lasting and time.monotonic() - session_state.last_save > _SAME_GESTURE_S
         ):
             session_state.open_edit_owner = None
-        session_state.save(label, "manual", gesture)
+        session_state.save(label, "manual", gesture, person)

@@ -88,7 +88,7 @@ class CostLandscapes:
             model, state = models[person], self._session_state.state
             values = model.clip(along(model, state.poses[person], dof, np.array([value]))[0])
             self._session_state.show_pose(person, values)
-            self._session_state.save(f"set {display_name(model.dof_names[dof])}", "manual")
+            self._session_state.save(f"set {display_name(model.dof_names[dof])}", "manual", None, person)
 
     def close(self) -> None:
         """End the thread."""

@@ -206,21 +206,35 @@ class SessionState:
         self.show_frame(self.state.frame)
         self.refresh_saving()
 
-    def save(self, label: str, source: str, gesture: object = None, vouched: Collection[int] | None = None) -> None:
+    def save(
+        self,
+        label: str,
+        source: str,
+        gesture: object = None,
+        person: int | None = None,
+        vouched: Collection[int] | None = None,
+    ) -> None:
         """Save the shown poses.
 
         Args:
             label: of the entry of the history.
             source: of the values that changed.
             gesture: successive saves of one gesture make one entry; None makes an entry for this save.
+            person: index of the only person who is edited, whom the label then names; None for several.
             vouched: indices of the people whom the edit is about, as for `Saver.save`; None for all.
         """
+        label = self.label_of(label, person)
         goes_on = gesture is not None and (self.open_edit_owner is gesture or self.open_edit_owner == gesture)
         amend = self._edit if goes_on else None
         self._edit = self.saver.save(self.state, label, source, amend, vouched)
         self.open_edit_owner, self.last_save = gesture, time.monotonic()
         self.note_stored()
         self.refresh_saving()
+
+    def label_of(self, label: str, person: int | None) -> str:
+        """Return the label of an edit of one person, whom it names where there are several."""
+        people = self.session.people
+        return label if person is None or len(people) == 1 else f"{people[person].name}: {label}"
 
     def note_stored(self) -> None:
         """Note that the saver has the shown poses and pins; those that it cannot write wait in its queue."""

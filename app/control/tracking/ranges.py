@@ -80,7 +80,7 @@ class Ranges:
                     "set a pose at each end first"
                 )
             total = sum(end - start - 1 for _, start, end in gaps)
-            run = _Run(f"interpolate frames {first} to {last}", "interpolated", by_program=True)
+            run = _Run(self._label(f"interpolate frames {first} to {last}", people), "interpolated", by_program=True)
             self._begin(run, "interpolating", total, (c for gap in gaps for c in self._filled(*gap)))
 
     def clear(self, first: int, last: int, people: Sequence[int] | None = None) -> None:
@@ -98,7 +98,7 @@ class Ranges:
                     "to clear keyframes too, remove their marks first"
                 )
             changes = (PoseChange(self._name(i), row.frame, None) for i, row in rows)
-            run = _Run(f"clear frames {first} to {last}", "cleared", by_program=True)
+            run = _Run(self._label(f"clear frames {first} to {last}", people), "cleared", by_program=True)
             self._begin(run, "clearing", len(rows), changes)
 
     def mark(self, first: int, last: int, mark: Mark, people: Sequence[int] | None = None) -> None:
@@ -115,7 +115,7 @@ class Ranges:
             changes = [c for i, row in rows if (c := _marked(self._name(i), row, mark)) is not None]
             where = f"frame {first}" if first == last else f"frames {first} to {last}"
             how = {"keyframe": "as keyframe", "none": "as no keyframe"}.get(mark, f"as {mark}")
-            run = _Run(f"mark {where} {how}", "marked", by_program=False)
+            run = _Run(self._label(f"mark {where} {how}", people), "marked", by_program=False)
             self._begin(run, "marking", len(changes), iter(changes))
 
     def toggle_keyframe(self) -> None:
@@ -132,7 +132,7 @@ class Ranges:
                 values, ("manual",) * len(values), saver.revisions.current(state.person), keyframe=True, reviewed=True
             )
             change = PoseChange(self._name(state.person), state.frame, record)
-            run = _Run(f"keyframe, frame {state.frame}", "marked", by_program=False)
+            run = _Run(self._label(f"keyframe, frame {state.frame}", [state.person]), "marked", by_program=False)
             self._begin(run, "marking", 1, iter([change]))
 
     def toggle_reviewed(self) -> None:
@@ -240,6 +240,9 @@ class Ranges:
         return [
             (i, row) for i in self._checked(people) for row in self._session_state.saver.rows(i, range(first, last + 1))
         ]
+
+    def _label(self, label: str, people: Sequence[int] | None) -> str:
+        return self._session_state.label_of(label, people[0] if people is not None and len(people) == 1 else None)
 
     def _name(self, person: int) -> str:
         return self._session_state.session.people[person].name

@@ -189,3 +189,13 @@ def test_what_is_done_for_several_people_counts_frames_and_people(couple):
             couple.pose_edits.set_dof(person, 3, 0.1 * frame)
     couple.ranges.interpolate(0, 6)
     assert couple.state.ranges.message == "interpolated 5 frames of 2 people"
+
+
+def test_the_history_names_the_person(couple):
+    couple.pose_edits.set_dof(1, 3, 0.1)
+    assert couple.state.undo.startswith("bob: set ")
+    couple.navigation.select(1, None)
+    couple.ranges.toggle_keyframe()
+    assert couple.state.undo == "bob: mark frame 0 as no keyframe"
+    couple.ranges.mark(0, 0, "keyframe")
+    assert couple.state.undo == "mark frame 0 as keyframe"

@@ -122,7 +122,7 @@ def test_a_pose_is_bent_as_the_others_and_stays_in_its_place(couple):
     np.testing.assert_array_equal(bent[:6], bob[:6])
     np.testing.assert_allclose(bent[6:], ann[6:])
     assert couple.state.people[BOB].source == "manual"
-    assert couple.state.undo == "copy the pose of ann, frame 0"
+    assert couple.state.undo == "bob: copy the pose of ann, frame 0"
     couple.history.undo()
     assert couple.state.people[BOB].source is None
     with pytest.raises(TrackerError, match="expected another person"):
