@@ -1,7 +1,6 @@
 """References for an evaluation: joints of a TRC file, poses of a CSV table, or another session."""
 
 from collections.abc import Sequence
-from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,12 +10,12 @@ from tracker.body.model import BodyModel
 from tracker.errors import FormatError, SessionError
 from tracker.evaluation.metrics import Motion, at_rate, joints_of_poses, remap_axes
 from tracker.formats.joint_maps import joints_of, read_joint_map
-from tracker.formats.model_toml import PRESETS, load_model, parse_model
+from tracker.formats.model_toml import PRESETS, load_model
 from tracker.formats.pose_csv import PoseTable, read_pose_table
 from tracker.formats.trc import MarkerTable, read_trc
 from tracker.geometry.arrays import Array
 from tracker.session.session import SESSION_FILE, Session, load_session
-from tracker.store.annotation_store import AnnotationStore
+from tracker.store.stored_poses import read_stored_poses
 
 
 class Reference(NamedTuple):
@@ -82,17 +81,12 @@ def stored_motion(session: Session, person: int) -> Reference:
     The dimensions of a body may have changed since: a pose belongs to the model revision that it names.
     """
     name, model = session.people[person].name, session.people[person].model
-    by_revision: dict[int, dict[int, Array]] = {}
-    models: dict[int, BodyModel] = {}
-    if session.annotations_path.exists():
-        with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
-            for row in store.frames(name):
-                record = store.pose(name, row.frame)
-                if record is not None and len(record.values) == len(model.value_names):
-                    by_revision.setdefault(record.model_revision, {})[row.frame] = record.values
-            models = {r: parse_model(store.model_revision(r).toml, f"of '{name}', revision {r}") for r in by_revision}
-    tables = [joints_of_poses(models[r], poses, session.fps) for r, poses in by_revision.items()]
-    poses = {frame: values for some in by_revision.values() for frame, values in some.items()}
+    by_model: dict[BodyModel, dict[int, Array]] = {}
+    for frame, stored in read_stored_poses(session.annotations_path, name, model).items():
+        if len(stored.body.values) == len(model.value_names):
+            by_model.setdefault(stored.body.model, {})[frame] = stored.body.values
+    tables = [joints_of_poses(m, poses, session.fps) for m, poses in by_model.items()]
+    poses = {frame: values for some in by_model.values() for frame, values in some.items()}
     return Reference(_merged(tables) if tables else joints_of_poses(model, {}, session.fps), Motion(model, poses))
 
 

@@ -1,7 +1,6 @@
 """Read the stored poses of a session that are exported."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,26 +8,11 @@ import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import SessionError
-from tracker.formats.model_toml import format_model, parse_model
 from tracker.geometry.arrays import Array
 from tracker.motion.interpolation import interpolate_pose
 from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Person, Session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import SOURCES, PoseRecord
-
-
-@dataclass(frozen=True, eq=False)
-class StoredPose:
-    """A stored pose, in the body that it was made with."""
-
-    body: PosedBody
-    record: PoseRecord
-
-    @property
-    def source(self) -> str:
-        """The most manual source of its values."""
-        return min(self.record.sources, key=SOURCES.index)
+from tracker.store.stored_poses import StoredPose, read_stored_poses
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +33,7 @@ class PersonMotion:
     @cached_property
     def models(self) -> list[BodyModel]:
         """The bodies of all poses, each once, in the order of frames."""
-        return list({id(p.body.model): p.body.model for p in self.poses.values()}.values())
+        return list(dict.fromkeys(p.body.model for p in self.poses.values()))
 
     @property
     def n_refitted(self) -> int:
@@ -140,7 +124,7 @@ def read_motion(
     within = range(session.n_frames) if frames is None else frames
     people, n_lost = [], 0
     for index, person in enumerate(session.people):
-        stored = _stored_poses(session, person, within)
+        stored = read_stored_poses(session.annotations_path, person.name, person.model, within)
         lost = [frame for frame, pose in stored.items() if pose.record.status == "lost"]
         n_lost += len(lost) * (index in chosen)
         poses = {f: p for f, p in stored.items() if not skip_lost or p.record.status != "lost"}
@@ -157,23 +141,3 @@ def read_motion(
         found = [frame for i in having for frame in people[i].poses]
         within = range(min(found), max(found) + 1)
     return ExportedMotion(session, within, tuple(people), having, n_lost)
-
-
-def _stored_poses(session: Session, person: Person, frames: range) -> dict[int, StoredPose]:
-    """Return the poses of a person by frame, each in the body of its model revision."""
-    if not session.annotations_path.exists():
-        return {}
-    models: dict[int, BodyModel] = {}
-    out = {}
-    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
-        for row in store.frames(person.name, frames):
-            record = store.pose(person.name, row.frame)
-            if record is None:
-                continue  # another program has cleared it
-            if record.model_revision not in models:
-                toml = store.model_revision(record.model_revision).toml
-                where = f"of '{person.name}', revision {record.model_revision}"
-                is_present = toml == format_model(person.model)
-                models[record.model_revision] = person.model if is_present else parse_model(toml, where)
-            out[row.frame] = StoredPose(PosedBody(models[record.model_revision], record.values), record)
-    return out

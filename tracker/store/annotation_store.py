@@ -69,12 +69,17 @@ class AnnotationStore:
 
     def pose(self, person: str, frame: int) -> PoseRecord | None:
         """Return the pose of a person in a frame, or None."""
-        row = self._connection.one(
-            f"SELECT {rows.RECORD_COLUMNS} {rows.CURRENT_POSES} JOIN edits e ON e.id = c.edit "
-            "LEFT JOIN program_settings t ON t.id = c.program_settings WHERE p.person = ? AND p.frame = ?",
-            (person, frame),
+        return self.poses(person, range(frame, frame + 1)).get(frame)
+
+    def poses(self, person: str, frames: range) -> dict[int, PoseRecord]:
+        """Return the poses of a person in a range of frames, by frame, ascending."""
+        found = self._connection.all(
+            f"SELECT p.frame, {rows.RECORD_COLUMNS} {rows.CURRENT_POSES} JOIN edits e ON e.id = c.edit "
+            "LEFT JOIN program_settings t ON t.id = c.program_settings "
+            "WHERE p.person = ? AND p.frame BETWEEN ? AND ? ORDER BY p.frame",
+            (person, frames.start, frames.stop - 1),
         )
-        return None if row is None else rows.row_to_record(row)
+        return {frame: rows.row_to_record(row) for frame, *row in found}
 
     def alternatives(self, person: str, frame: int) -> tuple[Alternative, ...]:
         """Return the alternatives to a person's pose in a frame, best first."""
