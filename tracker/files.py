@@ -8,15 +8,21 @@ from pathlib import Path
 from tracker.errors import SessionError
 
 
-def write_text_atomic(path: Path, text: str) -> None:
+def write_text_atomic(path: Path, text: str, mode: int = 0o666) -> None:
     """Write UTF-8 text to a temporary sibling, then rename it to `path`: a crash leaves the old file or the new one.
+
+    Args:
+        path: the file.
+        text: its content.
+        mode: permissions, less those that the process masks; 0o600 for a file of this user alone.
 
     Raises:
         OSError: the folder is missing or not writable, or the disk is full.
     """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
-        with temporary.open("x", encoding="utf-8", newline="") as file:
+        opened = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
+        with open(opened, "w", encoding="utf-8", newline="") as file:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())

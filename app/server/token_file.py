@@ -7,6 +7,8 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from tracker.files import write_text_atomic
+
 _NAME = "token"
 _KEPT_S = 7 * 86400.0
 """Age from which a token is replaced."""
@@ -27,7 +29,8 @@ def kept_token(folder: Path) -> str:
     if token is None:
         token = secrets.token_urlsafe(32)
         with suppress(OSError):
-            _write(path, token)
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            write_text_atomic(path, token, mode=0o600)
     return token
 
 
@@ -44,14 +47,3 @@ def _read(path: Path) -> str | None:
             return None
         text = opened.read(_MAX_BYTES).decode("ascii", "replace")
     return text if len(text) >= 43 and text.replace("-", "").replace("_", "").isalnum() and text.isascii() else None
-
-
-def _write(path: Path, token: str) -> None:
-    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    temporary = path.with_name(f".{_NAME}.{secrets.token_hex(4)}.tmp")
-    try:
-        with os.fdopen(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
-            file.write(token)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)

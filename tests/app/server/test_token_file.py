@@ -55,9 +55,9 @@ def test_a_file_that_cannot_be_trusted_is_replaced(tmp_path, how):
 
 
 def test_without_a_writable_folder_a_token_holds_for_one_start(tmp_path, monkeypatch):
-    def full(*_words):
+    def full(*_words, **_more):
         raise OSError("no space left on device")
 
-    monkeypatch.setattr(token_file, "_write", full)
+    monkeypatch.setattr(token_file, "write_text_atomic", full)
     assert kept_token(tmp_path) != kept_token(tmp_path)
     assert list(tmp_path.iterdir()) == []
