@@ -48,7 +48,7 @@ export class Transport {
       this.#frame.value = String(this.#store.facts.target);
     });
     this.#frame.addEventListener("keydown", (event) => {
-      if (event.key === "Enter" || event.key === "Escape") this.#frame.blur();
+      if (event.key === "Escape") this.#frame.blur(); // Enter: `leaveFields`
     });
     store.subscribe((changed) => {
       if (changed.has("session")) this.#showSession();

@@ -19,28 +19,15 @@ export function watchTyping(target) {
 }
 
 /**
- * Give the keys back to the page: a field loses the focus after Enter, a list after a choice by the pointer. Fields with
- * refused text and those of dialogs keep it.
+ * Give the keys back to the page: a field loses the focus after Enter, unless its text was refused or it is in a dialog.
  *
  * @param {Document} target
  */
 export function leaveFields(target) {
-  /** @type {EventTarget | null} the list that the pointer has opened */
-  let opened = null;
-  target.addEventListener("pointerdown", (event) => (opened = event.target), true);
-  target.addEventListener("keydown", (event) => {
-    opened = null;
-    if (event.key === "Enter") leave(event.target, "input:not([aria-invalid])");
+  target.addEventListener("keydown", ({ key, target: field }) => {
+    if (key !== "Enter" || !(field instanceof HTMLInputElement)) return;
+    if (!field.ariaInvalid && !field.closest("dialog, [role=dialog]")) field.blur();
   });
-  target.addEventListener("change", (event) => event.target === opened && leave(event.target, "select"));
-}
-
-/**
- * @param {EventTarget | null} field
- * @param {string} selector of the fields that are left
- */
-function leave(field, selector) {
-  if (field instanceof HTMLElement && field.matches(selector) && !field.closest("dialog, [role=dialog]")) field.blur();
 }
 
 /**
