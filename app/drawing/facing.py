@@ -1,5 +1,7 @@
 """Show where the heads of people face: an arrow from the face, in the views and in 3-D."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
@@ -41,8 +43,9 @@ def facing_arrow(body: PosedBody, camera: Camera) -> tuple[FloatArray, bool]:
     return lines.reshape(-1, 4).astype(np.float32), bool(depths[1] > depths[0])
 
 
+@lru_cache(maxsize=32)
 def face_part(model: BodyModel) -> Array:
-    """Return the middle of the face in the frame of the head, (3,), metres."""
+    """Return the middle of the face in the frame of the head, (3,), metres; cached, because models are immutable."""
     part = model.part_index[_HEAD]
     vertices = model.shapes[part].triangles().vertices
     return np.asarray(model.centers_part[part] + (vertices[:, 0].max(), 0.0, 0.0))

@@ -259,22 +259,23 @@ def _is_near(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_], target_
 
     A target beyond the chain's full length counts at that length.
     """
-    places = _chain(grabbed, pose, active_dofs)
-    length = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    places, length = _chain(grabbed, pose, active_dofs)
     way = target_world - places[-1]
     reachable = places[-1] + min(1.0, length / max(float(np.linalg.norm(way)), 1e-9)) * way
     return float(np.linalg.norm(places[0] - reachable)) < _NEAR_M
 
 
-def _chain(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_]) -> Array:
-    """Return the positions of the grabbed point and of the joints up to the first that follows it, (n, 3), metres."""
+def _chain(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_]) -> tuple[Array, float]:
+    """Return the positions of the grabbed point and of the joints up to the first that follows it, (n, 3), and the
+    length of that chain, metres."""
     model, part, first = grabbed.model, grabbed.part, int(grabbed.model.dof_joint[active_dofs][0])
     places = [grabbed.point_world(pose)]
     Ts_world_part = model.kinematics(pose).Ts_world_part
     while part != first:
         places.append(Ts_world_part[part, :3, 3])
         part = int(model.parents[part])
-    return np.array([*places, Ts_world_part[first, :3, 3]])
+    found = np.array([*places, Ts_world_part[first, :3, 3]])
+    return found, float(np.linalg.norm(np.diff(found, axis=0), axis=1).sum())
 
 
 def _has_reached(grabbed: Grab, pose: Array, target_world: Array) -> bool:
@@ -286,6 +287,5 @@ def _has_reached(grabbed: Grab, pose: Array, target_world: Array) -> bool:
 
 def _is_stretched(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_], target_world: Array) -> bool:
     """Return whether the chain of the point has its full length and its target is farther away."""
-    places = _chain(grabbed, pose, active_dofs)
-    length = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    places, length = _chain(grabbed, pose, active_dofs)
     return bool(min(np.linalg.norm(p - places[-1]) for p in (places[0], target_world)) > _STRETCHED * length)
