@@ -1,4 +1,4 @@
-"""Check that the footage of two cameras is not exchanged, for the commands that tell it."""
+"""Check that the footage of two cameras is not exchanged, for the commands that report it."""
 
 from typing import TYPE_CHECKING
 

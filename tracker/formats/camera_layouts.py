@@ -1,8 +1,8 @@
 """Rewrite cameras of common layouts to sections of the anipose layout.
 
-A layout is read where its keys tell the convention: OpenCV's names (K, R, t, rvec, ...), which mean
-`X_camera = R X_world + t` and OpenCV's order of distortion; EasyMocap; CMU Panoptic; Kalibr. A pose from camera to
-world is read only under a key that tells its direction.
+A layout is read where its keys fix the convention: OpenCV's names (K, R, t, rvec, ...), which mean
+`X_camera = R X_world + t` and OpenCV's order of distortion; EasyMocap; CMU Panoptic; Kalibr. Poses map world to camera;
+camera-to-world poses are not read.
 """
 
 from collections.abc import Mapping
