@@ -1,10 +1,14 @@
 """Check that the footage of two cameras is not exchanged, for the commands that report it."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
+    from tracker.footage.recording import Recording
     from tracker.geometry.arrays import Array
     from tracker.session.session import Session
+
+T = TypeVar("T")
 
 
 def exchange_note(session: "Session") -> str | None:
@@ -12,31 +16,17 @@ def exchange_note(session: "Session") -> str | None:
 
     Footage that cannot be read is not checked: what needs it says so.
     """
-    from app.session.footage_indices import footage_indices
-    from tracker.errors import RecordingError
     from tracker.evidence.camera_exchange import find_exchange
-    from tracker.footage.recording import Recording
 
-    try:
-        with Recording(session.cameras, indices=footage_indices()) as recording:
-            found = find_exchange(session.cameras, recording)
-    except RecordingError:
-        return None
+    found = _looked_at(session, lambda recording: find_exchange(session.cameras, recording))
     return None if found is None else found.text
 
 
 def body_exchange_note(session: "Session", frame: int, points_world: "Array") -> str | None:
     """Return a sentence about two cameras that see a body, (N, 3), metres, only if exchanged; else None."""
-    from app.session.footage_indices import footage_indices
-    from tracker.errors import RecordingError
     from tracker.evidence.camera_exchange import find_body_exchange
-    from tracker.footage.recording import Recording
 
-    try:
-        with Recording(session.cameras, indices=footage_indices()) as recording:
-            found = find_body_exchange(session.cameras, recording, frame, points_world)
-    except RecordingError:
-        return None
+    found = _looked_at(session, lambda recording: find_body_exchange(session.cameras, recording, frame, points_world))
     if found is None:
         return None
     a, b = found
@@ -44,3 +34,16 @@ def body_exchange_note(session: "Session", frame: int, points_world: "Array") ->
         f"the footage of '{a}' and '{b}' seems to be exchanged: nothing differs from the background where the body is, "
         "and it does with the two exchanged; check which file is of which camera"
     )
+
+
+def _looked_at(session: "Session", find: "Callable[[Recording], T | None]") -> T | None:
+    """Return what a function finds in the footage of a session; None also where that cannot be read."""
+    from app.session.footage_indices import footage_indices
+    from tracker.errors import RecordingError
+    from tracker.footage.recording import Recording
+
+    try:
+        with Recording(session.cameras, indices=footage_indices()) as recording:
+            return find(recording)
+    except RecordingError:
+        return None
