@@ -9,7 +9,7 @@ import tyro
 from app.cli.arguments import OptionalName, OptionalRange, SessionArg
 from app.cli.json_output import format_json
 from app.cli.target import load_target, parse_frames
-from app.export.formats import FORMATS, ExportFormat, find_format
+from app.export.formats import FORMATS, OPTIONS, ExportFormat, find_format
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 
@@ -63,7 +63,7 @@ def command(arguments: Annotated[ExportArguments, tyro.conf.arg(name="")]) -> No
     at = load_target(arguments.session, arguments.person, several=True)
     chosen = find_format(arguments.format, arguments.out)
     out = _file(arguments.out, chosen, at.session.folder.name)
-    given = {name: getattr(arguments, name) for name in ("axes", "units", "view", "keypoints")}
+    given = {name: getattr(arguments, name) for name in OPTIONS}
     options = check_options(chosen, at.session, given)
     frames = None if arguments.frames is None else parse_frames(arguments.frames, at.session)
     motion = read_motion(at.session, at.people, frames, arguments.skip_lost)

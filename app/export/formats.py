@@ -38,34 +38,18 @@ class ExportFormat:
     """Whether all poses of a person are of one body; those of earlier sizes are refitted."""
 
 
-def _trc(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:
-    from tracker.export.writers import write_person_trc
+def _by_writer(name: str) -> Writer:
+    """Return a function of `tracker.export.writers`, which is imported at the first export: help is quick without."""
 
-    write_person_trc(motion, options, paths, tick)
+    def write(
+        motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]
+    ) -> None:
+        from tracker.export import writers
 
+        writer: Writer = getattr(writers, name)
+        writer(motion, options, paths, tick)
 
-def _csv(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:
-    from tracker.export.writers import write_tables
-
-    write_tables(motion, options, paths, tick)
-
-
-def _mot(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:
-    from tracker.export.writers import write_person_opensim
-
-    write_person_opensim(motion, options, paths, tick)
-
-
-def _coco(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:
-    from tracker.export.writers import write_keypoints
-
-    write_keypoints(motion, options, paths, tick)
-
-
-def _bvh(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:
-    from tracker.export.writers import write_person_bvh
-
-    write_person_bvh(motion, options, paths, tick)
+    return write
 
 
 def _mp4(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:
@@ -74,17 +58,21 @@ def _mp4(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Pat
     write_overlay_video(motion, options, paths[0], tick)
 
 
+OPTIONS = ("axes", "units", "view", "keypoints")
+"""Options that a format may have, the fields of `ExportOptions`."""
 _PLACE = frozenset(("axes", "units"))
 FORMATS: Mapping[str, ExportFormat] = {
     f.name: f
     for f in (
-        ExportFormat("trc", "joint centers (TRC)", (".trc",), _trc, _PLACE, one_person=True),
-        ExportFormat("csv", "tables of joints and angles (CSV)", (".csv", "_angles.csv"), _csv, _PLACE),
+        ExportFormat("trc", "joint centers (TRC)", (".trc",), _by_writer("write_person_trc"), _PLACE, one_person=True),
+        ExportFormat(
+            "csv", "tables of joints and angles (CSV)", (".csv", "_angles.csv"), _by_writer("write_tables"), _PLACE
+        ),
         ExportFormat(
             "mot",
             "OpenSim motion with its model (MOT, OSIM)",
             (".mot", ".osim"),
-            _mot,
+            _by_writer("write_person_opensim"),
             frozenset(("axes",)),
             one_person=True,
             axes="y-up",
@@ -95,7 +83,7 @@ FORMATS: Mapping[str, ExportFormat] = {
             "coco",
             "keypoints in each view (COCO)",
             (".json",),
-            _coco,
+            _by_writer("write_keypoints"),
             frozenset(("keypoints",)),
             gaps="left without annotation",
         ),
@@ -103,7 +91,7 @@ FORMATS: Mapping[str, ExportFormat] = {
             "bvh",
             "skeleton animation (BVH)",
             (".bvh",),
-            _bvh,
+            _by_writer("write_person_bvh"),
             _PLACE,
             one_person=True,
             axes="y-up",

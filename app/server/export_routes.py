@@ -15,13 +15,12 @@ from urllib.parse import quote
 
 from aiohttp import web
 
-from app.export.formats import FORMATS, ExportFormat
+from app.export.formats import FORMATS, OPTIONS, ExportFormat
 from app.server import connections
 from tracker.errors import TrackerError
 
 _LOG = logging.getLogger(__name__)
 _CHUNK_BYTES = 1 << 18
-_OPTIONS = ("axes", "units", "view", "keypoints")
 
 
 class _StoppedError(Exception):
@@ -97,7 +96,7 @@ class ExportRoutes:
         if person is not None and person not in names:
             raise TrackerError(f"expected a person of {', '.join(names)}, found '{person}'; reload the page")
         people = tuple(range(len(names))) if person is None else (names.index(person),)
-        options = check_options(chosen, session, {name: query.get(name) for name in _OPTIONS})
+        options = check_options(chosen, session, {name: query.get(name) for name in OPTIONS})
         frames = None if not query.get("frames") else _frames(query["frames"], session.n_frames)
         motion = read_motion(session, people, frames, query.get("skip_lost") == "1")
         self._total = n_ticks(chosen, motion)
