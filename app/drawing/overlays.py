@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -10,14 +11,14 @@ from app.drawing.facing import facing_arrow
 from app.state.page_view import View
 from app.state.people import DragState
 from app.state.state import State
-from tracker.body.model import PosedBody
+from tracker.body.model import BodyModel, PosedBody
 from tracker.contours import occluding_contours, part_edges
 from tracker.contours.occluding_contours import Contour
 from tracker.contours.pieces import PIECE_PX
 from tracker.contours.surfaces import surfaces_of
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray, IntArray
 from tracker.geometry.cameras import Camera, epipolar_segment
 from tracker.images.background_subtraction import Mask
 from tracker.images.edge_segments import accept_segments
@@ -261,17 +262,23 @@ def _by_person(
     ]
 
 
+@lru_cache(maxsize=32)
+def _part_sides(models: tuple[BodyModel, ...]) -> IntArray:
+    """Return the side of each part of some bodies, as an index into `SIDES`; cached, because models are immutable."""
+    return np.array([SIDES.index(side_of(part.name)) for model in models for part in model.parts])
+
+
 def _by_side(
     session: Session, bodies: Sequence[PosedBody], contour: Contour, chosen: Mask, index: int, kind: PathKind
 ) -> list[Path]:
     """Return some pieces of a contour as one path per person and side of the body."""
     models = tuple(b.model for b in bodies)
     people = surfaces_of(models).people[contour.parts]
-    sides = np.array([side_of(part.name) for model in models for part in model.parts])[contour.parts]
+    sides = _part_sides(models)[contour.parts]
     return [
-        Path(index, i, kind, person.color, contour.pieces_px[chosen & (people == i) & (sides == side)], side)
+        Path(index, i, kind, person.color, contour.pieces_px[chosen & (people == i) & (sides == k)], side)
         for i, person in enumerate(session.people)
-        for side in SIDES
+        for k, side in enumerate(SIDES)
     ]
 
 
@@ -281,7 +288,7 @@ def _by_part(
     """Return some pieces of a contour as one path per part that has any."""
     models = tuple(b.model for b in bodies)
     people, colors = surfaces_of(models).people, part_colors(session.people)
-    sides = [side_of(part.name) for model in models for part in model.parts]
+    sides = _part_sides(models)
     return [
         Path(
             index,
@@ -289,7 +296,7 @@ def _by_part(
             kind,
             colors[part],
             contour.pieces_px[chosen & (contour.parts == part)],
-            sides[part],
+            SIDES[sides[part]],
         )
         for part in np.unique(contour.parts[chosen])
     ]

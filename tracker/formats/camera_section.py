@@ -47,10 +47,7 @@ _RotationMatrix: TypeAlias = Annotated[
 class _CameraSection(msgspec.Struct):
     """The section of one camera; it may have other keys besides."""
 
-    size: (
-        Annotated[tuple[_Pixels, _Pixels], Meta(description="width and height in whole pixels, from 1 to 32767,")]
-        | None
-    )
+    size: _Size | None
     matrix: Annotated[
         tuple[tuple[_Focal, Number, Number], tuple[_Zero, _Focal, Number], tuple[_Zero, _Zero, _One]],
         Meta(description="[[fx, skew, cx], [0, fy, cy], [0, 0, 1]] with positive fx and fy"),
