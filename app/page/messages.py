@@ -13,6 +13,7 @@ from app.drawing.floor_lines import floor_lines
 from app.page import server_messages as wire
 from app.page.binary_headers import CellsHeader, CurvesHeader, Outline, OverlayHeader, Path, Plot
 from app.page.encoding import encode_binary
+from app.state.comparison import PoseComparison
 from app.state.floor_picking import Picking
 from app.state.page_view import View
 from app.state.progress import TrackState
@@ -87,6 +88,7 @@ def state(session: Session, state: State) -> wire.StateMessage:
         other_sizes=state.revisions[state.person] != state.present[state.person],
         job=_job(state.search),
         replay=_replay(state.search_view.replay),
+        compared=_compared(state.compared),
         track=_track(state.track),
         range=wire.RangeWork(
             state.ranges.running, state.ranges.what, state.ranges.done, state.ranges.total, state.ranges.message
@@ -129,8 +131,8 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         hulls.append(Outline(hull.camera, hull.person, hull.part, hull.depth, first, count))
         segments.append(hull.segments_px)
         first += count
-    # A replayed step is no stored pose, so its joints cannot be dragged.
-    handles = overlays.handles(session, state, view.cameras) if state.search_view.replay is None else []
+    # A replayed or former pose is not the stored one, so its joints cannot be dragged.
+    handles = overlays.handles(session, state, view.cameras) if state.is_stored_drawn else []
     header = OverlayHeader(
         frame=state.frame,
         seq=dict(state.drag_seqs).get(page, 0),
@@ -248,6 +250,21 @@ def _job(job: SearchState) -> wire.Job:
 
 def _replay(replay: ReplayState | None) -> wire.ReplayedStep | None:
     return None if replay is None else wire.ReplayedStep(replay.run, replay.step, replay.steps, replay.stage)
+
+
+def _compared(last: PoseComparison | None) -> wire.Compared | None:
+    if last is None:
+        return None
+    return wire.Compared(
+        number=last.number,
+        work=last.work,
+        before_px=last.before_px,
+        after_px=last.after_px,
+        before_view_costs_px=last.before_view_costs_px,
+        after_view_costs_px=last.after_view_costs_px,
+        warning=last.warning,
+        is_before_shown=last.is_before_shown,
+    )
 
 
 def _track(track: TrackState) -> wire.Track:

@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias, Union, get_args
 
 from app.page.message_types import Message, Part, Status
 from app.page.search_messages import SearchRunsMessage, SearchSetupMessage
+from app.state.comparison import ComparedWork
 
 # --- session -------------------------------------------------------------------------------------------------------
 
@@ -167,6 +168,24 @@ class ReplayedStep(Part, frozen=True):
     stage: str | None
 
 
+class Compared(Part, frozen=True):
+    """The last fit or search, while its result is shown unchanged."""
+
+    number: int
+    """Differs between fits and searches; a search that continues keeps it."""
+    work: ComparedWork
+    before_px: float | None
+    """Mean cost before."""
+    after_px: float | None
+    before_view_costs_px: tuple[float | None, ...]
+    """By camera; empty where unknown."""
+    after_view_costs_px: tuple[float | None, ...]
+    warning: str
+    """Where the edges and the user's placement disagree by much, as a sentence; empty if nowhere."""
+    is_before_shown: bool
+    """Whether the views show the poses before. The costs are theirs then, and the overlay has no handles."""
+
+
 class FloorPicking(Part, frozen=True):
     """Progress of setting the floor."""
 
@@ -226,6 +245,8 @@ class StateMessage(Message, frozen=True, tag="state"):
     job: Job
     replay: ReplayedStep | None
     """While one is shown, the costs are those of the step, and the overlay shows its best and its candidate."""
+    compared: Compared | None
+    """Null where there is no such result, or it has changed."""
     track: Track
     range: RangeWork
     follow: bool

@@ -20,6 +20,7 @@
  * @typedef {{type: "view", layers: Layer[], reductions: number[], by_part: boolean}} SetView
  * @typedef {{type: "people", action: "show", person: number, shown: boolean}} ShowPerson
  * @typedef {{type: "people", action: "solo", on: boolean}} Solo
+ * @typedef {{type: "before", shown: boolean}} ShowBefore
  * @typedef {{type: "curves", group: CurveGroup | null}} ShowCurves
  * @typedef {{type: "watch", tab: "search" | "landscape" | null}} WatchTab
  * @typedef {{type: "history", limit: number}} ShowHistory
@@ -82,6 +83,9 @@
  * @typedef {{running: boolean, kind: string | null, stage: string | null, stages: string[], evaluations: number,
  *   per_second: number, best_px: number | null, message: string}} Job
  * @typedef {{run: number, step: number, steps: number, stage: string | null}} ReplayedStep
+ * @typedef {{number: number, work: "fit" | "search", before_px: number | null, after_px: number | null,
+ *   before_view_costs_px: (number | null)[], after_view_costs_px: (number | null)[], warning: string, is_before_shown:
+ *   boolean}} Compared
  * @typedef {{running: boolean, first: number | null, last: number | null, at: number | null, done: number, total:
  *   number, per_second: number, doubtful: number, lost: number, back: boolean, message: string}} Track
  * @typedef {{running: boolean, what: string, done: number, total: number, message: string}} RangeWork
@@ -91,9 +95,9 @@
  * @typedef {{type: "state", frame: number, person: number, point: string | null, people: PersonState[], solo: boolean,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
  *   part_costs_px: (number | null)[], dofs: number[], locked: number[], other_sizes: boolean, job: Job, replay:
- *   ReplayedStep | null, track: Track, range: RangeWork, follow: boolean, snapped: number | null, floor: FloorPicking |
- *   null, footage: FootageProgress, compiling: boolean, undo: string | null, redo: string | null, saved: boolean,
- *   save_error: string | null}} StateMessage
+ *   ReplayedStep | null, compared: Compared | null, track: Track, range: RangeWork, follow: boolean, snapped: number |
+ *   null, floor: FloorPicking | null, footage: FootageProgress, compiling: boolean, undo: string | null, redo: string |
+ *   null, saved: boolean, save_error: string | null}} StateMessage
  * @typedef {{edit: number, label: string, author: string, time: string, undone: boolean}} HistoryEntry
  * @typedef {{type: "history", entries: HistoryEntry[], later: boolean, earlier: boolean}} HistoryMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
@@ -142,12 +146,12 @@
  *   current_px: number | null, count: number}} LandscapeHeader
  * @typedef {SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative | ResetLimb | LockDofs |
  *   HoldPoint} PoseEdit
- * @typedef {Seek | Select | SetView | ShowPerson | Solo | ShowCurves | WatchTab | ShowHistory | LookThrough | Pause3d |
- *   Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative | ResetLimb | LockDofs |
- *   HoldPoint | DragPin | RemovePins | FitPose | RunSearch | RepeatSearch | SetSearchSpeed | SetSearchSettings |
- *   ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape | SetLandscapeDof | StartTracking |
- *   ControlTracking | EditRange | StopRange | ToggleMark | FollowTracking | EditFloor | MarkFloor | Undo | Redo | GoTo
- *   | Save} ClientMessage
+ * @typedef {Seek | Select | SetView | ShowPerson | Solo | ShowBefore | ShowCurves | WatchTab | ShowHistory |
+ *   LookThrough | Pause3d | Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative |
+ *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | RunSearch | RepeatSearch | SetSearchSpeed |
+ *   SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape | SetLandscapeDof |
+ *   StartTracking | ControlTracking | EditRange | StopRange | ToggleMark | FollowTracking | EditFloor | MarkFloor |
+ *   Undo | Redo | GoTo | Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
  *   SearchSetupMessage | SearchRunsMessage} TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |

@@ -134,7 +134,7 @@ class FakeEndpoint:
         self.state = {
             "type": "state", "frame": 12, "person": 0, "point": None,
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
-            "source": "manual", "status": "", "remark": "", "part_costs_px": [], "replay": None,
+            "source": "manual", "status": "", "remark": "", "part_costs_px": [], "replay": None, "compared": None,
             "job": self.idle_job(""),
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "dofs": [1.0, 2.0, 90.0, 30.0], "locked": [], "other_sizes": False, "solo": False,
@@ -203,6 +203,9 @@ class FakeEndpoint:
             case "follow" | "snap":
                 is_follow = message["type"] == "follow"
                 self.state |= {"follow": message["follow"]} if is_follow else {"snapped": message["camera"]}
+                await self.broadcast(self.state)
+            case "before":
+                self.state["compared"] = {**self.state["compared"], "is_before_shown": message["shown"]}
                 await self.broadcast(self.state)
             case "curves":
                 self.curves_group = message["group"]
