@@ -24,7 +24,7 @@ import { displayName } from "../widgets/text.js";
  */
 
 const BUTTONS =
-  ".top-bar button, .top-bar input, #inspector button, .transport button, .transport input, #range-bar button, .drawer-bar label";
+  ".top-bar button, .top-bar input, #joint-bar button, .transport button, .transport input, #range-bar button, .drawer-bar label";
 
 /**
  * Commands of keys. Bindings of several keys are left out, because other commands replace them.

@@ -57,7 +57,11 @@ NO_RANGE = {"running": False, "what": "", "done": 0, "total": 0, "message": ""}
 STAGES = ["torso_head", "arms", "legs"]
 PARTS = ["torso", "left_arm", "left_leg", "head", "right_leg", "right_arm", "pelvis"]
 DOFS = [{"joint": "torso", "name": name, "unit": "cm", "low": None, "high": None} for name in ("x", "y", "z")] + [
-    {"joint": "l_elbow", "name": "extension", "unit": "deg", "low": 0.0, "high": 155.0}
+    {"joint": "l_elbow", "name": "extension", "unit": "deg", "low": 0.0, "high": 155.0},
+    *(
+        {"joint": "torso", "name": n, "unit": "deg", "low": None, "high": None}
+        for n in ("abduction", "elevation", "twist")
+    ),
 ]
 ANGLES = ("abduction", "elevation", "twist", "extension")
 PLOTS = {
@@ -137,7 +141,7 @@ class FakeEndpoint:
             "source": "manual", "status": "", "remark": "", "part_costs_px": [], "replay": None, "compared": None,
             "job": self.idle_job(""),
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
-            "dofs": [1.0, 2.0, 90.0, 30.0], "locked": [], "other_sizes": False, "solo": False,
+            "dofs": [1.0, 2.0, 90.0, 30.0, 4.0, 5.0, 6.0], "locked": [], "other_sizes": False, "solo": False,
             "people": [
                 {"source": "manual", "status": "", "shown": True, "alternatives": 0} for _ in range(self.n_people)
             ],
@@ -359,7 +363,7 @@ class FakeEndpoint:
                 "bones": BONES,
                 "parts": PARTS,
                 "dofs": DOFS,
-                "point_dofs": {name: [0, 1, 2] if name == "torso" else [3] for name in REST},
+                "point_dofs": {name: [0, 1, 2, 4, 5, 6] if name == "torso" else [3] for name in REST},
                 "point_limbs": {
                     name: {"name": "body" if name == "torso" else "left arm", "dofs": [3]} for name in REST
                 },

@@ -37,7 +37,7 @@ async def test_notices_leave_panes_and_bars_free(page, endpoint):
     await say(endpoint, "a sentence of some length that says what was expected, what was found, and what to do now")
     await page.get_by_role("alert").wait_for()
     box = await page.locator("#notices .notice:visible").bounding_box()
-    for part in ("#panes", "#inspector", "footer", ".top-bar"):
+    for part in ("#panes", "#joint-bar", "footer", ".top-bar"):
         other = await page.locator(part).bounding_box()
         apart = (
             box["x"] >= other["x"] + other["width"]
@@ -85,7 +85,7 @@ async def test_the_first_card_is_put_away_for_good_and_found_again(browser, addr
     assert "quadrille --sample elbow_rotation" in await card.inner_text()
     box, panes = await card.bounding_box(), await page.locator("#panes").bounding_box()
     assert box["x"] >= panes["x"] + panes["width"]
-    assert box["y"] + box["height"] <= (await page.locator("#inspector").bounding_box())["y"]
+    assert box["y"] + box["height"] <= (await page.locator("#joint-bar").bounding_box())["y"]
     await say(endpoint, "a sentence of some length that says what was expected, what was found, and what to do now")
     await page.get_by_role("alert").wait_for()
     await page.locator("#close-first-steps").click(timeout=2000)  # the notice does not lie over it
