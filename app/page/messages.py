@@ -19,11 +19,13 @@ from app.state.page_view import View
 from app.state.progress import TrackState
 from app.state.search import ReplayState, SearchState
 from app.state.state import State
+from tracker.body.limbs import limb_display_name, limbs
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import FloatArray
 from tracker.posing.grab import heading_points, minor_points
 from tracker.session.session import Person, Session
 from tracker.store.records import SOURCES, STATUSES, FramePose, HistoryEntry
+from tracker.tracking.confidence import DOUBTFUL_FROM, LOST_FROM
 
 _FEW_CELLS = 2000
 """Largest number of timeline cells sent by name. More are sent as columns, which take a tenth of the bytes and time."""
@@ -37,6 +39,7 @@ _NO_CELL: dict[str, Any] = {
     "remark": "",
     "reviewed": False,
     "ambiguous": False,
+    "limbs_lost": (),
 }
 
 
@@ -44,7 +47,9 @@ def session(session: Session) -> wire.SessionMessage:
     """Describe the session."""
     cameras = tuple(wire.CameraInfo(c.camera.name, c.camera.width, c.camera.height) for c in session.cameras)
     people = tuple(_person(p) for p in session.people)
-    return wire.SessionMessage(session.name, session.fps, session.n_frames, cameras, people, _START)
+    return wire.SessionMessage(
+        session.name, session.fps, session.n_frames, cameras, people, DOUBTFUL_FROM, LOST_FROM, _START
+    )
 
 
 def _person(person: Person) -> wire.PersonInfo:
@@ -59,6 +64,7 @@ def _person(person: Person) -> wire.PersonInfo:
         "heading": list(heading_points(model)),
         "bones": model.bones,
         "parts": [part.name for part in model.parts],
+        "limbs": [limb_display_name(limb.name) for limb in limbs(model)],
         **dof_labels.described(model),
     }
     return msgspec.convert(fields, wire.PersonInfo)
@@ -169,6 +175,7 @@ def timeline(
         sources=SOURCES,
         statuses=tuple(map(_status, STATUSES)),
         remarks={str(k): row["remark"] for k, row in zip(frames, rows, strict=True) if row["remark"]},
+        limbs_lost={str(k): row["limbs_lost"] for k, row in zip(frames, rows, strict=True) if row["limbs_lost"]},
     )
     costs = np.array([row["cost_px"] for row in rows], dtype="<f4")  # None becomes NaN
     source, status = {name: i for i, name in enumerate(SOURCES)}, {name: i for i, name in enumerate(STATUSES)}

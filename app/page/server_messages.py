@@ -63,6 +63,8 @@ class PersonInfo(Part, frozen=True):
     """Pairs of points that the stick figure connects."""
     parts: tuple[str, ...]
     """Names of the body parts."""
+    limbs: tuple[str, ...]
+    """Names of the limbs that are assessed, for display."""
     dofs: tuple[DofInfo, ...]
     point_dofs: dict[str, tuple[int, ...]]
     """By point: the degrees of freedom of its joint, by index."""
@@ -78,6 +80,10 @@ class SessionMessage(Message, frozen=True, tag="session"):
     n_frames: int
     cameras: tuple[CameraInfo, ...]
     people: tuple[PersonInfo, ...]
+    doubtful_from: float
+    """A limb that is lost with a higher probability is doubtful."""
+    lost_from: float
+    """A limb that is lost with a higher probability counts as lost."""
     start: str
     """Identifies the start of the program. After another start a page goes back to the frame and person it showed."""
 
@@ -312,6 +318,8 @@ class Cell(Part, frozen=True):
     reviewed: bool
     ambiguous: bool
     """Whether there is an alternative, and nobody has confirmed the pose."""
+    limbs_lost: tuple[float, ...]
+    """Probability that each of the person's `limbs` is lost; empty for good poses, unknown ones and several people."""
 
 
 class TimelineMessage(Message, frozen=True, tag="timeline"):

@@ -75,10 +75,10 @@
  * @typedef {{joint: string, name: string, unit: "deg" | "cm", low: number | null, high: number | null}} DofInfo
  * @typedef {{name: string, dofs: number[]}} Limb
  * @typedef {{name: string, color: string, model: string, height_m: number, points: string[], minor: string[], heading:
- *   string[], bones: [string, string][], parts: string[], dofs: DofInfo[], point_dofs: Record<string, number[]>,
- *   point_limbs: Record<string, Limb>}} PersonInfo
+ *   string[], bones: [string, string][], parts: string[], limbs: string[], dofs: DofInfo[], point_dofs: Record<string,
+ *   number[]>, point_limbs: Record<string, Limb>}} PersonInfo
  * @typedef {{type: "session", name: string, fps: number, n_frames: number, cameras: CameraInfo[], people: PersonInfo[],
- *   start: string}} SessionMessage
+ *   doubtful_from: number, lost_from: number, start: string}} SessionMessage
  * @typedef {{source: string | null, status: Status, shown: boolean, alternatives: number}} PersonState
  * @typedef {{running: boolean, kind: string | null, stage: string | null, stages: string[], evaluations: number,
  *   per_second: number, best_px: number | null, message: string}} Job
@@ -102,7 +102,7 @@
  * @typedef {{type: "history", entries: HistoryEntry[], later: boolean, earlier: boolean}} HistoryMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
  * @typedef {{source: string, cost_px: number | null, keyframe: boolean, status: Status, remark: string, reviewed:
- *   boolean, ambiguous: boolean}} Cell
+ *   boolean, ambiguous: boolean, limbs_lost: number[]}} Cell
  * @typedef {{type: "timeline", person: number | null, cells: Record<string, Cell | null>, replace: boolean}}
  *   TimelineMessage
  * @typedef {{type: "inconsistent", frames: number[]}} InconsistentMessage
@@ -135,7 +135,7 @@
  * @typedef {{type: "overlay", frame: number, seq: number, job: boolean, paths: Path[], outlines: Outline[], handles:
  *   Handle[], out_of_reach: OutOfReach | null, pins: PinMark[], triangulation: PinTriangulation | null}} OverlayHeader
  * @typedef {{type: "cells", person: number | null, replace: boolean, count: number, sources: string[], statuses:
- *   Status[], remarks: Record<string, string>}} CellsHeader
+ *   Status[], remarks: Record<string, string>, limbs_lost: Record<string, number[]>}} CellsHeader
  * @typedef {{title: string, unit: "deg" | "cm" | "px", labels: string[]}} Plot
  * @typedef {{type: "curves", group: CurveGroup, person: number, replace: boolean, count: number, plots: Plot[]}}
  *   CurvesHeader
