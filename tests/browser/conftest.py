@@ -81,11 +81,15 @@ class _Server:
     async def serve(self, socket):
         await self.endpoint.serve(socket)
 
+    async def thumbnail(self, request):
+        return await self.endpoint.thumbnail(request)
+
 
 @pytest_asyncio.fixture(loop_scope="session", scope="session")
 async def server(blank_viser):
     server = _Server()
     app = create_app(server, blank_viser, Access(), static_folder())
+    app.router.add_get("/thumbnail/{person}/{frame}", server.thumbnail)
     app.on_response_prepare.append(_let_cache)
     async with listening(app) as port:
         server.address = f"http://127.0.0.1:{port}/"
