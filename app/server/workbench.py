@@ -15,7 +15,6 @@ from platformdirs import user_state_path
 from app.control.controller import Controller
 from app.page.socket import PaneSocket
 from app.scene3d.gizmos import Gizmos
-from app.scene3d.panels import Panels
 from app.scene3d.scene import SceneView
 from app.server.access import access_for
 from app.server.export_routes import ExportRoutes
@@ -79,7 +78,6 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
         try:
             SceneView(viser.server, controller)
             Gizmos(viser.server, controller)
-            Panels(viser.server, controller)
             app = create_app(PaneSocket(controller, offers), viser.socket_path, access, static)
             ExportRoutes(session.folder).add_to(app)
 

@@ -16,6 +16,11 @@ export function displayName(name) {
   return name.replaceAll("_", " ");
 }
 
+/** @param {string} text */
+export function capital(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
 /** @param {number} value */
 export function count(value) {
   return COUNT.format(value);
