@@ -114,12 +114,17 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         view: what the page shows.
         views: the evidence of the shown frame; None draws no edge segments.
     """
-    state = state.drawn
+    stored, state = state, state.drawn
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
     tried = state.search.candidate if state.search.running or state.search_view.replay is not None else None
     drafted, others = _with_draft(state, bodies), _alternatives(state, bodies)
-    ghosts = ((state.search_view.compared, COMPARED_COLOR), (state.search_view.preview, PREVIEW_COLOR))
+    result = stored.poses if state is not stored and state.search_view.replay is None else None
+    ghosts = (
+        (state.search_view.compared, COMPARED_COLOR),
+        (state.search_view.preview, PREVIEW_COLOR),
+        (result, COMPARED_COLOR),
+    )
     for index in sorted(view.cameras):
         camera = session.cameras[index].camera.pinhole
         if not view.layers.isdisjoint(("contours", "hidden")):

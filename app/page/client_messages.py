@@ -85,6 +85,12 @@ class Solo(Command, frozen=True, tag="people"):
     on: bool
 
 
+class ShowBefore(Command, frozen=True, tag="before"):
+    """Show the poses before the last fit or search, or its result again. No pose changes."""
+
+    shown: bool
+
+
 class ShowCurves(Command, frozen=True, tag="curves"):
     """Subscribe to a group of curves of the person worked on; null unsubscribes."""
 
@@ -203,7 +209,7 @@ class Save(Command, frozen=True, tag="save"):
 
 
 ClientMessage: TypeAlias = Union[  # noqa: UP007
-    Seek, Select, SetView, ShowPerson, Solo, ShowCurves, WatchTab, ShowHistory, LookThrough, Pause3d,
+    Seek, Select, SetView, ShowPerson, Solo, ShowBefore, ShowCurves, WatchTab, ShowHistory, LookThrough, Pause3d,
     Drag, PoseEdit, DragPin, RemovePins, FitPose,
     RunSearch, RepeatSearch, SetSearchSpeed, SetSearchSettings, ReplayStep, CompareRun, PreviewCandidate,
     TakeCandidate, ShowLandscape, SetLandscapeDof,

@@ -20,6 +20,7 @@
  * @typedef {{type: "view", layers: Layer[], reductions: number[], by_part: boolean}} SetView
  * @typedef {{type: "people", action: "show", person: number, shown: boolean}} ShowPerson
  * @typedef {{type: "people", action: "solo", on: boolean}} Solo
+ * @typedef {{type: "before", shown: boolean}} ShowBefore
  * @typedef {{type: "curves", group: CurveGroup | null}} ShowCurves
  * @typedef {{type: "watch", tab: "search" | "landscape" | null}} WatchTab
  * @typedef {{type: "history", limit: number}} ShowHistory
@@ -87,14 +88,17 @@
  * @typedef {{joint: string, name: string, unit: "deg" | "cm", low: number | null, high: number | null}} DofInfo
  * @typedef {{name: string, dofs: number[]}} Limb
  * @typedef {{name: string, color: string, model: string, height_m: number, points: string[], minor: string[], heading:
- *   string[], bones: [string, string][], parts: string[], dofs: DofInfo[], point_dofs: Record<string, number[]>,
- *   point_limbs: Record<string, Limb>}} PersonInfo
+ *   string[], bones: [string, string][], parts: string[], limbs: string[], dofs: DofInfo[], point_dofs: Record<string,
+ *   number[]>, point_limbs: Record<string, Limb>}} PersonInfo
  * @typedef {{type: "session", name: string, fps: number, n_frames: number, cameras: CameraInfo[], people: PersonInfo[],
- *   start: string}} SessionMessage
+ *   doubtful_from: number, lost_from: number, start: string}} SessionMessage
  * @typedef {{source: string | null, status: Status, shown: boolean, alternatives: number}} PersonState
  * @typedef {{running: boolean, kind: string | null, stage: string | null, stages: string[], evaluations: number,
  *   per_second: number, best_px: number | null, message: string}} Job
  * @typedef {{run: number, step: number, steps: number, stage: string | null}} ReplayedStep
+ * @typedef {{number: number, work: "fit" | "search", before_px: number | null, after_px: number | null,
+ *   before_view_costs_px: (number | null)[], after_view_costs_px: (number | null)[], warning: string, is_before_shown:
+ *   boolean}} Compared
  * @typedef {{running: boolean, first: number | null, last: number | null, at: number | null, done: number, total:
  *   number, per_second: number, doubtful: number, lost: number, back: boolean, message: string}} Track
  * @typedef {{running: boolean, what: string, done: number, total: number, message: string}} RangeWork
@@ -104,14 +108,14 @@
  * @typedef {{type: "state", frame: number, person: number, point: string | null, people: PersonState[], solo: boolean,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
  *   part_costs_px: (number | null)[], dofs: number[], locked: number[], other_sizes: boolean, job: Job, replay:
- *   ReplayedStep | null, track: Track, range: RangeWork, follow: boolean, snapped: number | null, floor: FloorPicking |
- *   null, footage: FootageProgress, compiling: boolean, undo: string | null, redo: string | null, saved: boolean,
- *   save_error: string | null}} StateMessage
+ *   ReplayedStep | null, compared: Compared | null, track: Track, range: RangeWork, follow: boolean, snapped: number |
+ *   null, floor: FloorPicking | null, footage: FootageProgress, compiling: boolean, undo: string | null, redo: string |
+ *   null, saved: boolean, save_error: string | null}} StateMessage
  * @typedef {{edit: number, label: string, author: string, time: string, undone: boolean}} HistoryEntry
  * @typedef {{type: "history", entries: HistoryEntry[], later: boolean, earlier: boolean}} HistoryMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
  * @typedef {{source: string, cost_px: number | null, keyframe: boolean, status: Status, remark: string, reviewed:
- *   boolean, ambiguous: boolean}} Cell
+ *   boolean, ambiguous: boolean, limbs_lost: number[]}} Cell
  * @typedef {{type: "timeline", person: number | null, cells: Record<string, Cell | null>, replace: boolean}}
  *   TimelineMessage
  * @typedef {{type: "inconsistent", frames: number[]}} InconsistentMessage
@@ -159,7 +163,7 @@
  * @typedef {{type: "overlay", frame: number, seq: number, job: boolean, paths: Path[], outlines: Outline[], handles:
  *   Handle[], out_of_reach: OutOfReach | null, pins: PinMark[], triangulation: PinTriangulation | null}} OverlayHeader
  * @typedef {{type: "cells", person: number | null, replace: boolean, count: number, sources: string[], statuses:
- *   Status[], remarks: Record<string, string>}} CellsHeader
+ *   Status[], remarks: Record<string, string>, limbs_lost: Record<string, number[]>}} CellsHeader
  * @typedef {{title: string, unit: "deg" | "cm" | "px", labels: string[]}} Plot
  * @typedef {{type: "curves", group: CurveGroup, person: number, replace: boolean, count: number, plots: Plot[]}}
  *   CurvesHeader
@@ -170,13 +174,13 @@
  *   current_px: number | null, count: number}} LandscapeHeader
  * @typedef {SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative | ResetLimb | LockDofs |
  *   HoldPoint} PoseEdit
- * @typedef {Seek | Select | SetView | ShowPerson | Solo | ShowCurves | WatchTab | ShowHistory | LookThrough | Pause3d |
- *   Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative | ResetLimb | LockDofs |
- *   HoldPoint | DragPin | RemovePins | FitPose | RunSearch | RepeatSearch | SetSearchSpeed | SetSearchSettings |
- *   ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape | SetLandscapeDof | StartTracking |
- *   ControlTracking | EditRange | StopRange | ToggleMark | FollowTracking | SetTrackSettings | SetView3d | SetHeight |
- *   SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | DraftSizes | EditFloor | MarkFloor | Undo | Redo | GoTo
- *   | Save} ClientMessage
+ * @typedef {Seek | Select | SetView | ShowPerson | Solo | ShowBefore | ShowCurves | WatchTab | ShowHistory |
+ *   LookThrough | Pause3d | Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative |
+ *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | RunSearch | RepeatSearch | SetSearchSpeed |
+ *   SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape | SetLandscapeDof |
+ *   StartTracking | ControlTracking | EditRange | StopRange | ToggleMark | FollowTracking | SetTrackSettings |
+ *   SetView3d | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | DraftSizes | EditFloor |
+ *   MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
  *   SearchSetupMessage | SearchRunsMessage | SettingsMessage | View3dMessage | BodySizesMessage} TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |

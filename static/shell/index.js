@@ -8,6 +8,7 @@ import { button, byId } from "../widgets/elements.js";
 import { makeSplitter } from "../widgets/splitter.js";
 import { leaveFields, watchTyping } from "../widgets/typing.js";
 import { Announcer } from "./announcer.js";
+import { Comparison } from "./comparison.js";
 import { ExportPanel } from "./export_panel.js";
 import { FirstSteps } from "./first_steps.js";
 import { HistoryList } from "./history_list.js";
@@ -45,6 +46,7 @@ export function mount(context, rooms) {
   const notices = new Notices();
   context.onNotice((notice) => notices.show(notice));
   new TopBar(store, actions);
+  new Comparison(store, actions, context.notify);
   const people = new People(store, actions, posing);
   showProgressMarks(store);
   watchConnection(byId("banner", HTMLElement), store);

@@ -25,6 +25,13 @@ export function helpBindings({ actions, history, notices, palette, keyList, firs
       matches: (event) => control("z", true)(event) || control("y", false)(event),
       run: () => actions.redo(),
     },
+    {
+      keys: ["Shift B"],
+      label: "Show the pose before the last fit or search, or its result",
+      matches: shift("b"),
+      why: reasons.compared,
+      run: () => actions.toggleBefore(),
+    },
     { keys: ["H"], label: "History of edits", matches: plain("h"), run: () => history.toggle() },
     { keys: ["Shift H"], label: "Messages", matches: shift("h"), run: () => notices.toggleLog() },
     { keys: ["Shift Esc"], label: "Dismiss all messages", matches: shift("escape"), run: () => notices.dismissAll() },
@@ -49,7 +56,8 @@ export function helpBindings({ actions, history, notices, palette, keyList, firs
  */
 export function escapeBinding({ store, actions, notices, grid, gestures, pinning, floor }) {
   const run = () => {
-    if (gestures.cancel() || closePopover() || floor.cancel() || pinning.cancel() || actions.leaveReplay()) return;
+    if (gestures.cancel() || closePopover() || floor.cancel() || pinning.cancel()) return;
+    if (actions.leaveReplay() || actions.leaveBefore()) return;
     const { state, range, filled } = store.facts;
     if (hasTrack(state)) actions.stopTracking();
     else if (state?.range.running) actions.stopRange();

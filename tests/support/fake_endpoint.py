@@ -55,6 +55,9 @@ DISAGREEING = [44, 45]
 AMBIGUOUS = (71, 72)
 NO_RANGE = {"running": False, "what": "", "done": 0, "total": 0, "message": ""}
 STAGES = ["torso_head", "arms", "legs"]
+LIMBS = ["left arm", "right arm", "left leg", "right leg", "head"]
+LIMBS_LOST = {"doubtful": [0.31, 0.01, 0.0, 0.02, 0.0], "lost": [0.97, 0.04, 0.0, 0.0, 0.01]}
+"""Probabilities of the limbs of a frame by its status."""
 PARTS = ["torso", "left_arm", "left_leg", "head", "right_leg", "right_arm", "pelvis"]
 DOFS = [{"joint": "torso", "name": name, "unit": "cm", "low": None, "high": None} for name in ("x", "y", "z")] + [
     {"joint": "l_elbow", "name": "extension", "unit": "deg", "low": 0.0, "high": 155.0},
@@ -156,7 +159,7 @@ class FakeEndpoint:
         self.state = {
             "type": "state", "frame": 12, "person": 0, "point": None,
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
-            "source": "manual", "status": "", "remark": "", "part_costs_px": [], "replay": None,
+            "source": "manual", "status": "", "remark": "", "part_costs_px": [], "replay": None, "compared": None,
             "job": self.idle_job(""),
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "dofs": [1.0, 2.0, 90.0, 30.0, 4.0, 5.0, 6.0], "locked": [], "other_sizes": False, "solo": False,
@@ -236,6 +239,9 @@ class FakeEndpoint:
             case "follow" | "snap":
                 is_follow = message["type"] == "follow"
                 self.state |= {"follow": message["follow"]} if is_follow else {"snapped": message["camera"]}
+                await self.broadcast(self.state)
+            case "before":
+                self.state["compared"] = {**self.state["compared"], "is_before_shown": message["shown"]}
                 await self.broadcast(self.state)
             case "curves":
                 self.curves_group = message["group"]
@@ -338,6 +344,7 @@ class FakeEndpoint:
                 "remark": "",
                 "reviewed": False,
                 "ambiguous": False,
+                "limbs_lost": LIMBS_LOST.get(status_of(frame), []),
             }
             await self.broadcast({"type": "timeline", "person": None, "cells": {frame: cell}, "replace": False})
             if self.state["follow"]:
@@ -388,6 +395,7 @@ class FakeEndpoint:
                 "heading": [name for name in REST if name.endswith(("shoulder", "hip"))],
                 "bones": BONES,
                 "parts": PARTS,
+                "limbs": LIMBS,
                 "dofs": DOFS,
                 "point_dofs": {name: [0, 1, 2, 4, 5, 6] if name == "torso" else [3] for name in REST},
                 "point_limbs": {
@@ -398,7 +406,7 @@ class FakeEndpoint:
         ]
         await socket.send_str(encoded({
             "type": "session", "name": "elbow_rotation", "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
-            "people": people, "start": self.start,
+            "people": people, "doubtful_from": 0.02, "lost_from": 0.5, "start": self.start,
         }))  # fmt: skip
         for message in (self.state, self.settings, self.view_3d, self.body_sizes):
             await socket.send_str(encoded(message))
@@ -412,6 +420,7 @@ class FakeEndpoint:
                 "remark": REMARK if k in (31, 32) else "",
                 "reviewed": k % 20 == 0 or k < 16,
                 "ambiguous": k in AMBIGUOUS,
+                "limbs_lost": LIMBS_LOST.get(status_of(k), []) if k >= 10 else [],
             }
             for k in range(self.n_frames * 100 // N_FRAMES)
         }

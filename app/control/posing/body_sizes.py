@@ -202,7 +202,7 @@ class BodySizeEditing:
             settings = {"method": "refit", "model_revision": record.model_revision}
             pose = replace(
                 record, values=values, model_revision=revision, status="", cost_px=None, settings=settings,
-                view_costs_px=(), part_costs_px=(), remark="refitted to other sizes",
+                view_costs_px=(), part_costs_px=(), limbs_lost=(), remark="refitted to other sizes",
             )  # fmt: skip
             changes.append(PoseChange(name, row.frame, pose))
             moved = becomes.points_world(values) - was.points_world(record.values)
