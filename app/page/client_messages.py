@@ -2,7 +2,8 @@
 
 `message_parsing` checks messages against these declarations, `protocol_docs` writes the page's types and
 docs/protocol.md from them.
-Those that change poses or run searches are in `pose_messages` and `search_messages`.
+Those that change poses or run searches are in `pose_messages` and `search_messages`, those of the inspector in
+`inspector_messages`.
 """
 
 from typing import Annotated, Literal, TypeAlias, Union, get_args
@@ -10,6 +11,16 @@ from typing import Annotated, Literal, TypeAlias, Union, get_args
 from msgspec import Meta
 
 from app.drawing.curves import CurveGroup
+from app.page.inspector_messages import (
+    ApplySizes,
+    CoupleSides,
+    DraftSizes,
+    SetGirdleWidth,
+    SetHeight,
+    SetPartSizes,
+    SetTrackSettings,
+    SetView3d,
+)
 from app.page.message_types import Command, Frame, Index, Name, Number
 from app.page.pose_messages import Drag, DragPin, FitPose, PoseEdit, RemovePins
 from app.page.search_messages import (
@@ -203,6 +214,7 @@ ClientMessage: TypeAlias = Union[  # noqa: UP007
     RunSearch, RepeatSearch, SetSearchSpeed, SetSearchSettings, ReplayStep, CompareRun, PreviewCandidate,
     TakeCandidate, ShowLandscape, SetLandscapeDof,
     StartTracking, ControlTracking, EditRange, StopRange, ToggleMark, FollowTracking,
+    SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, DraftSizes,
     EditFloor, MarkFloor, Undo, Redo, GoTo, Save,
 ]  # fmt: skip
 

@@ -1,11 +1,12 @@
 """Text messages from the program to the page: the one declaration of their types and fields.
 
-Those about searches are in `search_messages`. `messages` and `search_feed` make them, `protocol_docs` writes the
-page's types and docs/protocol.md from them.
+Those about searches are in `search_messages`, those for the inspector in `inspector_messages`. `messages` and the feeds
+make them, `protocol_docs` writes the page's types and docs/protocol.md from them.
 """
 
 from typing import Literal, TypeAlias, Union, get_args
 
+from app.page.inspector_messages import BodySizesMessage, SettingsMessage, View3dMessage
 from app.page.message_types import Message, Part, Status
 from app.page.search_messages import SearchRunsMessage, SearchSetupMessage
 from app.state.comparison import ComparedWork
@@ -341,7 +342,7 @@ class InconsistentMessage(Message, frozen=True, tag="inconsistent"):
 
 TextMessage: TypeAlias = Union[  # noqa: UP007
     SessionMessage, StateMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
-    SearchSetupMessage, SearchRunsMessage,
+    SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
 ]  # fmt: skip
 
 TEXT_MESSAGES: tuple[type[Message], ...] = get_args(TextMessage)

@@ -16,7 +16,6 @@ from app.control.controller import Controller
 from app.page.socket import PaneSocket
 from app.page.thumbnails import Thumbnails
 from app.scene3d.gizmos import Gizmos
-from app.scene3d.panels import Panels
 from app.scene3d.scene import SceneView
 from app.server.access import access_for
 from app.server.export_routes import ExportRoutes
@@ -83,7 +82,6 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
         try:
             SceneView(viser.server, controller)
             Gizmos(viser.server, controller)
-            Panels(viser.server, controller)
             app = create_app(PaneSocket(controller, offers), viser.socket_path, access, static)
             ExportRoutes(session.folder).add_to(app)
             ThumbnailRoutes(thumbnails.jpeg, lambda: not _can_draw(controller)).add_to(app)

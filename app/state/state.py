@@ -70,6 +70,8 @@ class State:
     pages_pausing_3d: frozenset[int] = frozenset()
     """Numbers of the pages that render the 3-D view in software and pause it during a drag."""
     view_3d: View3d = field(default_factory=View3d)
+    prediction_note: str = ""
+    """What the predicted pose of the 3-D view was computed from, or why there is none; empty while it is not shown."""
     floor: FloorState = field(default_factory=FloorState)
     footage: FootageState = field(default_factory=FootageState)
     compiling: bool = False
@@ -90,12 +92,12 @@ class State:
 
     @property
     def is_3d_paused(self) -> bool:
-        """Whether the 3-D view and its panels wait for the end of a drag."""
+        """Whether the 3-D view waits for the end of a drag."""
         return self.is_dragging and bool(self.pages_pausing_3d)
 
     @property
     def is_3d_throttled(self) -> bool:
-        """Whether the 3-D view and its panels are drawn rarely, to leave the processor to a running job."""
+        """Whether the 3-D view is drawn rarely, to leave the processor to a running job."""
         return (self.track.running or self.search.running) and bool(self.pages_pausing_3d)
 
     @property
@@ -191,6 +193,7 @@ class StateChanges(TypedDict, total=False):
     drag_seqs: tuple[tuple[int, int], ...]
     pages_pausing_3d: frozenset[int]
     view_3d: View3d
+    prediction_note: str
     floor: FloorState
     footage: FootageState
     compiling: bool

@@ -65,6 +65,19 @@
  * @typedef {{type: "stop_range"}} StopRange
  * @typedef {{type: "mark", toggle: "keyframe" | "reviewed"}} ToggleMark
  * @typedef {{type: "follow", follow: boolean}} FollowTracking
+ * @typedef {{estimate?: "refine" | "search", order?: number, past_poses?: number, recover?: boolean, backward_pass?:
+ *   boolean}} TrackChanges
+ * @typedef {{type: "track_settings", changes: TrackChanges}} SetTrackSettings
+ * @typedef {{bodies?: boolean, colors?: "parts" | "people", opacity?: number, cameras?: boolean, images?: boolean,
+ *   floor?: boolean, gizmos?: boolean, ghost?: boolean, trail_points?: string[], trail_frames?: number}} View3dChanges
+ * @typedef {{type: "view_3d", changes: View3dChanges}} SetView3d
+ * @typedef {{type: "body_sizes", action: "height", person: number, height_m: number}} SetHeight
+ * @typedef {{type: "body_sizes", action: "part", person: number, part: string, length_m?: number, half_depth_m?:
+ *   number, half_width_m?: number}} SetPartSizes
+ * @typedef {{type: "body_sizes", action: "width", person: number, girdle: string, width_m: number}} SetGirdleWidth
+ * @typedef {{type: "body_sizes", action: "couple", on: boolean}} CoupleSides
+ * @typedef {{type: "body_sizes", action: "apply", person: number, refit: boolean}} ApplySizes
+ * @typedef {{type: "body_sizes", action: "discard" | "previous", person: number}} DraftSizes
  * @typedef {{type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "revert"}} EditFloor
  * @typedef {{type: "floor", action: "mark", camera: number, u: number, v: number}} MarkFloor
  * @typedef {{type: "undo"}} Undo
@@ -108,9 +121,7 @@
  * @typedef {{type: "inconsistent", frames: number[]}} InconsistentMessage
  * @typedef {{person: number, name: string, dofs: string[], bound_rad: number | null, step_rad: number | null, bound_m:
  *   number | null, step_m: number | null, angles: number, lengths: number, own: boolean}} SearchLeaf
- * @typedef {{type: "search_setup", theta_px: number | null, outliers: "truncated" | "paper", passes: number[],
- *   patience: number, max_expansions: number, limbs_apart: boolean, bound_rad: number, bound_m: number, step_rad:
- *   number, step_m: number, speed: number | null, leaves: SearchLeaf[]}} SearchSetupMessage
+ * @typedef {{type: "search_setup", speed: number | null, leaves: SearchLeaf[]}} SearchSetupMessage
  * @typedef {{person: number, name: string, factor: number, evaluations: number, gain_px: number, done: boolean,
  *   running: boolean}} SearchStage
  * @typedef {{number: number, state: RunState, start_px: number | null, best_px: number | null, evaluations: number,
@@ -118,6 +129,23 @@
  * @typedef {{run: number, step: number, stage: string | null, candidate_px: number | null, best_px: number | null,
  *   evaluations: number}} Replay
  * @typedef {{type: "search_runs", runs: SearchRun[], replay: Replay | null, compared: number | null}} SearchRunsMessage
+ * @typedef {{estimate: "refine" | "search", order: number, past_poses: number, recover: boolean, backward_pass:
+ *   boolean}} TrackValues
+ * @typedef {{theta_px: number | null, outliers: "truncated" | "paper", passes: number[], patience: number,
+ *   max_expansions: number, limbs_apart: boolean, bound_rad: number, bound_m: number, step_rad: number, step_m:
+ *   number}} SearchValues
+ * @typedef {{type: "settings", track: TrackValues, search: SearchValues, track_default: TrackValues, search_default:
+ *   SearchValues}} SettingsMessage
+ * @typedef {{bodies: boolean, colors: "parts" | "people", opacity: number, cameras: boolean, images: boolean, floor:
+ *   boolean, gizmos: boolean, ghost: boolean, trail_points: string[], trail_frames: number}} View3d
+ * @typedef {{up: string, tilt_deg: number | null, height_m: number | null, has_former: boolean}} FloorInfo
+ * @typedef {{type: "view_3d", view: View3d, floor: FloorInfo, prediction: string, trail_points: string[]}}
+ *   View3dMessage
+ * @typedef {{name: string, length_m: number, half_depth_m: number, half_width_m: number}} PartSizes
+ * @typedef {{name: string, width_m: number}} GirdleWidth
+ * @typedef {{type: "body_sizes", person: number, height_m: number, parts: PartSizes[], widths: GirdleWidth[],
+ *   sides_alike: boolean, edited: boolean, has_former: boolean, outcome: string, height_limits_m: [number, number],
+ *   size_limits_m: [number, number]}} BodySizesMessage
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number, limit_px:
  *   number | null}} ImageHeader
  * @typedef {{camera: number, person: number, kind: PathKind, color: string, side: Side, first: number, count: number}}
@@ -150,10 +178,11 @@
  *   LookThrough | Pause3d | Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative |
  *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | RunSearch | RepeatSearch | SetSearchSpeed |
  *   SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape | SetLandscapeDof |
- *   StartTracking | ControlTracking | EditRange | StopRange | ToggleMark | FollowTracking | EditFloor | MarkFloor |
- *   Undo | Redo | GoTo | Save} ClientMessage
+ *   StartTracking | ControlTracking | EditRange | StopRange | ToggleMark | FollowTracking | SetTrackSettings |
+ *   SetView3d | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | DraftSizes | EditFloor |
+ *   MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
- *   SearchSetupMessage | SearchRunsMessage} TextMessage
+ *   SearchSetupMessage | SearchRunsMessage | SettingsMessage | View3dMessage | BodySizesMessage} TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader} BinaryHeader
  * generated: end

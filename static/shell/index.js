@@ -30,6 +30,7 @@ import { TopBar } from "./top_bar.js";
  * @property {import("../timeline/index.js").TimelineRoom} timeline
  * @property {import("../search/index.js").SearchRoom} search
  * @property {import("../scene/index.js").SceneRoom} scene
+ * @property {import("../inspector/index.js").InspectorRoom} inspector
  */
 
 /**
@@ -49,13 +50,13 @@ export function mount(context, rooms) {
   const people = new People(store, actions, posing);
   showProgressMarks(store);
   watchConnection(byId("banner", HTMLElement), store);
-  makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement));
+  makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement), byId("inspector", HTMLElement));
   const history = new HistoryList(store, send);
   new ExportPanel(store, context.notify);
   new SavedMark(store, send);
   new Announcer(byId("announcer", HTMLElement), store);
   const firstSteps = new FirstSteps(store);
-  const palette = new Palette({ store, navigation, grid, posing, layers, actions, away: reasons.away });
+  const palette = new Palette({ store, navigation, grid, posing, layers, actions, inspector: rooms.inspector.inspector, away: reasons.away });
   const keyList = new KeyList();
   button("show-palette", () => palette.toggle());
 
@@ -64,10 +65,10 @@ export function mount(context, rooms) {
     escapeBinding({ store, actions, notices, grid, gestures, pinning, floor: rooms.scene.floor }),
     ...peopleBindings({ actions, posing, people, reasons }),
   ];
-  const { panes, timeline, search, scene } = rooms;
+  const { panes, timeline, search, scene, inspector } = rooms;
   const table = orderedByArea([
     own,
-    ...[scene, search, timeline, rooms.posing, panes].map(({ bindings }) => bindings),
+    ...[scene, search, timeline, rooms.posing, panes, inspector].map(({ bindings }) => bindings),
   ]);
   palette.setBindings(table);
   keyList.setBindings(table);

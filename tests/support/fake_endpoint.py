@@ -74,6 +74,24 @@ PLOTS = {
     "torso": [("Angles", "deg", ANGLES[:3]), ("Position", "cm", ("x", "y", "z"))],
     "cost": [("Cost", "px", ("mean", *CAMERA_NAMES))],
 }
+TRACK = {"estimate": "refine", "order": 1, "past_poses": 3, "recover": True, "backward_pass": True}
+SEARCH = {
+    "theta_px": None, "outliers": "truncated", "passes": [1.0, 0.5], "patience": 3, "max_expansions": 60,
+    "limbs_apart": False, "bound_rad": 0.2618, "bound_m": 0.1, "step_rad": 0.0873, "step_m": 0.05,
+}  # fmt: skip
+VIEW_3D = {
+    "bodies": True, "colors": "parts", "opacity": 1.0, "cameras": True, "images": True, "floor": True, "gizmos": True,
+    "ghost": False, "trail_points": [], "trail_frames": 25,
+}  # fmt: skip
+BODY_SIZES = {
+    "type": "body_sizes", "person": 0, "height_m": 1.7, "sides_alike": True, "edited": False, "has_former": False,
+    "outcome": "", "height_limits_m": [0.3, 3.0], "size_limits_m": [0.005, 1.19],
+    "parts": [
+        {"name": name, "length_m": 0.3, "half_depth_m": 0.05, "half_width_m": 0.06}
+        for name in ("torso", "left_forearm", "right_forearm")
+    ],
+    "widths": [{"name": "hip", "width_m": 0.17}],
+}  # fmt: skip
 REMARK = "left arm relocated"
 
 
@@ -154,6 +172,17 @@ class FakeEndpoint:
             "snapped": None, "floor": None, "footage": {"listed": None, "error": None}, "compiling": False,
             "saved": True, "save_error": None,
         }  # fmt: skip
+
+        self.settings = {"type": "settings"} | {
+            name: dict(values)
+            for values, names in ((TRACK, ("track", "track_default")), (SEARCH, ("search", "search_default")))
+            for name in names
+        }
+        self.view_3d = {
+            "type": "view_3d", "view": dict(VIEW_3D), "prediction": "", "trail_points": ["head", "l_wrist"],
+            "floor": {"up": "y", "tilt_deg": None, "height_m": None, "has_former": False},
+        }  # fmt: skip
+        self.body_sizes = dict(BODY_SIZES)
 
     def idle_job(self, message):
         return {
@@ -396,7 +425,8 @@ class FakeEndpoint:
             "type": "session", "name": "elbow_rotation", "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
             "people": people, "doubtful_from": 0.02, "lost_from": 0.5, "start": self.start,
         }))  # fmt: skip
-        await socket.send_str(encoded(self.state))
+        for message in (self.state, self.settings, self.view_3d, self.body_sizes):
+            await socket.send_str(encoded(message))
         cells = {k: self.cell(k) for k in range(self.n_frames * 100 // N_FRAMES)}
         for person in (None, *(range(self.n_people) if self.n_people > 1 else ())):
             told = {"type": "timeline", "person": person, "cells": cells, "replace": True}

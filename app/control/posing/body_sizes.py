@@ -47,6 +47,11 @@ class BodySizeEditing:
         draft = self._session_state.state.draft
         return draft.model if draft is not None and draft.person == person else self._session_state.present[person]
 
+    def has_former(self, person: int) -> bool:
+        """Return whether a person had other sizes before the present ones."""
+        with self._session_state.lock:
+            return self._session_state.saver.revisions.former_body(person) is not None
+
     def couple(self, alike: bool) -> None:
         """Choose whether both sides are edited at once."""
         self._session_state.set(sides_alike=alike)
@@ -125,7 +130,7 @@ class BodySizeEditing:
             if same and not refitted.changes:
                 raise TrackerError(
                     f"expected other sizes of {name}, or keyframes made with others, found neither; "
-                    "enter a length in the panel first"
+                    "enter a length in the inspector first"
                 )
             n = len(refitted.changes)
             counted = f", {n} keyframe{'' if n == 1 else 's'} refitted" if n else ""
