@@ -12,6 +12,13 @@ import { searchSection } from "./search_section.js";
 import { trackSection } from "./track_section.js";
 import { viewSection } from "./view_section.js";
 
+/** @type {{choice: import("../model/theme.js").ThemeChoice, label: string}[]} */
+const THEMES = [
+  { choice: "dark", label: "Dark theme" },
+  { choice: "light", label: "Light theme" },
+  { choice: "system", label: "System theme" },
+];
+
 /** @typedef {ReturnType<typeof mount>} InspectorRoom */
 
 /**
@@ -34,10 +41,17 @@ export function mount(context, posing, scene) {
     { keys: ["Alt I"], label: "Inspector: body sizes and settings (toggle)", matches: alt("KeyI", false), run: () => inspector.toggle() },
     ...sections.map(({ id, title, hint }) => ({
       keys: [],
-      label: id === "view" ? "3-D view settings" : title,
+      label: id === "view" ? "View settings: theme, 3-D view" : title,
       words: `${hint} inspector settings`,
       matches: () => false,
       run: () => inspector.reveal(id),
+    })),
+    ...THEMES.map(({ choice, label }) => ({
+      keys: [],
+      label,
+      words: "colour scheme mode appearance",
+      matches: () => false,
+      run: () => context.themes.choose(choice),
     })),
   ]);
   return { inspector, bindings };

@@ -1,10 +1,17 @@
-/** What the 3-D view shows: layers, the camera to look through, the floor and trails. */
+/** Theme of the page, and what the 3-D view shows: layers, the camera to look through, the floor and trails. */
 
 import { displayName } from "../widgets/text.js";
 import { checkRow, choiceRow, sliderRow, textButton } from "./rows.js";
 
 const FREE = "free";
 const MAX_TRAIL_FRAMES = 250;
+
+/** @type {[import("../model/theme.js").ThemeChoice, string][]} */
+const THEMES = [
+  ["system", "As the system"],
+  ["dark", "Dark"],
+  ["light", "Light"],
+];
 
 /** @typedef {"bodies" | "cameras" | "images" | "floor" | "gizmos" | "ghost"} Layer */
 
@@ -23,8 +30,14 @@ const LAYERS = [
  * @param {import("../scene/index.js").SceneRoom} scene
  * @returns {import("./inspector.js").Section}
  */
-export function viewSection({ store, send }, { floor }) {
+export function viewSection({ store, send, themes }, { floor }) {
   const set = (/** @type {import("../model/protocol.js").View3dChanges} */ changes) => send({ type: "view_3d", changes });
+  const theme = choiceRow({
+    label: "Theme",
+    title: "Colour scheme of the page and the 3-D view; kept in this browser",
+    options: THEMES,
+    change: (value) => themes.choose(value),
+  });
   const camera = choiceRow({
     label: "Look through",
     title: "Look through a camera, its image behind the bodies (Y: the camera under the pointer). Turning the view leaves the camera",
@@ -74,14 +87,15 @@ export function viewSection({ store, send }, { floor }) {
   const body = document.createElement("div");
   const [bodies, ...others] = layers.map(({ row }) => row.element);
   body.append(
-    camera.element, bodies, colors.element, opacity.element, ...others, prediction,
+    theme.element, heading("3-D view"), camera.element, bodies, colors.element, opacity.element, ...others, prediction,
     heading("Floor"), floorText, buttons(setFloor, formerFloor),
     heading("Trails"), trails.element, points, buttons(noTrails),
   ); // prettier-ignore
   let built = "";
 
   const show = () => {
-    const { view3d, state, session } = store.facts;
+    const { view3d, state, session, theme: chosen } = store.facts;
+    theme.show(chosen.choice);
     if (session) camera.fill([[FREE, "Free view"], ...session.cameras.map(({ name }, i) => /** @type {[string, string]} */ ([String(i), name]))]);
     camera.show(state?.snapped == null ? FREE : String(state.snapped));
     if (!view3d) return;
@@ -107,10 +121,10 @@ export function viewSection({ store, send }, { floor }) {
   };
   return {
     id: "view",
-    title: "3-D view",
-    hint: "What the 3-D view shows",
+    title: "View",
+    hint: "Theme of the page, and what the 3-D view shows",
     body,
-    update: (changed) => ["view3d", "state", "session"].some((fact) => changed.has(/** @type {"state"} */ (fact))) && show(),
+    update: (changed) => ["view3d", "state", "session", "theme"].some((fact) => changed.has(/** @type {"state"} */ (fact))) && show(),
   };
 }
 

@@ -25,6 +25,7 @@ import { defaultLayers } from "./layers.js";
  * @property {import("../widgets/frame_axis.js").Span | null} visible the visible part of timeline and curves; null for all
  * @property {import("./series.js").Curves | null} curves the current group of curves
  * @property {import("./series.js").Tab | null} drawer the open tab; null while the drawer is closed
+ * @property {{choice: import("./theme.js").ThemeChoice, isDark: boolean}} theme
  * @property {import("./protocol.js").SettingsMessage | null} settings of tracker and search
  * @property {import("./protocol.js").View3dMessage | null} view3d what the 3-D view shows
  * @property {import("./protocol.js").BodySizesMessage | null} bodySizes of the active person
@@ -75,6 +76,7 @@ export class Store {
     visible: null,
     curves: null,
     drawer: null,
+    theme: { choice: "system", isDark: true },
     settings: null,
     view3d: null,
     bodySizes: null,

@@ -11,9 +11,11 @@ const STYLE = `
   html, body { background: var(--page-stage) !important; }
 `;
 
-/** @param {HTMLIFrameElement} scene */
-export function loadScene(scene) {
-  const dark = matchMedia("(prefers-color-scheme: dark)");
+/**
+ * @param {HTMLIFrameElement} scene
+ * @param {import("../model/store.js").Store} store
+ */
+export function loadScene(scene, store) {
   const paint = () => {
     const stage = getComputedStyle(document.documentElement).getPropertyValue("--stage");
     scene.contentDocument?.documentElement.style.setProperty("--page-stage", stage);
@@ -26,6 +28,6 @@ export function loadScene(scene) {
     target.head.append(style);
     paint();
   });
-  dark.addEventListener("change", paint);
-  scene.src = dark.matches ? "viser/?darkMode" : "viser/";
+  store.subscribe((changed) => changed.has("theme") && paint());
+  scene.src = store.facts.theme.isDark ? "viser/?darkMode" : "viser/";
 }

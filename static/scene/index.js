@@ -27,6 +27,6 @@ export function mount({ store, send, reasons }, { grid }) {
   const isSoftware = drawsInSoftware();
   if (isSoftware) new ScenePause(frame, store);
   // viser is a large program: loaded earlier, it would delay the first images.
-  store.onceKnown("shown", () => loadScene(frame));
+  store.onceKnown("shown", () => loadScene(frame, store));
   return { frame, floor, isSoftware, bindings: sceneBindings(cameraView, floor, reasons.away) };
 }

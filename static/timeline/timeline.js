@@ -54,7 +54,7 @@ export class Timeline {
       if (has("target", "timeline", "lanes", "session")) this.#describe();
     });
     new ResizeObserver(() => this.#drawAll()).observe(element);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#drawAll());
+    store.subscribe((changed) => changed.has("theme") && this.#drawAll());
     this.#listen();
   }
 

@@ -117,7 +117,7 @@ async def test_it_leaves_the_views_room_and_stays_open_after_a_reload(page):
             await page.locator("#inspector").wait_for()
     panes, scene = boxes["open"]
     inspector = await page.locator("#inspector").bounding_box()
-    assert panes["width"] >= 700
+    assert panes["width"] >= 690
     assert scene["width"] >= 290
     assert boxes["closed"][0]["width"] >= panes["width"]
     assert inspector["x"] >= scene["x"] + scene["width"] - 1
@@ -132,6 +132,7 @@ async def test_it_leaves_the_views_room_and_stays_open_after_a_reload(page):
 FOUND = {
     "body": ("Body sizes", "Height, cm"),
     "sizes": ("Body sizes", "Height, cm"),
+    "settings": ("Track settings", "How the pose"),
     "track settings": ("Track settings", "How the pose"),
     "search settings": ("Search settings", "Angle bound, °"),
     "angle bound": ("Angle bound", "Angle bound, °"),
@@ -146,5 +147,46 @@ async def test_the_palette_leads_to_sections_and_rows(page, endpoint):
         await page.keyboard.press("Enter")
         name = "(document.activeElement.ariaLabel ?? document.activeElement.closest('label').title)"
         await shows(page, f"{name}.startsWith('{focused}')")
-        await page.keyboard.press("Escape")
+    assert endpoint.received == []
+
+
+FIRST = {
+    "dark": "Dark theme",
+    "light": "Light theme",
+    "theme": "Theme",
+    "zoom": "Zoom all views to the people",
+    "track": "Track forward",
+    "search": "Search panel",
+}
+
+
+async def test_words_of_a_beginner_find_something(page):
+    await page.keyboard.press("Control+k")
+    for query, label in FIRST.items():
+        await page.locator("#palette-query").fill(query)
+        assert await page.locator("#palette-list li > span").first.inner_text() == label, query
+
+
+GROUND = "getComputedStyle(document.querySelector('#scene')).backgroundColor"
+
+
+async def test_a_theme_is_chosen_kept_and_recolours_the_3d_view_as_it_stands(page, endpoint):
+    frame = page.frame_locator("#scene").locator("body")
+    await frame.evaluate("() => (window.isLoadedOnce = true)")
+    dark = await page.evaluate(GROUND)
+    await page.keyboard.press("Control+k")
+    await page.keyboard.type("light")
+    await page.keyboard.press("Enter")
+    await shows(page, f"{GROUND} !== '{dark}'")
+    light = await page.evaluate(GROUND)
+    assert await frame.evaluate("(body) => getComputedStyle(body).backgroundColor") == light
+    assert await frame.evaluate("() => window.isLoadedOnce")
+    await page.reload()
+    await shows(page, "window.quadrille?.state.overlay")
+    assert await page.evaluate(GROUND) == light
+    await opened(page, "view")
+    theme = row(page, "Theme").locator("select")
+    assert await theme.input_value() == "light"
+    await theme.select_option("system")
+    await shows(page, f"{GROUND} === '{dark}'")
     assert endpoint.received == []

@@ -30,6 +30,7 @@ async def test_colours_are_told_apart(page):
     """WCAG AA: 4.5 to 1 for text, 3 to 1 for what is not text."""
     for scheme in ("dark", "light"):
         await page.emulate_media(color_scheme=scheme)
+        await shows(page, f"document.documentElement.dataset.theme === '{scheme}'")
         assert await poor_contrasts(page) == []
 
 
