@@ -105,7 +105,7 @@ async def _let_cache(_request, response):
 def endpoint(request):
     """What answers the page, made with the keywords of a test's mark `endpoint`."""
     mark = request.node.get_closest_marker("endpoint")
-    return FakeEndpoint(**(mark.kwargs if mark else {}))
+    return FakeEndpoint(**(getattr(request, "param", None) or (mark.kwargs if mark else {})))
 
 
 @pytest_asyncio.fixture(loop_scope="session")
