@@ -15,6 +15,7 @@ from platformdirs import user_state_path
 
 from app.control.controller import Controller
 from app.page.socket import PaneSocket
+from app.page.thumbnails import Thumbnails
 from app.scene3d.gizmos import Gizmos
 from app.scene3d.scene import SceneView
 from app.server.access import access_for, is_loopback
@@ -22,7 +23,9 @@ from app.server.export_routes import ExportRoutes
 from app.server.private_viser import PrivateViser
 from app.server.server import create_app, serve_forever, static_folder
 from app.server.session_routes import SessionRoutes, refusal
+from app.server.thumbnail_routes import ThumbnailRoutes
 from app.session import proxies
+from app.session.footage_crops import FootageCrops
 from app.session.footage_indices import footage_indices
 from app.session.frame_cache import FrameCache
 from app.session.recent_sessions import remember
@@ -93,6 +96,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
         saver = Saver(session, store, _author())
         controller = Controller(session, saver, frames)
         viser = PrivateViser()
+        thumbnails = Thumbnails(controller, FootageCrops(session.cameras, indices))
         try:
             SceneView(viser.server, controller)
             Gizmos(viser.server, controller)
@@ -104,6 +108,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
             )
             others.add_to(app)
             port = serving.port
+            ThumbnailRoutes(thumbnails.jpeg, lambda: not _can_draw(controller)).add_to(app)
 
             def ready(address: str, opened: str) -> None:
                 nonlocal port
@@ -122,11 +127,17 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
                 controller.close()
             finally:  # also where a second Ctrl+C ends the work
                 unsaved = _keep_unsaved(saver, session.folder)
+                thumbnails.close()
             viser.stop()
             store.close()
             if unsaved is not None:
                 raise TrackerError(unsaved)
     return None if others.chosen is None else NextSession(others.chosen, port)
+
+
+def _can_draw(controller: Controller) -> bool:
+    """Return whether thumbnails can be made: compiling a kernel, or listing footage, would take long."""
+    return not controller.state.compiling and controller.frames.is_listed
 
 
 def _keep_unsaved(saver: Saver, folder: Path) -> str | None:

@@ -90,6 +90,15 @@ export class Actions {
     if (range) this.#send({ type: "range", action, first: range.first, last: range.last, person });
   }
 
+  /**
+   * Mark the poses of a person in some frames as reviewed.
+   *
+   * @param {{person: number, first: number, last: number}} poses `last` is included
+   */
+  review({ person, first, last }) {
+    this.#send({ type: "range", action: "reviewed", first, last, person });
+  }
+
   stopRange() {
     this.#send({ type: "stop_range" });
   }

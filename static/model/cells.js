@@ -110,6 +110,15 @@ export class Cells {
     }
   }
 
+  /**
+   * Probability that the likeliest limb is lost; 0 if unknown.
+   *
+   * @param {number} frame
+   */
+  worstLimb(frame) {
+    return Math.max(0, ...(this.#limbsLost.get(frame) ?? []));
+  }
+
   /** Frames that have a pose, and their cells. */
   *[Symbol.iterator]() {
     for (let frame = 0; frame < this.frames; frame += 1) {

@@ -55,6 +55,7 @@ DISAGREEING = [44, 45]
 AMBIGUOUS = (71, 72)
 NO_RANGE = {"running": False, "what": "", "done": 0, "total": 0, "message": ""}
 STAGES = ["torso_head", "arms", "legs"]
+SOURCES = ["manual", "searched", "searched", "tracked", "tracked", "tracked", "interpolated", "smoothed"]
 LIMBS = ["left arm", "right arm", "left leg", "right leg", "head"]
 LIMBS_LOST = {"doubtful": [0.31, 0.01, 0.0, 0.02, 0.0], "lost": [0.97, 0.04, 0.0, 0.0, 0.01]}
 """Probabilities of the limbs of a frame by its status."""
@@ -142,6 +143,8 @@ class FakeEndpoint:
     sizes: tuple = ((WIDTH, HEIGHT),)
     """Of the cameras' images, px; in turn, where there are more cameras."""
     sockets: set = field(default_factory=set)
+    thumbnails: list = field(default_factory=list)
+    """Addresses of the thumbnails that the pages requested."""
     start: str = "first"
     """Identifies the start of the pretended program."""
 
@@ -221,10 +224,7 @@ class FakeEndpoint:
                     self.state["follow"] = False
                 await self.broadcast(self.state)
                 await self.send_frame()
-            case "select":
-                self.state |= {"person": message["person"], "point": message["point"]}
-                await self.broadcast(self.state)
-            case "people":
+            case "select" | "people":
                 await self.cast(message)
             case "view":
                 await self.send_frame()
@@ -236,13 +236,10 @@ class FakeEndpoint:
                 await self.search(message["action"])
             case "track":
                 await self.track(message["action"], message.get("until"))
-            case "follow" | "snap":
-                is_follow = message["type"] == "follow"
-                self.state |= {"follow": message["follow"]} if is_follow else {"snapped": message["camera"]}
-                await self.broadcast(self.state)
-            case "before":
-                self.state["compared"] = {**self.state["compared"], "is_before_shown": message["shown"]}
-                await self.broadcast(self.state)
+            case "follow" | "snap" | "before":
+                await self.switch(message)
+            case "range":
+                await self.review(message)
             case "curves":
                 self.curves_group = message["group"]
                 if self.curves_group:
@@ -250,13 +247,33 @@ class FakeEndpoint:
             case "undo" | "redo":
                 await self.broadcast(self.state)
 
+    async def switch(self, message):
+        match message["type"]:
+            case "follow":
+                self.state["follow"] = message["follow"]
+            case "snap":
+                self.state["snapped"] = message["camera"]
+            case "before":
+                self.state["compared"] = {**self.state["compared"], "is_before_shown": message["shown"]}
+        await self.broadcast(self.state)
+
+    async def review(self, message):
+        """Mark the poses of a range as reviewed; other work on ranges is only heard."""
+        if message["action"] != "reviewed":
+            return
+        cells = {k: self.cell(k) | {"reviewed": True} for k in range(message["first"], message["last"] + 1)}
+        for person in (None, *((message["person"],) if self.n_people > 1 else ())):
+            await self.broadcast({"type": "timeline", "person": person, "cells": cells, "replace": False})
+
     async def hold(self, message):
         change = self.held_joints.add if message["held"] else self.held_joints.discard
         change((message["person"], message["point"]))
         await self.send_overlay()
 
     async def cast(self, message):
-        if message["action"] == "solo":
+        if message["type"] == "select":
+            self.state |= {"person": message["person"], "point": message["point"]}
+        elif message["action"] == "solo":
             self.state["solo"] = message["on"]
         else:
             self.state["people"][message["person"]]["shown"] = message["shown"]
@@ -410,26 +427,31 @@ class FakeEndpoint:
         }))  # fmt: skip
         for message in (self.state, self.settings, self.view_3d, self.body_sizes):
             await socket.send_str(encoded(message))
-        sources = ["manual", "searched", "searched", "tracked", "tracked", "tracked", "interpolated", "smoothed"]
-        cells = {
-            k: {
-                "source": sources[k // 10 % 8],
-                "cost_px": 1 + 0.5 * np.sin(k / 7) + (k == 50) * 9,
-                "keyframe": k % 20 == 0,
-                "status": "" if k < 10 else status_of(k),
-                "remark": REMARK if k in (31, 32) else "",
-                "reviewed": k % 20 == 0 or k < 16,
-                "ambiguous": k in AMBIGUOUS,
-                "limbs_lost": LIMBS_LOST.get(status_of(k), []) if k >= 10 else [],
-            }
-            for k in range(self.n_frames * 100 // N_FRAMES)
-        }
+        cells = {k: self.cell(k) for k in range(self.n_frames * 100 // N_FRAMES)}
         for person in (None, *(range(self.n_people) if self.n_people > 1 else ())):
             told = {"type": "timeline", "person": person, "cells": cells, "replace": True}
             await socket.send_str(encoded(told))
         await socket.send_str(encoded({"type": "inconsistent", "frames": DISAGREEING}))
         if self.views:
             await self.send_frame([socket])
+
+    async def thumbnail(self, request):
+        """Answer a request for a thumbnail, as the program does beside the socket."""
+        self.thumbnails.append(request.path_qs.removeprefix("/"))
+        picture = self.picture(0, int(request.match_info["frame"]), "image")
+        return web.Response(body=picture, content_type="image/jpeg")
+
+    def cell(self, frame):
+        return {
+            "source": SOURCES[frame // 10 % 8],
+            "cost_px": 1 + 0.5 * np.sin(frame / 7) + (frame == 50) * 9,
+            "keyframe": frame % 20 == 0,
+            "status": "" if frame < 10 else status_of(frame),
+            "remark": REMARK if frame in (31, 32) else "",
+            "reviewed": frame % 20 == 0 or frame < 16,
+            "ambiguous": frame in AMBIGUOUS,
+            "limbs_lost": LIMBS_LOST.get(status_of(frame), []) if frame >= 10 else [],
+        }
 
     async def broadcast(self, message):
         text = encoded(message)
