@@ -1,0 +1,48 @@
+"""The popover that opens another session: recent ones, a typed folder, what is refused."""
+
+import json
+import re
+
+from page_driver import shows
+
+RECENT = {"refusal": None, "folder": "/data/here", "recent": [
+    {"folder": "/data/walks/dance", "name": "dance", "opened": "2026-03-04T10:00:00+00:00"},
+]}  # fmt: skip
+WHY = "expected a page that only its user can open, found --no-token"
+
+
+async def test_a_session_is_opened_by_its_folder_or_from_the_list(fresh_page, endpoint):
+    page, listed, posted = fresh_page, dict(RECENT), []
+
+    async def answer(route):
+        request, path = route.request, route.request.url.partition("/sessions")[2]
+        if path.startswith("/paths"):
+            await route.fulfill(json=[{"path": "/data/walks/", "is_session": False}])
+        elif path == "/open":
+            posted.append(json.loads(request.post_data)["folder"])
+            is_good = posted[-1] == "/data/walks/dance"
+            listed["folder"] = "/data/walks/dance" if is_good else listed["folder"]
+            await route.fulfill(**({"json": {"name": "dance"}} if is_good else {"status": 400, "body": "no session"}))
+        else:
+            await route.fulfill(json=listed)
+
+    await page.route(re.compile(r"/sessions(/|$)"), answer)
+    await page.keyboard.press("Control+o")
+    await shows(page, "document.activeElement.id === 'session-folder'")
+    await shows(page, "document.querySelector('#recent-sessions').innerText.includes('/data/walks/dance')")
+    await page.keyboard.type("/data/w")
+    await shows(page, "document.querySelector('#session-folders option')?.value === '/data/walks/'")
+    async with page.expect_event("console"):  # the browser reports each answer of 400
+        await page.keyboard.press("Enter")
+    await shows(page, "document.querySelector('#sessions-note.is-failed')?.textContent === 'no session'")
+    page.errors.clear()
+    async with page.expect_event("load"):
+        await page.locator("#recent-sessions button").click()
+        await shows(page, "document.querySelector('#banner').textContent === 'Opening dance…'")
+    assert posted == ["/data/w", "/data/walks/dance"]
+    await shows(page, "window.quadrille?.state.overlay")
+    listed |= {"refusal": WHY, "recent": []}
+    await page.locator("#session-name").click()
+    await shows(page, f"document.querySelector('#sessions-note').textContent === '{WHY}'")
+    assert await page.locator("#session-folder").is_disabled()
+    assert endpoint.received == []
