@@ -1,4 +1,4 @@
-"""Open another session from the page, or make one.
+"""Open another session from the page, or make one of videos and a calibration.
 
 A page names folders of this machine, as the user could on the command line. So these requests are answered only where
 nobody but the user can send them: the server listens on loopback under no other name, and asks for the token.
@@ -13,6 +13,9 @@ import msgspec
 from aiohttp import web
 from msgspec import Meta
 
+from app.server import connections
+from app.session.camera_check import exchange_note
+from app.session.new_session import NewSessionForm, make_session
 from app.session.path_choice import completions, typed_path
 from app.session.recent_sessions import recent_sessions
 from tracker.errors import SessionError, TrackerError
@@ -43,6 +46,7 @@ class SessionRoutes:
         """
         self._folder, self._state_folder = folder.resolve(), state_folder
         self._refusal, self._unsaved = refusal, unsaved
+        self._making = asyncio.Lock()
         self.chosen: Path | None = None
         """The session to open next."""
         self.is_chosen = asyncio.Event()
@@ -53,6 +57,7 @@ class SessionRoutes:
         app.router.add_get("/sessions", self._list)
         app.router.add_get("/sessions/paths", self._complete)
         app.router.add_post("/sessions/open", self._open)
+        app.router.add_post("/sessions/new", self._make)
 
     async def _list(self, _: web.Request) -> web.Response:
         if self._refusal is not None:
@@ -81,6 +86,29 @@ class SessionRoutes:
         self.chosen = folder
         self.is_chosen.set()
         return web.json_response({"name": folder.name})
+
+    async def _make(self, request: web.Request) -> web.StreamResponse:
+        """Make a session. The answer has one JSON object per line: each check that has passed, then the outcome."""
+        form = await self._body(request, NewSessionForm)
+        if self._making.locked():
+            raise web.HTTPConflict(text="Another session is being made; wait for it.")
+        async with self._making:
+            connections.keep_open(request)
+            response = web.StreamResponse(headers={"Content-Type": "application/x-ndjson"})
+            await response.prepare(request)
+            lines: asyncio.Queue[dict[str, str] | None] = asyncio.Queue()
+            loop = asyncio.get_running_loop()
+
+            def report(kind: str, text: str) -> None:
+                loop.call_soon_threadsafe(lines.put_nowait, {kind: text})
+
+            work = asyncio.ensure_future(asyncio.to_thread(_made, form, report))
+            work.add_done_callback(lambda _: lines.put_nowait(None))
+            while (line := await lines.get()) is not None:
+                await response.write(msgspec.json.encode(line) + b"\n")
+            await work
+            await response.write_eof()
+            return response
 
     def _checked(self, text: str) -> Path:
         """Return the folder of a session that can be opened in place of the present one.
@@ -122,6 +150,20 @@ class SessionRoutes:
             raise web.HTTPBadRequest(text=f"Expected a request in JSON, found other data ({error}).") from error
         except SessionError as error:
             raise web.HTTPBadRequest(text=str(error)) from error
+
+
+def _made(form: NewSessionForm, report: Callable[[str, str], None]) -> None:
+    """Make a session, and report the checks that pass, what went wrong or seems wrong, and its folder."""
+    try:
+        session = make_session(form, lambda text: report("passed", text))
+    except TrackerError as error:
+        report("failed", str(error))
+        return
+    if note := exchange_note(session):
+        report("warning", note)
+    else:
+        report("passed", "No two cameras seem to be exchanged.")
+    report("made", str(session.folder))
 
 
 def refusal(host_is_private: bool, has_token: bool) -> str | None:

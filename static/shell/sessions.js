@@ -2,9 +2,9 @@
 
 import { byId } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
+import { NewSession } from "./new_session.js";
+import { completePaths, postJson } from "./session_requests.js";
 
-/** Wait for a pause in typing before paths are completed. */
-const PAUSE_MS = 120;
 const POLL_MS = 300;
 
 /** @typedef {{refusal: string | null, folder: string, recent: {folder: string, name: string, opened: string}[]}} Listed */
@@ -18,6 +18,7 @@ export class Sessions {
   #form = byId("open-session", HTMLFormElement);
 
   #store;
+  #create;
   /** Folder of the open session. */
   #present = "";
 
@@ -29,6 +30,11 @@ export class Sessions {
       event.preventDefault();
       void this.#choose(this.#folder.value);
     });
+    this.#create = new NewSession((folder) => {
+      this.toggle();
+      void this.#choose(folder);
+    });
+    byId("show-new-session", HTMLButtonElement).addEventListener("click", () => this.showNew());
     completePaths(this.#folder, byId("session-folders", HTMLDataListElement));
     /** @type {string | undefined} */
     let first;
@@ -48,6 +54,12 @@ export class Sessions {
     void this.#fill();
   }
 
+  /** Show the form of a new session. */
+  showNew() {
+    if (this.#panel.matches(":popover-open")) this.#panel.hidePopover();
+    this.#create.show();
+  }
+
   async #fill() {
     /** @type {Listed} */
     let listed = { refusal: "The program does not answer.", folder: "", recent: [] };
@@ -57,7 +69,9 @@ export class Sessions {
       // Said in the panel.
     }
     this.#present = listed.folder;
-    for (const control of this.#form.elements) /** @type {HTMLInputElement} */ (control).disabled = listed.refusal !== null;
+    for (const control of [...this.#form.elements, byId("show-new-session", HTMLButtonElement)]) {
+      /** @type {HTMLInputElement} */ (control).disabled = listed.refusal !== null;
+    }
     if (listed.refusal) this.#say(listed.refusal, true);
     this.#list.replaceChildren(...listed.recent.map((one) => this.#row(one)));
     if (!listed.recent.length && !listed.refusal) this.#say("No other session was opened before.");
@@ -87,9 +101,7 @@ export class Sessions {
   async #choose(folder) {
     this.#say("Checking…");
     try {
-      const answer = await postJson("sessions/open", { folder });
-      const { name } = JSON.parse(answer);
-      this.#store.set({ opening: name });
+      await postJson("sessions/open", { folder }, (answer) => this.#store.set({ opening: JSON.parse(answer).name }));
       this.#panel.hidePopover();
     } catch (error) {
       this.#say(error instanceof Error ? error.message : String(error), true);
@@ -124,53 +136,4 @@ async function untilAnotherIsOpen(present) {
       // The program is starting.
     }
   }
-}
-
-/**
- * Complete the path in a field as the user types.
- *
- * @param {HTMLInputElement} field
- * @param {HTMLDataListElement} list of the field
- */
-function completePaths(field, list) {
-  /** @type {ReturnType<typeof setTimeout> | undefined} */
-  let timer;
-  field.addEventListener("input", () => {
-    clearTimeout(timer);
-    timer = setTimeout(async () => {
-      const text = field.value;
-      try {
-        const found = await (await fetch(`sessions/paths?text=${encodeURIComponent(text)}`)).json();
-        if (field.value !== text) return;
-        list.replaceChildren(
-          ...found.map((/** @type {{path: string, is_session: boolean}} */ { path, is_session }) => {
-            const option = new Option("", path);
-            if (is_session) option.label = "session";
-            return option;
-          }),
-        );
-      } catch {
-        // Completion is a convenience; opening says what is wrong.
-      }
-    }, PAUSE_MS);
-  });
-}
-
-/**
- * Send JSON to the program. Returns the text of the answer.
- *
- * @param {string} address
- * @param {unknown} body
- */
-async function postJson(address, body) {
-  const headers = { "Content-Type": "application/json" };
-  let answer;
-  try {
-    answer = await fetch(address, { method: "POST", headers, body: JSON.stringify(body) });
-  } catch {
-    throw new Error("The program does not answer.");
-  }
-  const text = await answer.text();
-  if (!answer.ok) throw new Error(text);
-  return text;
 }

@@ -46,6 +46,13 @@ export function helpBindings({ actions, history, notices, palette, keyList, firs
     },
     {
       keys: [],
+      label: "New session from videos and a calibration",
+      words: "create recording footage form",
+      matches: () => false,
+      run: () => sessions.showNew(),
+    },
+    {
+      keys: [],
       label: "First steps with a new recording",
       matches: () => false,
       run: () => firstSteps.show(),

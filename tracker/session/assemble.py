@@ -84,7 +84,7 @@ def assemble(request: NewSession, report: Callable[[str], None] = lambda _: None
     unused = calibrated.keys() - set(names)
     check_names(request.offsets, names, "camera", "--offset")
     paths = match_footage(names, request.videos, request.camera_paths, unused)
-    report("Each camera has footage: " + ", ".join(f"{name} {paths[name].name}" for name in names) + ".")
+    report("Each camera has footage: " + ", ".join(f"{name} ({paths[name].name})" for name in names) + ".")
     footage = {name: open_footage(paths[name], name) for name in names}
     try:
         cameras = {name: calibrated[name].camera(footage[name].size) for name in names}
@@ -115,6 +115,30 @@ def _source(request: NewSession, camera: Camera, footage: Footage, fps: float) -
         request.offsets.get(camera.name, 0),
         None if footage.fps is None or same_rate(footage.fps, fps) else footage.fps,
     )
+
+
+def footage_in(folder: Path) -> list[Path]:
+    """Return the videos of a folder, or its folders of images if it has no video.
+
+    Raises:
+        SessionError: there is neither.
+    """
+    try:
+        entries = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+    except OSError as error:
+        raise SessionError(f"expected a folder of videos, found that {folder} cannot be read ({error})") from error
+    videos = [path for path in entries if path.suffix.lower() in _VIDEO_SUFFIXES and path.is_file()]
+    found = videos or [path for path in entries if path.is_dir() and _has_image(path)]
+    if not found:
+        raise SessionError(
+            f"expected videos ({', '.join(_VIDEO_SUFFIXES)}) or folders of images in {folder}, found none; "
+            "choose the folder that holds the footage of all cameras"
+        )
+    return found
+
+
+def _has_image(folder: Path) -> bool:
+    return any(path.suffix.lower() in IMAGE_SUFFIXES for path in folder.iterdir())
 
 
 def find_background(folder: Path, camera: str) -> Path:

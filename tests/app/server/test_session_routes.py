@@ -14,6 +14,7 @@ from app.server.access import Access
 from app.server.session_routes import SessionRoutes, refusal
 from app.session.recent_sessions import recent_sessions, remember
 from tracker.session.lock import SessionLock
+from tracker.session.session import load_session
 
 
 class Nobody:
@@ -39,10 +40,15 @@ class Client:
         async with self._session.get(path) as response:
             return response.status, await response.text()
 
-    async def open(self, body, **headers):
+    async def make(self, form):
+        status, text = await self.open(form, "/sessions/new")
+        assert status == 200, text
+        return [json.loads(line) for line in text.splitlines()]
+
+    async def open(self, body, path="/sessions/open", **headers):
         headers = {"Origin": self._origin, "Content-Type": "application/json"} | headers
         data = body if isinstance(body, bytes) else json.dumps(body).encode()
-        async with self._session.post("/sessions/open", data=data, headers=headers) as response:
+        async with self._session.post(path, data=data, headers=headers) as response:
             return response.status, await response.text()
 
 
@@ -170,3 +176,35 @@ def test_a_restart_keeps_the_way_in_which_the_program_was_started(monkeypatch, o
     restart.restart(["open", "/data/dance"])
     executable = restart.sys.executable
     assert called == [(executable, [executable, *program, "open", "/data/dance"])]
+
+
+async def test_a_session_is_made_with_its_checks_told_one_by_one(folders, serve, tmp_path):
+    walk = folders[0]
+    client = await serve()
+    form = {
+        "folder": str(tmp_path / "new"), "calibration": str(walk / "calibration.toml"), "footage": str(walk),
+        "people": ["ann", "bob"], "height_m": 1.7,
+    }  # fmt: skip
+    lines = await client.make(form)
+    assert [next(iter(line)) for line in lines] == ["passed"] * 6 + ["made"]
+    assert "4 cameras: FRONT" in lines[0]["passed"]
+    assert "50 frames at 25" in lines[3]["passed"]
+    assert "ann 1.70 m" in lines[4]["passed"]
+    assert lines[-1]["made"] == str(tmp_path / "new")
+    made = load_session(tmp_path / "new")
+    assert [p.name for p in made.people] == ["ann", "bob"]
+    # A second one in the same place: checks pass, and what fails is a sentence.
+    lines = await client.make(form)
+    assert "exists already" in lines[-1]["failed"]
+    for wrong, expected in (
+        ({"footage": str(tmp_path / "state")}, "expected a folder of videos"),
+        ({"footage": "relative"}, "expected a path from the root"),
+        ({"calibration": str(walk / "session.toml"), "folder": str(tmp_path / "other")}, "calibration"),
+    ):
+        (line,) = await client.make(form | wrong)
+        assert expected in line["failed"]
+    assert not (tmp_path / "other").exists()
+    status, text = await client.open(form | {"height_m": 9}, "/sessions/new")
+    assert (status, "a height of 0.3 to 3 metres" in text) == (400, True)
+    public = await serve(why="no")
+    assert (await public.open(form, "/sessions/new"))[0] == 403

@@ -107,6 +107,7 @@ async def test_angles_of_the_joint_have_whole_names_and_sliders(page, endpoint):
     }  # fmt: skip
 
 
+@pytest.mark.endpoint(n_people=2)
 async def test_it_leaves_the_views_room_and_stays_open_after_a_reload(page):
     await page.set_viewport_size({"width": 1280, "height": 720})
     boxes = {}
@@ -122,6 +123,8 @@ async def test_it_leaves_the_views_room_and_stays_open_after_a_reload(page):
     assert boxes["closed"][0]["width"] >= panes["width"]
     assert inspector["x"] >= scene["x"] + scene["width"] - 1
     assert inspector["x"] + inspector["width"] <= 1280
+    last = await page.locator("#show-key-list").bounding_box()
+    assert last["x"] + last["width"] <= 1280
     await page.locator("[data-section=search] summary").click()
     await page.reload()
     await shows(page, "window.quadrille?.state.settings && document.querySelector('[data-section=search]').open")
