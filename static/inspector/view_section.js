@@ -22,7 +22,7 @@ const LAYERS = [
   { name: "images", label: "Camera images", title: "Show the image of each camera, a moment after the frame changes" },
   { name: "floor", label: "Floor grid", title: "Draw a grid on the floor with a line every 50 cm" },
   { name: "gizmos", label: "Gizmos", title: "Draw the handles that move the body and turn the selected joint" },
-  { name: "ghost", label: "Prediction", title: "Draw in grey the pose that the tracker predicts for this frame from the poses before it" },
+  { name: "ghost", label: "Predicted pose", title: "Draw in grey the pose that the tracker predicts for this frame from the poses before it" },
 ];
 
 /**
