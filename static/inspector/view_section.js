@@ -92,11 +92,16 @@ export function viewSection({ store, send, themes }, { floor }) {
     heading("Trails"), trails.element, points, buttons(noTrails),
   ); // prettier-ignore
   let built = "";
+  let listed = "";
 
   const show = () => {
     const { view3d, state, session, theme: chosen } = store.facts;
     theme.show(chosen.choice);
-    if (session) camera.fill([[FREE, "Free view"], ...session.cameras.map(({ name }, i) => /** @type {[string, string]} */ ([String(i), name]))]);
+    const cameras = session?.cameras.map(({ name }) => name) ?? [];
+    if (cameras.join("\n") !== listed) {
+      listed = cameras.join("\n"); // an open list of choices must not be replaced
+      camera.fill([[FREE, "Free view"], ...cameras.map((name, i) => /** @type {[string, string]} */ ([String(i), name]))]);
+    }
     camera.show(state?.snapped == null ? FREE : String(state.snapped));
     if (!view3d) return;
     const { view } = view3d;
