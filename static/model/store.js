@@ -17,6 +17,7 @@ import { defaultLayers } from "./layers.js";
  *
  * @typedef {object} Facts
  * @property {boolean} connected
+ * @property {string | null} opening name of another session that the program is opening
  * @property {import("./protocol.js").SessionMessage | null} session
  * @property {import("./protocol.js").StateMessage | null} state
  * @property {import("./cells.js").Cells} timeline cells of all people together
@@ -68,6 +69,7 @@ export class Store {
   /** @type {Facts} */
   facts = {
     connected: false,
+    opening: null,
     session: null,
     state: null,
     timeline: new Cells(0),

@@ -20,6 +20,7 @@ import { People } from "./people.js";
 import { peopleBindings } from "./people_keys.js";
 import { showProgressMarks } from "./progress_marks.js";
 import { SavedMark } from "./saved_mark.js";
+import { Sessions } from "./sessions.js";
 import { escapeBinding, helpBindings } from "./shell_keys.js";
 import { TopBar } from "./top_bar.js";
 
@@ -54,6 +55,7 @@ export function mount(context, rooms) {
   const history = new HistoryList(store, send);
   new ExportPanel(store, context.notify);
   new SavedMark(store, send);
+  const sessions = new Sessions(store, context.notify);
   new Announcer(byId("announcer", HTMLElement), store);
   const firstSteps = new FirstSteps(store);
   const palette = new Palette({ store, navigation, grid, posing, layers, actions, inspector: rooms.inspector.inspector, away: reasons.away });
@@ -61,7 +63,7 @@ export function mount(context, rooms) {
   button("show-palette", () => palette.toggle());
 
   const own = [
-    ...helpBindings({ actions, history, notices, palette, keyList, firstSteps, reasons }),
+    ...helpBindings({ actions, history, notices, palette, keyList, firstSteps, sessions, reasons }),
     escapeBinding({ store, actions, notices, grid, gestures, pinning, floor: rooms.scene.floor }),
     ...peopleBindings({ actions, posing, people, reasons }),
   ];

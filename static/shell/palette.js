@@ -83,6 +83,8 @@ export class Palette {
 
   /** @param {KeyboardEvent} event */
   #onKey(event) {
+    // The field of the closed dialog keeps the focus until the page is drawn again: its keys belong to the page.
+    if (!this.#dialog.open) return;
     const count = this.#found.length;
     const page = 8;
     const to = {

@@ -52,6 +52,11 @@ export class Drawer {
     this.#open(this.#store.facts.drawer === tab ? null : tab);
   }
 
+  /** @param {import("../model/series.js").Tab} tab */
+  open(tab) {
+    this.#open(tab);
+  }
+
   /** Open the last group of curves, or close the drawer if curves are shown. */
   toggleCurves() {
     const stored = localStorage.getItem(STORED_CURVES);

@@ -32,9 +32,9 @@ export function mount({ store, actions, navigation, reasons }) {
   const frameWindow = new FrameWindow(store);
   new Transport(store, navigation, playback, actions);
   new TrackBar(store, actions);
-  new JumpMenu(store, jumps);
   new RangeBar(store, actions);
   const drawer = new Drawer(store);
+  new JumpMenu(store, jumps, () => drawer.open("doubts"));
   const queue = new DoubtQueue(store, navigation, actions);
   new DoubtList(store, queue);
   new Curves(store, navigation, actions, frameWindow);

@@ -82,6 +82,8 @@ async def test_sizes_are_entered_in_centimetres_then_applied(page, endpoint):
 async def test_the_3d_view_is_chosen(page, endpoint):
     await opened(page, "view")
     await row(page, "Floor grid").locator("input").uncheck()
+    choice = row(page, "Look through").locator("option").nth(2)
+    await choice.evaluate("(option) => (window.option = option)")
     await row(page, "Look through").locator("select").select_option(label="RIGHT")
     await page.locator(".trail-points").get_by_label("head").check()
     await row(page, "Opacity").locator("input").fill("0.5")
@@ -94,6 +96,8 @@ async def test_the_3d_view_is_chosen(page, endpoint):
         {"type": "view_3d", "changes": {"opacity": 0.5}},
         {"type": "floor", "action": "begin"},
     ]
+    await shows(page, "quadrille.state.state.snapped === 1")
+    assert await choice.evaluate("(option) => option === window.option")  # an open list stays open
 
 
 async def test_angles_of_the_joint_have_whole_names_and_sliders(page, endpoint):
@@ -107,6 +111,7 @@ async def test_angles_of_the_joint_have_whole_names_and_sliders(page, endpoint):
     }  # fmt: skip
 
 
+@pytest.mark.endpoint(n_people=2)
 async def test_it_leaves_the_views_room_and_stays_open_after_a_reload(page):
     await page.set_viewport_size({"width": 1280, "height": 720})
     boxes = {}
@@ -122,6 +127,8 @@ async def test_it_leaves_the_views_room_and_stays_open_after_a_reload(page):
     assert boxes["closed"][0]["width"] >= panes["width"]
     assert inspector["x"] >= scene["x"] + scene["width"] - 1
     assert inspector["x"] + inspector["width"] <= 1280
+    last = await page.locator("#show-key-list").bounding_box()
+    assert last["x"] + last["width"] <= 1280
     await page.locator("[data-section=search] summary").click()
     await page.reload()
     await shows(page, "window.quadrille?.state.settings && document.querySelector('[data-section=search]').open")

@@ -89,3 +89,15 @@ async def test_an_empty_list_says_why(page, endpoint):
     await page.keyboard.press("Shift+L")
     await until(lambda: not endpoint.thumbnails)
     await page.locator("#doubts").wait_for(state="hidden")
+
+
+async def test_poses_that_were_accepted_are_no_longer_visited(page, endpoint):
+    await page.locator("#show-jumps").click()
+    row = page.locator(".jump-row", has_text="Doubtful or lost").locator("output")
+    assert await row.inner_text() == "3"
+    await page.get_by_role("button", name="List doubts by severity").click()
+    await shows(page, f"{ROWS}.length === 2 && document.querySelector('#jump-menu').hidden")
+    await page.locator("#doubt-list .doubt-accept").last.click()
+    await shows(page, f"{ROWS}.length === 1")
+    await page.keyboard.press("n")
+    await shows(page, "quadrille.state.shown.frame === 50")  # not 31
