@@ -176,7 +176,7 @@ def trace_pieces(P: Array, eye: Array, surfaces: Surfaces, piece_px: float, out:
     for i in range(n):
         out.occluded[i] = False
     mark_all_occluded(n_parts, surfaces, out)
-    return n
+    return int(n)
 
 
 @njit(nogil=True, cache=True)

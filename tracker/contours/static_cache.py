@@ -154,7 +154,7 @@ def trace_moving_parts(
         n += int(count)
     out.firsts[n_parts] = n
     mark_all_occluded(n_parts, surfaces, out)
-    return n
+    return int(n)
 
 
 @njit(**FAST_MATH)
