@@ -1,21 +1,25 @@
-"""Compile the kernels that are not in the cache: `python -m app.bench.compile_kernels [--background]`.
+"""Compile the kernels that are not in the cache: `python -m app.bench.compile_kernels [--background | --evidence]`.
 
 Numba compiles a kernel on its first call and holds the interpreter lock meanwhile. The first tracking run after an
 installation would wait for a minute, and the page with it. This program calls all kernels; other programs then load
-them from the cache.
+them from the cache. The kernels that a new user meets first come first (`kernel_cache.STAGES`).
 """
 
 import gc
 import os
+import subprocess
 import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
 
-from app.bench.sample_frames import FRAME, read_crowd
+import numpy as np
+
+from app.bench.sample_frames import FRAME, BenchCrowd, read_crowd
 from app.session.samples import bundled
 from tracker.body.model import BodyModel, PosedBody
-from tracker.compute.kernel_cache import compiled_mark, record_compiled
+from tracker.compute.kernel_cache import compiled_mark, record_compiled, record_stage
+from tracker.contours import occluding_contours
 from tracker.contours.label_image import part_labels
 from tracker.contours.part_edges import points_occluded
 from tracker.errors import SessionError
@@ -23,12 +27,16 @@ from tracker.evidence.observer import Observer
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array
+from tracker.posing.default_pose import default_pose
+from tracker.posing.drag import drag
+from tracker.posing.grab import grab
 from tracker.session.lock import SessionLock
+from tracker.session.session import load_session
 from tracker.simulate.people.model_figure import ModelFigure
 from tracker.simulate.stage.camera_rig import make_cameras
 from tracker.simulate.stage.film import film, freeze
 from tracker.simulate.stage.room import see_room
-from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.chamfer.settings import TrackSettings, pose_cost
 from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
@@ -44,11 +52,9 @@ def main(background: bool = False) -> None:
     """Compile the missing kernels. While another program compiles them, wait for it.
 
     Args:
-        background: work at the lowest priority.
+        background: work at the lowest priority beside a page, and on two cores.
     """
-    if background and hasattr(os, "nice"):
-        os.nice(19)
-    gc.set_threshold(*_GC_THRESHOLDS)
+    _prepare(background)
     mark = compiled_mark()
     if mark.exists():
         mark.touch()  # the versions used last stay in the cache
@@ -56,25 +62,64 @@ def main(background: bool = False) -> None:
         try:
             with SessionLock(mark.parent):
                 if not mark.exists():  # another process may have compiled them meanwhile
-                    _call_kernels()
+                    _call_kernels(background)
                     record_compiled()
         except SessionError:
             time.sleep(_WAIT_S)
 
 
-def _call_kernels() -> None:
-    """Search and track on a few frames of the bundled tango: two people, one as in GD96, one without a background.
+def _prepare(background: bool) -> None:
+    if background and hasattr(os, "nice"):
+        os.nice(19)
+    gc.set_threshold(*_GC_THRESHOLDS)
 
-    Kernels that tracking does not need follow: labels of the parts, hidden points, the simulator.
+
+def _call_kernels(background: bool) -> None:
+    """Call the kernels stage by stage on the bundled tango: two people in four views.
+
+    In the background, a second process compiles the kernels of the evidence, which need none of the contours'.
     """
-    crowd = read_crowd(bundled("tango"), FRAME)
+    command = (sys.executable, "-m", "app.bench.compile_kernels", "--evidence")
+    beside = subprocess.Popen(command) if background else None
+    try:
+        session = load_session(bundled("tango"))
+        cameras = [c.camera for c in session.cameras]
+        bodies = [PosedBody(p.model, default_pose(p.model, cameras, np.eye(3), 0.0)) for p in session.people]
+        held = grab(bodies[0].model, bodies[0].values, cameras[0], "left_wrist", np.zeros(2))
+        drag(held, np.ones(2), bodies[0].values)
+        record_stage("posing")
+        occluding_contours.trace(bodies, cameras[0].pinhole)
+        points_occluded(bodies, [cameras[0].pinhole], bodies[0].points_world)
+        record_stage("contours")
+    finally:
+        if beside is not None:
+            beside.wait()
+    crowd = read_crowd(session.folder, FRAME)
+    record_stage("evidence")
+    pose_cost(crowd.views, crowd.models, crowd.values, TrackSettings())(crowd.values)
+    record_stage("cost")
+    _call_tracking(crowd)
+
+
+def _compile_evidence() -> None:
+    """Compile the kernels of the evidence alone, beside the others."""
+    _prepare(background=True)
+    cameras = load_session(bundled("tango")).cameras
+    with Recording(cameras) as recording:
+        Observer(cameras, recording).evidence(FRAME)
+    record_stage("evidence")
+
+
+def _call_tracking(crowd: BenchCrowd) -> None:
+    """Search and track on a few frames: two people, one as in GD96, one without a background.
+
+    Kernels that tracking does not need follow: labels of the parts, the simulator.
+    """
     cameras, settings = crowd.session.cameras, TrackSettings()
     _track(cameras, settings, crowd.models, crowd.values)
     _track(cameras, replace(settings, estimate="search"), crowd.models[:1], crowd.values[:1])
     _track([replace(c, background=None) for c in cameras], settings, crowd.models[:1], crowd.values[:1])
-    bodies = [PosedBody(m, v) for m, v in zip(crowd.models, crowd.values, strict=True)]
-    part_labels(bodies, cameras[0].camera.pinhole)
-    points_occluded(bodies, [cameras[0].camera.pinhole], bodies[0].points_world)
+    part_labels([PosedBody(crowd.models[0], crowd.values[0])], cameras[0].camera.pinhole)
     film(see_room(make_cameras(1, (32, 32), 0)[0], 0), freeze([ModelFigure(crowd.models[0])], crowd.values[:1]))
 
 
@@ -89,4 +134,7 @@ def _track(
 
 
 if __name__ == "__main__":
-    main("--background" in sys.argv[1:])
+    if "--evidence" in sys.argv[1:]:
+        _compile_evidence()
+    else:
+        main("--background" in sys.argv[1:])

@@ -37,27 +37,33 @@ from app.control.tracking.tracking import Tracking
 from app.control.view.floor import FloorEditing
 from app.control.view.view_3d import View3dSettings
 from app.control.view.visibility import PeopleVisibility
+from app.runtime.kernel_compiler import KernelCompiler
 from app.session.frame_cache import FrameCache
 from app.state.state import State
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel
+from tracker.compute.kernel_cache import STAGES
 from tracker.session.session import Session
 
 
 class Controller:
     """The parts that change the state of one open session, and read access to that state."""
 
-    def __init__(self, session: Session, saver: Saver, frames: FrameCache) -> None:
+    def __init__(
+        self, session: Session, saver: Saver, frames: FrameCache, compiler: KernelCompiler | None = None
+    ) -> None:
         """Show the first frame.
 
         Args:
             session: to open.
             saver: stores its poses.
             frames: gives images and evidence.
+            compiler: compiles missing kernels, which are not called before; None to compile each at its first call.
         """
         self.frames = frames
         """Images and evidence of the footage."""
-        self._session_state = session_state = SessionState(session, saver, frames)
+        compiled = frozenset(STAGES) if compiler is None else compiler.stages
+        self._session_state = session_state = SessionState(session, saver, frames, compiled)
         runs = SearchRuns()
         self.activities = activities = Activities(session_state.lock)
         """Stops what is at work."""
@@ -103,7 +109,7 @@ class Controller:
         self._inconsistent_frames = InconsistentFrames(session_state)
         self._footage_scan = FootageScan(session_state)
         self._save_retry = SaveRetry(session_state)
-        self._compiling: KernelWarmup | None = None
+        self._compiling = None if compiler is None else KernelWarmup(session_state, compiler)
 
     @property
     def state(self) -> State:
@@ -137,10 +143,6 @@ class Controller:
     def subscribe(self, view: Callable[[State], None]) -> Callable[[], None]:
         """Call a view with every new state; returns the function that ends this."""
         return self._session_state.subscribe(view)
-
-    def compile_kernels(self) -> None:
-        """Start to compile missing kernels in the background."""
-        self._compiling = KernelWarmup(self._session_state)
 
     def close(self) -> None:
         """Stop all work and save; the controller must not be used afterwards."""

@@ -127,6 +127,9 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     )
     for index in sorted(view.cameras):
         camera = session.cameras[index].camera.pinhole
+        if "contours" not in state.compiled:  # the contours' kernels are being compiled
+            out += _skeletons(session, bodies, camera, index)
+            continue
         if not view.layers.isdisjoint(("contours", "hidden")):
             out += _model(session, bodies, camera, index, view)
         if "contours" in view.layers:
@@ -155,7 +158,11 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     points = [b.points_world for b in bodies]
     seen = {index: session.cameras[index].camera.pinhole for index in sorted(cameras)}
-    out, hidden_by_view = [], part_edges.points_occluded(bodies, list(seen.values()), np.concatenate(points))
+    if "contours" in state.compiled:
+        hidden_by_view = part_edges.points_occluded(bodies, list(seen.values()), np.concatenate(points))
+    else:  # the kernels are being compiled: every joint can be grabbed
+        hidden_by_view = np.zeros((len(seen), sum(map(len, points))), bool)
+    out = []
     for (index, camera), hidden in zip(seen.items(), hidden_by_view, strict=True):
         first = 0
         for person, body in enumerate(bodies):
@@ -208,6 +215,18 @@ def _model(session: Session, bodies: Sequence[PosedBody], camera: Camera, index:
             out += _by_part(session, bodies, contour, pieces, index, kind)
         elif layer in view.layers:
             out += _by_side(session, bodies, contour, pieces, index, kind)
+    return out
+
+
+def _skeletons(session: Session, bodies: Sequence[PosedBody], camera: Camera, index: int) -> list[Path]:
+    """Draw the bones of the shown poses in the place of their contours."""
+    out = []
+    for person, body in enumerate(bodies):
+        places, px = {name: i for i, name in enumerate(body.model.point_names)}, camera.project(body.points_world)
+        ends = np.array([(places[a], places[b]) for a, b in body.model.bones]).reshape(-1, 2)
+        segments = px[ends].reshape(-1, 4)
+        seen = segments[np.isfinite(segments).all(axis=1)].astype(np.float32)
+        out.append(Path(index, person, "model", session.people[person].color, seen))
     return out
 
 

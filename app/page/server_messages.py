@@ -263,8 +263,8 @@ class StateMessage(Message, frozen=True, tag="state"):
     floor: FloorPicking | None
     """Null while nobody sets the floor."""
     footage: FootageProgress
-    compiling: bool
-    """Whether kernels are being compiled, as after an installation."""
+    compiling: str | None
+    """Group of kernels being compiled, as after an installation."""
     undo: str | None
     """Label of the entry that undo would undo."""
     redo: str | None

@@ -251,7 +251,7 @@ class PageConnection:
 
     async def _send_overlay(self, state: State, view: View) -> None:
         views = self._evidence(state, view)
-        if view.layers.isdisjoint(_EDGES):
+        if view.layers.isdisjoint(_EDGES) or "contours" not in state.compiled:
             views = None
         drawn = (*_drawn(state), view, views is None)
         if drawn == self._sent_overlay:
@@ -267,7 +267,7 @@ class PageConnection:
         if view.layers.isdisjoint(page_view.EVIDENCE):
             return None
         frames, views = self._controller.frames, self._controller.frames.cached_evidence(state.frame)
-        if views is None:
+        if views is None and "evidence" in state.compiled:
             frames.request(state.frame, lambda _: self._wake(state))
         return views
 
@@ -346,6 +346,7 @@ def _drawn(state: State) -> tuple[object, ...]:
         state.drag,
         state.drag_seqs,
         state.visibility.hidden,
+        state.compiled,
     )
     return (*drawn, _pins(state), state.floor.picking)
 

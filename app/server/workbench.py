@@ -6,6 +6,7 @@ import signal
 import threading
 import webbrowser
 from collections.abc import Callable, Coroutine
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +17,7 @@ from platformdirs import user_state_path
 from app.control.controller import Controller
 from app.page.socket import PaneSocket
 from app.page.thumbnails import Thumbnails
+from app.runtime.kernel_compiler import KernelCompiler
 from app.scene3d.gizmos import Gizmos
 from app.scene3d.scene import SceneView
 from app.server.access import access_for, is_loopback
@@ -84,7 +86,11 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
     access = access_for(serving.host, serving.allow_hosts, serving.token, tokens)
     static = static_folder()
     indices = footage_indices()
-    with SessionLock(session.folder), Recording(session.cameras, indices=indices, in_background=True) as recording:
+    with (
+        closing(KernelCompiler()) as compiler,
+        SessionLock(session.folder),
+        Recording(session.cameras, indices=indices, in_background=True) as recording,
+    ):
         remember(tokens, session.folder)
         store = AnnotationStore(session.annotations_path)
         if store.backup_error is not None:
@@ -94,7 +100,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
             say(offer)
         frames = FrameCache(Observer(session.cameras, recording), proxies.proxies(session))
         saver = Saver(session, store, _author())
-        controller = Controller(session, saver, frames)
+        controller = Controller(session, saver, frames, compiler)
         viser = PrivateViser()
         thumbnails = Thumbnails(controller, FootageCrops(session.cameras, indices))
         try:
@@ -116,7 +122,6 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
                 for name in proxies.stale(session):
                     say(f"the proxy of camera {name} is of other footage: run quadrille index {session.folder} again")
                 say(f"{session.name}: {address}")
-                controller.compile_kernels()
                 if serving.browser:
                     threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
 

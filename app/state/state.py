@@ -12,6 +12,7 @@ from app.state.progress import FootageState, RangeState, TrackState
 from app.state.search import CostLandscape, SearchState, SearchView
 from app.state.view_3d import View3d
 from tracker.body.model import BodyModel
+from tracker.compute.kernel_cache import STAGES
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -74,8 +75,8 @@ class State:
     """What the predicted pose of the 3-D view was computed from, or why there is none; empty while it is not shown."""
     floor: FloorState = field(default_factory=FloorState)
     footage: FootageState = field(default_factory=FootageState)
-    compiling: bool = False
-    """Whether kernels are being compiled in the background."""
+    compiled: frozenset[str] = frozenset(STAGES)
+    """Groups of kernels that can be called without delay; see `tracker.compute.kernel_cache`."""
     snapped: int | None = None
     """Index of the camera through which the 3-D view looks; None for a free view."""
     settings: TrackSettings = field(default_factory=TrackSettings)
@@ -99,6 +100,11 @@ class State:
     def is_3d_throttled(self) -> bool:
         """Whether the 3-D view is drawn rarely, to leave the processor to a running job."""
         return (self.track.running or self.search.running) and bool(self.pages_pausing_3d)
+
+    @property
+    def compiling(self) -> str | None:
+        """The group of kernels being compiled; None once all are compiled."""
+        return next((stage for stage in STAGES if stage not in self.compiled), None)
 
     @property
     def is_dragging(self) -> bool:
@@ -196,7 +202,7 @@ class StateChanges(TypedDict, total=False):
     prediction_note: str
     floor: FloorState
     footage: FootageState
-    compiling: bool
+    compiled: frozenset[str]
     snapped: int | None
     settings: TrackSettings
     undo: str | None

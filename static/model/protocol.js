@@ -109,8 +109,8 @@
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
  *   part_costs_px: (number | null)[], dofs: number[], locked: number[], other_sizes: boolean, job: Job, replay:
  *   ReplayedStep | null, compared: Compared | null, track: Track, range: RangeWork, follow: boolean, snapped: number |
- *   null, floor: FloorPicking | null, footage: FootageProgress, compiling: boolean, undo: string | null, redo: string |
- *   null, saved: boolean, save_error: string | null}} StateMessage
+ *   null, floor: FloorPicking | null, footage: FootageProgress, compiling: string | null, undo: string | null, redo:
+ *   string | null, saved: boolean, save_error: string | null}} StateMessage
  * @typedef {{edit: number, label: string, author: string, time: string, undone: boolean}} HistoryEntry
  * @typedef {{type: "history", entries: HistoryEntry[], later: boolean, earlier: boolean}} HistoryMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage

@@ -8,7 +8,9 @@ export function showProgressMarks(store) {
   const listing = byId("listing", HTMLElement);
   store.subscribe((changed) => {
     if (!changed.has("state")) return;
-    compiling.hidden = !store.facts.state?.compiling;
+    const group = store.facts.state?.compiling ?? null;
+    compiling.hidden = group === null;
+    compiling.textContent = `Compiling ${group ?? ""}`;
     showListing(listing, store.facts.state?.footage);
   });
 }

@@ -62,14 +62,15 @@ def opened(session, observer):
             controller.close()
             store.close()
 
-    def open_it():
+    def open_it(compiler=None):
         close()
         loaded = load_session(session)
         store = AnnotationStore(loaded.annotations_path)
         frames = FrameCache(observer, rest_s=0)  # no page waits for pictures
-        controller = Controller(loaded, Saver(loaded, store), frames)
+        controller = Controller(loaded, Saver(loaded, store), frames, compiler)
         open_now.append((controller, store))
-        wait_for(lambda: controller.state.cost_px is not None)
+        if compiler is None:  # otherwise there is none before its kernels are compiled
+            wait_for(lambda: controller.state.cost_px is not None)
         return controller
 
     yield open_it

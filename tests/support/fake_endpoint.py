@@ -169,7 +169,7 @@ class FakeEndpoint:
             "people": [
                 {"source": "manual", "status": "", "shown": True, "alternatives": 0} for _ in range(self.n_people)
             ],
-            "snapped": None, "floor": None, "footage": {"listed": None, "error": None}, "compiling": False,
+            "snapped": None, "floor": None, "footage": {"listed": None, "error": None}, "compiling": None,
             "saved": True, "save_error": None,
         }  # fmt: skip
 

@@ -1,4 +1,4 @@
 """Numba options, the kernel cache, thread pools and quantiles of small arrays. Imports no other room.
 
-Public: `numba_options`, `threads`, `quantiles`, and of `kernel_cache` `compiled_mark` and `record_compiled`.
+Public: `numba_options`, `threads`, `quantiles`, and of `kernel_cache` which kernels are compiled.
 """

@@ -1,6 +1,7 @@
 """The cache of compiled kernels: one folder for all clones of the project, keyed by the kernels' own text.
 
-`use_kernel_cache` registers the cache with numba. The file `compiled_mark()` exists once all kernels are compiled.
+`use_kernel_cache` registers the cache with numba. The file `compiled_mark()` exists once all kernels are compiled, and
+`compiled_stages` names the groups that are compiled before.
 """
 
 import hashlib
@@ -22,7 +23,9 @@ from tracker.compute.kernel_keys import KernelKeys, UnknownSourceError
 from tracker.files import write_text_atomic
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-_MARK, _KEYS = "compiled-", "keys-"
+STAGES = ("posing", "contours", "evidence", "cost", "tracking")
+"""Groups of kernels in the order in which a new user needs them; each needs some of the groups before it."""
+_MARK, _KEYS, _STAGE = "compiled-", "keys-", "stage-"
 _N_STATES = 12
 """Number of versions of the kernels, such as branches, that stay in the cache."""
 _N_KEY_FILES = 60
@@ -131,14 +134,35 @@ def _computed_keys(environment: str) -> dict[str, str]:
 
 def compiled_mark() -> Path:
     """Return the file that exists once this numba has compiled all kernels for this Python."""
+    return _folder() / f"{_MARK}{_version()}"
+
+
+def compiled_stages() -> frozenset[str]:
+    """Return which of the `STAGES` are compiled."""
+    if compiled_mark().exists():
+        return frozenset(STAGES)
+    return frozenset(stage for stage in STAGES if _stage_mark(stage).exists())
+
+
+def record_stage(stage: str) -> None:
+    """Mark that the kernels of a stage are compiled."""
+    _stage_mark(stage).touch()
+
+
+def _stage_mark(stage: str) -> Path:
+    return _folder() / f"{_STAGE}{_version()}-{stage}"
+
+
+def _version() -> str:
+    """Return what the compiled kernels depend on: their sources, numba and Python."""
     state = hashlib.sha256(repr(sorted(kernel_keys().items())).encode()).hexdigest()[:20]
-    return _folder() / f"{_MARK}{state}-{numba.__version__}-{sys.implementation.cache_tag}"
+    return f"{state}-{numba.__version__}-{sys.implementation.cache_tag}"
 
 
 def record_compiled() -> None:
     """Mark that all kernels are compiled, and delete those of old versions."""
     compiled_mark().write_text("\n".join(kernel_keys().values()), "utf-8")
-    for old in _newest_first(f"{_KEYS}*.json")[_N_KEY_FILES:]:
+    for old in (*_newest_first(f"{_KEYS}*.json")[_N_KEY_FILES:], *_newest_first(f"{_STAGE}{_version()}-*")):
         old.unlink(missing_ok=True)
     marks = _newest_first(f"{_MARK}*")
     for old in marks[_N_STATES:]:

@@ -14,6 +14,7 @@ from app.state.people import ShownPose
 from app.state.state import Costs, ShownFrame, State, StateChanges, finite_or_none
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel
+from tracker.compute.kernel_cache import STAGES
 from tracker.errors import TrackerError
 from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
@@ -35,13 +36,16 @@ _APART_M = 0.9
 class SessionState:
     """The state of one open session. A change takes `lock`; the views are called under it."""
 
-    def __init__(self, session: Session, saver: Saver, frames: FrameCache) -> None:
+    def __init__(
+        self, session: Session, saver: Saver, frames: FrameCache, compiled: frozenset[str] = frozenset(STAGES)
+    ) -> None:
         """Show the first frame.
 
         Args:
             session: to open.
             saver: stores its poses.
             frames: gives images and evidence.
+            compiled: groups of kernels that can be called without delay.
         """
         self.session, self.saver, self.frames = session, saver, frames
         self.lock = threading.RLock()
@@ -57,10 +61,10 @@ class SessionState:
         """Time of the last save, s of the monotonic clock."""
         unlocked = (frozenset[int](),) * len(session.people)
         shown = self._load(0)
-        self.state = State(frame=0, pins=self._load_pins(0), locked=unlocked, **shown)
+        self.state = State(frame=0, pins=self._load_pins(0), locked=unlocked, compiled=compiled, **shown)
         self.note_stored()
         self.refresh_saving()
-        self.frames.request(0, self._evidence_ready)
+        self.request_evidence()
 
     @property
     def models(self) -> tuple[BodyModel, ...]:
@@ -157,9 +161,19 @@ class SessionState:
         self.request_evidence()
 
     def request_evidence(self) -> None:
-        """Request the frame's evidence in the background, unless it is cached; the costs follow."""
-        if self.frames.cached_evidence(self.state.frame) is None:
+        """Request the frame's evidence in the background, unless it is cached; the costs follow.
+
+        Kernels that are compiled beside the page come first: here they would hold it up.
+        """
+        if "evidence" in self.state.compiled and self.frames.cached_evidence(self.state.frame) is None:
             self.frames.request(self.state.frame, self._evidence_ready)
+
+    def note_compiled(self, stages: frozenset[str]) -> None:
+        """Note the groups of kernels that can be called without delay, and do what has waited for them."""
+        with self.lock:
+            self.set(compiled=stages)
+            self.request_evidence()
+            self.set(**self.costs(self.state.poses))
 
     def costs(
         self, poses: tuple[Array, ...], frame: int | None = None, models: tuple[BodyModel, ...] | None = None
@@ -175,7 +189,7 @@ class SessionState:
             Costs without values while the frame has no evidence.
         """
         views = self.frames.cached_evidence(self.state.frame if frame is None else frame)
-        if views is None:
+        if views is None or "cost" not in self.state.compiled:
             return {"cost_px": None, "view_costs_px": ()}
         cost = pose_cost(views, models or self.models, poses, self.state.settings)(poses)
         return {

@@ -169,11 +169,11 @@ async def test_every_control_has_a_name_and_a_tooltip(page):
 async def test_that_kernels_are_compiled_is_said_while_they_are(page, endpoint):
     mark = page.locator("#compiling")
     assert not await mark.is_visible()
-    endpoint.state["compiling"] = True
+    endpoint.state["compiling"] = "contours"
     await endpoint.broadcast(endpoint.state)
     await mark.wait_for(state="visible")
-    assert await mark.inner_text() == "Compiling"
-    endpoint.state["compiling"] = False
+    assert await mark.inner_text() == "Compiling contours"
+    endpoint.state["compiling"] = None
     await endpoint.broadcast(endpoint.state)
     await mark.wait_for(state="hidden")
 
@@ -181,7 +181,11 @@ async def test_that_kernels_are_compiled_is_said_while_they_are(page, endpoint):
 async def test_work_that_waits_for_kernels_says_so(page, endpoint):
     figures = page.locator("#search-figures")
     track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "total": 18}
-    for compiling, done, text in ((True, 0, "waiting for compilation"), (False, 0, "0.0/s"), (True, 3, "0.0/s")):
+    for compiling, done, text in (
+        ("tracking", 0, "waiting for compilation"),
+        (None, 0, "0.0/s"),
+        ("tracking", 3, "0.0/s"),
+    ):
         endpoint.state |= {"compiling": compiling, "track": track | {"done": done}}
         await endpoint.broadcast(endpoint.state)
         await expect(figures).to_have_text(text)

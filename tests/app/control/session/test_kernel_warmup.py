@@ -1,22 +1,33 @@
 """The kernels are compiled beside the page by a program of its own, where they are not yet."""
 
+import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 
 import numba
+import numpy as np
 import pytest
 from gestures import wait_for
 
 from app.bench import compile_kernels
-from app.control.session.kernel_warmup import KernelWarmup
-from app.control.session.session_state import SessionState
-from tracker.compute.kernel_cache import compiled_mark
+from app.drawing import overlays
+from app.runtime import kernel_compiler
+from app.runtime.kernel_compiler import KernelCompiler
+from app.state.page_view import View
+from tracker.compute.kernel_cache import STAGES, compiled_mark, compiled_stages, record_compiled, record_stage
 
+VIEW = View(frozenset({"contours"}), (1, 0, 0, 0))
+"""The contours of one camera."""
 WAITS = (sys.executable, "-c", "import time; time.sleep(100)")
 FAILS = (sys.executable, "-c", "raise SystemExit(3)")
+WITH_CHILD = (
+    sys.executable,
+    "-c",
+    "import subprocess, sys, time; c = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(100)']);"
+    "print(c.pid, file=open(sys.argv[1], 'w'), flush=True); time.sleep(100)",
+)
 
 
 @pytest.fixture
@@ -27,62 +38,86 @@ def empty_cache(monkeypatch, tmp_path):
 
 
 @pytest.fixture
-def screen(opened) -> SessionState:
-    screen = opened()._session_state
-    wait_for(lambda: screen.state.cost_px is not None)
-    return screen
+def compiling(opened, empty_cache):
+    """A controller beside a program that compiles nothing by itself."""
+    compiler = KernelCompiler(WAITS)
+    controller = opened(compiler=compiler)
+    yield controller
+    controller.close()
 
 
-def test_the_page_is_told_until_all_is_compiled(screen, empty_cache):
-    touches = f"import pathlib, time; time.sleep(0.5); pathlib.Path({str(compiled_mark())!r}).touch()"
-    compiling = KernelWarmup(screen, (sys.executable, "-c", touches))
-    assert screen.state.compiling
-    wait_for(lambda: not screen.state.compiling)
-    assert compiled_mark().exists()
-    compiling.close()
+def test_the_page_shows_each_thing_once_its_kernels_are_compiled(compiling):
+    state = compiling._session_state
+    assert state.state.compiling == "posing"
+    assert compiling.frames.cached_evidence(0) is None
+    for stage in ("posing", "contours"):
+        record_stage(stage)
+    wait_for(lambda: state.state.compiling == "evidence")
+    assert compiling.frames.cached_evidence(0) is None
+    record_stage("evidence")
+    wait_for(lambda: compiling.frames.cached_evidence(0) is not None)
+    assert state.state.cost_px is None
+    record_stage("cost")
+    wait_for(lambda: state.state.cost_px is not None)
+    assert state.state.compiling == "tracking"
+    record_compiled()
+    wait_for(lambda: state.state.compiling is None)
 
 
-def test_nothing_is_started_where_all_is_compiled(screen, empty_cache, monkeypatch):
+def test_a_drag_before_all_kernels_moves_a_skeleton_without_cost(compiling):
+    state = compiling.state
+    handles = overlays.handles(compiling.session, state, {0})
+    assert all(h.visible for h in handles)
+    (skeleton,) = overlays.paths(compiling.session, state, VIEW, None)
+    by_name = {h.point: (h.u, h.v) for h in handles}
+    bones = [(*by_name[a], *by_name[b]) for a, b in compiling.models[0].bones]
+    np.testing.assert_allclose(skeleton.segments_px, bones, atol=1e-3)
+    before = state.people[0].values
+    wrist = by_name["left_wrist"]
+    compiling.dragging.begin(1, 0, 0, "left_wrist", wrist)
+    compiling.dragging.move(1, (wrist[0] + 10, wrist[1]), 1)
+    compiling.dragging.end(1)
+    assert not np.array_equal(compiling.state.people[0].values, before)
+    assert compiling.state.cost_px is None
+
+
+def test_nothing_is_started_where_all_is_compiled(opened, empty_cache, monkeypatch):
     compiled_mark().touch()
-    monkeypatch.setattr(subprocess, "Popen", pytest.fail)
-    KernelWarmup(screen).close()
-    assert not screen.state.compiling
+    monkeypatch.setattr(kernel_compiler.subprocess, "Popen", pytest.fail)
+    assert KernelCompiler().stages == frozenset(STAGES)
 
 
-def test_the_program_waits_for_the_first_cost(screen, empty_cache, monkeypatch):
-    started = threading.Event()
-    monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: started.set())
-    with screen.lock:
-        screen.set(cost_px=None)
-    compiling = KernelWarmup(screen, WAITS)
-    assert screen.state.compiling
-    assert not started.wait(0.5)
-    compiling.close()
+def test_closing_ends_the_program_and_what_it_started(empty_cache):
+    file = empty_cache / "child"
+    compiler = KernelCompiler((*WITH_CHILD, str(file)))
+    wait_for(lambda: file.exists() and file.read_text().strip())
+    child = int(file.read_text())
+    compiler.close()
+    assert compiler._process.returncode == -signal.SIGTERM
+
+    def is_gone():
+        try:
+            os.kill(child, 0)
+        except ProcessLookupError:
+            return True
+        with open(f"/proc/{child}/stat") as stat:  # a container may have nobody who reaps it
+            return stat.read().rsplit(")", 1)[1].split()[0] == "Z"
+
+    wait_for(is_gone)
 
 
-def test_closing_ends_the_program(screen, empty_cache, caplog, monkeypatch):
-    started = []
-    real = subprocess.Popen
-    monkeypatch.setattr(subprocess, "Popen", lambda *a, **k: started.append(real(*a, **k)) or started[0])
-    compiling = KernelWarmup(screen, WAITS)
-    wait_for(lambda: started)
-    compiling.close()
-    assert started[0].returncode == -signal.SIGTERM
-    wait_for(lambda: not screen.state.compiling)
-    assert not caplog.records
-
-
-def test_a_program_that_fails_is_reported_and_the_page_goes_on(screen, empty_cache, caplog):
-    KernelWarmup(screen, FAILS)
-    wait_for(lambda: not screen.state.compiling)
-    assert "could not be compiled in the background" in caplog.text
+def test_a_program_that_fails_is_reported_and_the_page_goes_on(opened, empty_cache, caplog):
+    controller = opened(compiler=KernelCompiler(FAILS))
+    wait_for(lambda: controller.state.compiling is None)
+    wait_for(lambda: "could not be compiled in the background" in caplog.text)
+    wait_for(lambda: controller.state.cost_px is not None)
     assert not compiled_mark().exists()
 
 
 def test_one_program_compiles_at_a_time(empty_cache, monkeypatch):
     """The second finds all compiled once the first gives its lock back."""
     calls = []
-    monkeypatch.setattr(compile_kernels, "_call_kernels", lambda: calls.append(1))
+    monkeypatch.setattr(compile_kernels, "_call_kernels", calls.append)
     with compile_kernels.SessionLock(empty_cache):
         monkeypatch.setattr(time, "sleep", lambda _: compiled_mark().touch())
         compile_kernels.main()
@@ -91,14 +126,28 @@ def test_one_program_compiles_at_a_time(empty_cache, monkeypatch):
 
 def test_the_program_calls_the_kernels_and_marks_them_compiled(empty_cache, monkeypatch):
     """All of them, by tracking: those that two people need, the paper's search, and a room without a background."""
-    tracked, priorities = [], []
+    tracked, priorities, stages, beside = [], [], [], []
     monkeypatch.setattr("os.nice", priorities.append)
+
+    class Beside:
+        def __init__(self, command):
+            beside.append(command[-1])
+
+        def wait(self):
+            beside.append("waited")
+
+    monkeypatch.setattr(subprocess, "Popen", Beside)
+    monkeypatch.setattr(compile_kernels, "record_stage", lambda stage: stages.append(stage) or record_stage(stage))
     monkeypatch.setattr(
         compile_kernels, "_track", lambda cameras, settings, models, start: tracked.append((cameras, settings, models))
     )
     compile_kernels.main(background=True)
     assert priorities == [19]
+    assert beside == ["--evidence", "waited"]
+    assert stages == list(STAGES[:4])
     assert [(s.estimate, len(m), c[0].background is None) for c, s, m in tracked] == [
         ("refine", 2, False), ("search", 1, False), ("refine", 1, True)
     ]  # fmt: skip
     assert compiled_mark().exists()
+    assert compiled_stages() == frozenset(STAGES)
+    assert not list(empty_cache.glob("stage-*"))
