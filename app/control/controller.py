@@ -74,7 +74,7 @@ class Controller:
         """Sets pins, and fits people to them."""
         self.replay = Replay(session_state, runs, activities)
         """Replays and compares recorded searches."""
-        self.navigation = Navigation(session_state, activities, self.search, self.replay, self.tracking)
+        self.navigation = Navigation(session_state, activities, self.search, self.tracking)
         """Chooses the shown frame and the selection."""
         self.stored_poses = StoredPoses(session_state)
         """Reads the stored poses."""

@@ -33,7 +33,9 @@ PART_EDGE_COLOR = "#9aa3ad"
 EPIPOLAR_COLOR = "#ffd54a"
 ACCEPTED_COLOR = "#35e0c8"
 REJECTED_COLOR = "#ff4fa3"
-_PERSON_KINDS = ("model", "hidden", "facing", "facing_away", "candidate", "ghost")
+_PERSON_KINDS = (
+    "model", "hidden", "facing", "facing_away", "candidate", "compared", "preview", "alternative", "new_sizes",
+)  # fmt: skip
 """Kinds of lines that belong to a person, and are left out when the person is hidden."""
 _SHORT_M = 0.01
 """Smallest distance from the pointer's line of sight that counts as out of reach, metres."""
@@ -47,12 +49,16 @@ PathKind = Literal[
     "facing",
     "facing_away",
     "candidate",
-    "ghost",
+    "compared",
+    "preview",
+    "alternative",
+    "new_sizes",
     "part_edge",
     "epipolar",
     "accepted",
     "rejected",
     "floor",
+    "floor_sight",
 ]
 Side = Literal["left", "right", ""]
 SIDES: tuple[Side, ...] = get_args(Side)
@@ -119,7 +125,12 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     out = []
     tried = state.search.candidate if state.search.running or state.search_view.replay is not None else None
     drafted, others = _with_draft(state, bodies), _alternatives(state, bodies)
-    ghosts = ((state.search_view.compared, COMPARED_COLOR), (state.search_view.preview, PREVIEW_COLOR))
+    preview = state.search_view.preview
+    outlined: tuple[tuple[PathKind, tuple[Array, ...] | None, str], ...] = (
+        ("candidate", tried if "contours" in view.layers else None, CANDIDATE_COLOR),
+        ("compared", state.search_view.compared, COMPARED_COLOR),
+        ("preview", None if preview is None else preview.poses, PREVIEW_COLOR),
+    )
     for index in sorted(view.cameras):
         camera = session.cameras[index].camera.pinhole
         if not view.layers.isdisjoint(("contours", "hidden")):
@@ -127,15 +138,13 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         if "contours" in view.layers:
             out += _facing(session, bodies, camera, index)
         if state.draft is not None:
-            out += _ghosts({state.draft.person}, drafted, camera, index, PREVIEW_COLOR)
+            out += _some({state.draft.person}, drafted, camera, index, "new_sizes", PREVIEW_COLOR)
         if others:
             changed = {i for i, (now, other) in enumerate(zip(bodies, others, strict=True)) if now is not other}
-            out += _ghosts(changed, others, camera, index, OTHER_COLOR)
-        if "contours" in view.layers and tried is not None:
-            out += _outlined(session, tried, camera, index, "candidate", CANDIDATE_COLOR)
-        for ghost, color in ghosts:
-            if ghost is not None:
-                out += _outlined(session, ghost, camera, index, "ghost", color)
+            out += _some(changed, others, camera, index, "alternative", OTHER_COLOR)
+        for kind, poses, color in outlined:
+            if poses is not None:
+                out += _outlined(session, poses, camera, index, kind, color)
         if "part_edges" in view.layers:
             out.append(Path(index, 0, "part_edge", PART_EDGE_COLOR, part_edges.part_edges(bodies, camera)))
         if views is not None:
@@ -244,10 +253,12 @@ def _alternatives(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
     ]
 
 
-def _ghosts(chosen: Collection[int], people: Sequence[PosedBody], camera: Camera, index: int, color: str) -> list[Path]:
+def _some(
+    chosen: Collection[int], people: Sequence[PosedBody], camera: Camera, index: int, kind: PathKind, color: str
+) -> list[Path]:
     """Draw the visible contours of some people, given by index, among all people."""
     contour = _traced(people, camera)
-    found = _by_person(people, contour, ~contour.occluded, index, "ghost", [color] * len(people))
+    found = _by_person(people, contour, ~contour.occluded, index, kind, [color] * len(people))
     return [path for path in found if path.person in chosen]
 
 

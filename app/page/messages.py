@@ -16,7 +16,7 @@ from app.page.encoding import encode_binary
 from app.state.floor_picking import Picking
 from app.state.page_view import View
 from app.state.progress import TrackState
-from app.state.search import ReplayState, SearchState
+from app.state.search import PreviewState, ReplayState, SearchState
 from app.state.state import State
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import FloatArray
@@ -87,6 +87,8 @@ def state(session: Session, state: State) -> wire.StateMessage:
         other_sizes=state.revisions[state.person] != state.present[state.person],
         job=_job(state.search),
         replay=_replay(state.search_view.replay),
+        compared=state.search_view.compared_run,
+        preview=_preview(state.search_view.preview),
         track=_track(state.track),
         range=wire.RangeWork(
             state.ranges.running, state.ranges.what, state.ranges.done, state.ranges.total, state.ranges.message
@@ -248,6 +250,10 @@ def _job(job: SearchState) -> wire.Job:
 
 def _replay(replay: ReplayState | None) -> wire.ReplayedStep | None:
     return None if replay is None else wire.ReplayedStep(replay.run, replay.step, replay.steps, replay.stage)
+
+
+def _preview(preview: PreviewState | None) -> wire.PreviewedCandidate | None:
+    return None if preview is None else wire.PreviewedCandidate(preview.run, preview.candidate)
 
 
 def _track(track: TrackState) -> wire.Track:

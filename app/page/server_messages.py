@@ -167,6 +167,14 @@ class ReplayedStep(Part, frozen=True):
     stage: str | None
 
 
+class PreviewedCandidate(Part, frozen=True):
+    """The candidate of a search that is drawn over the views."""
+
+    run: int
+    candidate: int
+    """Index among the best candidates of the run."""
+
+
 class FloorPicking(Part, frozen=True):
     """Progress of setting the floor."""
 
@@ -226,6 +234,9 @@ class StateMessage(Message, frozen=True, tag="state"):
     job: Job
     replay: ReplayedStep | None
     """While one is shown, the costs are those of the step, and the overlay shows its best and its candidate."""
+    compared: int | None
+    """Number of the run whose result is drawn."""
+    preview: PreviewedCandidate | None
     track: Track
     range: RangeWork
     follow: bool

@@ -11,8 +11,8 @@
  *   "none"} RangeAction
  * @typedef {"move" | "turn" | "push" | "bend"} DragMode
  * @typedef {"start" | "move" | "end" | "cancel"} GesturePhase
- * @typedef {"model" | "hidden" | "facing" | "facing_away" | "candidate" | "ghost" | "part_edge" | "epipolar" |
- *   "accepted" | "rejected" | "floor"} PathKind
+ * @typedef {"model" | "hidden" | "facing" | "facing_away" | "candidate" | "compared" | "preview" | "alternative" |
+ *   "new_sizes" | "part_edge" | "epipolar" | "accepted" | "rejected" | "floor" | "floor_sight"} PathKind
  * @typedef {"running" | "paused" | "over"} RunState
  * @typedef {"left" | "right" | ""} Side
  * @typedef {{type: "seek", frame: number}} Seek
@@ -82,6 +82,7 @@
  * @typedef {{running: boolean, kind: string | null, stage: string | null, stages: string[], evaluations: number,
  *   per_second: number, best_px: number | null, message: string}} Job
  * @typedef {{run: number, step: number, steps: number, stage: string | null}} ReplayedStep
+ * @typedef {{run: number, candidate: number}} PreviewedCandidate
  * @typedef {{running: boolean, first: number | null, last: number | null, at: number | null, done: number, total:
  *   number, per_second: number, doubtful: number, lost: number, back: boolean, message: string}} Track
  * @typedef {{running: boolean, what: string, done: number, total: number, message: string}} RangeWork
@@ -91,9 +92,9 @@
  * @typedef {{type: "state", frame: number, person: number, point: string | null, people: PersonState[], solo: boolean,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
  *   part_costs_px: (number | null)[], dofs: number[], locked: number[], other_sizes: boolean, job: Job, replay:
- *   ReplayedStep | null, track: Track, range: RangeWork, follow: boolean, snapped: number | null, floor: FloorPicking |
- *   null, footage: FootageProgress, compiling: boolean, undo: string | null, redo: string | null, saved: boolean,
- *   save_error: string | null}} StateMessage
+ *   ReplayedStep | null, compared: number | null, preview: PreviewedCandidate | null, track: Track, range: RangeWork,
+ *   follow: boolean, snapped: number | null, floor: FloorPicking | null, footage: FootageProgress, compiling: boolean,
+ *   undo: string | null, redo: string | null, saved: boolean, save_error: string | null}} StateMessage
  * @typedef {{edit: number, label: string, author: string, time: string, undone: boolean}} HistoryEntry
  * @typedef {{type: "history", entries: HistoryEntry[], later: boolean, earlier: boolean}} HistoryMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage

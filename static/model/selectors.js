@@ -20,6 +20,15 @@ export function isDimmed(state, person) {
 }
 
 /**
+ * Cells of the person worked on.
+ *
+ * @param {import("./store.js").Facts} facts
+ */
+export function personCells({ lanes, timeline, state }) {
+  return (state && lanes[state.person]) ?? timeline;
+}
+
+/**
  * Whether a search is running, or paused between two steps.
  *
  * @param {import("./protocol.js").StateMessage | null} state
@@ -35,4 +44,15 @@ export function hasSearch(state) {
  */
 export function hasTrack(state) {
   return !!state && state.track.first !== null;
+}
+
+/**
+ * What the Stop button of a search does.
+ *
+ * @param {boolean} isRunning whether the search is running
+ */
+export function stopTitle(isRunning) {
+  return isRunning
+    ? "Pause the search and keep the best pose; Step, Stage or Frame continue it (Esc)"
+    : "End the paused search and keep the best pose (Esc)";
 }

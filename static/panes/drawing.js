@@ -34,18 +34,22 @@ const DIMMED = 0.3;
  *   ofPerson?: boolean}} LineStyle ofPerson: whether they are dimmed with their person
  * @type {Record<import("../model/protocol.js").Path["kind"], LineStyle>}
  */
-const LINE_STYLES = {
+export const LINE_STYLES = {
   model: { width: 1.75, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
   hidden: { width: 1.25, dash: [4, 4], layer: "hidden", hasHalo: false, ofPerson: true },
   facing: { width: 2.25, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
   facing_away: { width: 2.25, dash: [3, 4], layer: "contours", hasHalo: true, ofPerson: true },
   candidate: { width: 1.25, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
-  ghost: { width: 1.5, dash: [5, 4], layer: null, hasHalo: true, ofPerson: true },
+  compared: { width: 1.5, dash: [6, 4], layer: null, hasHalo: true, ofPerson: true },
+  preview: { width: 1.75, dash: [2, 4], layer: null, hasHalo: true, ofPerson: true },
+  alternative: { width: 1.5, dash: [9, 4, 2, 4], layer: null, hasHalo: true, ofPerson: true },
+  new_sizes: { width: 1.5, dash: [9, 4, 2, 4, 2, 4], layer: null, hasHalo: true, ofPerson: true },
   part_edge: { width: 1, dash: [], layer: "part_edges", hasHalo: true },
   epipolar: { width: 1.25, dash: [6, 4], layer: "epipolar", hasHalo: true },
   // Halos would merge thousands of short lines into one area.
   accepted: { width: 1.5, dash: [], layer: "accepted", hasHalo: false },
   floor: { width: 1.25, dash: [], layer: null, hasHalo: true },
+  floor_sight: { width: 1.5, dash: [5, 4], layer: null, hasHalo: true },
   rejected: { width: 1, dash: [], layer: "rejected", hasHalo: false },
 };
 
