@@ -1,5 +1,6 @@
 /** Mount the rooms of the page in order, then connect to the program. */
 
+import * as inspectorRoom from "./inspector/index.js";
 import * as model from "./model/index.js";
 import * as panesRoom from "./panes/index.js";
 import * as posingRoom from "./posing/index.js";
@@ -18,6 +19,7 @@ const posing = posingRoom.mount(context, panes);
 const timeline = timelineRoom.mount(context);
 const search = searchRoom.mount(context);
 const scene = sceneRoom.mount(context, panes);
-shellRoom.mount(context, { panes, posing, timeline, search, scene });
+const inspector = inspectorRoom.mount(context, posing, scene);
+shellRoom.mount(context, { panes, posing, timeline, search, scene, inspector });
 exposeState(context, panes.grid);
 context.connect(scene.isSoftware ? { type: "pause_3d", pause: true } : null);

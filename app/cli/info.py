@@ -19,7 +19,7 @@ def command(session: SessionArg, /, check: bool = True, json: bool = False) -> N
         check: look at a few frames, whether the footage of two cameras is exchanged.
         json: print one JSON object.
     """
-    from app.cli.camera_check import exchange_note
+    from app.session.camera_check import exchange_note
     from tracker.session.session import load_session
 
     loaded = load_session(session)

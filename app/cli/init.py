@@ -170,7 +170,7 @@ def _where(session: "Session", person: "Person", pose: "Array", frame: int) -> d
     Raises:
         TrackerError: it is in no picture.
     """
-    from app.cli.camera_check import body_exchange_note
+    from app.session.camera_check import body_exchange_note
     from tracker.geometry.framing import framings
 
     points_world = person.model.points_world(pose)

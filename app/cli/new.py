@@ -56,7 +56,7 @@ class NewArguments:
 
 def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
     """Make a session from videos and a calibration."""
-    from app.cli.camera_check import exchange_note
+    from app.session.camera_check import exchange_note
     from tracker.session.assemble import DEFAULT_MODEL, NewSession, assemble
 
     made = assemble(

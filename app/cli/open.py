@@ -34,6 +34,7 @@ def command(
         sample: name of the sample: tango, two people to be placed by hand (the default), or elbow_rotation, one person.
         start_again: discard the working copy of the sample and make a new one.
     """
+    from app.runtime.restart import restart
     from app.server.workbench import Serving, open_session
     from app.session.samples import DEFAULT_SAMPLE, sample_copy
 
@@ -43,4 +44,7 @@ def command(
             "leave one of them out"
         )
     folder = sample_copy(sample or DEFAULT_SAMPLE, start_again) if session is None else session
-    open_session(folder, Serving(host, port, allow_host, browser, token), lambda line: print(line, flush=True))
+    serving = Serving(host, port, allow_host, browser, token)
+    chosen = open_session(folder, serving, lambda line: print(line, flush=True))
+    if chosen is not None:
+        restart(["open", str(chosen.folder), "--host", host, "--port", str(chosen.port), "--no-browser"])

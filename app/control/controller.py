@@ -24,6 +24,7 @@ from app.control.search.replay import Replay
 from app.control.search.search_runs import SearchRuns
 from app.control.search.searching import SearchRunner
 from app.control.session.activities import Activities
+from app.control.session.comparing import Comparing
 from app.control.session.footage_scan import FootageScan
 from app.control.session.history import History
 from app.control.session.kernel_warmup import KernelWarmup
@@ -74,6 +75,9 @@ class Controller:
         """Sets pins, and fits people to them."""
         self.replay = Replay(session_state, runs, activities)
         """Replays and compares recorded searches."""
+        self.comparing = Comparing(session_state)
+        """Shows the poses before the last fit or search."""
+        activities.add_gesture(self.comparing.leave)
         self.navigation = Navigation(session_state, activities, self.search, self.tracking)
         """Chooses the shown frame and the selection."""
         self.stored_poses = StoredPoses(session_state)

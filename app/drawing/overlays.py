@@ -53,6 +53,7 @@ PathKind = Literal[
     "preview",
     "alternative",
     "new_sizes",
+    "result",
     "part_edge",
     "epipolar",
     "accepted",
@@ -120,16 +121,18 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         view: what the page shows.
         views: the evidence of the shown frame; None draws no edge segments.
     """
-    state = state.drawn
+    stored, state = state, state.drawn
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
     tried = state.search.candidate if state.search.running or state.search_view.replay is not None else None
     drafted, others = _with_draft(state, bodies), _alternatives(state, bodies)
+    result = stored.poses if state is not stored and state.search_view.replay is None else None
     preview = state.search_view.preview
     outlined: tuple[tuple[PathKind, tuple[Array, ...] | None, str], ...] = (
         ("candidate", tried if "contours" in view.layers else None, CANDIDATE_COLOR),
         ("compared", state.search_view.compared, COMPARED_COLOR),
         ("preview", None if preview is None else preview.poses, PREVIEW_COLOR),
+        ("result", result, COMPARED_COLOR),
     )
     for index in sorted(view.cameras):
         camera = session.cameras[index].camera.pinhole

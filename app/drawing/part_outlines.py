@@ -28,14 +28,10 @@ def part_hulls(session: Session, state: State, view: View) -> list[PartOutline]:
     """Return the hulls of all visible people in the views that a page shows.
 
     While a point is dragged there are none, and while a part is dragged there is only its own, because they would only
-    delay the drag. A replayed step has none, because it is no stored pose.
+    delay the drag. A replayed or former pose has none, because it is not the stored one.
     """
     drag = state.drag
-    if (
-        "joints" not in view.layers
-        or state.search_view.replay is not None
-        or (drag is not None and not drag.by_surface)
-    ):
+    if "joints" not in view.layers or not state.is_stored_drawn or (drag is not None and not drag.by_surface):
         return []
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []

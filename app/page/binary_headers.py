@@ -84,6 +84,8 @@ class CellsHeader(Message, frozen=True, tag="cells"):
     statuses: tuple[Status, ...]
     remarks: dict[str, str]
     """By frame."""
+    limbs_lost: dict[str, tuple[float, ...]]
+    """By frame, as in a cell."""
 
 
 class Plot(Part, frozen=True):

@@ -2,7 +2,8 @@
 
 `message_parsing` checks messages against these declarations, `protocol_docs` writes the page's types and
 docs/protocol.md from them.
-Those that change poses or run searches are in `pose_messages` and `search_messages`.
+Those that change poses or run searches are in `pose_messages` and `search_messages`, those of the inspector in
+`inspector_messages`.
 """
 
 from typing import Annotated, Literal, TypeAlias, Union, get_args
@@ -10,6 +11,16 @@ from typing import Annotated, Literal, TypeAlias, Union, get_args
 from msgspec import Meta
 
 from app.drawing.curves import CurveGroup
+from app.page.inspector_messages import (
+    ApplySizes,
+    CoupleSides,
+    DraftSizes,
+    SetGirdleWidth,
+    SetHeight,
+    SetPartSizes,
+    SetTrackSettings,
+    SetView3d,
+)
 from app.page.message_types import Command, Frame, Index, Name, Number
 from app.page.pose_messages import Drag, DragPin, FitPose, PoseEdit, RemovePins
 from app.page.search_messages import (
@@ -72,6 +83,12 @@ class Solo(Command, frozen=True, tag="people"):
 
     action: Literal["solo"]
     on: bool
+
+
+class ShowBefore(Command, frozen=True, tag="before"):
+    """Show the poses before the last fit or search, or its result again. No pose changes."""
+
+    shown: bool
 
 
 class ShowCurves(Command, frozen=True, tag="curves"):
@@ -192,11 +209,12 @@ class Save(Command, frozen=True, tag="save"):
 
 
 ClientMessage: TypeAlias = Union[  # noqa: UP007
-    Seek, Select, SetView, ShowPerson, Solo, ShowCurves, WatchTab, ShowHistory, LookThrough, Pause3d,
+    Seek, Select, SetView, ShowPerson, Solo, ShowBefore, ShowCurves, WatchTab, ShowHistory, LookThrough, Pause3d,
     Drag, PoseEdit, DragPin, RemovePins, FitPose,
     RunSearch, RepeatSearch, SetSearchSpeed, SetSearchSettings, ReplayStep, CompareRun, PreviewCandidate,
     TakeCandidate, ShowLandscape, SetLandscapeDof,
     StartTracking, ControlTracking, EditRange, StopRange, ToggleMark, FollowTracking,
+    SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, DraftSizes,
     EditFloor, MarkFloor, Undo, Redo, GoTo, Save,
 ]  # fmt: skip
 

@@ -6,6 +6,7 @@ from typing import Any
 from app.control.controller import Controller
 from app.page import client_messages as wire
 from app.page import pose_messages as pose_wire
+from app.page.inspector_commands import INSPECTOR_COMMANDS
 from app.page.message_parsing import MessageError
 from app.page.message_types import Command
 from app.page.pose_commands import POSE_COMMANDS
@@ -118,6 +119,7 @@ COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.Select: lambda controller, _, m: controller.navigation.select(m.person, m.point),
     wire.ShowPerson: lambda controller, _, m: controller.visibility.show(m.person, m.shown),
     wire.Solo: lambda controller, _, m: controller.visibility.solo(m.on),
+    wire.ShowBefore: lambda controller, _, m: controller.comparing.show_before(m.shown),
     wire.LookThrough: lambda controller, _, m: controller.view_3d.snap(m.camera),
     wire.Pause3d: lambda controller, page, m: controller.view_3d.pause(page, m.pause),
     pose_wire.Drag: _drag,
@@ -138,5 +140,6 @@ COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.Save: lambda controller, _, __: controller.history.save(),
     **POSE_COMMANDS,
     **SEARCH_COMMANDS,
+    **INSPECTOR_COMMANDS,
 }
 """What each message does. The connection itself answers those that subscribe a page to something (`socket`)."""

@@ -13,16 +13,19 @@ from app.drawing.floor_lines import floor_lines
 from app.page import server_messages as wire
 from app.page.binary_headers import CellsHeader, CurvesHeader, Outline, OverlayHeader, Path, Plot
 from app.page.encoding import encode_binary
+from app.state.comparison import PoseComparison
 from app.state.floor_picking import Picking
 from app.state.page_view import View
 from app.state.progress import TrackState
 from app.state.search import PreviewState, ReplayState, SearchState
 from app.state.state import State
+from tracker.body.limbs import limb_display_name, limbs
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import FloatArray
 from tracker.posing.grab import heading_points, minor_points
 from tracker.session.session import Person, Session
 from tracker.store.records import SOURCES, STATUSES, FramePose, HistoryEntry
+from tracker.tracking.confidence import DOUBTFUL_FROM, LOST_FROM
 
 _FEW_CELLS = 2000
 """Largest number of timeline cells sent by name. More are sent as columns, which take a tenth of the bytes and time."""
@@ -36,6 +39,7 @@ _NO_CELL: dict[str, Any] = {
     "remark": "",
     "reviewed": False,
     "ambiguous": False,
+    "limbs_lost": (),
 }
 
 
@@ -43,7 +47,9 @@ def session(session: Session) -> wire.SessionMessage:
     """Describe the session."""
     cameras = tuple(wire.CameraInfo(c.camera.name, c.camera.width, c.camera.height) for c in session.cameras)
     people = tuple(_person(p) for p in session.people)
-    return wire.SessionMessage(session.name, session.fps, session.n_frames, cameras, people, _START)
+    return wire.SessionMessage(
+        session.name, session.fps, session.n_frames, cameras, people, DOUBTFUL_FROM, LOST_FROM, _START
+    )
 
 
 def _person(person: Person) -> wire.PersonInfo:
@@ -58,6 +64,7 @@ def _person(person: Person) -> wire.PersonInfo:
         "heading": list(heading_points(model)),
         "bones": model.bones,
         "parts": [part.name for part in model.parts],
+        "limbs": [limb_display_name(limb.name) for limb in limbs(model)],
         **dof_labels.described(model),
     }
     return msgspec.convert(fields, wire.PersonInfo)
@@ -87,8 +94,9 @@ def state(session: Session, state: State) -> wire.StateMessage:
         other_sizes=state.revisions[state.person] != state.present[state.person],
         job=_job(state.search),
         replay=_replay(state.search_view.replay),
-        compared=state.search_view.compared_run,
+        compared_run=state.search_view.compared_run,
         preview=_preview(state.search_view.preview),
+        compared=_compared(state.compared),
         track=_track(state.track),
         range=wire.RangeWork(
             state.ranges.running, state.ranges.what, state.ranges.done, state.ranges.total, state.ranges.message
@@ -131,8 +139,8 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         hulls.append(Outline(hull.camera, hull.person, hull.part, hull.depth, first, count))
         segments.append(hull.segments_px)
         first += count
-    # A replayed step is no stored pose, so its joints cannot be dragged.
-    handles = overlays.handles(session, state, view.cameras) if state.search_view.replay is None else []
+    # A replayed or former pose is not the stored one, so its joints cannot be dragged.
+    handles = overlays.handles(session, state, view.cameras) if state.is_stored_drawn else []
     header = OverlayHeader(
         frame=state.frame,
         seq=dict(state.drag_seqs).get(page, 0),
@@ -169,6 +177,7 @@ def timeline(
         sources=SOURCES,
         statuses=tuple(map(_status, STATUSES)),
         remarks={str(k): row["remark"] for k, row in zip(frames, rows, strict=True) if row["remark"]},
+        limbs_lost={str(k): row["limbs_lost"] for k, row in zip(frames, rows, strict=True) if row["limbs_lost"]},
     )
     costs = np.array([row["cost_px"] for row in rows], dtype="<f4")  # None becomes NaN
     source, status = {name: i for i, name in enumerate(SOURCES)}, {name: i for i, name in enumerate(STATUSES)}
@@ -254,6 +263,21 @@ def _replay(replay: ReplayState | None) -> wire.ReplayedStep | None:
 
 def _preview(preview: PreviewState | None) -> wire.PreviewedCandidate | None:
     return None if preview is None else wire.PreviewedCandidate(preview.run, preview.candidate)
+
+
+def _compared(last: PoseComparison | None) -> wire.Compared | None:
+    if last is None:
+        return None
+    return wire.Compared(
+        number=last.number,
+        work=last.work,
+        before_px=last.before_px,
+        after_px=last.after_px,
+        before_view_costs_px=last.before_view_costs_px,
+        after_view_costs_px=last.after_view_costs_px,
+        warning=last.warning,
+        is_before_shown=last.is_before_shown,
+    )
 
 
 def _track(track: TrackState) -> wire.Track:

@@ -13,7 +13,15 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 
 import msgspec
 
-from app.page import binary_headers, client_messages, message_types, pose_messages, search_messages, server_messages
+from app.page import (
+    binary_headers,
+    client_messages,
+    inspector_messages,
+    message_types,
+    pose_messages,
+    search_messages,
+    server_messages,
+)
 from app.page.binary_headers import BINARY_HEADERS
 from app.page.client_messages import CLIENT_MESSAGES
 from app.page.pose_messages import PoseEdit
@@ -70,7 +78,7 @@ def to_typescript(hint: Any) -> str:
         return " | ".join(to_typescript(a) for a in args if a is not msgspec.UnsetType)
     if origin is dict:
         return f"Record<string, {to_typescript(args[1])}>"
-    if origin is list or (origin is tuple and args[-1] is Ellipsis):
+    if origin in (list, frozenset) or (origin is tuple and args[-1] is Ellipsis):
         item = to_typescript(args[0])
         return f"({item})[]" if " | " in item else f"{item}[]"
     if origin is tuple:
@@ -161,7 +169,10 @@ def _names() -> dict[Any, str]:
 
 
 def _named(name: str) -> Any:
-    modules = (message_types, client_messages, pose_messages, search_messages, server_messages, binary_headers)
+    modules = (
+        message_types, client_messages, pose_messages, search_messages, inspector_messages, server_messages,
+        binary_headers,
+    )  # fmt: skip
     return next(getattr(module, name) for module in modules if hasattr(module, name))
 
 

@@ -90,20 +90,9 @@ class SearchFeed:
 
 
 def setup(controller: Controller, state: State) -> wire.SearchSetupMessage:
-    """Describe the decomposition and the settings of the search that the page edits."""
-    settings, search = state.settings, state.settings.search
-    leaves = search_settings.leaves(controller.models, search, controller.active_dofs())
+    """Describe the decomposition of the search."""
+    leaves = search_settings.leaves(controller.models, state.settings.search, controller.active_dofs())
     return wire.SearchSetupMessage(
-        theta_px=settings.theta_px,
-        outliers=settings.outliers,
-        passes=tuple(search.passes),
-        patience=search.patience,
-        max_expansions=search.max_expansions,
-        limbs_apart=search.limbs_apart,
-        bound_rad=search.bound_rad,
-        bound_m=search.bound_m,
-        step_rad=search.step_rad,
-        step_m=search.step_m,
         speed=state.search_view.speed,
         leaves=tuple(leaves),
     )

@@ -128,18 +128,8 @@ class SetLandscapeDof(Command, frozen=True, tag="landscape_set"):
 
 
 class SearchSetupMessage(Message, frozen=True, tag="search_setup"):
-    """Settings of the search and its decomposition, in the order of search; only for pages that watch searches."""
+    """The decomposition of the search, in its order, and the speed; only for pages that watch searches."""
 
-    theta_px: float | None
-    outliers: Literal["truncated", "paper"]
-    passes: tuple[float, ...]
-    patience: int
-    max_expansions: int
-    limbs_apart: bool
-    bound_rad: float
-    bound_m: float
-    step_rad: float
-    step_m: float
     speed: float | None
     """Expansions per second; null for no limit."""
     leaves: tuple[SearchLeaf, ...]

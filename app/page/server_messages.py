@@ -1,13 +1,15 @@
 """Text messages from the program to the page: the one declaration of their types and fields.
 
-Those about searches are in `search_messages`. `messages` and `search_feed` make them, `protocol_docs` writes the
-page's types and docs/protocol.md from them.
+Those about searches are in `search_messages`, those for the inspector in `inspector_messages`. `messages` and the feeds
+make them, `protocol_docs` writes the page's types and docs/protocol.md from them.
 """
 
 from typing import Literal, TypeAlias, Union, get_args
 
+from app.page.inspector_messages import BodySizesMessage, SettingsMessage, View3dMessage
 from app.page.message_types import Message, Part, Status
 from app.page.search_messages import SearchRunsMessage, SearchSetupMessage
+from app.state.comparison import ComparedWork
 
 # --- session -------------------------------------------------------------------------------------------------------
 
@@ -62,6 +64,8 @@ class PersonInfo(Part, frozen=True):
     """Pairs of points that the stick figure connects."""
     parts: tuple[str, ...]
     """Names of the body parts."""
+    limbs: tuple[str, ...]
+    """Names of the limbs that are assessed, for display."""
     dofs: tuple[DofInfo, ...]
     point_dofs: dict[str, tuple[int, ...]]
     """By point: the degrees of freedom of its joint, by index."""
@@ -77,6 +81,10 @@ class SessionMessage(Message, frozen=True, tag="session"):
     n_frames: int
     cameras: tuple[CameraInfo, ...]
     people: tuple[PersonInfo, ...]
+    doubtful_from: float
+    """A limb that is lost with a higher probability is doubtful."""
+    lost_from: float
+    """A limb that is lost with a higher probability counts as lost."""
     start: str
     """Identifies the start of the program. After another start a page goes back to the frame and person it showed."""
 
@@ -175,6 +183,24 @@ class PreviewedCandidate(Part, frozen=True):
     """Index among the best candidates of the run."""
 
 
+class Compared(Part, frozen=True):
+    """The last fit or search, while its result is shown unchanged."""
+
+    number: int
+    """Differs between fits and searches; a search that continues keeps it."""
+    work: ComparedWork
+    before_px: float | None
+    """Mean cost before."""
+    after_px: float | None
+    before_view_costs_px: tuple[float | None, ...]
+    """By camera; empty where unknown."""
+    after_view_costs_px: tuple[float | None, ...]
+    warning: str
+    """Where the edges and the user's placement disagree by much, as a sentence; empty if nowhere."""
+    is_before_shown: bool
+    """Whether the views show the poses before. The costs are theirs then, and the overlay has no handles."""
+
+
 class FloorPicking(Part, frozen=True):
     """Progress of setting the floor."""
 
@@ -234,9 +260,11 @@ class StateMessage(Message, frozen=True, tag="state"):
     job: Job
     replay: ReplayedStep | None
     """While one is shown, the costs are those of the step, and the overlay shows its best and its candidate."""
-    compared: int | None
+    compared_run: int | None
     """Number of the run whose result is drawn."""
     preview: PreviewedCandidate | None
+    compared: Compared | None
+    """Null where there is no such result, or it has changed."""
     track: Track
     range: RangeWork
     follow: bool
@@ -302,6 +330,8 @@ class Cell(Part, frozen=True):
     reviewed: bool
     ambiguous: bool
     """Whether there is an alternative, and nobody has confirmed the pose."""
+    limbs_lost: tuple[float, ...]
+    """Probability that each of the person's `limbs` is lost; empty for good poses, unknown ones and several people."""
 
 
 class TimelineMessage(Message, frozen=True, tag="timeline"):
@@ -323,7 +353,7 @@ class InconsistentMessage(Message, frozen=True, tag="inconsistent"):
 
 TextMessage: TypeAlias = Union[  # noqa: UP007
     SessionMessage, StateMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
-    SearchSetupMessage, SearchRunsMessage,
+    SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
 ]  # fmt: skip
 
 TEXT_MESSAGES: tuple[type[Message], ...] = get_args(TextMessage)

@@ -15,6 +15,7 @@ from app.drawing.curves import CurveGroup
 from app.page import client_messages as wire
 from app.page import commands, messages, picture_sets
 from app.page.encoding import encode_text
+from app.page.inspector_feed import InspectorFeed
 from app.page.message_parsing import MessageError, parse
 from app.page.message_types import Message
 from app.page.search_feed import SearchFeed
@@ -84,6 +85,7 @@ class PageConnection:
         self._curves: CurveGroup | None = None
         self._sent_curves: tuple[CurveGroup, int, int] | None = None  # group, person, version of the timeline
         self._feed = SearchFeed()
+        self._inspector = InspectorFeed()
         self._history_limit = 0  # entries in each direction; 0: not subscribed
         self._sent_history: HistoryMessage | None = None
         self._loop = asyncio.get_running_loop()
@@ -189,6 +191,9 @@ class PageConnection:
                 # Otherwise the vectors go first: the eye follows them. No page may show what is not on disk as saved.
                 if with_figures or (self._sent_text is not None and self._sent_text.saved and not state.saved):
                     await self._send_state(state)
+                if self._inspector.is_behind(state):
+                    for news in await asyncio.to_thread(self._inspector.updates, self._controller, state):
+                        await self._send(news)
                 if sent is None or sent.timeline_version != state.timeline_version:  # after the text, which names cells
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
                 if self._view is not None:
@@ -337,6 +342,7 @@ def _drawn(state: State) -> tuple[object, ...]:
         None if state.search.candidate is None else tuple(map(Identity, state.search.candidate)),
         state.search.running,
         state.search_view,
+        state.compared if not state.is_stored_drawn else None,
         state.drag,
         state.drag_seqs,
         state.visibility.hidden,

@@ -1,5 +1,5 @@
-"""The 3-D view and its panels, in viser.
+"""The 3-D view, in viser.
 
-Imports `app.runtime`, `app.state`, `app.drawing` and `app.control`. Public: `scene.SceneView`, `gizmos.Gizmos` and
-`panels.Panels`.
+Imports `app.runtime`, `app.state`, `app.drawing` and `app.control`. Public: `scene.SceneView` and
+`gizmos.Gizmos`.
 """

@@ -88,7 +88,7 @@ class Gizmos:
         model, values = state.models[state.person], state.poses[state.person]
         joint = joint_of(model, state.point)
         Ts = model.kinematics(values).Ts_world_part
-        is_busy = state.track.running or state.search.running or state.search_view.replay is not None
+        is_busy = state.track.running or state.search.running or not state.is_stored_drawn
         shown = not is_busy and state.person not in state.visibility.hidden
         with self._server.atomic():
             for which, part in (("root", 0), ("joint", joint)):

@@ -13,7 +13,6 @@ from app.scene3d.camera_view import CameraView
 from app.scene3d.frusta import Frusta
 from app.scene3d.meshes import PeopleMeshes
 from app.scene3d.throttle import Throttle
-from app.scene3d.view_panel import ViewPanel
 from app.state.floor_picking import FloorState
 from app.state.identity import Identity
 from app.state.state import State
@@ -46,7 +45,6 @@ class SceneView:
         self._trails_version = controller.state.timeline_version
         self._appearance: tuple[View3d, frozenset[int], frozenset[int]] | None = None
         self._drawn_floor: tuple[object, ...] = ()
-        self._panel = ViewPanel(server, controller)
         self._grid = _add_surroundings(server, self._session)
         self._people = self._new_people(controller.state)
         self._models: tuple[BodyModel, ...] = controller.state.models
@@ -140,7 +138,7 @@ class SceneView:
             return
         self._drawn_prediction = wanted
         if not state.view_3d.ghost:
-            self._panel.set_prediction_note("")
+            self._controller.view_3d.note_prediction("")
             assert self._predicted is not None
             self._predicted.show_only(frozenset())
             return
@@ -151,7 +149,7 @@ class SceneView:
         ]
         several = len(found) > 1
         notes = [f"{p.name}: {f.why}" if several else f.why for p, f in zip(self._session.people, found, strict=True)]
-        self._panel.set_prediction_note("; ".join(notes))
+        self._controller.view_3d.note_prediction("; ".join(notes))
         if self._predicted is None:
             session = self._controller.session
             self._predicted = PeopleMeshes(

@@ -1,4 +1,4 @@
-"""Throttle updates of the 3-D view and its panels when a browser renders in software."""
+"""Throttle updates of the 3-D view when a browser renders in software."""
 
 import time
 

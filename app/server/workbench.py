@@ -8,22 +8,27 @@ import webbrowser
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+from urllib.parse import urlsplit
 
 from platformdirs import user_state_path
 
 from app.control.controller import Controller
 from app.page.socket import PaneSocket
+from app.page.thumbnails import Thumbnails
 from app.scene3d.gizmos import Gizmos
-from app.scene3d.panels import Panels
 from app.scene3d.scene import SceneView
-from app.server.access import access_for
+from app.server.access import access_for, is_loopback
 from app.server.export_routes import ExportRoutes
 from app.server.private_viser import PrivateViser
 from app.server.server import create_app, serve_forever, static_folder
+from app.server.session_routes import SessionRoutes, refusal
+from app.server.thumbnail_routes import ThumbnailRoutes
 from app.session import proxies
+from app.session.footage_crops import FootageCrops
 from app.session.footage_indices import footage_indices
 from app.session.frame_cache import FrameCache
+from app.session.recent_sessions import remember
 from app.storage import rescue
 from app.storage.saver import Saver
 from tracker.errors import TrackerError
@@ -33,6 +38,9 @@ from tracker.session.lock import SessionLock
 from tracker.session.relink import require_files
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
+
+_ANSWER_S = 0.3
+"""Time for the answer to a page that has chosen another session."""
 
 
 @dataclass(frozen=True)
@@ -48,13 +56,24 @@ class Serving:
     """Whether requests need a token."""
 
 
-def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> None:
-    """Serve the page of a session until the program is interrupted.
+class NextSession(NamedTuple):
+    """A session that the page has asked for."""
+
+    folder: Path
+    port: int
+    """Port of the page, which connects again there."""
+
+
+def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> NextSession | None:
+    """Serve the page of a session until the program is interrupted, or the page asks for another session.
 
     Args:
         folder: the session folder.
         serving: address and access of the page.
         say: shows a line to the user.
+
+    Returns:
+        The session to open next; None if the program was interrupted.
 
     Raises:
         TrackerError: the session cannot be opened, is open elsewhere, or the port is taken.
@@ -66,6 +85,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
     static = static_folder()
     indices = footage_indices()
     with SessionLock(session.folder), Recording(session.cameras, indices=indices, in_background=True) as recording:
+        remember(tokens, session.folder)
         store = AnnotationStore(session.annotations_path)
         if store.backup_error is not None:
             say(store.backup_error)
@@ -76,14 +96,23 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
         saver = Saver(session, store, _author())
         controller = Controller(session, saver, frames)
         viser = PrivateViser()
+        thumbnails = Thumbnails(controller, FootageCrops(session.cameras, indices))
         try:
             SceneView(viser.server, controller)
             Gizmos(viser.server, controller)
-            Panels(viser.server, controller)
             app = create_app(PaneSocket(controller, offers), viser.socket_path, access, static)
             ExportRoutes(session.folder).add_to(app)
+            is_private = is_loopback(serving.host) and not serving.allow_hosts
+            others = SessionRoutes(
+                session.folder, tokens, refusal(is_private, serving.token), lambda: controller.state.save_error
+            )
+            others.add_to(app)
+            port = serving.port
+            ThumbnailRoutes(thumbnails.jpeg, lambda: not _can_draw(controller)).add_to(app)
 
             def ready(address: str, opened: str) -> None:
+                nonlocal port
+                port = urlsplit(address).port or port
                 for name in proxies.stale(session):
                     say(f"the proxy of camera {name} is of other footage: run quadrille index {session.folder} again")
                 say(f"{session.name}: {address}")
@@ -91,16 +120,24 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
                 if serving.browser:
                     threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
 
-            asyncio.run(_until_interrupted(serve_forever(app, access, serving.host, serving.port, ready)))
+            served = serve_forever(app, access, serving.host, serving.port, ready)
+            asyncio.run(_until_interrupted(served, others.is_chosen))
         finally:
             try:
                 controller.close()
             finally:  # also where a second Ctrl+C ends the work
                 unsaved = _keep_unsaved(saver, session.folder)
+                thumbnails.close()
             viser.stop()
             store.close()
             if unsaved is not None:
                 raise TrackerError(unsaved)
+    return None if others.chosen is None else NextSession(others.chosen, port)
+
+
+def _can_draw(controller: Controller) -> bool:
+    """Return whether thumbnails can be made: compiling a kernel, or listing footage, would take long."""
+    return not controller.state.compiling and controller.frames.is_listed
 
 
 def _keep_unsaved(saver: Saver, folder: Path) -> str | None:
@@ -114,11 +151,16 @@ def _keep_unsaved(saver: Saver, folder: Path) -> str | None:
     return f"edits are not saved: {saver.error}; they are kept in {path}, and 'quadrille restore {folder}' writes them"
 
 
-async def _until_interrupted(serving: Coroutine[Any, Any, None]) -> None:
-    """Run until SIGINT, SIGTERM or the end of the terminal, then shut the server down."""
+async def _until_interrupted(serving: Coroutine[Any, Any, None], is_chosen: asyncio.Event) -> None:
+    """Run until SIGINT, SIGTERM, the terminal's end or the choice of another session; then shut the server down."""
     task = asyncio.ensure_future(serving)
+    choice = asyncio.ensure_future(is_chosen.wait())
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, task.cancel)
+    await asyncio.wait({task, choice}, return_when=asyncio.FIRST_COMPLETED)
+    if not choice.cancel():
+        await asyncio.sleep(_ANSWER_S)
+        task.cancel()
     try:
         await task
     except asyncio.CancelledError:

@@ -173,6 +173,19 @@ class FrameCache:
                 self._remember_view(frame, camera)
                 return pictures.unreadable(self._resamplers(camera, reduction).camera.size)
 
+    @property
+    def is_listed(self) -> bool:
+        """Whether all footage is indexed."""
+        try:
+            return self.listed_share is None
+        except RecordingError:
+            return False
+
+    @property
+    def is_making_pictures(self) -> bool:
+        """Whether a picture of a page is in the making, which other work gives way to."""
+        return self._n_pictures > 0
+
     @contextmanager
     def _making_picture(self) -> Iterator[None]:
         with self._idle:

@@ -5,6 +5,7 @@ from typing import TypedDict
 
 import numpy as np
 
+from app.state.comparison import PoseComparison
 from app.state.floor_picking import FloorState
 from app.state.people import DragState, HeldPoint, ShownPose, SizeDraft, Visibility
 from app.state.progress import FootageState, RangeState, TrackState
@@ -43,6 +44,8 @@ class State:
     """Mean over the views, px; None until the frame's evidence is computed."""
     view_costs_px: tuple[float | None, ...] = ()
     """Cost of each view, px; None for a view without edges."""
+    comparison: PoseComparison | None = None
+    """The last fit or search of any frame; see `compared`."""
     search: SearchState = field(default_factory=SearchState)
     search_view: SearchView = field(default_factory=SearchView)
     landscape: CostLandscape | None = None
@@ -67,6 +70,8 @@ class State:
     pages_pausing_3d: frozenset[int] = frozenset()
     """Numbers of the pages that render the 3-D view in software and pause it during a drag."""
     view_3d: View3d = field(default_factory=View3d)
+    prediction_note: str = ""
+    """What the predicted pose of the 3-D view was computed from, or why there is none; empty while it is not shown."""
     floor: FloorState = field(default_factory=FloorState)
     footage: FootageState = field(default_factory=FootageState)
     compiling: bool = False
@@ -87,12 +92,12 @@ class State:
 
     @property
     def is_3d_paused(self) -> bool:
-        """Whether the 3-D view and its panels wait for the end of a drag."""
+        """Whether the 3-D view waits for the end of a drag."""
         return self.is_dragging and bool(self.pages_pausing_3d)
 
     @property
     def is_3d_throttled(self) -> bool:
-        """Whether the 3-D view and its panels are drawn rarely, to leave the processor to a running job."""
+        """Whether the 3-D view is drawn rarely, to leave the processor to a running job."""
         return (self.track.running or self.search.running) and bool(self.pages_pausing_3d)
 
     @property
@@ -101,21 +106,34 @@ class State:
         return self.drag is not None or self.is_pin_held
 
     @property
+    def compared(self) -> PoseComparison | None:
+        """The last fit or search, if its result is shown unchanged; None otherwise."""
+        last = self.comparison
+        if last is None or (last.frame, last.revisions) != (self.frame, self.revisions):
+            return None
+        pairs = zip(self.people, last.after, strict=True)
+        return last if all(p.values is v or np.array_equal(p.values, v) for p, v in pairs) else None
+
+    @property
     def drawn(self) -> "State":
-        """The state to draw: this one, or during a replay the poses and costs of the replayed step."""
+        """The state to draw: this one, the replayed step of a search, or the poses before the last fit or search."""
         replayed = self.search_view.replay
-        if replayed is None:
-            return self
-        people = tuple(ShownPose(best, "searched") for best in replayed.best)
-        search = replace(self.search, candidate=replayed.candidate)
-        return replace(
-            self,
-            people=people,
-            search=search,
-            cost_px=replayed.best_px,
-            view_costs_px=replayed.best_view_costs_px,
-            drag=None,
-        )
+        if replayed is not None:
+            people = tuple(ShownPose(best, "searched") for best in replayed.best)
+            search = replace(self.search, candidate=replayed.candidate)
+            costs = Costs(cost_px=replayed.best_px, view_costs_px=replayed.best_view_costs_px)
+            return replace(self, people=people, search=search, drag=None, **costs)
+        compared = self.compared
+        if compared is not None and compared.is_before_shown:
+            costs = Costs(cost_px=compared.before_px, view_costs_px=compared.before_view_costs_px)
+            return replace(self, people=compared.before, drag=None, **costs)
+        return self
+
+    @property
+    def is_stored_drawn(self) -> bool:
+        """Whether the views show the poses that an edit would change."""
+        compared = self.compared
+        return self.search_view.replay is None and (compared is None or not compared.is_before_shown)
 
     def held_points(self, person: int) -> frozenset[str]:
         """Return the names of the points of a person, given by index, that are held on the shown frame."""
@@ -159,6 +177,7 @@ class StateChanges(TypedDict, total=False):
     visibility: Visibility
     cost_px: float | None
     view_costs_px: tuple[float | None, ...]
+    comparison: PoseComparison | None
     search: SearchState
     search_view: SearchView
     landscape: CostLandscape | None
@@ -174,6 +193,7 @@ class StateChanges(TypedDict, total=False):
     drag_seqs: tuple[tuple[int, int], ...]
     pages_pausing_3d: frozenset[int]
     view_3d: View3d
+    prediction_note: str
     floor: FloorState
     footage: FootageState
     compiling: bool

@@ -366,8 +366,9 @@ def _with_marks_of(stored: PoseRecord | None, record: PoseRecord) -> PoseRecord:
     if stored is None:
         return replace(record, keyframe=False)
     return replace(
-        record, keyframe=stored.keyframe, status=stored.status, remark=stored.remark, reviewed=stored.reviewed
-    )
+        record, keyframe=stored.keyframe, status=stored.status, remark=stored.remark, reviewed=stored.reviewed,
+        limbs_lost=stored.limbs_lost,
+    )  # fmt: skip
 
 
 def _is_same(stored: PoseRecord, shown: ShownPose, revision: int) -> bool:

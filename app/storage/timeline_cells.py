@@ -61,6 +61,9 @@ class TimelineCells:
 def _cell(rows: Mapping[str, FrameRow]) -> dict:
     """Summarize a frame: the worst status and cost of the people, and the source nearest to a person's own work."""
     costs = [row.cost_px for row in rows.values() if row.cost_px is not None]
+    # Several people have lanes of their own, which name their limbs.
+    alone = next(iter(rows.values())) if len(rows) == 1 else None
+    is_assessed = alone is not None and alone.status in ("lost", "doubtful")
     remarks = [row.remark if len(rows) == 1 else f"{name}: {row.remark}" for name, row in rows.items() if row.remark]
     return {
         "source": min((row.source for row in rows.values()), key=SOURCES.index),
@@ -70,4 +73,5 @@ def _cell(rows: Mapping[str, FrameRow]) -> dict:
         "remark": "; ".join(remarks),
         "reviewed": all(row.reviewed for row in rows.values()),
         "ambiguous": any(row.ambiguous for row in rows.values()),
+        "limbs_lost": tuple(round(p, 3) for p in alone.limbs_lost) if alone is not None and is_assessed else (),
     }

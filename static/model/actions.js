@@ -43,6 +43,19 @@ export class Actions {
     return true;
   }
 
+  /** Show the pose before the last fit or search, or its result. */
+  toggleBefore() {
+    const { state } = this.#store.facts;
+    if (state?.compared) this.#send({ type: "before", shown: !state.compared.is_before_shown });
+  }
+
+  /** Show the result of the last fit or search again. Returns whether the pose before was shown. */
+  leaveBefore() {
+    if (!this.#store.facts.state?.compared?.is_before_shown) return false;
+    this.#send({ type: "before", shown: false });
+    return true;
+  }
+
   /**
    * Track from the current frame to the end of the recording, or of the marked range if that lies ahead.
    *
@@ -75,6 +88,15 @@ export class Actions {
   onRange(action, person) {
     const { range } = this.#store.facts;
     if (range) this.#send({ type: "range", action, first: range.first, last: range.last, person });
+  }
+
+  /**
+   * Mark the poses of a person in some frames as reviewed.
+   *
+   * @param {{person: number, first: number, last: number}} poses `last` is included
+   */
+  review({ person, first, last }) {
+    this.#send({ type: "range", action: "reviewed", first, last, person });
   }
 
   stopRange() {

@@ -30,6 +30,8 @@ export class Cells {
   size = 0;
   /** @type {Map<number, string>} */
   #remarks = new Map();
+  /** @type {Map<number, number[]>} */
+  #limbsLost = new Map();
 
   /** @param {number} frames of the recording */
   constructor(frames) {
@@ -68,6 +70,7 @@ export class Cells {
       remark: this.#remarks.get(frame) ?? "",
       reviewed: (this.marks[frame] & REVIEWED) !== 0,
       ambiguous: (this.marks[frame] & AMBIGUOUS) !== 0,
+      limbs_lost: this.#limbsLost.get(frame) ?? [],
     };
   }
 
@@ -84,6 +87,7 @@ export class Cells {
       cell ? (cell.keyframe ? KEYFRAME : 0) | (cell.reviewed ? REVIEWED : 0) | (cell.ambiguous ? AMBIGUOUS : 0) : 0,
       cell?.cost_px ?? NaN,
       cell?.remark ?? "",
+      cell?.limbs_lost ?? [],
     );
   }
 
@@ -93,7 +97,7 @@ export class Cells {
    * @param {import("./protocol.js").CellsHeader} header
    * @param {ArrayBuffer} payload
    */
-  take({ count, sources, statuses, remarks }, payload) {
+  take({ count, sources, statuses, remarks, limbs_lost }, payload) {
     const frames = new Uint32Array(payload, 0, count);
     const costs = new Float32Array(payload, 4 * count, count);
     const [source, status, marks] = [0, 1, 2].map((kind) => new Uint8Array(payload, (8 + kind) * count, count));
@@ -102,8 +106,17 @@ export class Cells {
     for (let i = 0; i < count; i += 1) {
       if (frames[i] >= this.frames) continue;
       const of = source[i] === NO_POSE ? NO_POSE : ownSource[source[i]];
-      this.#put(frames[i], of, ownStatus[status[i]], marks[i], costs[i], remarks[frames[i]] ?? "");
+      this.#put(frames[i], of, ownStatus[status[i]], marks[i], costs[i], remarks[frames[i]] ?? "", limbs_lost[frames[i]] ?? []);
     }
+  }
+
+  /**
+   * Probability that the likeliest limb is lost; 0 if unknown.
+   *
+   * @param {number} frame
+   */
+  worstLimb(frame) {
+    return Math.max(0, ...(this.#limbsLost.get(frame) ?? []));
   }
 
   /** Frames that have a pose, and their cells. */
@@ -121,8 +134,9 @@ export class Cells {
    * @param {number} marks
    * @param {number} cost
    * @param {string} remark
+   * @param {number[]} limbsLost
    */
-  #put(frame, source, status, marks, cost, remark) {
+  #put(frame, source, status, marks, cost, remark, limbsLost) {
     this.size += Number(source !== NO_POSE) - Number(this.sources[frame] !== NO_POSE);
     this.sources[frame] = source;
     this.statuses[frame] = status;
@@ -130,6 +144,8 @@ export class Cells {
     this.costs[frame] = cost;
     if (remark) this.#remarks.set(frame, remark);
     else this.#remarks.delete(frame);
+    if (limbsLost.length) this.#limbsLost.set(frame, limbsLost);
+    else this.#limbsLost.delete(frame);
   }
 }
 

@@ -13,6 +13,7 @@ import { Navigation } from "./navigation.js";
 import { Receiver } from "./receiver.js";
 import { RecentImages } from "./recent_images.js";
 import { Store } from "./store.js";
+import { Themes } from "./theme.js";
 import { unavailableReasons } from "./unavailable_reasons.js";
 
 /**
@@ -43,6 +44,7 @@ export function mount() {
     navigation: new Navigation(store, send),
     layers: new Layers(store),
     imageTones: new ImageTones(store),
+    themes: new Themes(store),
     reasons: unavailableReasons(store),
 
     /** @param {(notice: NoticeMessage) => void} listener shows notices of the program and of the page */

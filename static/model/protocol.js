@@ -12,7 +12,7 @@
  * @typedef {"move" | "turn" | "push" | "bend"} DragMode
  * @typedef {"start" | "move" | "end" | "cancel"} GesturePhase
  * @typedef {"model" | "hidden" | "facing" | "facing_away" | "candidate" | "compared" | "preview" | "alternative" |
- *   "new_sizes" | "part_edge" | "epipolar" | "accepted" | "rejected" | "floor" | "floor_sight"} PathKind
+ *   "new_sizes" | "result" | "part_edge" | "epipolar" | "accepted" | "rejected" | "floor" | "floor_sight"} PathKind
  * @typedef {"running" | "paused" | "over"} RunState
  * @typedef {"left" | "right" | ""} Side
  * @typedef {{type: "seek", frame: number}} Seek
@@ -20,6 +20,7 @@
  * @typedef {{type: "view", layers: Layer[], reductions: number[], by_part: boolean}} SetView
  * @typedef {{type: "people", action: "show", person: number, shown: boolean}} ShowPerson
  * @typedef {{type: "people", action: "solo", on: boolean}} Solo
+ * @typedef {{type: "before", shown: boolean}} ShowBefore
  * @typedef {{type: "curves", group: CurveGroup | null}} ShowCurves
  * @typedef {{type: "watch", tab: "search" | "landscape" | null}} WatchTab
  * @typedef {{type: "history", limit: number}} ShowHistory
@@ -64,6 +65,19 @@
  * @typedef {{type: "stop_range"}} StopRange
  * @typedef {{type: "mark", toggle: "keyframe" | "reviewed"}} ToggleMark
  * @typedef {{type: "follow", follow: boolean}} FollowTracking
+ * @typedef {{estimate?: "refine" | "search", order?: number, past_poses?: number, recover?: boolean, backward_pass?:
+ *   boolean}} TrackChanges
+ * @typedef {{type: "track_settings", changes: TrackChanges}} SetTrackSettings
+ * @typedef {{bodies?: boolean, colors?: "parts" | "people", opacity?: number, cameras?: boolean, images?: boolean,
+ *   floor?: boolean, gizmos?: boolean, ghost?: boolean, trail_points?: string[], trail_frames?: number}} View3dChanges
+ * @typedef {{type: "view_3d", changes: View3dChanges}} SetView3d
+ * @typedef {{type: "body_sizes", action: "height", person: number, height_m: number}} SetHeight
+ * @typedef {{type: "body_sizes", action: "part", person: number, part: string, length_m?: number, half_depth_m?:
+ *   number, half_width_m?: number}} SetPartSizes
+ * @typedef {{type: "body_sizes", action: "width", person: number, girdle: string, width_m: number}} SetGirdleWidth
+ * @typedef {{type: "body_sizes", action: "couple", on: boolean}} CoupleSides
+ * @typedef {{type: "body_sizes", action: "apply", person: number, refit: boolean}} ApplySizes
+ * @typedef {{type: "body_sizes", action: "discard" | "previous", person: number}} DraftSizes
  * @typedef {{type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "revert"}} EditFloor
  * @typedef {{type: "floor", action: "mark", camera: number, u: number, v: number}} MarkFloor
  * @typedef {{type: "undo"}} Undo
@@ -74,15 +88,18 @@
  * @typedef {{joint: string, name: string, unit: "deg" | "cm", low: number | null, high: number | null}} DofInfo
  * @typedef {{name: string, dofs: number[]}} Limb
  * @typedef {{name: string, color: string, model: string, height_m: number, points: string[], minor: string[], heading:
- *   string[], bones: [string, string][], parts: string[], dofs: DofInfo[], point_dofs: Record<string, number[]>,
- *   point_limbs: Record<string, Limb>}} PersonInfo
+ *   string[], bones: [string, string][], parts: string[], limbs: string[], dofs: DofInfo[], point_dofs: Record<string,
+ *   number[]>, point_limbs: Record<string, Limb>}} PersonInfo
  * @typedef {{type: "session", name: string, fps: number, n_frames: number, cameras: CameraInfo[], people: PersonInfo[],
- *   start: string}} SessionMessage
+ *   doubtful_from: number, lost_from: number, start: string}} SessionMessage
  * @typedef {{source: string | null, status: Status, shown: boolean, alternatives: number}} PersonState
  * @typedef {{running: boolean, kind: string | null, stage: string | null, stages: string[], evaluations: number,
  *   per_second: number, best_px: number | null, message: string}} Job
  * @typedef {{run: number, step: number, steps: number, stage: string | null}} ReplayedStep
  * @typedef {{run: number, candidate: number}} PreviewedCandidate
+ * @typedef {{number: number, work: "fit" | "search", before_px: number | null, after_px: number | null,
+ *   before_view_costs_px: (number | null)[], after_view_costs_px: (number | null)[], warning: string, is_before_shown:
+ *   boolean}} Compared
  * @typedef {{running: boolean, first: number | null, last: number | null, at: number | null, done: number, total:
  *   number, per_second: number, doubtful: number, lost: number, back: boolean, message: string}} Track
  * @typedef {{running: boolean, what: string, done: number, total: number, message: string}} RangeWork
@@ -92,22 +109,21 @@
  * @typedef {{type: "state", frame: number, person: number, point: string | null, people: PersonState[], solo: boolean,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
  *   part_costs_px: (number | null)[], dofs: number[], locked: number[], other_sizes: boolean, job: Job, replay:
- *   ReplayedStep | null, compared: number | null, preview: PreviewedCandidate | null, track: Track, range: RangeWork,
- *   follow: boolean, snapped: number | null, floor: FloorPicking | null, footage: FootageProgress, compiling: boolean,
- *   undo: string | null, redo: string | null, saved: boolean, save_error: string | null}} StateMessage
+ *   ReplayedStep | null, compared_run: number | null, preview: PreviewedCandidate | null, compared: Compared | null,
+ *   track: Track, range: RangeWork, follow: boolean, snapped: number | null, floor: FloorPicking | null, footage:
+ *   FootageProgress, compiling: boolean, undo: string | null, redo: string | null, saved: boolean, save_error: string |
+ *   null}} StateMessage
  * @typedef {{edit: number, label: string, author: string, time: string, undone: boolean}} HistoryEntry
  * @typedef {{type: "history", entries: HistoryEntry[], later: boolean, earlier: boolean}} HistoryMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
  * @typedef {{source: string, cost_px: number | null, keyframe: boolean, status: Status, remark: string, reviewed:
- *   boolean, ambiguous: boolean}} Cell
+ *   boolean, ambiguous: boolean, limbs_lost: number[]}} Cell
  * @typedef {{type: "timeline", person: number | null, cells: Record<string, Cell | null>, replace: boolean}}
  *   TimelineMessage
  * @typedef {{type: "inconsistent", frames: number[]}} InconsistentMessage
  * @typedef {{person: number, name: string, dofs: string[], bound_rad: number | null, step_rad: number | null, bound_m:
  *   number | null, step_m: number | null, angles: number, lengths: number, own: boolean}} SearchLeaf
- * @typedef {{type: "search_setup", theta_px: number | null, outliers: "truncated" | "paper", passes: number[],
- *   patience: number, max_expansions: number, limbs_apart: boolean, bound_rad: number, bound_m: number, step_rad:
- *   number, step_m: number, speed: number | null, leaves: SearchLeaf[]}} SearchSetupMessage
+ * @typedef {{type: "search_setup", speed: number | null, leaves: SearchLeaf[]}} SearchSetupMessage
  * @typedef {{person: number, name: string, factor: number, evaluations: number, gain_px: number, done: boolean,
  *   running: boolean}} SearchStage
  * @typedef {{number: number, state: RunState, start_px: number | null, best_px: number | null, evaluations: number,
@@ -115,6 +131,23 @@
  * @typedef {{run: number, step: number, stage: string | null, candidate_px: number | null, best_px: number | null,
  *   evaluations: number}} Replay
  * @typedef {{type: "search_runs", runs: SearchRun[], replay: Replay | null, compared: number | null}} SearchRunsMessage
+ * @typedef {{estimate: "refine" | "search", order: number, past_poses: number, recover: boolean, backward_pass:
+ *   boolean}} TrackValues
+ * @typedef {{theta_px: number | null, outliers: "truncated" | "paper", passes: number[], patience: number,
+ *   max_expansions: number, limbs_apart: boolean, bound_rad: number, bound_m: number, step_rad: number, step_m:
+ *   number}} SearchValues
+ * @typedef {{type: "settings", track: TrackValues, search: SearchValues, track_default: TrackValues, search_default:
+ *   SearchValues}} SettingsMessage
+ * @typedef {{bodies: boolean, colors: "parts" | "people", opacity: number, cameras: boolean, images: boolean, floor:
+ *   boolean, gizmos: boolean, ghost: boolean, trail_points: string[], trail_frames: number}} View3d
+ * @typedef {{up: string, tilt_deg: number | null, height_m: number | null, has_former: boolean}} FloorInfo
+ * @typedef {{type: "view_3d", view: View3d, floor: FloorInfo, prediction: string, trail_points: string[]}}
+ *   View3dMessage
+ * @typedef {{name: string, length_m: number, half_depth_m: number, half_width_m: number}} PartSizes
+ * @typedef {{name: string, width_m: number}} GirdleWidth
+ * @typedef {{type: "body_sizes", person: number, height_m: number, parts: PartSizes[], widths: GirdleWidth[],
+ *   sides_alike: boolean, edited: boolean, has_former: boolean, outcome: string, height_limits_m: [number, number],
+ *   size_limits_m: [number, number]}} BodySizesMessage
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number, limit_px:
  *   number | null}} ImageHeader
  * @typedef {{camera: number, person: number, kind: PathKind, color: string, side: Side, first: number, count: number}}
@@ -132,7 +165,7 @@
  * @typedef {{type: "overlay", frame: number, seq: number, job: boolean, paths: Path[], outlines: Outline[], handles:
  *   Handle[], out_of_reach: OutOfReach | null, pins: PinMark[], triangulation: PinTriangulation | null}} OverlayHeader
  * @typedef {{type: "cells", person: number | null, replace: boolean, count: number, sources: string[], statuses:
- *   Status[], remarks: Record<string, string>}} CellsHeader
+ *   Status[], remarks: Record<string, string>, limbs_lost: Record<string, number[]>}} CellsHeader
  * @typedef {{title: string, unit: "deg" | "cm" | "px", labels: string[]}} Plot
  * @typedef {{type: "curves", group: CurveGroup, person: number, replace: boolean, count: number, plots: Plot[]}}
  *   CurvesHeader
@@ -143,14 +176,15 @@
  *   current_px: number | null, count: number}} LandscapeHeader
  * @typedef {SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative | ResetLimb | LockDofs |
  *   HoldPoint} PoseEdit
- * @typedef {Seek | Select | SetView | ShowPerson | Solo | ShowCurves | WatchTab | ShowHistory | LookThrough | Pause3d |
- *   Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative | ResetLimb | LockDofs |
- *   HoldPoint | DragPin | RemovePins | FitPose | RunSearch | RepeatSearch | SetSearchSpeed | SetSearchSettings |
- *   ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape | SetLandscapeDof | StartTracking |
- *   ControlTracking | EditRange | StopRange | ToggleMark | FollowTracking | EditFloor | MarkFloor | Undo | Redo | GoTo
- *   | Save} ClientMessage
+ * @typedef {Seek | Select | SetView | ShowPerson | Solo | ShowBefore | ShowCurves | WatchTab | ShowHistory |
+ *   LookThrough | Pause3d | Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative |
+ *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | RunSearch | RepeatSearch | SetSearchSpeed |
+ *   SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape | SetLandscapeDof |
+ *   StartTracking | ControlTracking | EditRange | StopRange | ToggleMark | FollowTracking | SetTrackSettings |
+ *   SetView3d | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | DraftSizes | EditFloor |
+ *   MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
- *   SearchSetupMessage | SearchRunsMessage} TextMessage
+ *   SearchSetupMessage | SearchRunsMessage | SettingsMessage | View3dMessage | BodySizesMessage} TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader} BinaryHeader
  * generated: end

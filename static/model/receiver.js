@@ -54,6 +54,15 @@ export class Receiver {
       case "timeline":
         this.#mergeTimeline(message);
         break;
+      case "settings":
+        this.#store.set({ settings: message });
+        break;
+      case "view_3d":
+        this.#store.set({ view3d: message });
+        break;
+      case "body_sizes":
+        this.#store.set({ bodySizes: message });
+        break;
       case "search_setup":
         this.#store.set({ searchSetup: message });
         break;

@@ -17,6 +17,7 @@ import { defaultLayers } from "./layers.js";
  *
  * @typedef {object} Facts
  * @property {boolean} connected
+ * @property {string | null} opening name of another session that the program is opening
  * @property {import("./protocol.js").SessionMessage | null} session
  * @property {import("./protocol.js").StateMessage | null} state
  * @property {import("./cells.js").Cells} timeline cells of all people together
@@ -25,6 +26,10 @@ import { defaultLayers } from "./layers.js";
  * @property {import("../widgets/frame_axis.js").Span | null} visible the visible part of timeline and curves; null for all
  * @property {import("./series.js").Curves | null} curves the current group of curves
  * @property {import("./series.js").Tab | null} drawer the open tab; null while the drawer is closed
+ * @property {{choice: import("./theme.js").ThemeChoice, isDark: boolean}} theme
+ * @property {import("./protocol.js").SettingsMessage | null} settings of tracker and search
+ * @property {import("./protocol.js").View3dMessage | null} view3d what the 3-D view shows
+ * @property {import("./protocol.js").BodySizesMessage | null} bodySizes of the active person
  * @property {import("./protocol.js").SearchSetupMessage | null} searchSetup
  * @property {import("./protocol.js").SearchRunsMessage | null} searchRuns
  * @property {Map<number, import("./search_runs.js").Steps>} searchSteps recorded steps by run
@@ -64,6 +69,7 @@ export class Store {
   /** @type {Facts} */
   facts = {
     connected: false,
+    opening: null,
     session: null,
     state: null,
     timeline: new Cells(0),
@@ -72,6 +78,10 @@ export class Store {
     visible: null,
     curves: null,
     drawer: null,
+    theme: { choice: "system", isDark: true },
+    settings: null,
+    view3d: null,
+    bodySizes: null,
     searchSetup: null,
     searchRuns: null,
     searchSteps: new Map(),

@@ -22,6 +22,7 @@ export function unavailableReasons(store) {
     track: here(() => (facts().state?.track.running ? "Tracking is already running. Stop it first (Esc)." : null)),
     tracking: here(() => (hasTrack(facts().state) ? null : "Nothing is being tracked. Press T to start.")),
     range: here(() => (facts().range ? null : "No range is marked. Press [ and ] to mark its ends.")),
+    compared: here(() => (facts().state?.compared ? null : "No fit or search result is shown. Press G or F for one.")),
     people: here(() => ((facts().session?.people.length ?? 0) > 1 ? null : "This session has only one person.")),
   };
 }

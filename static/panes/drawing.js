@@ -42,6 +42,7 @@ export const LINE_STYLES = {
   candidate: { width: 1.25, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
   compared: { width: 1.5, dash: [6, 4], layer: null, hasHalo: true, ofPerson: true },
   preview: { width: 1.75, dash: [2, 4], layer: null, hasHalo: true, ofPerson: true },
+  result: { width: 1.5, dash: [6, 4], layer: null, hasHalo: true, ofPerson: true },
   alternative: { width: 1.5, dash: [9, 4, 2, 4], layer: null, hasHalo: true, ofPerson: true },
   new_sizes: { width: 1.5, dash: [9, 4, 2, 4, 2, 4], layer: null, hasHalo: true, ofPerson: true },
   part_edge: { width: 1, dash: [], layer: "part_edges", hasHalo: true },

@@ -6,7 +6,7 @@
 
 import { byId } from "../widgets/elements.js";
 import { FrameCard } from "./frame_card.js";
-import { Inspector } from "./inspector.js";
+import { JointBar } from "./joint_bar.js";
 import { PinBar } from "./pin_bar.js";
 import { Pinning } from "./pinning.js";
 import { Posing } from "./posing.js";
@@ -15,7 +15,7 @@ import { pinBindings, posingBindings } from "./posing_keys.js";
 /** @typedef {ReturnType<typeof mount>} PosingRoom */
 
 /**
- * Build the inspector, the pins and the frame card.
+ * Build the bar of the joint, the pins and the frame card.
  *
  * @param {import("../model/index.js").Context} context
  * @param {import("../panes/index.js").Panes} panes
@@ -24,9 +24,9 @@ export function mount({ store, send, notify, reasons }, { grid }) {
   const pinning = new Pinning(store, send, notify);
   grid.addPointerTarget(pinning);
   const posing = new Posing(store, send);
-  const inspector = new Inspector(byId("inspector", HTMLElement), store, posing, notify);
+  const jointBar = new JointBar(byId("joint-bar", HTMLElement), store, posing, notify);
   new FrameCard(store, posing);
   new PinBar(store, pinning);
-  const bindings = [...posingBindings(posing, inspector, reasons.away), ...pinBindings(pinning, reasons.away)];
+  const bindings = [...posingBindings(posing, jointBar, reasons.away), ...pinBindings(pinning, reasons.away)];
   return { posing, pinning, bindings };
 }

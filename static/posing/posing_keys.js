@@ -12,10 +12,10 @@ const WAYS = [
 
 /**
  * @param {import("./posing.js").Posing} posing
- * @param {import("./inspector.js").Inspector} inspector
+ * @param {import("./joint_bar.js").JointBar} jointBar
  * @param {() => string | null} why why posing is unavailable
  */
-export function posingBindings(posing, inspector, why) {
+export function posingBindings(posing, jointBar, why) {
   const sign = (/** @type {string[]} */ keys) => (/** @type {KeyboardEvent} */ event) =>
     keys.includes(event.key) && !event.ctrlKey && !event.metaKey && !event.altKey;
   const bindings = [
@@ -31,7 +31,7 @@ export function posingBindings(posing, inspector, why) {
     { keys: ["U"], label: "Next degree of freedom of the joint", matches: plain("u"), run: () => posing.nextDof() },
     { keys: ["+"], label: "Increase the selected degree of freedom by one step", matches: sign(["+", "="]), run: () => posing.turn(1) },
     { keys: ["-"], label: "Decrease the selected degree of freedom by one step", matches: sign(["-", "_"]), run: () => posing.turn(-1) },
-    { keys: ["Enter"], label: "Type a value for the selected degree of freedom", matches: plain("enter"), run: () => inspector.type() },
+    { keys: ["Enter"], label: "Type a value for the selected degree of freedom", matches: plain("enter"), run: () => jointBar.type() },
     { keys: ["O"], label: "Lock or unlock the joint", matches: plain("o"), run: () => posing.toggleLock(posing.dofs) },
     {
       keys: ["Shift O"],

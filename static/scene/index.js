@@ -6,8 +6,8 @@
 
 import { byId } from "../widgets/elements.js";
 import { drawsInSoftware } from "../widgets/webgl.js";
+import { loadScene } from "./appearance.js";
 import { CameraView } from "./camera_view.js";
-import { followColorScheme } from "./color_scheme.js";
 import { Floor } from "./floor.js";
 import { ScenePause } from "./pause.js";
 import { sceneBindings } from "./scene_keys.js";
@@ -27,6 +27,6 @@ export function mount({ store, send, reasons }, { grid }) {
   const isSoftware = drawsInSoftware();
   if (isSoftware) new ScenePause(frame, store);
   // viser is a large program: loaded earlier, it would delay the first images.
-  store.onceKnown("shown", () => followColorScheme(frame));
+  store.onceKnown("shown", () => loadScene(frame, store));
   return { frame, floor, isSoftware, bindings: sceneBindings(cameraView, floor, reasons.away) };
 }

@@ -35,7 +35,7 @@ export class CostCurve {
     this.#read.className = "curve-readout";
     this.#element.append(this.#lines, this.#read);
     new ResizeObserver(() => this.#draw()).observe(this.#element);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#draw());
+    store.subscribe((changed) => changed.has("theme") && this.#draw());
     this.#listen();
   }
 

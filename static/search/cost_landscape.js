@@ -54,7 +54,7 @@ export class CostLandscape {
       if (changed.has("landscape") || changed.has("session")) this.#show();
     });
     new ResizeObserver(() => this.#draw()).observe(this.#element);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#show());
+    store.subscribe((changed) => changed.has("theme") && this.#show());
     this.#listen();
     this.#open();
   }

@@ -56,7 +56,7 @@ export class SearchPanel {
       if (changed.has("drawer")) this.#open();
       if (!this.#isOpen) return;
       if (changed.has("connected") && store.facts.connected) send({ type: "watch", tab: "search" });
-      if (["state", "connected", "searchSetup", "searchRuns", "searchRun"].some((f) => changed.has(/** @type {"state"} */ (f)))) {
+      if (["state", "connected", "settings", "searchSetup", "searchRuns", "searchRun"].some((f) => changed.has(/** @type {"state"} */ (f)))) {
         this.#show();
       }
       for (const view of views) view.update(changed);
@@ -120,7 +120,7 @@ export class SearchPanel {
   }
 
   #show() {
-    const { state, connected, searchSetup } = this.#store.facts;
+    const { state, connected, settings, searchSetup } = this.#store.facts;
     const isReady = connected && !!state;
     const isRunning = !!state?.job.running;
     const { step, stage, frame, again, track, stop } = this.#buttons;
@@ -131,8 +131,8 @@ export class SearchPanel {
     track.textContent = state?.track.running ? "Pause" : "Track";
     stop.disabled = !isReady || !(hasSearch(state) || hasTrack(state));
     stop.title = hasTrack(state) ? "Stop tracking and keep the results (Esc)" : stopTitle(isRunning);
+    if (settings) this.#theta.show(settings.search.theta_px);
     if (searchSetup) {
-      this.#theta.show(searchSetup.theta_px);
       if (document.activeElement !== this.#speed) this.#speed.value = String(searchSetup.speed ?? 0);
     }
     const rate = run && run.seconds > 0 ? ` · ${count(run.evaluations / run.seconds)}/s` : "";

@@ -8,7 +8,10 @@ import { selectedRun } from "../model/search_runs.js";
 import { makeNumber } from "./search_widgets.js";
 import { count, displayName } from "../widgets/text.js";
 
-/** @typedef {import("../model/protocol.js").SearchLeaf} SearchLeaf */
+/**
+ * @typedef {import("../model/protocol.js").SearchLeaf} SearchLeaf
+ * @typedef {import("../model/protocol.js").SearchSetupMessage & import("../model/protocol.js").SearchValues} Setup
+ */
 
 const DEGREES = 180 / Math.PI;
 const CENTIMETRES = 100;
@@ -28,7 +31,7 @@ export class SearchTree {
   #built = "";
   /** @type {Map<string, HTMLElement>} cells by person, stage and pass */
   #cells = new Map();
-  /** @type {{field: ReturnType<typeof makeNumber>, read: (setup: import("../model/protocol.js").SearchSetupMessage) => number | null}[]} */
+  /** @type {{field: ReturnType<typeof makeNumber>, read: (setup: Setup) => number | null}[]} */
   #fields = [];
 
   /**
@@ -42,14 +45,15 @@ export class SearchTree {
 
   /** @param {Set<keyof import("../model/store.js").Facts>} changed */
   update(changed) {
-    const { searchSetup: setup, session } = this.#store.facts;
-    if (!setup || !session) return;
-    if (changed.has("searchSetup") || changed.has("session") || changed.has("drawer")) this.#build(setup, session);
+    const { searchSetup, settings, session } = this.#store.facts;
+    if (!searchSetup || !settings || !session) return;
+    const isOther = ["searchSetup", "settings", "session", "drawer"].some((fact) => changed.has(/** @type {"session"} */ (fact)));
+    if (isOther) this.#build({ ...settings.search, ...searchSetup }, session);
     this.#showRun();
   }
 
   /**
-   * @param {import("../model/protocol.js").SearchSetupMessage} setup
+   * @param {Setup} setup
    * @param {import("../model/protocol.js").SessionMessage} session
    */
   #build(setup, session) {
@@ -77,7 +81,7 @@ export class SearchTree {
     }
   }
 
-  /** @param {import("../model/protocol.js").SearchSetupMessage} setup */
+  /** @param {Setup} setup */
   #head(setup) {
     const passes = setup.passes.map((factor) => {
       const title = `Pass with steps ×${factor}: poses evaluated and reduction of the cost`;
@@ -94,7 +98,7 @@ export class SearchTree {
   /**
    * Root row of a person. The root of the first person has the default bounds and steps.
    *
-   * @param {import("../model/protocol.js").SearchSetupMessage} setup
+   * @param {Setup} setup
    * @param {string} name
    * @param {number} dofs
    * @param {number} person
@@ -119,7 +123,7 @@ export class SearchTree {
   }
 
   /**
-   * @param {import("../model/protocol.js").SearchSetupMessage} setup
+   * @param {Setup} setup
    * @param {SearchLeaf} leaf
    * @param {boolean} isLast
    */
@@ -150,7 +154,7 @@ export class SearchTree {
   /**
    * Settings of all stages.
    *
-   * @param {import("../model/protocol.js").SearchSetupMessage} setup
+   * @param {Setup} setup
    */
   #rest(setup) {
     const line = document.createElement("div");
@@ -176,7 +180,7 @@ export class SearchTree {
     text.addEventListener("change", () => {
       const factors = text.value.split(/[\s,;]+/).filter(Boolean).map(Number);
       this.#change({ passes: factors.map((factor) => (Number.isFinite(factor) ? factor : 0)) });
-      text.value = this.#store.facts.searchSetup?.passes.join(" ") ?? "";
+      text.value = this.#store.facts.settings?.search.passes.join(" ") ?? "";
     });
     text.addEventListener("keydown", (event) => event.stopPropagation());
     passes.append("Passes", text);
@@ -230,7 +234,7 @@ function cell(className, text, title) {
 }
 
 /**
- * @param {import("../model/protocol.js").SearchSetupMessage} setup
+ * @param {Setup} setup
  * @param {number} person
  * @param {string} name
  * @param {"bound_rad" | "step_rad" | "bound_m" | "step_m"} key

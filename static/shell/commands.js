@@ -20,11 +20,12 @@ import { displayName } from "../widgets/text.js";
  * @property {import("../posing/posing.js").Posing} posing
  * @property {import("../model/layers.js").Layers} layers
  * @property {import("../model/actions.js").Actions} actions
+ * @property {import("../inspector/inspector.js").Inspector} inspector
  * @property {() => string | null} away why all commands are unavailable while disconnected
  */
 
 const BUTTONS =
-  ".top-bar button, .top-bar input, #inspector button, .transport button, .transport input, #range-bar button, .drawer-bar label";
+  ".top-bar button, .top-bar input, #joint-bar button, .transport button, .transport input, #range-bar button, .drawer-bar label";
 
 /**
  * Commands of keys. Bindings of several keys are left out, because other commands replace them.
@@ -35,12 +36,12 @@ const BUTTONS =
 export function keyCommands(table) {
   return table
     .filter(({ keys, label }) => !keys.some((key) => key.includes("–")) && label !== "Commands")
-    .map(({ keys, label, area, why, run }) => ({
+    .map(({ keys, label, words, area, why, run }) => ({
       id: `key ${label}`,
       area: area ?? "More",
       label,
       keys,
-      words: "",
+      words: words ?? "",
       why: () => why?.() ?? null,
       run: () => run(new KeyboardEvent("keydown")),
     }));
@@ -119,6 +120,16 @@ export function contextCommands({ store, navigation, grid, posing, layers, actio
   const points = session?.people[state?.person ?? 0]?.points ?? [];
   for (const point of points) add("Joint", `Select ${displayName(point)}`, () => posing.selectPoint(point), "joint");
   return commands;
+}
+
+/**
+ * The rows of the inspector, each of which opens there.
+ *
+ * @param {CommandContext} context
+ * @returns {Command[]}
+ */
+export function settingCommands({ inspector, away }) {
+  return inspector.commands().map(({ area, label, words, run }) => ({ id: `${area} ${label}`, area, label, keys: [], words, why: away, run }));
 }
 
 /** @param {HTMLElement} control */

@@ -2,6 +2,7 @@
 
 import { button, byId } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
+import { capital } from "../widgets/text.js";
 
 const PROGRESS_MS = 400;
 /** Longest text of the server that is shown as its reason. */
@@ -199,9 +200,4 @@ function save(data, name) {
   link.download = name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
-}
-
-/** @param {string} text */
-function capital(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1);
 }

@@ -1,36 +1,64 @@
-/** Card with the first steps, shown until the user closes it. The palette can show it again. */
+/**
+ * First steps: the shortest way from a new session to a tracked one. Shown until the user closes them or tracks for the
+ * first time; the palette shows them again.
+ */
 
+import { hasTrack } from "../model/selectors.js";
 import { button, byId } from "../widgets/elements.js";
 
 const STORED = "quadrille.first_steps";
 
 export class FirstSteps {
-  #card = byId("first-steps", HTMLElement);
+  #store;
+  #row = byId("first-steps", HTMLElement);
+  #place = byId("first-place", HTMLElement);
+  #search = byId("first-search", HTMLElement);
+  #fit = byId("first-fit", HTMLElement);
+  #track = byId("first-track", HTMLElement);
+  /** Whether the last state had a tracking run; null before the first state. */
+  #wasTracking = /** @type {boolean | null} */ (null);
 
   /** @param {import("../model/store.js").Store} store */
   constructor(store) {
+    this.#store = store;
     button("close-first-steps", () => this.#close());
-    this.#card.addEventListener("keydown", (event) => {
+    this.#row.addEventListener("keydown", (event) => {
       if (event.key !== "Escape") return;
       event.preventDefault();
       this.#close();
     });
     store.subscribe((changed) => {
-      if (!changed.has("session")) return;
-      const isAlone = (store.facts.session?.people.length ?? 1) < 2;
-      byId("first-choose-person", HTMLElement).hidden = isAlone;
-      if (localStorage.getItem(STORED) !== "seen") this.#card.hidden = false;
+      if (changed.has("session")) this.#begin();
+      if (changed.has("state")) this.#follow();
     });
   }
 
-  /** Show the card and focus its button. */
+  /** Show the first steps and focus their button. */
   show() {
-    this.#card.hidden = false;
+    this.#row.hidden = false;
     byId("close-first-steps", HTMLButtonElement).focus();
+  }
+
+  #begin() {
+    this.#place.hidden = (this.#store.facts.session?.people.length ?? 1) < 2;
+    if (localStorage.getItem(STORED) !== "seen") this.#row.hidden = false;
+  }
+
+  /** Tick the steps that are done. */
+  #follow() {
+    const { state } = this.#store.facts;
+    if (!state) return;
+    const done = (/** @type {HTMLElement} */ step) => step.classList.add("is-done");
+    if (state.people.every(({ source }) => source !== null)) done(this.#place);
+    if (state.compared?.work === "search" || state.job.message) done(this.#search);
+    if (state.compared?.work === "fit") done(this.#fit);
+    if (hasTrack(state)) done(this.#track);
+    if (this.#wasTracking === false && hasTrack(state)) this.#close();
+    this.#wasTracking = hasTrack(state);
   }
 
   #close() {
     localStorage.setItem(STORED, "seen");
-    this.#card.hidden = true;
+    this.#row.hidden = true;
   }
 }

@@ -8,6 +8,7 @@ import { button, byId } from "../widgets/elements.js";
 import { makeSplitter } from "../widgets/splitter.js";
 import { leaveFields, watchTyping } from "../widgets/typing.js";
 import { Announcer } from "./announcer.js";
+import { Comparison } from "./comparison.js";
 import { ExportPanel } from "./export_panel.js";
 import { FirstSteps } from "./first_steps.js";
 import { HistoryList } from "./history_list.js";
@@ -19,6 +20,7 @@ import { People } from "./people.js";
 import { peopleBindings } from "./people_keys.js";
 import { showProgressMarks } from "./progress_marks.js";
 import { SavedMark } from "./saved_mark.js";
+import { Sessions } from "./sessions.js";
 import { escapeBinding, helpBindings } from "./shell_keys.js";
 import { TopBar } from "./top_bar.js";
 
@@ -29,6 +31,7 @@ import { TopBar } from "./top_bar.js";
  * @property {import("../timeline/index.js").TimelineRoom} timeline
  * @property {import("../search/index.js").SearchRoom} search
  * @property {import("../scene/index.js").SceneRoom} scene
+ * @property {import("../inspector/index.js").InspectorRoom} inspector
  */
 
 /**
@@ -44,28 +47,30 @@ export function mount(context, rooms) {
   const notices = new Notices();
   context.onNotice((notice) => notices.show(notice));
   new TopBar(store, actions);
+  new Comparison(store, actions, context.notify);
   const people = new People(store, actions, posing);
   showProgressMarks(store);
   watchConnection(byId("banner", HTMLElement), store);
-  makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement));
+  makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement), byId("inspector", HTMLElement));
   const history = new HistoryList(store, send);
   new ExportPanel(store, context.notify);
   new SavedMark(store, send);
+  const sessions = new Sessions(store);
   new Announcer(byId("announcer", HTMLElement), store);
   const firstSteps = new FirstSteps(store);
-  const palette = new Palette({ store, navigation, grid, posing, layers, actions, away: reasons.away });
+  const palette = new Palette({ store, navigation, grid, posing, layers, actions, inspector: rooms.inspector.inspector, away: reasons.away });
   const keyList = new KeyList();
   button("show-palette", () => palette.toggle());
 
   const own = [
-    ...helpBindings({ actions, history, notices, palette, keyList, firstSteps, reasons }),
+    ...helpBindings({ actions, history, notices, palette, keyList, firstSteps, sessions, reasons }),
     escapeBinding({ store, actions, notices, grid, gestures, pinning, floor: rooms.scene.floor }),
     ...peopleBindings({ actions, posing, people, reasons }),
   ];
-  const { panes, timeline, search, scene } = rooms;
+  const { panes, timeline, search, scene, inspector } = rooms;
   const table = orderedByArea([
     own,
-    ...[scene, search, timeline, rooms.posing, panes].map(({ bindings }) => bindings),
+    ...[scene, search, timeline, rooms.posing, panes, inspector].map(({ bindings }) => bindings),
   ]);
   palette.setBindings(table);
   keyList.setBindings(table);

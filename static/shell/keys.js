@@ -16,6 +16,7 @@ const AREAS = [
   "People",
   "Pins",
   "Views",
+  "Inspector",
 ];
 
 /** Keys of viser's camera while the 3-D view has the focus. */

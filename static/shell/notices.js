@@ -138,13 +138,13 @@ export class Notices {
  */
 export function watchConnection(banner, store) {
   const show = () => {
-    const { connected, session } = store.facts;
-    banner.textContent = session ? "Connection lost. Reconnecting…" : "Connecting…";
-    banner.classList.toggle("is-shown", !connected);
+    const { connected, session, opening } = store.facts;
+    banner.textContent = opening !== null ? `Opening ${opening}…` : session ? "Connection lost. Reconnecting…" : "Connecting…";
+    banner.classList.toggle("is-shown", !connected || opening !== null);
     document.body.classList.toggle("is-cut-off", !connected);
   };
   store.subscribe((changed) => {
-    if (changed.has("connected") || changed.has("session")) show();
+    if (changed.has("connected") || changed.has("session") || changed.has("opening")) show();
   });
   show();
 }

@@ -1,6 +1,6 @@
 /** Command palette: find commands by a few letters, run them with Enter. */
 
-import { buttonCommands, keyCommands, contextCommands } from "./commands.js";
+import { buttonCommands, contextCommands, keyCommands, settingCommands } from "./commands.js";
 import { byId, keyCaps } from "../widgets/elements.js";
 import { fitness } from "../widgets/fuzzy.js";
 
@@ -56,7 +56,12 @@ export class Palette {
   #search() {
     const query = this.#input.value;
     const recent = recentIds();
-    const commands = [...contextCommands(this.#context, query), ...keyCommands(this.#table), ...buttonCommands(this.#table)];
+    const commands = [
+      ...contextCommands(this.#context, query),
+      ...keyCommands(this.#table),
+      ...buttonCommands(this.#table),
+      ...settingCommands(this.#context),
+    ];
     const scored = commands.flatMap((command) => {
       const found = fitness(query, `${command.label} ${command.area} ${command.words} ${command.keys.join(" ")}`);
       if (found === null) return [];
@@ -78,6 +83,8 @@ export class Palette {
 
   /** @param {KeyboardEvent} event */
   #onKey(event) {
+    // The field of the closed dialog keeps the focus until the page is drawn again: its keys belong to the page.
+    if (!this.#dialog.open) return;
     const count = this.#found.length;
     const page = 8;
     const to = {

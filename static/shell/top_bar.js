@@ -38,7 +38,7 @@ export class TopBar {
     const { session } = this.#store.facts;
     if (!session) return;
     this.#session.textContent = session.name;
-    this.#session.title = session.name;
+    this.#session.title = `${session.name}. Open another session (Ctrl+O)`;
     document.title = `${session.name} – Quadrille`;
   }
 

@@ -51,7 +51,7 @@ export class Curves {
     this.#stage.append(this.#lines, this.#cursor);
     store.subscribe((changed) => this.#update(changed));
     new ResizeObserver(() => this.#drawAll()).observe(this.#stage);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#drawAll());
+    store.subscribe((changed) => changed.has("theme") && this.#drawAll());
     this.#listen();
     this.#open();
   }

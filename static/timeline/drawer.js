@@ -1,4 +1,4 @@
-/** Drawer above the timeline with tabs for curves, search and cost landscape. Its height and tab are stored. */
+/** Drawer above the timeline with tabs for curves, search, cost landscape and doubtful poses. Its height and tab are stored. */
 
 import { button, byId } from "../widgets/elements.js";
 
@@ -11,7 +11,7 @@ const STORED_TAB = "quadrille.drawer-tab";
 const STORED_CURVES = "quadrille.drawer-curves";
 const STORED_HEIGHT = "quadrille.drawer-height-";
 /** Height below the tabs: default fraction of the window, and minimum in CSS pixels. */
-const DEFAULT_SHARES = { curves: 0.21, search: 0.3 };
+const DEFAULT_SHARES = { curves: 0.21, search: 0.3, doubts: 0.2 };
 const MIN_PX = 140;
 /** Minimum height of the rest of the window, CSS pixels. */
 const PANES_PX = 340;
@@ -52,6 +52,11 @@ export class Drawer {
     this.#open(this.#store.facts.drawer === tab ? null : tab);
   }
 
+  /** @param {import("../model/series.js").Tab} tab */
+  open(tab) {
+    this.#open(tab);
+  }
+
   /** Open the last group of curves, or close the drawer if curves are shown. */
   toggleCurves() {
     const stored = localStorage.getItem(STORED_CURVES);
@@ -80,9 +85,11 @@ export class Drawer {
     this.#fit();
   }
 
-  /** Curves need less height than the search, so each kind has its own. */
+  /** Curves and thumbnails need less height than the search, so each kind has its own. */
   get #kind() {
-    return CURVE_GROUPS.some((group) => group === this.#store.facts.drawer) ? "curves" : "search";
+    const { drawer } = this.#store.facts;
+    if (drawer === "doubts") return "doubts";
+    return CURVE_GROUPS.some((group) => group === drawer) ? "curves" : "search";
   }
 
   /** Apply the stored height, as far as the window has room for it. */

@@ -6,6 +6,8 @@
 
 import { byId } from "../widgets/elements.js";
 import { Curves } from "./curves.js";
+import { DoubtList } from "./doubt_list.js";
+import { DoubtQueue } from "./doubt_queue.js";
 import { Drawer } from "./drawer.js";
 import { FrameWindow } from "./frame_window.js";
 import { JumpMenu } from "./jump_menu.js";
@@ -13,7 +15,7 @@ import { Jumps } from "./jumps.js";
 import { Playback } from "./playback.js";
 import { RangeBar } from "./range_bar.js";
 import { Timeline } from "./timeline.js";
-import { drawerBindings, frameBindings, timelineBindings, trackBindings } from "./timeline_keys.js";
+import { drawerBindings, frameBindings, queueBindings, timelineBindings, trackBindings } from "./timeline_keys.js";
 import { TrackBar } from "./track_bar.js";
 import { Transport } from "./transport.js";
 
@@ -30,9 +32,11 @@ export function mount({ store, actions, navigation, reasons }) {
   const frameWindow = new FrameWindow(store);
   new Transport(store, navigation, playback, actions);
   new TrackBar(store, actions);
-  new JumpMenu(store, jumps);
   new RangeBar(store, actions);
   const drawer = new Drawer(store);
+  new JumpMenu(store, jumps, () => drawer.open("doubts"));
+  const queue = new DoubtQueue(store, navigation, actions);
+  new DoubtList(store, queue);
   new Curves(store, navigation, actions, frameWindow);
   new Timeline(byId("timeline", HTMLElement), { store, navigation, jumps, frameWindow });
   const bindings = [
@@ -40,6 +44,7 @@ export function mount({ store, actions, navigation, reasons }) {
     ...trackBindings(store, actions, reasons),
     ...timelineBindings({ store, actions, playback, jumps, frameWindow, reasons }),
     ...drawerBindings(drawer),
+    ...queueBindings(queue, reasons.away),
   ];
   return { bindings };
 }

@@ -17,18 +17,24 @@ export class JumpMenu {
   /** @type {Map<import("./jumps.js").Kind, {count: HTMLElement, buttons: HTMLButtonElement[]}>} */
   #rows = new Map();
   #gap = document.createElement("button");
+  #list = document.createElement("button");
 
   /**
    * @param {import("../model/store.js").Store} store
    * @param {import("./jumps.js").Jumps} jumps
+   * @param {() => void} listDoubts opens the list of doubts
    */
-  constructor(store, jumps) {
+  constructor(store, jumps, listDoubts) {
     this.#store = store;
     this.#jumps = jumps;
     this.#previous = button("previous-doubt", () => jumps.go("doubt", -1));
     this.#next = button("next-doubt", () => jumps.go("doubt", 1));
     this.#open = button("show-jumps", () => this.#show(this.#menu.hidden));
     this.#build();
+    this.#list.addEventListener("click", () => {
+      this.#show(false);
+      listDoubts();
+    });
     document.addEventListener("pointerdown", (event) => {
       const at = /** @type {Node} */ (event.target);
       if (!this.#menu.contains(at) && !this.#open.contains(at)) this.#show(false);
@@ -80,7 +86,11 @@ export class JumpMenu {
     this.#gap.textContent = "Longest gap between keyframes";
     this.#gap.title = "Go to the middle of the longest gap between keyframes, the best place for a new one (Q)";
     this.#gap.addEventListener("click", () => this.#jumps.toLongestGap());
-    this.#menu.append(...rows, this.#gap);
+    this.#list.type = "button";
+    this.#list.className = "jump-list";
+    this.#list.textContent = "List doubts by severity";
+    this.#list.title = "List doubtful and lost poses with thumbnails, most severe first (Shift+L)";
+    this.#menu.append(...rows, this.#gap, this.#list);
   }
 
   /** @param {boolean} isShown */

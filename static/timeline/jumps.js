@@ -9,7 +9,7 @@ export const KINDS = [
   {
     kind: "doubt",
     label: "Doubtful or lost",
-    title: "Frames whose pose the tracker is not sure of",
+    title: "Frames whose pose the tracker is not sure of, and that nobody has confirmed or reviewed",
     key: "N",
     more: "doubtful or lost frame",
   },
@@ -121,7 +121,7 @@ export class Jumps {
  */
 function tests({ sources, statuses, marks }) {
   return {
-    doubt: (frame) => statuses[frame] >= DOUBT,
+    doubt: (frame) => statuses[frame] >= DOUBT && !(marks[frame] & REVIEWED),
     ambiguous: (frame) => (marks[frame] & AMBIGUOUS) !== 0,
     unreviewed: (frame) => sources[frame] !== NO_POSE && !(marks[frame] & REVIEWED),
     keyframe: (frame) => (marks[frame] & KEYFRAME) !== 0,

@@ -5,9 +5,10 @@
 
 import { AMBIGUOUS, framesWith, keyframesOf } from "../model/cells.js";
 import { prepare } from "../panes/drawing.js";
+import { describeFrame } from "./cell_text.js";
+import { CellTip } from "./cell_tip.js";
 import { FrameAxis } from "../widgets/frame_axis.js";
 import { zoomByWheel } from "./frame_window.js";
-import { px } from "../widgets/text.js";
 import * as drawing from "./timeline_drawing.js";
 
 /** Margin of the overview for the pointer. */
@@ -24,6 +25,7 @@ export class Timeline {
   #frameWindow;
   #cells = document.createElement("canvas");
   #cursor = document.createElement("canvas");
+  #tip;
   #hovered = /** @type {number | null} */ (null);
   #gesture = /** @type {Gesture | null} */ (null);
   /** Start of the range that is being marked. */
@@ -43,6 +45,7 @@ export class Timeline {
     this.#jumps = jumps;
     this.#frameWindow = frameWindow;
     element.append(this.#cells, this.#cursor);
+    this.#tip = new CellTip(element);
     store.subscribe((changed) => {
       const has = (/** @type {(keyof import("../model/store.js").Facts)[]} */ ...facts) => facts.some((f) => changed.has(f));
       if (has("session")) element.style.height = `${this.#layout.height}px`;
@@ -51,7 +54,7 @@ export class Timeline {
       if (has("target", "timeline", "lanes", "session")) this.#describe();
     });
     new ResizeObserver(() => this.#drawAll()).observe(element);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#drawAll());
+    store.subscribe((changed) => changed.has("theme") && this.#drawAll());
     this.#listen();
   }
 
@@ -74,9 +77,12 @@ export class Timeline {
     element.addEventListener("pointermove", (event) => {
       if (this.#gesture) this.#drag(event);
       const frame = this.#isOverview(event) ? null : this.#axis.frameUnder(event, element);
+      const lane = this.#laneUnder(event);
+      if (frame === null || this.#gesture) this.#tip.hide();
+      else this.#tip.show(describeFrame(frame, this.#store.facts, lane), event.clientX);
+      element.title = frame === null ? "Overview of the recording: drag to move the visible part" : "";
       if (frame === this.#hovered) return;
       this.#hovered = frame;
-      element.title = frame === null ? "Overview of the recording: drag to move the visible part" : this.#describeFrame(frame);
       requestAnimationFrame(() => this.#drawCursor());
     });
     for (const end of /** @type {const} */ (["pointerup", "pointercancel"])) {
@@ -87,6 +93,7 @@ export class Timeline {
     }
     element.addEventListener("pointerleave", () => {
       this.#hovered = null;
+      this.#tip.hide();
       requestAnimationFrame(() => this.#drawCursor());
     });
     element.addEventListener("dblclick", (event) => {
@@ -153,6 +160,18 @@ export class Timeline {
     return event.clientY - this.#element.getBoundingClientRect().top >= this.#layout.overview.top - REACH;
   }
 
+  /**
+   * Index of the person whose lane is under the pointer; null beside the lanes, and where there is only one person.
+   *
+   * @param {MouseEvent} event
+   */
+  #laneUnder(event) {
+    const y = event.clientY - this.#element.getBoundingClientRect().top;
+    const { lanes } = this.#layout;
+    const lane = lanes.length > 1 ? lanes.findIndex(({ top, bottom }) => y >= top && y < bottom) : -1;
+    return lane < 0 ? null : lane;
+  }
+
   #drawAll() {
     this.#drawCells();
     this.#drawCursor();
@@ -174,7 +193,8 @@ export class Timeline {
     for (const [lane, band] of bands.entries()) {
       const cells = bands.length > 1 ? lanes[lane] : timeline;
       if (!cells) continue; // arrives shortly
-      drawing.drawSources(context, axis, cells, style, band);
+      if (bands.length > 1) drawing.drawPerson(context, axis, cells, style, band, session.people[lane].color);
+      else drawing.drawSources(context, axis, cells, style, band);
       drawing.drawKeyframes(context, axis, keyframesOf(cells), band);
       drawing.drawAmbiguous(context, axis, framesWith(cells, AMBIGUOUS), band);
     }
@@ -210,37 +230,10 @@ export class Timeline {
     context.strokeRect(axis.middle(target) - width / 2, top, width, bottom - top);
   }
 
-  /** @param {number} frame */
-  #describeFrame(frame) {
-    const cell = this.#store.facts.timeline.get(frame);
-    if (!cell) return `Frame ${frame}: no pose`;
-    const { source, keyframe, status, remark, cost_px, reviewed, ambiguous } = cell;
-    const seen = keyframe ? "keyframe" : ambiguous ? "ambiguous" : reviewed && "reviewed";
-    const parts = [source, seen, status, px(cost_px)].filter(Boolean).join(", ") + this.#describeLanes(frame);
-    const jumps = this.#store.facts.disagreeing.includes(frame) ? "\ninconsistent with its neighbours" : "";
-    return `Frame ${frame}: ${parts}${remark && `\n${remark}`}${jumps}`;
-  }
-
-  /**
-   * One line per person, if there are several.
-   *
-   * @param {number} frame
-   */
-  #describeLanes(frame) {
-    const { lanes, session } = this.#store.facts;
-    return lanes
-      .map((lane, person) => {
-        const { source = "no pose", keyframe = false, status = "" } = lane.get(frame) ?? {};
-        const text = [source, keyframe && "keyframe", status].filter(Boolean).join(", ");
-        return `\n${session?.people[person]?.name}: ${text}`;
-      })
-      .join("");
-  }
-
   #describe() {
     const { target, session } = this.#store.facts;
     this.#element.setAttribute("aria-valuemax", String((session?.n_frames ?? 1) - 1));
     this.#element.setAttribute("aria-valuenow", String(target));
-    this.#element.setAttribute("aria-valuetext", this.#describeFrame(target));
+    this.#element.setAttribute("aria-valuetext", describeFrame(target, this.#store.facts).join("\n"));
   }
 }

@@ -16,7 +16,11 @@ const STATUS = { top: 28, bottom: 40 };
 const KEYFRAME_GAP = 5;
 const CELLS_TOP = 44;
 /** Height of the cells of a single person, and of each of several people; gap between lanes. */
-const [CELL_HEIGHT, LANE_HEIGHT, LANE_GAP] = [12, 10, 2];
+const [CELL_HEIGHT, LANE_HEIGHT, LANE_GAP] = [12, 15, 3];
+/** Height of the strip of source colours below the colour of a person. */
+const SOURCE_STRIP = 3;
+/** Width of a run from which its status is drawn as a pattern; a narrower one would show a random part of it. */
+const PATTERN_FROM = 4;
 
 /** @typedef {{top: number, bottom: number}} Band */
 
@@ -122,6 +126,64 @@ export function drawSources(context, axis, cells, style, { top, bottom }) {
     context.fillStyle = colors[source];
     context.fillRect(x, top, width, height);
   });
+}
+
+/**
+ * Draw the lane of one of several people: the person's colour with the pattern of the status, and a strip of the source
+ * below. Doubtful is striped, lost is cross-hatched on its own colour, everything else is plain.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {Cells} cells
+ * @param {CSSStyleDeclaration} style
+ * @param {Band} lane
+ * @param {string} color of the person
+ */
+export function drawPerson(context, axis, cells, style, { top, bottom }, color) {
+  const split = bottom - SOURCE_STRIP;
+  drawSources(context, axis, cells, style, { top: split, bottom });
+  const { sources, statuses } = cells;
+  const lost = style.getPropertyValue("--status-lost");
+  const fills = { good: color, doubtful: hatch(context, color, false), lost: hatch(context, lost, true) };
+  const narrow = { good: color, doubtful: style.getPropertyValue("--status-doubtful"), lost };
+  context.fillStyle = style.getPropertyValue("--track");
+  context.fillRect(axis.left, top, axis.right - axis.left, split - top);
+  // The worst last: where frames share a pixel, it stays visible.
+  for (const kind of STATUSES) {
+    const is = (/** @type {number} */ frame) =>
+      sources[frame] !== NO_POSE && (STATUSES.find((one) => one === ALL[statuses[frame]]) ?? "good") === kind;
+    const min = kind === "good" ? 1 : 2;
+    eachRun(axis, (frame) => (is(frame) ? 0 : -1), gapOf(axis), (_, x, width) => {
+      context.fillStyle = (width < PATTERN_FROM ? narrow : fills)[kind];
+      context.fillRect(x, top, Math.max(min, width), split - top);
+    });
+  }
+}
+
+/**
+ * Make a pattern of dark diagonal stripes in one direction, or in both.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {string} color
+ * @param {boolean} isCrossed
+ */
+function hatch(context, color, isCrossed) {
+  const size = 6;
+  const tile = Object.assign(document.createElement("canvas"), { width: size, height: size });
+  const ink = /** @type {CanvasRenderingContext2D} */ (tile.getContext("2d"));
+  ink.fillStyle = color;
+  ink.fillRect(0, 0, size, size);
+  ink.strokeStyle = "rgb(0 0 0 / 72%)";
+  ink.lineWidth = isCrossed ? 1.2 : 2;
+  for (const way of isCrossed ? [1, -1] : [1]) {
+    for (const shift of [-size, 0, size]) {
+      ink.beginPath();
+      ink.moveTo(shift, way > 0 ? size : 0);
+      ink.lineTo(shift + size, way > 0 ? 0 : size);
+      ink.stroke();
+    }
+  }
+  return context.createPattern(tile, "repeat") ?? color;
 }
 
 /**

@@ -59,6 +59,26 @@ export function drawerBindings(drawer) {
     { keys: ["C"], label: "Curves", matches: plain("c"), run: () => drawer.toggleCurves() },
     { keys: ["B"], label: "Search panel", matches: plain("b"), run: () => drawer.toggle("search") },
     { keys: ["V"], label: "Cost landscape", matches: plain("v"), run: () => drawer.toggle("landscape") },
+    { keys: ["Shift L"], label: "Doubtful and lost poses, most severe first", matches: shift("l"), run: () => drawer.toggle("doubts") },
+  ]);
+}
+
+/**
+ * @param {import("./doubt_queue.js").DoubtQueue} queue
+ * @param {() => string | null} away
+ */
+export function queueBindings(queue, away) {
+  const why = () => away() ?? queue.why;
+  return inArea("Timeline", [
+    { keys: ["Alt ↓"], label: "Next doubtful or lost pose by severity", matches: alt("ArrowDown", false), why, run: () => queue.step(1) },
+    { keys: ["Alt ↑"], label: "Previous doubtful or lost pose by severity", matches: alt("ArrowUp", false), why, run: () => queue.step(-1) },
+    {
+      keys: ["Alt Enter"],
+      label: "Accept the doubtful or lost poses here: mark them as reviewed",
+      matches: alt("Enter", false),
+      why: () => away() ?? queue.whyNotAccept,
+      run: () => queue.accept(queue.current),
+    },
   ]);
 }
 

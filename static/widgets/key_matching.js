@@ -6,6 +6,7 @@
  * @property {string} label
  * @property {(event: KeyboardEvent) => boolean} matches
  * @property {(event: KeyboardEvent) => void} run
+ * @property {string} [words] further words that the palette finds it by
  * @property {string} [area] area of the key list
  * @property {() => string | null} [why] why the command is unavailable; null if it is available
  * @property {boolean} [anywhere] whether it also applies while the user types text

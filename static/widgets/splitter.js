@@ -9,13 +9,14 @@ const KEY_STEP_PX = 24;
 /**
  * @param {HTMLElement} workspace
  * @param {HTMLElement} bar
+ * @param {HTMLElement} column beside the 3-D view, whose width is taken from the 3-D view first
  */
-export function makeSplitter(workspace, bar) {
+export function makeSplitter(workspace, bar, column) {
   let fraction = Number(localStorage.getItem(STORED)) || DEFAULT_FRACTION;
 
   const show = () => {
     const width = workspace.clientWidth;
-    const max = width - MIN_SCENE_PX;
+    const max = width - column.offsetWidth - MIN_SCENE_PX;
     const panes = Math.round(Math.max(Math.min(MIN_PANES_PX, max), Math.min(max, fraction * width)));
     workspace.style.setProperty("--panes-width", `${panes}px`);
     bar.setAttribute("aria-valuenow", String(Math.round((100 * panes) / Math.max(1, width))));
@@ -43,5 +44,7 @@ export function makeSplitter(workspace, bar) {
     event.preventDefault();
     moveTo(show() + step);
   });
-  new ResizeObserver(show).observe(workspace);
+  const sizes = new ResizeObserver(show);
+  sizes.observe(workspace);
+  sizes.observe(column);
 }

@@ -16,6 +16,16 @@ export function displayName(name) {
   return name.replaceAll("_", " ");
 }
 
+/** @param {string} text */
+export function capital(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
+/** @param {number} share 0 to 1 */
+export function percent(share) {
+  return share > 0 && share < 0.01 ? "< 1 %" : share < 1 && share > 0.99 ? "> 99 %" : `${Math.round(100 * share)} %`;
+}
+
 /** @param {number} value */
 export function count(value) {
   return COUNT.format(value);

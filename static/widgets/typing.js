@@ -19,14 +19,14 @@ export function watchTyping(target) {
 }
 
 /**
- * Give the keys back to the page: a field loses the focus after Enter, unless its text was refused or it is in a dialog.
+ * Give the keys back to the page: a field loses the focus after Enter, unless its text was refused or it is in a dialog or form.
  *
  * @param {Document} target
  */
 export function leaveFields(target) {
   target.addEventListener("keydown", ({ key, target: field }) => {
     if (key !== "Enter" || !(field instanceof HTMLInputElement)) return;
-    if (!field.ariaInvalid && !field.closest("dialog, [role=dialog]")) field.blur();
+    if (!field.ariaInvalid && !field.closest("dialog, [role=dialog], form")) field.blur();
   });
 }
 

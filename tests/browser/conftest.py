@@ -81,11 +81,15 @@ class _Server:
     async def serve(self, socket):
         await self.endpoint.serve(socket)
 
+    async def thumbnail(self, request):
+        return await self.endpoint.thumbnail(request)
+
 
 @pytest_asyncio.fixture(loop_scope="session", scope="session")
 async def server(blank_viser):
     server = _Server()
     app = create_app(server, blank_viser, Access(), static_folder())
+    app.router.add_get("/thumbnail/{person}/{frame}", server.thumbnail)
     app.on_response_prepare.append(_let_cache)
     async with listening(app) as port:
         server.address = f"http://127.0.0.1:{port}/"
@@ -101,7 +105,7 @@ async def _let_cache(_request, response):
 def endpoint(request):
     """What answers the page, made with the keywords of a test's mark `endpoint`."""
     mark = request.node.get_closest_marker("endpoint")
-    return FakeEndpoint(**(mark.kwargs if mark else {}))
+    return FakeEndpoint(**(getattr(request, "param", None) or (mark.kwargs if mark else {})))
 
 
 @pytest_asyncio.fixture(loop_scope="session")

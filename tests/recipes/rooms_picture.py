@@ -11,6 +11,7 @@ HOUSE = {
     "static/  the page": [
         ["main.js"],
         ["shell"],
+        ["inspector"],
         ["search", "scene"],
         ["posing", "timeline"],
         ["panes"],

@@ -160,6 +160,26 @@ async def fitted(page: Page) -> None:
     await page.frame_locator("#scene").locator(".mantine-Notification-closeButton").first.click(timeout=60_000)
 
 
+async def before_fit(page: Page) -> None:
+    """A fit, with the pose before it and the costs of each view."""
+    await page.keyboard.press("g")
+    await shows(page, "quadrille.state.state.compared?.work === 'fit'", 60)
+    await page.keyboard.press("Shift+B")
+    await shows(page, "quadrille.state.state.compared.is_before_shown", 20)
+    await page.click("#show-comparison")
+
+
+async def doubts(page: Page) -> None:
+    """Two people tracked, and what is doubtful, with the worst pose shown."""
+    await page.keyboard.press("t")
+    await shows(page, "quadrille.state.state.track.message.startsWith('done')", 300)
+    await page.keyboard.press("Shift+L")
+    await page.keyboard.press("Alt+ArrowDown")
+    await shows(
+        page, "[...document.querySelectorAll('.doubt img')].slice(0, 3).every((one) => one.naturalWidth > 0)", 60
+    )
+
+
 async def filled(page: Page) -> None:
     await page.keyboard.press("1")
 
@@ -187,6 +207,9 @@ SCREENS = [
     Screenshot("one-camera", "one", nothing),
     Screenshot("eight-cameras", "eight", nothing),
     Screenshot("eight-cameras-large-light", "eight", nothing, LARGE, "light"),
+    Screenshot("before-fit", "near", before_fit),
+    Screenshot("doubts", "tango", doubts),
+    Screenshot("doubts-light-large", "tango", doubts, LARGE, "light"),
     Screenshot("two-people", "tango", nothing),
     Screenshot("page", "tango", fitted, (1600, 900)),
 ]

@@ -19,7 +19,7 @@ def written_store(path):
         def pose(name, source, **more):
             values = rng.normal(size=40)
             sources = (source,) * 40
-            costs = {"view_costs_px": (1.5, None, 0.25), "part_costs_px": (0.5,) * 17}
+            costs = {"view_costs_px": (1.5, None, 0.25), "part_costs_px": (0.5,) * 17, "limbs_lost": (0.5, 0.125)}
             return PoseRecord(values, sources, revisions[name], cost_px=1.25, **costs, **more)
 
         for name in revisions:
@@ -53,6 +53,7 @@ def shown(store):
                     record.values.tobytes(), record.sources, record.model_revision, record.keyframe, record.status,
                     record.cost_px, dict(record.settings), record.author, record.time, record.program,
                     record.view_costs_px, record.part_costs_px, record.remark, record.reviewed,
+                    record.limbs_lost,
                     [(a.values.tobytes(), a.model_revision, a.cost_px) for a in store.alternatives(name, row.frame)],
                     store.pins(name, row.frame),
                 )  # fmt: skip

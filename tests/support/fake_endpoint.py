@@ -55,9 +55,17 @@ DISAGREEING = [44, 45]
 AMBIGUOUS = (71, 72)
 NO_RANGE = {"running": False, "what": "", "done": 0, "total": 0, "message": ""}
 STAGES = ["torso_head", "arms", "legs"]
+SOURCES = ["manual", "searched", "searched", "tracked", "tracked", "tracked", "interpolated", "smoothed"]
+LIMBS = ["left arm", "right arm", "left leg", "right leg", "head"]
+LIMBS_LOST = {"doubtful": [0.31, 0.01, 0.0, 0.02, 0.0], "lost": [0.97, 0.04, 0.0, 0.0, 0.01]}
+"""Probabilities of the limbs of a frame by its status."""
 PARTS = ["torso", "left_arm", "left_leg", "head", "right_leg", "right_arm", "pelvis"]
 DOFS = [{"joint": "torso", "name": name, "unit": "cm", "low": None, "high": None} for name in ("x", "y", "z")] + [
-    {"joint": "l_elbow", "name": "extension", "unit": "deg", "low": 0.0, "high": 155.0}
+    {"joint": "l_elbow", "name": "extension", "unit": "deg", "low": 0.0, "high": 155.0},
+    *(
+        {"joint": "torso", "name": n, "unit": "deg", "low": None, "high": None}
+        for n in ("abduction", "elevation", "twist")
+    ),
 ]
 ANGLES = ("abduction", "elevation", "twist", "extension")
 PLOTS = {
@@ -66,6 +74,24 @@ PLOTS = {
     "torso": [("Angles", "deg", ANGLES[:3]), ("Position", "cm", ("x", "y", "z"))],
     "cost": [("Cost", "px", ("mean", *CAMERA_NAMES))],
 }
+TRACK = {"estimate": "refine", "order": 1, "past_poses": 3, "recover": True, "backward_pass": True}
+SEARCH = {
+    "theta_px": None, "outliers": "truncated", "passes": [1.0, 0.5], "patience": 3, "max_expansions": 60,
+    "limbs_apart": False, "bound_rad": 0.2618, "bound_m": 0.1, "step_rad": 0.0873, "step_m": 0.05,
+}  # fmt: skip
+VIEW_3D = {
+    "bodies": True, "colors": "parts", "opacity": 1.0, "cameras": True, "images": True, "floor": True, "gizmos": True,
+    "ghost": False, "trail_points": [], "trail_frames": 25,
+}  # fmt: skip
+BODY_SIZES = {
+    "type": "body_sizes", "person": 0, "height_m": 1.7, "sides_alike": True, "edited": False, "has_former": False,
+    "outcome": "", "height_limits_m": [0.3, 3.0], "size_limits_m": [0.005, 1.19],
+    "parts": [
+        {"name": name, "length_m": 0.3, "half_depth_m": 0.05, "half_width_m": 0.06}
+        for name in ("torso", "left_forearm", "right_forearm")
+    ],
+    "widths": [{"name": "hip", "width_m": 0.17}],
+}  # fmt: skip
 REMARK = "left arm relocated"
 
 
@@ -117,6 +143,8 @@ class FakeEndpoint:
     sizes: tuple = ((WIDTH, HEIGHT),)
     """Of the cameras' images, px; in turn, where there are more cameras."""
     sockets: set = field(default_factory=set)
+    thumbnails: list = field(default_factory=list)
+    """Addresses of the thumbnails that the pages requested."""
     start: str = "first"
     """Identifies the start of the pretended program."""
 
@@ -136,16 +164,27 @@ class FakeEndpoint:
             "type": "state", "frame": 12, "person": 0, "point": None,
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
             "source": "manual", "status": "", "remark": "", "part_costs_px": [], "replay": None,
-            "compared": None, "preview": None,
+            "compared": None, "compared_run": None, "preview": None,
             "job": self.idle_job(""),
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
-            "dofs": [1.0, 2.0, 90.0, 30.0], "locked": [], "other_sizes": False, "solo": False,
+            "dofs": [1.0, 2.0, 90.0, 30.0, 4.0, 5.0, 6.0], "locked": [], "other_sizes": False, "solo": False,
             "people": [
                 {"source": "manual", "status": "", "shown": True, "alternatives": 0} for _ in range(self.n_people)
             ],
             "snapped": None, "floor": None, "footage": {"listed": None, "error": None}, "compiling": False,
             "saved": True, "save_error": None,
         }  # fmt: skip
+
+        self.settings = {"type": "settings"} | {
+            name: dict(values)
+            for values, names in ((TRACK, ("track", "track_default")), (SEARCH, ("search", "search_default")))
+            for name in names
+        }
+        self.view_3d = {
+            "type": "view_3d", "view": dict(VIEW_3D), "prediction": "", "trail_points": ["head", "l_wrist"],
+            "floor": {"up": "y", "tilt_deg": None, "height_m": None, "has_former": False},
+        }  # fmt: skip
+        self.body_sizes = dict(BODY_SIZES)
 
     def idle_job(self, message):
         return {
@@ -187,10 +226,7 @@ class FakeEndpoint:
                     self.state["follow"] = False
                 await self.broadcast(self.state)
                 await self.send_frame()
-            case "select":
-                self.state |= {"person": message["person"], "point": message["point"]}
-                await self.broadcast(self.state)
-            case "people":
+            case "select" | "people":
                 await self.cast(message)
             case "view":
                 await self.send_frame()
@@ -202,10 +238,10 @@ class FakeEndpoint:
                 await self.search(message["action"])
             case "track":
                 await self.track(message["action"], message.get("until"))
-            case "follow" | "snap":
-                is_follow = message["type"] == "follow"
-                self.state |= {"follow": message["follow"]} if is_follow else {"snapped": message["camera"]}
-                await self.broadcast(self.state)
+            case "follow" | "snap" | "before":
+                await self.switch(message)
+            case "range":
+                await self.review(message)
             case "curves":
                 self.curves_group = message["group"]
                 if self.curves_group:
@@ -213,13 +249,33 @@ class FakeEndpoint:
             case "undo" | "redo":
                 await self.broadcast(self.state)
 
+    async def switch(self, message):
+        match message["type"]:
+            case "follow":
+                self.state["follow"] = message["follow"]
+            case "snap":
+                self.state["snapped"] = message["camera"]
+            case "before":
+                self.state["compared"] = {**self.state["compared"], "is_before_shown": message["shown"]}
+        await self.broadcast(self.state)
+
+    async def review(self, message):
+        """Mark the poses of a range as reviewed; other work on ranges is only heard."""
+        if message["action"] != "reviewed":
+            return
+        cells = {k: self.cell(k) | {"reviewed": True} for k in range(message["first"], message["last"] + 1)}
+        for person in (None, *((message["person"],) if self.n_people > 1 else ())):
+            await self.broadcast({"type": "timeline", "person": person, "cells": cells, "replace": False})
+
     async def hold(self, message):
         change = self.held_joints.add if message["held"] else self.held_joints.discard
         change((message["person"], message["point"]))
         await self.send_overlay()
 
     async def cast(self, message):
-        if message["action"] == "solo":
+        if message["type"] == "select":
+            self.state |= {"person": message["person"], "point": message["point"]}
+        elif message["action"] == "solo":
             self.state["solo"] = message["on"]
         else:
             self.state["people"][message["person"]]["shown"] = message["shown"]
@@ -307,6 +363,7 @@ class FakeEndpoint:
                 "remark": "",
                 "reviewed": False,
                 "ambiguous": False,
+                "limbs_lost": LIMBS_LOST.get(status_of(frame), []),
             }
             await self.broadcast({"type": "timeline", "person": None, "cells": {frame: cell}, "replace": False})
             if self.state["follow"]:
@@ -357,8 +414,9 @@ class FakeEndpoint:
                 "heading": [name for name in REST if name.endswith(("shoulder", "hip"))],
                 "bones": BONES,
                 "parts": PARTS,
+                "limbs": LIMBS,
                 "dofs": DOFS,
-                "point_dofs": {name: [0, 1, 2] if name == "torso" else [3] for name in REST},
+                "point_dofs": {name: [0, 1, 2, 4, 5, 6] if name == "torso" else [3] for name in REST},
                 "point_limbs": {
                     name: {"name": "body" if name == "torso" else "left arm", "dofs": [3]} for name in REST
                 },
@@ -367,28 +425,35 @@ class FakeEndpoint:
         ]
         await socket.send_str(encoded({
             "type": "session", "name": "elbow_rotation", "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
-            "people": people, "start": self.start,
+            "people": people, "doubtful_from": 0.02, "lost_from": 0.5, "start": self.start,
         }))  # fmt: skip
-        await socket.send_str(encoded(self.state))
-        sources = ["manual", "searched", "searched", "tracked", "tracked", "tracked", "interpolated", "smoothed"]
-        cells = {
-            k: {
-                "source": sources[k // 10 % 8],
-                "cost_px": 1 + 0.5 * np.sin(k / 7) + (k == 50) * 9,
-                "keyframe": k % 20 == 0,
-                "status": "" if k < 10 else status_of(k),
-                "remark": REMARK if k in (31, 32) else "",
-                "reviewed": k % 20 == 0 or k < 16,
-                "ambiguous": k in AMBIGUOUS,
-            }
-            for k in range(self.n_frames * 100 // N_FRAMES)
-        }
+        for message in (self.state, self.settings, self.view_3d, self.body_sizes):
+            await socket.send_str(encoded(message))
+        cells = {k: self.cell(k) for k in range(self.n_frames * 100 // N_FRAMES)}
         for person in (None, *(range(self.n_people) if self.n_people > 1 else ())):
             told = {"type": "timeline", "person": person, "cells": cells, "replace": True}
             await socket.send_str(encoded(told))
         await socket.send_str(encoded({"type": "inconsistent", "frames": DISAGREEING}))
         if self.views:
             await self.send_frame([socket])
+
+    async def thumbnail(self, request):
+        """Answer a request for a thumbnail, as the program does beside the socket."""
+        self.thumbnails.append(request.path_qs.removeprefix("/"))
+        picture = self.picture(0, int(request.match_info["frame"]), "image")
+        return web.Response(body=picture, content_type="image/jpeg")
+
+    def cell(self, frame):
+        return {
+            "source": SOURCES[frame // 10 % 8],
+            "cost_px": 1 + 0.5 * np.sin(frame / 7) + (frame == 50) * 9,
+            "keyframe": frame % 20 == 0,
+            "status": "" if frame < 10 else status_of(frame),
+            "remark": REMARK if frame in (31, 32) else "",
+            "reviewed": frame % 20 == 0 or frame < 16,
+            "ambiguous": frame in AMBIGUOUS,
+            "limbs_lost": LIMBS_LOST.get(status_of(frame), []) if frame >= 10 else [],
+        }
 
     async def broadcast(self, message):
         text = encoded(message)

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from tracker.tracking.estimate import PoseEstimate
 
 STEP_M = 0.01
 N_PARTS, N_VIEWS = 10, 4
+LIMBS = SimpleNamespace(lost_probabilities=np.array([0.25, 0.0001]))
+"""What it knows of the limbs of a frame."""
 
 
 class FakeTracker:
@@ -58,7 +61,7 @@ class FakeTracker:
             n = len(models)
             self.last[frame] = PoseEstimate(
                 frame, tuple(poses), 1.0 + 0.1 * frame, view_costs_px, 9, (status,) * n, (remark,) * n,
-                (part_costs_px,) * n, tuple(np.eye(m.n_dofs) for m in models), (None,) * n, ((),) * n, "chamfer",
+                (part_costs_px,) * n, tuple(np.eye(m.n_dofs) for m in models), (LIMBS,) * n, ((),) * n, "chamfer",
             )  # fmt: skip
             yield self.last[frame]
 

@@ -15,11 +15,13 @@ ROOT = Path(__file__).resolve().parents[2]
 class Program:
     """`quadrille open SESSION` in a process of its own. Without a token a page finds it again after a restart."""
 
-    def __init__(self, session: Path, *options: str, hears_errors: bool = False) -> None:
+    def __init__(self, session: Path, *options: str, hears_errors: bool = False, has_token: bool = False) -> None:
         """Prepare it; with `hears_errors`, `errors` holds its standard error when it has ended."""
         self._hears_errors = hears_errors
         self.errors = ""
-        self._words = [sys.executable, "-m", "app", "open", str(session), "--no-browser", "--no-token", *options]
+        self._words = [sys.executable, "-m", "app", "open", str(session), "--no-browser", *options]
+        if not has_token:
+            self._words.append("--no-token")
         self._process: asyncio.subprocess.Process | None = None
         self.address = ""
 

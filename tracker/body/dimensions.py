@@ -16,7 +16,8 @@ from tracker.body.parts import Joint, Landmark, Part
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 
-_MIN_HEIGHT_M, _MAX_HEIGHT_M = 0.3, 3.0
+HEIGHT_LIMITS_M = (0.3, 3.0)
+"""Least and largest height of a body, metres."""
 _MIN_M, _MAX_SHARE = 0.005, 0.7
 """Shortest dimension of a part, metres; longest, as a share of the body's height."""
 _SIDES = ("left_", "right_")
@@ -67,9 +68,10 @@ def with_dimensions(model: BodyModel, sizes: BodyDimensions) -> BodyModel:
     Raises:
         TrackerError: a dimension is not possible for a body.
     """
-    if not _MIN_HEIGHT_M <= sizes.height_m <= _MAX_HEIGHT_M:
+    lowest_m, highest_m = HEIGHT_LIMITS_M
+    if not lowest_m <= sizes.height_m <= highest_m:
         raise TrackerError(
-            f"expected a height of {_MIN_HEIGHT_M * 100:g} to {_MAX_HEIGHT_M * 100:g} cm, "
+            f"expected a height of {lowest_m * 100:g} to {highest_m * 100:g} cm, "
             f"found {sizes.height_m * 100:g}; enter the person's own"
         )
     stretch = np.ones((len(model.parts), 3))  # of each part along its axes
@@ -108,6 +110,11 @@ def scaled(sizes: BodyDimensions, height_m: float) -> BodyDimensions:
     return BodyDimensions(height_m, parts, {n: w * by for n, w in sizes.widths_m.items()})
 
 
+def size_limits_m(height_m: float) -> tuple[float, float]:
+    """Return the least and the largest dimension of a part of a body of a height, metres."""
+    return _MIN_M, _MAX_SHARE * height_m
+
+
 def mirror_part(name: str) -> str | None:
     """Return the name of the part or joint on the other side; None for one in the middle."""
     for own, other in (_SIDES, _SIDES[::-1]):
@@ -117,9 +124,10 @@ def mirror_part(name: str) -> str | None:
 
 
 def _check(what: str, size_m: float, height_m: float) -> None:
-    if not (np.isfinite(size_m) and _MIN_M <= size_m <= _MAX_SHARE * height_m):
+    least_m, largest_m = size_limits_m(height_m)
+    if not (np.isfinite(size_m) and least_m <= size_m <= largest_m):
         raise TrackerError(
-            f"expected the {what} to be {_MIN_M * 100:g} to {_MAX_SHARE * height_m * 100:.0f} cm, "
+            f"expected the {what} to be {least_m * 100:g} to {largest_m * 100:.0f} cm, "
             f"found {size_m * 100:g}; enter a length of a body {height_m * 100:.0f} cm tall"
         )
 

@@ -10,6 +10,7 @@ from tracker.geometry.arrays import Array
 from tracker.session.session import Person
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import Alternative, PoseChange, PoseRecord
+from tracker.tracking.confidence import PoseQuality
 from tracker.tracking.estimate import PoseEstimate
 from tracker.tracking.subjects import Keyframes
 from tracker.tracking.tracker import TrackerSettings
@@ -57,6 +58,7 @@ def tracked_changes(
                 view_costs_px=tuple(_number(c) for c in found.view_costs_px),
                 part_costs_px=tuple(_number(c) for c in found.part_costs_px[i]),
                 remark=found.notes[i],
+                limbs_lost=_limbs_lost(found.qualities[i]),
             ),
             tuple(Alternative(o.values, stored[i].revision, _number(o.cost_px)) for o in found.alternatives[i]),
         )
@@ -90,6 +92,11 @@ def settings_record(settings: TrackerSettings) -> dict[str, Any]:
 def recorded_method(record: Mapping[str, Any]) -> str:
     """Return the method that stored settings name."""
     return str(record.get("method", _FIRST_METHOD))
+
+
+def _limbs_lost(quality: PoseQuality | None) -> tuple[float, ...]:
+    """Return the probability that each limb is lost; empty where not assessed."""
+    return () if quality is None else tuple(map(float, quality.lost_probabilities))
 
 
 def _number(value: float) -> float | None:

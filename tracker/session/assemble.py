@@ -1,6 +1,6 @@
 """Make a session from a calibration and loose footage: match them, and check that they fit together."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -62,8 +62,12 @@ class NewSession:
     """Unit of the calibration's translations; by default the one that its layout fixes, else metres."""
 
 
-def assemble(request: NewSession) -> Session:
+def assemble(request: NewSession, report: Callable[[str], None] = lambda _: None) -> Session:
     """Make a session folder of a calibration and footage. Nothing is written unless all of it fits.
+
+    Args:
+        request: what to make it of.
+        report: called with a sentence after each check that has passed.
 
     Raises:
         SessionError: an unknown name, a camera without footage or footage without a camera.
@@ -76,17 +80,21 @@ def assemble(request: NewSession) -> Session:
     if twice := [n for n in request.cameras if request.cameras.count(n) > 1]:
         raise SessionError(f"expected each camera once as --cameras, found '{twice[0]}' twice; leave one out")
     names = list(request.cameras) or list(calibrated)
+    report(f"The calibration has {len(calibrated)} cameras: {', '.join(calibrated)}.")
     unused = calibrated.keys() - set(names)
     check_names(request.offsets, names, "camera", "--offset")
     paths = match_footage(names, request.videos, request.camera_paths, unused)
+    report("Each camera has footage: " + ", ".join(f"{name} ({paths[name].name})" for name in names) + ".")
     footage = {name: open_footage(paths[name], name) for name in names}
     try:
         cameras = {name: calibrated[name].camera(footage[name].size) for name in names}
         for name in names:
             check_size(name, footage[name].path, footage[name].size, cameras[name].size)
+        report("All footage can be read and has the calibrated shape.")
         fps = common_rate(footage, request.fps)
         check_image_numbers(footage, request.offsets)
         n_frames = common_length(footage, request.offsets)
+        report(f"All cameras have {n_frames} frames at {fps:g} per second.")
         sources = tuple(_source(request, cameras[name], footage[name], fps) for name in names)
     finally:
         for f in footage.values():
@@ -94,6 +102,7 @@ def assemble(request: NewSession) -> Session:
     for source in sources:
         check_side_files(source)
     people = _make_people(request.people, request.models, request.heights)
+    report("The body models fit: " + ", ".join(f"{p.name} {p.model.height_m:.2f} m" for p in people) + ".")
     return create_session(request.folder, cameras=sources, people=people, fps=fps, n_frames=n_frames, up=request.up)
 
 
@@ -106,6 +115,30 @@ def _source(request: NewSession, camera: Camera, footage: Footage, fps: float) -
         request.offsets.get(camera.name, 0),
         None if footage.fps is None or same_rate(footage.fps, fps) else footage.fps,
     )
+
+
+def footage_in(folder: Path) -> list[Path]:
+    """Return the videos of a folder, or its folders of images if it has no video.
+
+    Raises:
+        SessionError: there is neither.
+    """
+    try:
+        entries = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+    except OSError as error:
+        raise SessionError(f"expected a folder of videos, found that {folder} cannot be read ({error})") from error
+    videos = [path for path in entries if path.suffix.lower() in _VIDEO_SUFFIXES and path.is_file()]
+    found = videos or [path for path in entries if path.is_dir() and _has_image(path)]
+    if not found:
+        raise SessionError(
+            f"expected videos ({', '.join(_VIDEO_SUFFIXES)}) or folders of images in {folder}, found none; "
+            "choose the folder that holds the footage of all cameras"
+        )
+    return found
+
+
+def _has_image(folder: Path) -> bool:
+    return any(path.suffix.lower() in IMAGE_SUFFIXES for path in folder.iterdir())
 
 
 def find_background(folder: Path, camera: str) -> Path:

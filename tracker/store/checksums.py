@@ -14,7 +14,7 @@ _COLUMNS = {
     "model_revisions": "id, person, toml, time",
     "program_settings": "id, settings",
     "pose_changes": "id, edit, previous, person, frame, numbers, sources, keyframe, status, cost_px, model_revision, "
-    "settings, views_px, parts_px, remark, program_settings, reviewed",
+    "settings, views_px, parts_px, remark, program_settings, reviewed, limbs",
     "poses": "person, frame, change",
     "alternatives": "change, rank, model_revision, numbers, cost_px",
     "pin_changes": "id, edit, previous, person, frame, point, camera, u, v",
@@ -22,6 +22,10 @@ _COLUMNS = {
     "settings": "key, value",
 }
 """Columns of each table that its checksums cover."""
+_LATER_COLUMNS = {6: {"pose_changes": ("limbs",)}}
+"""Columns that the tables of an older version with checksums lack."""
+OLDEST_VERSION = 6
+"""The first version of a store with checksums."""
 _KEYS = {
     "poses": "person, frame",
     "alternatives": "change, rank",
@@ -86,8 +90,12 @@ def contents(db: sqlite3.Connection) -> Contents:
     return tuple(db.execute("SELECT name, n_rows, total FROM contents ORDER BY name").fetchall())
 
 
-def differences(db: sqlite3.Connection) -> list[str]:
+def differences(db: sqlite3.Connection, version: int) -> list[str]:
     """Describe where a store differs from what was written into it; empty if nowhere.
+
+    Args:
+        db: connection to it.
+        version: of the store, `OLDEST_VERSION` or later.
 
     Raises:
         sqlite3.Error: tables or columns are missing, or the file cannot be read.
@@ -96,7 +104,9 @@ def differences(db: sqlite3.Connection) -> list[str]:
     known = {name: (n, total) for name, n, total in contents(db)}
     if set(known) != {*_COLUMNS, _SCHEMA}:
         found.append("the list of its tables is not as it was written")
-    for table, columns in _COLUMNS.items():
+    for table, all_columns in _COLUMNS.items():
+        later = _LATER_COLUMNS.get(version, {}).get(table, ())
+        columns = ", ".join(c for c in all_columns.split(", ") if c not in later)
         wrong = db.execute(
             f"SELECT {_label(table)} FROM {table} WHERE checksum IS NOT row_checksum({columns})"
         ).fetchall()

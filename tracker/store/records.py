@@ -44,6 +44,8 @@ class PoseRecord:
     """Note of the tracker on the frame, for display."""
     reviewed: bool = False
     """Whether a person has checked it and left it unchanged. A keyframe counts as reviewed too."""
+    limbs_lost: tuple[float, ...] = ()
+    """Probability that each limb is lost, in the order of `tracker.body.limbs.limbs`; empty where not assessed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +133,8 @@ class FrameRow(NamedTuple):
     """Whether a person has checked or set it."""
     ambiguous: bool = False
     """Whether it has alternatives and is no keyframe."""
+    limbs_lost: tuple[float, ...] = ()
+    """Probability that each limb is lost, in the order of `tracker.body.limbs.limbs`; empty where not assessed."""
 
 
 class FramePose(NamedTuple):

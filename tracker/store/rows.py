@@ -16,25 +16,25 @@ CURRENT_POSES = "FROM poses p JOIN pose_changes c ON c.id = p.change"
 
 RECORD_COLUMNS = (
     "c.numbers, c.sources, c.model_revision, c.keyframe, c.status, c.cost_px, coalesce(t.settings, c.settings), "
-    "e.author, e.time, e.program, c.views_px, c.parts_px, c.remark, c.reviewed"
+    "e.author, e.time, e.program, c.views_px, c.parts_px, c.remark, c.reviewed, c.limbs"
 )
 """Columns that `row_to_record` reads; `e` is the edit, `t` the row of the settings."""
 FRAME_ROW_COLUMNS = (
     "c.frame, c.sources, c.status, c.cost_px, c.keyframe, c.views_px, c.remark, c.reviewed, "
-    "EXISTS (SELECT 1 FROM alternatives a WHERE a.change = c.id)"
+    "EXISTS (SELECT 1 FROM alternatives a WHERE a.change = c.id), c.limbs"
 )
 """Columns that `row_to_frame_row` reads."""
 FRAME_POSE_COLUMNS = "c.frame, c.numbers, c.cost_px, c.views_px, c.model_revision"
 """Columns that `row_to_frame_pose` reads."""
 WRITTEN_COLUMNS = (
     "numbers, sources, keyframe, status, cost_px, model_revision, views_px, parts_px, remark, reviewed, "
-    "program_settings"
+    "limbs, program_settings"
 )
 """Columns that `record_to_row` fills, and `program_settings`, the id of the row of the settings."""
 ALTERNATIVE_COLUMNS = "a.numbers, a.model_revision, a.cost_px"
 """Columns that `row_to_alternative` reads; `a` is the alternative."""
 UNMARKED_COLUMNS = (
-    "numbers, sources, status, cost_px, model_revision, views_px, parts_px, remark, program_settings, settings"
+    "numbers, sources, status, cost_px, model_revision, views_px, parts_px, remark, limbs, program_settings, settings"
 )
 """Columns that marking a pose copies unchanged."""
 
@@ -54,21 +54,21 @@ def is_readable(numbers: Any, sources: Any) -> bool:
 
 def row_to_record(row: Sequence[Any]) -> PoseRecord:
     """Convert a row of `RECORD_COLUMNS`; the inverse of `record_to_row`."""
-    numbers, sources, revision, keyframe, status, cost, settings, author, time, program, views, parts, remark, seen = (
-        row
-    )
+    numbers, sources, revision, keyframe, status, cost, settings, *rest = row
+    author, time, program, views, parts, remark, seen, limbs = rest
     return PoseRecord(
         _array(numbers), tuple(SOURCES[i] for i in sources), revision, bool(keyframe), status, cost,
         json.loads(settings), author, time, program, _costs(views), _costs(parts), remark or "", bool(seen),
+        _numbers(limbs),
     )  # fmt: skip
 
 
 def row_to_frame_row(row: Sequence[Any]) -> FrameRow:
     """Convert a row of `FRAME_ROW_COLUMNS`."""
-    frame, sources, status, cost, keyframe, views, remark, seen, others = row
+    frame, sources, status, cost, keyframe, views, remark, seen, others, limbs = row
     return FrameRow(
         frame, SOURCES[min(sources)], status, cost, bool(keyframe), _costs(views), remark or "", bool(keyframe or seen),
-        bool(others and not keyframe),
+        bool(others and not keyframe), _numbers(limbs),
     )  # fmt: skip
 
 
@@ -106,6 +106,7 @@ def record_to_row(pose: PoseRecord) -> tuple[Any, ...]:
         _blob(pose.part_costs_px),
         pose.remark,
         pose.reviewed,
+        _blob(pose.limbs_lost),
     )
 
 
@@ -119,6 +120,11 @@ def _array(blob: bytes) -> Array:
 def _blob(costs_px: Sequence[float | None]) -> bytes | None:
     """Encode costs: NaN for None, NULL for an empty sequence."""
     return np.array([np.nan if c is None else c for c in costs_px], dtype="<f8").tobytes() if costs_px else None
+
+
+def _numbers(blob: bytes | None) -> tuple[float, ...]:
+    """Decode numbers; the inverse of `_blob` where all are known."""
+    return () if blob is None else tuple(number for (number,) in iter_unpack("<d", blob))
 
 
 def _costs(blob: bytes | None) -> tuple[float | None, ...]:

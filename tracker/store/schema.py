@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from tracker.store import checksums
 
-VERSION = 6
+VERSION = 7
 
 _SCHEMA = """
 CREATE TABLE edits (
@@ -43,7 +43,8 @@ CREATE TABLE pose_changes (
     views_px BLOB, parts_px BLOB,                                -- little-endian float64, NaN: unknown; NULL: none
     remark TEXT,
     program_settings INTEGER REFERENCES program_settings,
-    reviewed INTEGER                                             -- NULL: written before version 4, not reviewed
+    reviewed INTEGER,                                            -- NULL: written before version 4, not reviewed
+    limbs BLOB                                                   -- like views_px: probability that a limb is lost
 );
 CREATE INDEX pose_changes_edit ON pose_changes (edit);
 CREATE TABLE poses (
@@ -92,14 +93,16 @@ _UPGRADES = {
         "ALTER TABLE pose_changes RENAME COLUMN told TO program_settings",
         *checksums.ADDED,
     ),
+    6: ("ALTER TABLE pose_changes ADD COLUMN limbs BLOB",),
 }
 """Statements that upgrade a store from each older version to the next."""
 _MISSING_COLUMNS = {
-    1: ("views_px", "parts_px", "remark", "program_settings", "reviewed"),
-    2: ("program_settings", "reviewed"),
-    3: ("told AS program_settings", "reviewed"),
-    4: ("told AS program_settings",),
-    5: ("told AS program_settings",),
+    1: ("views_px", "parts_px", "remark", "program_settings", "reviewed", "limbs"),
+    2: ("program_settings", "reviewed", "limbs"),
+    3: ("told AS program_settings", "reviewed", "limbs"),
+    4: ("told AS program_settings", "limbs"),
+    5: ("told AS program_settings", "limbs"),
+    6: ("limbs",),
 }
 """Columns of `pose_changes` that each older version lacks or names differently. A store opened read only is read
 through temporary views, which hide the tables of the same names."""
@@ -144,5 +147,6 @@ def show_as_new(db: sqlite3.Connection) -> None:
     if found < 5:
         nulls = ", ".join(f"NULL AS {column}" for column in ("change", "rank", "model_revision", "numbers", "cost_px"))
         db.execute(f"CREATE TEMP VIEW alternatives AS SELECT {nulls} WHERE 0")
-    programs = "SELECT NULL AS id, NULL AS settings WHERE 0" if found < 3 else "SELECT * FROM main.told"
-    db.execute(f"CREATE TEMP VIEW program_settings AS {programs}")
+    if found < 6:
+        programs = "SELECT NULL AS id, NULL AS settings WHERE 0" if found < 3 else "SELECT * FROM main.told"
+        db.execute(f"CREATE TEMP VIEW program_settings AS {programs}")

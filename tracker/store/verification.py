@@ -49,8 +49,8 @@ def _damage(db: sqlite3.Connection) -> str | None:
     version = schema.version(db)
     if version > schema.VERSION:
         return None  # a newer program knows
-    if version == schema.VERSION:
-        return "; ".join(checksums.differences(db)) or None
+    if version >= checksums.OLDEST_VERSION:
+        return "; ".join(checksums.differences(db, version)) or None
     if db.execute("SELECT count(*) FROM sqlite_master WHERE name = 'contents'").fetchone() != (0,):
         return f"expected version {schema.VERSION}, found {version}"
     if version == 0:

@@ -33,6 +33,8 @@ _WEIGHTS = np.array([-1.611, 0.579, 2.663, 5.724, 6.632, -2.025, -2.906, -5.704]
 _DOUBTFUL, _LOST = -3.8, 0.0
 """Log odds of a lost limb above which a frame is doubtful, and lost. Few limbs are lost, and to call a lost limb good
 is the worse error: a frame is doubtful from odds of 1 to 45."""
+DOUBTFUL_FROM, LOST_FROM = (float(1.0 / (1.0 + np.exp(-odds))) for odds in (_DOUBTFUL, _LOST))
+"""The same as probabilities: a limb that is lost with a higher one is doubtful, or lost."""
 _SEARCH, _SEARCH_OF_SEVERAL = -3.5, -3.0
 """Log odds above which a limb is searched, of a single person and of one of several. A wrong limb misleads the frames
 after it, so that a search begins nearly as early as doubt. Among several people half of all limbs are in doubt, and a
@@ -76,6 +78,11 @@ class PoseQuality(NamedTuple):
     def log_odds(self) -> Array:
         """Log odds that each limb is lost, (n_limbs,)."""
         return _log_odds(self)
+
+    @property
+    def lost_probabilities(self) -> Array:
+        """Probability that each limb is lost, (n_limbs,), 0 to 1."""
+        return np.asarray(1.0 / (1.0 + np.exp(-self.log_odds)))
 
     def doubtful_limbs(self, alone: bool) -> tuple[str, ...]:
         """Return the names of limbs that seem lost, of a single person or of one of several."""

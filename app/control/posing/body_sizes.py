@@ -47,6 +47,11 @@ class BodySizeEditing:
         draft = self._session_state.state.draft
         return draft.model if draft is not None and draft.person == person else self._session_state.present[person]
 
+    def has_former(self, person: int) -> bool:
+        """Return whether a person had other sizes before the present ones."""
+        with self._session_state.lock:
+            return self._session_state.saver.revisions.former_body(person) is not None
+
     def couple(self, alike: bool) -> None:
         """Choose whether both sides are edited at once."""
         self._session_state.set(sides_alike=alike)
@@ -125,7 +130,7 @@ class BodySizeEditing:
             if same and not refitted.changes:
                 raise TrackerError(
                     f"expected other sizes of {name}, or keyframes made with others, found neither; "
-                    "enter a length in the panel first"
+                    "enter a length in the inspector first"
                 )
             n = len(refitted.changes)
             counted = f", {n} keyframe{'' if n == 1 else 's'} refitted" if n else ""
@@ -197,7 +202,7 @@ class BodySizeEditing:
             settings = {"method": "refit", "model_revision": record.model_revision}
             pose = replace(
                 record, values=values, model_revision=revision, status="", cost_px=None, settings=settings,
-                view_costs_px=(), part_costs_px=(), remark="refitted to other sizes",
+                view_costs_px=(), part_costs_px=(), limbs_lost=(), remark="refitted to other sizes",
             )  # fmt: skip
             changes.append(PoseChange(name, row.frame, pose))
             moved = becomes.points_world(values) - was.points_world(record.values)

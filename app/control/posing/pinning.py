@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.control.session.activities import Activities
+from app.control.session.comparing import note_comparison
 from app.control.session.session_state import Pins, SessionState
 from app.state.people import ShownPose
 from tracker.body.limbs import display_name
@@ -177,7 +178,9 @@ class Pinning:
                 )
             people = sorted(meant) if views is not None else pinned
             vouched = people if person is not None else pinned or [state.person]
+            costs = self._session_state.costs(state.poses)
             self._show_fit(people, vouched, state.people, state.pins)
+            note_comparison(self._session_state, "fit", state.people, costs, people)
             evidence = " and ".join([*(["pins"] if pinned else []), *(["edges"] if views is not None else [])])
             self._session_state.save(f"fit to {evidence}", "fitted", None, person, vouched)
 

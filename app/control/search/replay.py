@@ -6,6 +6,7 @@ import numpy as np
 
 from app.control.search.search_runs import SearchRun, SearchRuns
 from app.control.session.activities import Activities
+from app.control.session.comparing import leave_before
 from app.control.session.session_state import SessionState
 from app.state.people import ShownPose
 from app.state.search import PreviewState, ReplayState, SearchView
@@ -61,6 +62,7 @@ class Replay:
                     run.stages[recorded.stage].name, recorded.candidate_px, recorded.best_px,
                     tuple(finite_or_none(float(c)) for c in recorded.best_view_costs_px), recorded.evaluations,
                 )  # fmt: skip
+            leave_before(self._session_state)
             self._set_view(replace(self._view, replay=shown, preview=None))
 
     def leave(self) -> None:

@@ -8,11 +8,12 @@ import numpy as np
 
 from app.control.search.search_runs import SearchRun, SearchRuns
 from app.control.session.activities import Activities
+from app.control.session.comparing import note_comparison
 from app.control.session.session_state import SessionState
 from app.runtime.jobs import Job
 from app.state.people import ShownPose
 from app.state.search import SearchState, SearchView
-from app.state.state import finite_or_none
+from app.state.state import Costs, finite_or_none
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.search.best_first import SearchStep, Stage, stages
@@ -41,6 +42,7 @@ class SearchRunner:
         self._sources: list[tuple[str, ...]] = []  # of the values of each person; '' for those not searched yet
         self._stage: Stage | None = None
         self._person: int | None = None  # the only person searched; None for all people
+        self._before: tuple[tuple[ShownPose, ...], Costs] | None = None  # the poses before the search and their costs
 
     @property
     def running(self) -> bool:
@@ -151,8 +153,11 @@ class SearchRunner:
                 raise TrackerError("expected degrees of freedom to search, found all of them locked; unlock some")
             if self._run is not None:
                 self._run.over = True
-            start_px = session_state.costs(poses)["cost_px"]
-            known_px = np.nan if start_px is None else start_px
+            costs = session_state.costs(poses)
+            people = tuple(
+                p if p.values is v else ShownPose(v, p.source) for p, v in zip(state.people, poses, strict=True)
+            )
+            known_px = np.nan if costs["cost_px"] is None else costs["cost_px"]
             run = self._runs.begin(frame, models, poses, known_px, settings, free)
             subjects = Subjects.of(models, active_dofs=free)
             job: Job[SearchStep] = Job(
@@ -165,6 +170,7 @@ class SearchRunner:
             self._job, self._run, self._person, session_state.open_edit_owner = job, run, person, None
             self._sources = [("",) * len(p) for p in poses]
             self._stage = None
+            self._before = people, costs
             session_state.set(search=SearchState(kind="search", stages=tuple(s.name for s in run.stages)))
         return self._job
 
@@ -198,7 +204,11 @@ class SearchRunner:
     def _paused(self, job: Job[SearchStep]) -> None:
         with self._session_state.lock:
             if job is self._job:
-                self._session_state.set(search=replace(self._session_state.state.search, running=False))
+                state = self._session_state.state
+                self._session_state.set(
+                    search=replace(state.search, running=False), **self._session_state.costs(state.poses)
+                )
+                self._compare()
                 self._save(job)
 
     def _ended(self, job: Job[SearchStep], error: Exception | None) -> None:
@@ -215,6 +225,8 @@ class SearchRunner:
                 session_state.state.search, running=False, kind=None, stage=None, candidate=None, message=message
             )
             session_state.set(search=ended, **session_state.costs(session_state.state.poses))
+            if error is None:
+                self._compare()
             self._save(job)
 
     def _end(self) -> None:
@@ -228,6 +240,15 @@ class SearchRunner:
         """Return the search view; where a continued run is drawn for comparison, with its new result."""
         view = self._session_state.state.search_view
         return replace(view, compared=run.best) if view.compared_run == run.number else view
+
+    def _compare(self) -> None:
+        """Compare the shown poses with those before the search."""
+        if self._before is not None:
+            before, costs = self._before
+            if costs["cost_px"] is None:  # the evidence came with the first step
+                self._before = before, costs = before, self._session_state.costs(tuple(p.values for p in before))
+            moved = [person for person in range(len(before)) if not self._is_fixed(person)]
+            note_comparison(self._session_state, "search", before, costs, moved)
 
     def _is_fixed(self, person: int) -> bool:
         """Return whether only another person is searched, so that this person's pose stays as it is."""

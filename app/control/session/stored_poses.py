@@ -1,6 +1,7 @@
 """Read the stored poses of the session for views: timeline, curves, trails."""
 
 from app.control.session.session_state import SessionState
+from tracker.body.model import PosedBody
 from tracker.geometry.arrays import Array
 from tracker.store.records import FramePose
 
@@ -33,6 +34,17 @@ class StoredPoses:
         with self._session_state.lock:
             frames = sorted(saver.index.timeline(since)) if since > 0 else saver.index.frames(person)
         return frames, saver.pose_rows(person, frames)
+
+    def on_frame(self, frame: int) -> dict[int, PosedBody]:
+        """Return the stored poses of a frame by index of the person, each in the body that it was made with."""
+        saver, found = self._session_state.saver, dict[int, PosedBody]()
+        with self._session_state.lock:
+            for person in range(len(self._session_state.session.people)):
+                pose = saver.pose(person, frame)
+                if pose is not None:
+                    assert pose.revision is not None, "a stored pose has a revision"
+                    found[person] = PosedBody(saver.revisions.body(pose.revision), pose.values)
+        return found
 
     def in_present_body(self, person: int, frames: range) -> dict[int, Array]:
         """Return a person's poses, (n_values,), in the present body by frame; frames without a pose are left out."""

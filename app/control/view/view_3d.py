@@ -33,8 +33,13 @@ class View3dSettings:
             self._session_state.set(view_3d=view)
             self._session_state.saver.store_setting(_KEY, stored(view))
 
+    def note_prediction(self, note: str) -> None:
+        """Say what the predicted pose was computed from, or why there is none; empty if it is not shown."""
+        if note != self._session_state.state.prediction_note:
+            self._session_state.set(prediction_note=note)
+
     def pause(self, page: int, paused: bool) -> None:
-        """Pause the 3-D view and its panels during drags, or no longer, for a page that renders in software.
+        """Pause the 3-D view during drags, or no longer, for a page that renders in software.
 
         Args:
             page: number of the page.

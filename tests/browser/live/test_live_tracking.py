@@ -48,6 +48,12 @@ PAUSED_AFTER = """async (done) => {
   document.body.dispatchEvent(new KeyboardEvent("keydown", { key: "p", code: "KeyP", altKey: true, bubbles: true }));
 }"""
 """Pauses from within the page: a quick tracker is through before a driver outside has heard of it."""
+THUMBNAIL = """async (frame) => {
+  const answer = await fetch(`thumbnail/0/${frame}?limb=0`);
+  if (!answer.ok) return [answer.status];
+  const { width, height } = await createImageBitmap(await answer.blob());
+  return [answer.status, answer.headers.get("Content-Type"), width, height];
+}"""
 FOLLOWED = "quadrille.state.shown.frame === {0} && quadrille.state.overlay.frame === {0}"
 
 
@@ -87,6 +93,11 @@ async def test_a_run_is_watched_paused_looked_at_and_taken_back(live):
     box = await live.locator("#curves").bounding_box()
     await live.mouse.click(box["x"] + 52 + (START + 2.5) * (box["width"] - 60) / 50, box["y"] + 60)
     await shows(live, FOLLOWED.format(START + 2), 60)
+
+    # Beside the socket, the program draws any of the poses.
+    thumbnail = await live.evaluate(THUMBNAIL, START + 1)
+    assert thumbnail == [200, "image/jpeg", 160, 160]
+    assert (await live.evaluate(THUMBNAIL, at + 5))[0] == 404  # not tracked yet
 
     await live.keyboard.press("Alt+p")
     await said(live, f"quadrille.state.state.track.at > {at}", 120)

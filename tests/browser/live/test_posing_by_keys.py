@@ -1,4 +1,4 @@
-"""The inspector and its keys on the real program: a frame is posed without a mouse; numbers, locks, copies."""
+"""The joint bar and its keys on the real program: a frame is posed without a mouse; numbers, locks, copies."""
 
 import asyncio
 import shutil
@@ -164,8 +164,8 @@ async def test_the_bar_keeps_its_height_and_nothing_is_cut_off(live, width):
     await live.set_viewport_size({"width": width, "height": 720})
     for joint in ("torso", "left_shoulder", "head"):
         await select(live, joint)
-        box = await live.locator("#inspector").bounding_box()
+        box = await live.locator("#joint-bar").bounding_box()
         assert box["height"] == 34
         last = await live.locator("#reset-limb").bounding_box()
         assert last["x"] + last["width"] <= width
-    assert await live.evaluate("document.querySelector('#inspector').scrollWidth") <= width
+    assert await live.evaluate("document.querySelector('#joint-bar').scrollWidth") <= width

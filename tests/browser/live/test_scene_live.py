@@ -96,24 +96,16 @@ async def live(browser, folder):
         page = await context.new_page()
         await page.goto(program.address, timeout=120_000)
         await shows(page, "window.quadrille?.state.overlay && quadrille.state.state.cost_px !== null", 120)
-        panel = page.frame_locator("#scene")
-        for name in ("View", "Trails"):
-            await panel.get_by_text(name, exact=True).click()
-        # What viser draws over its canvas is no matter here; it can be used all the same.
-        await panel.locator("body").evaluate(
-            """(body) => body.append(Object.assign(document.createElement("style"), {
-              textContent: "body * { visibility: hidden } body canvas { visibility: visible }" }))"""
-        )
-        await switch(page, "floor")
-        await switch(page, "gizmos")
+        await switch(page, "Floor grid")
+        await switch(page, "Gizmos")
         yield page
         await context.close()
 
 
 async def switch(page, name):
-    """Tick a box of viser's panel, or untick it."""
-    label = page.frame_locator("#scene").get_by_text(name, exact=True).first
-    await label.locator("xpath=ancestor::*[.//input][1]//input").first.dispatch_event("click")
+    """Tick a box of the inspector, or untick it; the inspector stays closed."""
+    box = page.locator(".row", has=page.get_by_text(name, exact=True)).locator("input")
+    await box.dispatch_event("click")
 
 
 async def picture(page):
@@ -169,9 +161,9 @@ async def test_bodies_lie_on_their_images_at_any_size_of_the_canvas(live, index,
     found = []
     for width, height in sizes:
         await live.set_viewport_size({"width": width, "height": height})
-        await switch(live, "bodies")
+        await switch(live, "Bodies")
         filmed = await rested(live, lambda image: is_white(image).sum() > 600)
-        await switch(live, "bodies")
+        await switch(live, "Bodies")
         drawn = await rested(live, lambda image: is_white(image).sum() < 400)
         belongs = cv2.cvtColor(filmed, cv2.COLOR_BGR2GRAY) > 127
         is_drawn = np.abs(drawn.astype(int) - filmed).max(axis=-1) > 40
@@ -189,9 +181,9 @@ async def test_bodies_lie_on_their_images_at_any_size_of_the_canvas(live, index,
 
 async def test_a_click_on_a_part_works_on_its_joint(live):
     await snap(live, 0)
-    await switch(live, "bodies")
+    await switch(live, "Bodies")
     filmed = await rested(live, lambda image: is_white(image).sum() > 600)
-    await switch(live, "bodies")
+    await switch(live, "Bodies")
     await rested(live, lambda image: is_white(image).sum() < 400)
     scene = await live.locator("#scene").bounding_box()
     rows, columns = np.nonzero(is_white(filmed))
@@ -206,7 +198,7 @@ async def test_a_click_on_a_part_works_on_its_joint(live):
 
 async def test_the_image_follows_the_frame_and_a_turn_leaves_the_camera(live):
     await snap(live, 0)
-    await switch(live, "bodies")
+    await switch(live, "Bodies")
     await rested(live, lambda image: is_white(image).sum() > 600)
     await live.keyboard.press(".")
     await rested(live, lambda image: 100 < np.percentile(image, 99.9) < 150)

@@ -37,7 +37,7 @@ async def test_notices_leave_panes_and_bars_free(page, endpoint):
     await say(endpoint, "a sentence of some length that says what was expected, what was found, and what to do now")
     await page.get_by_role("alert").wait_for()
     box = await page.locator("#notices .notice:visible").bounding_box()
-    for part in ("#panes", "#inspector", "footer", ".top-bar"):
+    for part in ("#panes", "#joint-bar", "footer", ".top-bar"):
         other = await page.locator(part).bounding_box()
         apart = (
             box["x"] >= other["x"] + other["width"]
@@ -75,20 +75,59 @@ async def test_what_is_not_saved_says_why_is_tried_again_and_holds_the_page(fres
     assert await page.evaluate("dispatchEvent(new Event('beforeunload', { cancelable: true }))")
 
 
-async def test_the_first_card_is_put_away_for_good_and_found_again(browser, address, endpoint):
+TAKEN = """() => {
+  const card = document.querySelector("#first-steps").getBoundingClientRect();
+  const others = document.querySelectorAll(
+    ".pane, .pane *, #scene, #inspector:not([hidden]), button, input, select, canvas, #notices > :not([hidden])",
+  );
+  return [...others].filter((one) => {
+    const box = one.getBoundingClientRect();
+    const isBeside = box.right <= card.left || box.left >= card.right;
+    const isAboveOrBelow = box.bottom <= card.top || box.top >= card.bottom;
+    return box.width > 0 && !isBeside && !isAboveOrBelow && !one.closest("#first-steps");
+  }).map((one) => one.id || one.className || one.tagName);
+}"""
+"""JavaScript: which parts of the page the first steps cover."""
+CUT_OFF = """() => [...document.querySelectorAll("#first-steps > :not(p), #first-steps li:not([hidden])")].filter(
+  (one) => one.scrollWidth > one.clientWidth + 1 || one.getBoundingClientRect().right > innerWidth
+).length"""
+
+
+@pytest.mark.parametrize("endpoint", [{"n_people": 1}, {"n_people": 2}], indirect=True, ids=("one", "two"))
+async def test_the_first_steps_cover_nothing(browser, address, endpoint):
+    context = await browser.new_context(viewport={"width": 1280, "height": 720}, newcomer=True)
+    page = await context.new_page()
+    await page.goto(address)
+    await shows(page, "window.quadrille?.state.overlay")
+    await page.locator("#first-steps").wait_for()
+    await say(endpoint, "a sentence of some length that says what was expected, what was found, and what to do now")
+    await page.get_by_role("alert").wait_for()
+    assert await page.locator("#first-place").is_visible() == (endpoint.n_people > 1)
+    for width, height in ((1280, 720), (1920, 1080)):
+        await page.set_viewport_size({"width": width, "height": height})
+        await shows(page, f"innerWidth === {width}")
+        assert await page.evaluate(TAKEN) == []
+        assert await page.evaluate(CUT_OFF) == 0
+        footer = await page.locator("footer").bounding_box()
+        assert footer["y"] + footer["height"] <= height
+    await context.close()
+
+
+async def test_the_first_steps_tell_the_shortest_way_and_are_closed_for_good(browser, address, endpoint):
     context = await browser.new_context(viewport={"width": 1280, "height": 720}, newcomer=True)
     page = await context.new_page()
     await page.goto(address)
     card = page.locator("#first-steps")
     await card.wait_for()
-    assert not await page.locator("#first-choose-person").is_visible()
-    assert "quadrille --sample elbow_rotation" in await card.inner_text()
-    box, panes = await card.bounding_box(), await page.locator("#panes").bounding_box()
-    assert box["x"] >= panes["x"] + panes["width"]
-    assert box["y"] + box["height"] <= (await page.locator("#inspector").bounding_box())["y"]
-    await say(endpoint, "a sentence of some length that says what was expected, what was found, and what to do now")
-    await page.get_by_role("alert").wait_for()
-    await page.locator("#close-first-steps").click(timeout=2000)  # the notice does not lie over it
+    steps = [" ".join(text.split()) for text in await card.locator("li:visible").all_inner_texts()]
+    assert [step.rstrip(",") for step in steps] == ["Press F to search the pose", "then G to fit it", "then T to track"]
+    endpoint.state["compared"] = {
+        "number": 1, "work": "fit", "before_px": 6.3, "after_px": 2.4, "before_view_costs_px": [],
+        "after_view_costs_px": [], "warning": "", "is_before_shown": False,
+    }  # fmt: skip
+    await endpoint.broadcast(endpoint.state)
+    await shows(page, "document.querySelector('#first-fit').classList.contains('is-done')")
+    await page.locator("#close-first-steps").click()
     await page.reload()
     await shows(page, "window.quadrille?.state.overlay")
     assert not await card.is_visible()
@@ -98,14 +137,9 @@ async def test_the_first_card_is_put_away_for_good_and_found_again(browser, addr
     await card.wait_for()
     await page.keyboard.press("Escape")
     assert not await card.is_visible()
+    await page.evaluate("localStorage.clear()")
+    await page.reload()
+    await card.wait_for()
+    await page.keyboard.press("t")
+    await card.wait_for(state="hidden")  # the first steps are done
     await context.close()
-
-
-@pytest.mark.endpoint(n_people=2)
-class TestSeveralPeople:
-    async def test_the_first_card_begins_with_the_choice_of_a_person(self, page):
-        await page.keyboard.press("Control+k")
-        await page.keyboard.type("first steps")
-        await page.keyboard.press("Enter")
-        first = page.locator("#first-steps li:visible").first
-        assert "Choose a person" in await first.inner_text()

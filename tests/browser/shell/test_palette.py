@@ -112,7 +112,9 @@ async def test_the_list_of_keys_is_searched_and_fits(page):
     assert await scroller.evaluate("(element) => element.scrollWidth <= element.clientWidth")
     assert "More" not in await page.locator("#key-list h3").all_inner_texts()  # every key is about something
     await page.keyboard.type("previous doubt")
-    assert await page.locator("#key-list dd:visible").all_inner_texts() == ["Previous doubtful or lost frame"]
+    assert await page.locator("#key-list dd:visible").all_inner_texts() == [
+        "Previous doubtful or lost frame", "Previous doubtful or lost pose by severity",
+    ]  # fmt: skip
 
 
 async def test_undo_holds_in_every_part_of_the_page(page, endpoint):

@@ -2,6 +2,7 @@
 
 import pytest
 import pytest_asyncio
+from fake_endpoint import COLORS
 from page_driver import handle_of, shows, state_of, to_client, until
 
 pytestmark = pytest.mark.endpoint(n_people=2)
@@ -66,6 +67,39 @@ async def test_the_list_chooses_hides_and_copies(couple, endpoint):
     assert copies == [(0, 1), (1, 0)]
 
 
+LANE = """([lane, frame]) => {
+  const canvas = document.querySelector("#timeline canvas");
+  const { n_frames } = quadrille.state.session;
+  const pitch = (canvas.clientWidth - 60) / n_frames;
+  const [x, y] = [52 + frame * pitch + 1, 44 + 18 * lane + 1];
+  const [width, height] = [Math.floor(pitch - 3), 10].map((size) => size * devicePixelRatio);
+  const { data } = canvas.getContext("2d").getImageData(x * devicePixelRatio, y * devicePixelRatio, width, height);
+  const colors = new Set();
+  let dark = 0;
+  for (let i = 0; i < data.length; i += 4) {
+    colors.add(`#${[...data.slice(i, i + 3)].map((one) => one.toString(16).padStart(2, "0")).join("")}`);
+    dark += data[i] + data[i + 1] + data[i + 2] < 250;
+  }
+  return [[...colors], dark / (width * height)];
+}"""
+"""JavaScript: colours in the lane of a person at a frame, and the dark share of it: stripes."""
+
+
+async def test_a_lane_has_the_colour_of_its_person_and_the_pattern_of_the_status(couple):
+    for lane, color in enumerate(COLORS):
+        plain, doubtful, lost = [await couple.evaluate(LANE, [lane, frame]) for frame in (15, 31, 50)]
+        assert plain == [[color], 0.0]
+        assert color in doubtful[0]
+        assert min(doubtful[1], lost[1]) > 0.1
+        assert color not in lost[0]
+    assert (await couple.evaluate(LANE, [0, 110]))[0] == (await couple.evaluate(LANE, [1, 110]))[0]  # no pose
+    box = await couple.locator("#timeline").bounding_box()
+    await couple.mouse.move(box["x"] + 52 + 50.5 * (box["width"] - 60) / 120, box["y"] + 44 + 18 + 7)
+    await shows(couple, "!document.querySelector('#cell-tip').hidden")
+    lines = (await couple.locator("#cell-tip").inner_text()).split("\n")
+    assert [line.split(":")[0] for line in lines] == ["Frame 50", "person 1", "left arm"]
+
+
 async def test_each_has_a_lane_and_two_poses_as_good_are_gone_to(couple, endpoint):
     assert (await state_of(couple))["timeline"]["71"]["ambiguous"]
     height = (await couple.locator("#timeline").bounding_box())["height"]
@@ -99,7 +133,7 @@ async def test_bars_and_legend_tell_what_is_visible_of_the_person_worked_on(coup
     assert (await stop.get_attribute("title")).startswith("End the paused search")
     assert not await legend.is_visible()
     endpoint.state |= {
-        "compared": 2, "replay": {"run": 3, "step": 4, "steps": 9, "stage": "arms"},
+        "compared_run": 2, "replay": {"run": 3, "step": 4, "steps": 9, "stage": "arms"},
     }  # fmt: skip
     endpoint.other_kind = "compared"
     await endpoint.broadcast(endpoint.state)

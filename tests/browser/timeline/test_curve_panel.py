@@ -53,7 +53,7 @@ async def test_curves_are_sent_only_while_they_are_open(page, endpoint):
 
 
 async def test_what_is_open_is_remembered(curves, endpoint):
-    await curves.get_by_text("Torso", exact=True).click()
+    await curves.locator("#drawer-tabs").get_by_text("Torso", exact=True).click()
     await shows(curves, "quadrille.state.curves.group === 'torso'")
     await curves.reload()
     await shows(curves, "quadrille.state.curves?.group === 'torso'")

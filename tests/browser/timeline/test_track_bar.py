@@ -127,12 +127,20 @@ async def test_statuses_differ_by_colour_and_by_height(page, scheme):
     assert found[15][1] + 2 < found[31][1] < found[50][1] - 2
 
 
-async def test_a_tooltip_says_what_the_tracker_thinks(page):
+async def test_a_tooltip_says_what_the_tracker_thinks_of_each_limb(page):
+    tip = page.locator("#cell-tip")
     await page.mouse.move(*await place_of(page, 31))
-    await shows(page, "document.querySelector('#timeline').title.startsWith('Frame 31: tracked, doubtful, ')")
-    assert (await page.locator("#timeline").get_attribute("title")).endswith(f" px\n{REMARK}")
+    await shows(page, "document.querySelector('#cell-tip').innerText.startsWith('Frame 31: tracked, doubtful, ')")
+    assert (await tip.inner_text()).split("\n")[1:] == ["left arm: doubtful (31 %); others tracked", REMARK]
+    await page.mouse.move(*await place_of(page, 50))
+    await shows(page, "document.querySelector('#cell-tip').innerText.startsWith('Frame 50')")
+    assert (await tip.inner_text()).split("\n")[1:] == [
+        "left arm: lost (97 %); right arm: doubtful (4 %); others tracked"
+    ]
     await page.mouse.move(*await place_of(page, 110))
-    await shows(page, "document.querySelector('#timeline').title === 'Frame 110: no pose'")
+    await shows(page, "document.querySelector('#cell-tip').innerText === 'Frame 110: no pose'")
+    await page.mouse.move(400, 300)
+    await tip.wait_for(state="hidden")
 
 
 async def test_doubtful_and_lost_frames_are_visited_one_after_the_other(page, endpoint):

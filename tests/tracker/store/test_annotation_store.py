@@ -44,6 +44,7 @@ def test_pose_comes_back_whole(store, path):
     full = pose(
         0.1, keyframe=True, status="lost", cost_px=1.25, settings={"step_deg": 5, "tree": ["arms"]},
         view_costs_px=(0.5, None, 2.0), part_costs_px=(None, 0.25), remark="left arm relocated", reviewed=True,
+        limbs_lost=(0.25, 0.9),
     )  # fmt: skip
     store.commit("Place", [PoseChange("ann", 7, full)], author="eve")
     store.close()
@@ -51,7 +52,7 @@ def test_pose_comes_back_whole(store, path):
     np.testing.assert_array_equal(back.values, full.values)  # to the bit
     for name in (
         "sources", "model_revision", "keyframe", "status", "cost_px", "settings", "view_costs_px", "part_costs_px",
-        "remark", "reviewed",
+        "remark", "reviewed", "limbs_lost",
     ):  # fmt: skip
         assert getattr(back, name) == getattr(full, name), name
     assert back.author == "eve"
@@ -75,11 +76,18 @@ def test_people_have_their_own_poses(store):
 
 def test_frames_in_short(store):
     searched = PoseRecord(
-        np.zeros(2), ("tracked", "searched"), 1, status="good", cost_px=0.5, view_costs_px=(None, 0.5), remark="twice"
+        np.zeros(2),
+        ("tracked", "searched"),
+        1,
+        status="good",
+        cost_px=0.5,
+        view_costs_px=(None, 0.5),
+        remark="twice",
+        limbs_lost=(0.5,),
     )
     store.commit("a", [put(9, 1.0, keyframe=True), PoseChange("ann", 3, searched)])
     assert store.frames("ann") == [
-        FrameRow(3, "searched", "good", 0.5, False, (None, 0.5), "twice"),
+        FrameRow(3, "searched", "good", 0.5, False, (None, 0.5), "twice", limbs_lost=(0.5,)),
         FrameRow(9, "manual", "", None, True, reviewed=True),
     ]
 
@@ -87,7 +95,15 @@ def test_frames_in_short(store):
 def test_a_mark_leaves_the_pose_as_it_is(store):
     told = {"method": "chamfer"}
     put_it = put(
-        3, 1.0, cost_px=0.5, status="good", settings=told, view_costs_px=(None, 0.5), part_costs_px=(2.0,), remark="x"
+        3,
+        1.0,
+        cost_px=0.5,
+        status="good",
+        settings=told,
+        view_costs_px=(None, 0.5),
+        part_costs_px=(2.0,),
+        remark="x",
+        limbs_lost=(0.5,),
     )
     store.commit("a", [put_it])
     before = store.pose("ann", 3)
@@ -104,6 +120,7 @@ def test_a_mark_leaves_the_pose_as_it_is(store):
         "view_costs_px",
         "part_costs_px",
         "remark",
+        "limbs_lost",
     ):
         assert getattr(after, name) == getattr(before, name), name
     assert [row.frame for row in store.frames("ann")] == [3]  # where there is no pose there is nothing to mark

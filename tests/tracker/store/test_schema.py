@@ -69,6 +69,41 @@ def version_5(version_4):
     return upgraded(version_4, 4, f"INSERT INTO alternatives VALUES (3, 0, 1, X'{numbers}', 2.0)")
 
 
+@pytest.fixture
+def version_6(path):
+    """A store as its version 6 was written, with checksums: a keyframe and two tracked frames."""
+    return written(path, "store_version_6.sql")
+
+
+@pytest.mark.parametrize("read_only", [False, True])
+def test_in_version_6_limbs_were_not_assessed(version_6, read_only):
+    before = version_6.read_bytes()
+    store = AnnotationStore(version_6, read_only=read_only)
+    assert [(r.frame, r.status, r.limbs_lost) for r in store.frames("ann")] == [
+        (1, "", ()), (2, "lost", ()), (3, "lost", ()),
+    ]  # fmt: skip
+    assert store.pose("ann", 2).remark == "left arm uncertain"
+    assert [a.cost_px for a in store.alternatives("ann", 3)] == [2.0]
+    store.close()
+    assert (version_6.read_bytes() == before) == read_only
+
+
+def test_a_store_of_version_6_takes_limbs_and_is_still_checked(version_6):
+    store = AnnotationStore(version_6)
+    record = PoseRecord(np.zeros(2), ("tracked",) * 2, 1, status="lost", limbs_lost=(0.9, 0.01))
+    store.commit("track", [PoseChange("ann", 4, record)])
+    store.close()
+    assert AnnotationStore(version_6).frames("ann")[-1].limbs_lost == (0.9, 0.01)
+
+
+def test_damage_of_a_store_of_version_6_is_found_before_it_is_upgraded(version_6):
+    with closing(sqlite3.connect(version_6)) as db:
+        db.execute("UPDATE pose_changes SET keyframe = 1 - keyframe WHERE frame = 1")
+        db.commit()
+    with pytest.raises(DamagedStoreError, match="ann, frame 1"):
+        AnnotationStore(version_6)
+
+
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_5_there_were_no_checksums(version_5, read_only):
     before = version_5.read_bytes()

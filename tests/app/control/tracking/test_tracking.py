@@ -57,11 +57,14 @@ def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, sess
         shown.remark,
     )
     assert record.settings["method"]
+    assert record.limbs_lost == pytest.approx((0.25, 0.0001), abs=1e-6)
+    assert placed.stored_poses.timeline()[3]["limbs_lost"] == ()  # a good pose
     store.close()
     assert placed.stored_poses.timeline()[4] == {
         "source": "tracked", "cost_px": 1.4, "keyframe": False, "status": "doubtful", "remark": shown.remark,
         "reviewed": False,
         "ambiguous": False,
+        "limbs_lost": (0.25, 0.0),
     }  # fmt: skip
     placed.history.undo()
     assert set(placed.stored_poses.timeline()) == {2}

@@ -1,4 +1,4 @@
-"""Check that the footage of two cameras is not exchanged, for the commands that report it."""
+"""Check that the footage of two cameras is not exchanged, for commands and the page."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar

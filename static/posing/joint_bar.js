@@ -1,6 +1,7 @@
-/** Inspector below the views: selected joint, degrees of freedom as numbers, locks, step sizes and edits of the whole pose. */
+/** Bar below the views: selected joint, degrees of freedom as numbers, locks, step sizes and edits of the whole pose. */
 
 import { CopyMenu } from "./copy_menu.js";
+import { meaning, shortName } from "./dof_names.js";
 import { button, byId } from "../widgets/elements.js";
 import { numberField } from "../widgets/number_field.js";
 import { makeScrubber } from "../widgets/scrubber.js";
@@ -11,12 +12,9 @@ const UNLOCKED = '<path d="M4 7.5h8v5.5H4zM5.5 7.5V4.2a2.5 2.5 0 0 1 4.7-1.2" />
 const UNITS = { deg: "°", cm: "cm" };
 /** Change of a value per CSS pixel when its name is dragged sideways. */
 const PER_PIXEL = { deg: 0.5, cm: 0.2 };
-/** Above this number of degrees of freedom, short names are used. */
-const MAX_FULL_NAMES = 3;
-
 /** @typedef {{dof: number, row: HTMLElement, entry: import("../widgets/number_field.js").NumberField, lock: HTMLButtonElement}} Field */
 
-export class Inspector {
+export class JointBar {
   #store;
   #posing;
   #notify;
@@ -58,6 +56,7 @@ export class Inspector {
       if (changed.has("connected")) this.#enable(element);
       if (changed.has("state") || changed.has("session") || changed.has("dof")) this.#show();
     });
+    new ResizeObserver(() => this.#fitNames()).observe(this.#list);
     this.#enable(element);
   }
 
@@ -104,8 +103,9 @@ export class Inspector {
     if (built !== this.#built) {
       this.#built = built;
       this.#joint.replaceChildren(...person.points.map((name) => new Option(displayName(name), name)));
-      this.#fields = dofs.map((dof) => this.#field(person.dofs[dof], dof, dofs.length > MAX_FULL_NAMES, point));
+      this.#fields = dofs.map((dof) => this.#field(person.dofs[dof], dof, point));
       this.#list.replaceChildren(...this.#fields.map(({ row }) => row));
+      this.#fitNames();
     }
     this.#joint.value = point;
     this.#joint.classList.toggle("is-nothing", state.point === null);
@@ -116,22 +116,28 @@ export class Inspector {
     this.#reset.setAttribute("aria-label", `Reset ${limb.name}`);
   }
 
+  /** Use whole names where the row has room for them, else short ones. */
+  #fitNames() {
+    this.#list.classList.remove("is-short");
+    this.#list.classList.toggle("is-short", this.#list.scrollWidth > this.#list.clientWidth);
+  }
+
   /**
    * @param {import("../model/protocol.js").DofInfo} info
    * @param {number} dof
-   * @param {boolean} isShort
    * @param {string} point
    * @returns {Field}
    */
-  #field(info, dof, isShort, point) {
+  #field(info, dof, point) {
     const name = info.joint === point ? info.name : `${displayName(info.joint)} ${info.name}`;
     const row = document.createElement("div");
-    row.className = isShort ? "dof is-short" : "dof";
+    row.className = "dof";
     const hint = "Drag the name sideways to change it (Shift: fine steps). U selects the next, + and - change the selected one.";
-    row.title = `${displayName(info.joint)} ${info.name}, ${range(info)}. ${hint}`;
+    const effect = meaning(info);
+    row.title = `${displayName(info.joint)} ${info.name}${effect && `: ${effect}`}, ${range(info)}. ${hint}`;
     const label = document.createElement("span");
     label.className = "dof-name";
-    label.textContent = isShort ? info.name.slice(0, 3) : name;
+    label.append(span("is-whole", name), span("is-brief", shortName(info.name)));
     makeScrubber(label, {
       begin: () => (this.#posing.isLocked([dof]) ? null : (this.#store.facts.state?.dofs[dof] ?? null)),
       perPixel: PER_PIXEL[info.unit],
@@ -193,6 +199,14 @@ export class Inspector {
     }
     showLock(lock, isLocked, `${displayName(info.joint)} ${info.name}`);
   }
+}
+
+/**
+ * @param {string} className
+ * @param {string} text
+ */
+function span(className, text) {
+  return Object.assign(document.createElement("span"), { className, textContent: text });
 }
 
 /**

@@ -1,0 +1,64 @@
+"""Commands of the inspector: settings, the 3-D view and body sizes (docs/protocol.md)."""
+
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+
+from app.control.controller import Controller
+from app.control.tracking import track_settings
+from app.page import inspector_messages as wire
+from app.page.message_parsing import MessageError
+from app.page.message_types import Command
+from tracker.body.dimensions import PartDimensions, dimensions_of
+from tracker.validation import quoted
+
+
+def _track_settings(controller: Controller, _: int, message: wire.SetTrackSettings) -> None:
+    before = controller.state.settings
+    after = track_settings.changed(before, msgspec.to_builtins(message.changes))
+    if after != before:
+        controller.search.set_settings(after)
+
+
+def _view_3d(controller: Controller, _: int, message: wire.SetView3d) -> None:
+    changes = msgspec.to_builtins(message.changes)
+    if "trail_points" in changes:
+        changes["trail_points"] = frozenset(changes["trail_points"])
+    controller.view_3d.choose(**changes)
+
+
+def _part(controller: Controller, _: int, message: wire.SetPartSizes) -> None:
+    before = dimensions_of(controller.body_sizes.model(message.person)).parts
+    if message.part not in before:
+        raise MessageError("a part of the body as 'part'", quoted(message.part))
+    own = before[message.part]
+    changes = msgspec.to_builtins(message)
+    girths_m = (changes.get("half_depth_m", own.girths_m[0]), changes.get("half_width_m", own.girths_m[1]))
+    sizes = PartDimensions(changes.get("length_m", own.length_m), girths_m)
+    controller.body_sizes.set_part(message.person, message.part, sizes)
+
+
+def _width(controller: Controller, _: int, message: wire.SetGirdleWidth) -> None:
+    if message.girdle not in dimensions_of(controller.body_sizes.model(message.person)).widths_m:
+        raise MessageError("a girdle of the body as 'girdle'", quoted(message.girdle))
+    controller.body_sizes.set_width(message.person, message.girdle, message.width_m)
+
+
+def _draft(controller: Controller, _: int, message: wire.DraftSizes) -> None:
+    if message.action == "discard":
+        controller.body_sizes.discard()
+    else:
+        controller.body_sizes.recall(message.person)
+
+
+INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
+    wire.SetTrackSettings: _track_settings,
+    wire.SetView3d: _view_3d,
+    wire.SetHeight: lambda controller, _, m: controller.body_sizes.set_height(m.person, m.height_m),
+    wire.SetPartSizes: _part,
+    wire.SetGirdleWidth: _width,
+    wire.CoupleSides: lambda controller, _, m: controller.body_sizes.couple(m.on),
+    wire.ApplySizes: lambda controller, _, m: controller.body_sizes.apply(m.person, m.refit),
+    wire.DraftSizes: _draft,
+}

@@ -1,0 +1,108 @@
+"""Updates for the inspector of a page: only what changed since the last ones (docs/protocol.md)."""
+
+import numpy as np
+
+from app.control.controller import Controller
+from app.page import inspector_messages as wire
+from app.page.message_types import Message
+from app.state.floor_picking import FloorState
+from app.state.identity import Identity
+from app.state.state import State
+from tracker.body.dimensions import HEIGHT_LIMITS_M, dimensions_of, size_limits_m
+from tracker.posing.grab import minor_points
+from tracker.tracking.chamfer.settings import TrackSettings
+
+
+class InspectorFeed:
+    """Remembers which settings and sizes one page has received."""
+
+    def __init__(self) -> None:
+        """Begin with nothing sent."""
+        self._made_from: tuple[Identity, ...] = ()
+        self._sent: list[Message] = []
+
+    def is_behind(self, state: State) -> bool:
+        """Return whether there may be updates; quick, because during drags a state follows every few milliseconds."""
+        return _ingredients(state) != self._made_from
+
+    def updates(self, controller: Controller, state: State) -> list[Message]:
+        """Return the messages that bring the page up to date."""
+        self._made_from = _ingredients(state)
+        now: list[Message] = [settings(state.settings), view_3d(controller, state), body_sizes(controller, state)]
+        changed = [message for message in now if message not in self._sent]
+        self._sent = now
+        return changed
+
+
+def _ingredients(state: State) -> tuple[Identity, ...]:
+    """Return what the messages are made from, for comparison."""
+    made_from = (
+        state.settings, state.view_3d, state.floor, state.prediction_note, state.person, state.draft, state.present,
+        state.sides_alike, state.sizes_message,
+    )  # fmt: skip
+    return tuple(map(Identity, made_from))
+
+
+def settings(found: TrackSettings) -> wire.SettingsMessage:
+    """Describe the settings of tracker and search."""
+    default = TrackSettings()
+    return wire.SettingsMessage(
+        track_values(found), search_values(found), track_values(default), search_values(default)
+    )
+
+
+def track_values(found: TrackSettings) -> wire.TrackValues:
+    """Describe the settings of the tracker."""
+    return wire.TrackValues(
+        found.estimate, found.predict.order, found.predict.window, found.recover is not None, found.backward_pass
+    )
+
+
+def search_values(found: TrackSettings) -> wire.SearchValues:
+    """Describe the settings of the search that hold for all stages."""
+    search = found.search
+    return wire.SearchValues(
+        theta_px=found.theta_px,
+        outliers=found.outliers,
+        passes=tuple(search.passes),
+        patience=search.patience,
+        max_expansions=search.max_expansions,
+        limbs_apart=search.limbs_apart,
+        bound_rad=search.bound_rad,
+        bound_m=search.bound_m,
+        step_rad=search.step_rad,
+        step_m=search.step_m,
+    )
+
+
+def view_3d(controller: Controller, state: State) -> wire.View3dMessage:
+    """Describe what the 3-D view shows."""
+    models = [p.model for p in controller.session.people]
+    names = dict.fromkeys(n for m in models for n in m.point_names if n not in minor_points(m))
+    return wire.View3dMessage(state.view_3d, _floor(state.floor), state.prediction_note, tuple(names))
+
+
+def body_sizes(controller: Controller, state: State) -> wire.BodySizesMessage:
+    """Describe the sizes of the person worked on."""
+    person = state.person
+    sizes = dimensions_of(controller.body_sizes.model(person))
+    parts = (wire.PartSizes(name, p.length_m, *p.girths_m) for name, p in sizes.parts.items())
+    return wire.BodySizesMessage(
+        person=person,
+        height_m=sizes.height_m,
+        parts=tuple(parts),
+        widths=tuple(wire.GirdleWidth(name, width_m) for name, width_m in sizes.widths_m.items()),
+        sides_alike=state.sides_alike,
+        edited=state.draft is not None and state.draft.person == person,
+        has_former=controller.body_sizes.has_former(person),
+        outcome=state.sizes_message,
+        height_limits_m=HEIGHT_LIMITS_M,
+        size_limits_m=size_limits_m(sizes.height_m),
+    )
+
+
+def _floor(floor: FloorState) -> wire.FloorInfo:
+    if floor.plane is None:
+        return wire.FloorInfo(floor.up, None, None, floor.former)
+    cosine = np.clip(np.abs(floor.plane.normal).max(), -1, 1)
+    return wire.FloorInfo(floor.up, float(np.degrees(np.arccos(cosine))), floor.plane.offset_m, floor.former)

@@ -1,0 +1,218 @@
+"""Messages about what the inspector edits: settings, the 3-D view and body sizes, as `message_types` explains."""
+
+from typing import Annotated, Literal, TypeAlias
+
+import msgspec
+from msgspec import UNSET, Meta, UnsetType
+
+from app.page.message_types import Command, Index, Message, Name, Part
+from app.page.search_messages import OutlierMode
+from app.state.view_3d import MAX_TRAIL_FRAMES, View3d
+from tracker.motion.prediction import MAX_ORDER
+
+MAX_PAST_POSES = 8
+"""Largest number of poses from which a page may let the motion be predicted."""
+
+EstimationMode: TypeAlias = Literal["refine", "search"]
+_Metres: TypeAlias = Annotated[float, Meta(gt=0, le=10)]
+
+
+# --- from the page --------------------------------------------------------------------------------------------------
+
+
+class TrackChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Settings of the tracker to change; what is left out stays."""
+
+    estimate: EstimationMode | UnsetType = UNSET
+    """How the pose of a frame is found."""
+    order: Annotated[int, Meta(ge=0, le=MAX_ORDER)] | UnsetType = UNSET
+    """Degree of the motion model: 0 stays, 1 is constant velocity, 2 is constant acceleration."""
+    past_poses: Annotated[int, Meta(ge=1, le=MAX_PAST_POSES)] | UnsetType = UNSET
+    """Number of poses from which the motion is taken."""
+    recover: bool | UnsetType = UNSET
+    """Whether lost limbs are searched."""
+    backward_pass: bool | UnsetType = UNSET
+
+
+class SetTrackSettings(Command, frozen=True, tag="track_settings"):
+    """Change settings of the tracker."""
+
+    changes: TrackChanges
+
+
+class View3dChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the 3-D view shows, to change; what is left out stays."""
+
+    bodies: bool | UnsetType = UNSET
+    colors: Literal["parts", "people"] | UnsetType = UNSET
+    opacity: Annotated[float, Meta(ge=0.1, le=1)] | UnsetType = UNSET
+    cameras: bool | UnsetType = UNSET
+    images: bool | UnsetType = UNSET
+    floor: bool | UnsetType = UNSET
+    gizmos: bool | UnsetType = UNSET
+    ghost: bool | UnsetType = UNSET
+    trail_points: Annotated[list[Name], Meta(max_length=1000)] | UnsetType = UNSET
+    trail_frames: Annotated[int, Meta(ge=1, le=MAX_TRAIL_FRAMES)] | UnsetType = UNSET
+
+
+class SetView3d(Command, frozen=True, tag="view_3d"):
+    """Choose what the 3-D view shows; kept with the session."""
+
+    changes: View3dChanges
+
+
+class SetHeight(Command, frozen=True, tag="body_sizes"):
+    """Scale the sizes being edited to another body height."""
+
+    action: Literal["height"]
+    person: Index
+    height_m: _Metres
+
+
+class SetPartSizes(Command, frozen=True, tag="body_sizes"):
+    """Change sizes of a part, and of its counterpart on the other side if both sides are edited at once."""
+
+    action: Literal["part"]
+    person: Index
+    part: Name
+    length_m: _Metres | UnsetType = UNSET
+    half_depth_m: _Metres | UnsetType = UNSET
+    half_width_m: _Metres | UnsetType = UNSET
+
+
+class SetGirdleWidth(Command, frozen=True, tag="body_sizes"):
+    """Change the distance between the two shoulders or hips."""
+
+    action: Literal["width"]
+    person: Index
+    girdle: Name
+    width_m: _Metres
+
+
+class CoupleSides(Command, frozen=True, tag="body_sizes"):
+    """Edit both sides at once, or each on its own."""
+
+    action: Literal["couple"]
+    on: bool
+
+
+class ApplySizes(Command, frozen=True, tag="body_sizes"):
+    """Make the edited sizes those of the body, as one entry of the history."""
+
+    action: Literal["apply"]
+    person: Index
+    refit: bool
+    """Whether keyframes are fitted to the new body; otherwise they keep the sizes that they were made with."""
+
+
+class DraftSizes(Command, frozen=True, tag="body_sizes"):
+    """Discard the edited sizes, or edit those that the person had before the present ones."""
+
+    action: Literal["discard", "previous"]
+    person: Index
+
+
+# --- to the page ----------------------------------------------------------------------------------------------------
+
+
+class TrackValues(Part, frozen=True):
+    """Settings of the tracker."""
+
+    estimate: EstimationMode
+    """How the pose of a frame is found: refined, and searched where that does not suffice; or searched alone."""
+    order: int
+    """Degree of the motion model: 0 stays, 1 is constant velocity, 2 is constant acceleration."""
+    past_poses: int
+    """Number of poses from which the motion is taken."""
+    recover: bool
+    """Whether lost limbs are searched."""
+    backward_pass: bool
+
+
+class SearchValues(Part, frozen=True):
+    """Settings of the search that hold for all stages."""
+
+    theta_px: float | None
+    """Distance beyond which an edge adds nothing more to the cost; null for 3% of the longer side of the image."""
+    outliers: OutlierMode
+    passes: tuple[float, ...]
+    """Factors on the steps."""
+    patience: int
+    """Expansions without improvement after which a stage ends."""
+    max_expansions: int
+    limbs_apart: bool
+    bound_rad: float
+    bound_m: float
+    step_rad: float
+    step_m: float
+
+
+class SettingsMessage(Message, frozen=True, tag="settings"):
+    """Settings of tracker and search, and their defaults."""
+
+    track: TrackValues
+    search: SearchValues
+    track_default: TrackValues
+    search_default: SearchValues
+
+
+class FloorInfo(Part, frozen=True):
+    """The floor of the session."""
+
+    up: str
+    """World axis that points up."""
+    tilt_deg: float | None
+    """Angle between its normal and that axis; null for the floor of the calibration."""
+    height_m: float | None
+    """Its height; null for the floor of the calibration."""
+    has_former: bool
+    """Whether the floor before the last change can be restored."""
+
+
+class View3dMessage(Message, frozen=True, tag="view_3d"):
+    """What the 3-D view shows."""
+
+    view: View3d
+    floor: FloorInfo
+    prediction: str
+    """What the predicted pose was computed from, or why there is none; empty while it is not shown."""
+    trail_points: tuple[str, ...]
+    """Names of the points whose trails can be shown."""
+
+
+class PartSizes(Part, frozen=True):
+    """Sizes of one part of a body."""
+
+    name: str
+    length_m: float
+    half_depth_m: float
+    """Half its thickness from front to back."""
+    half_width_m: float
+    """Half its thickness from side to side."""
+
+
+class GirdleWidth(Part, frozen=True):
+    """Distance between the joints of the shoulders or hips."""
+
+    name: str
+    width_m: float
+
+
+class BodySizesMessage(Message, frozen=True, tag="body_sizes"):
+    """Body sizes of the person worked on: those being edited, otherwise the present ones."""
+
+    person: int
+    height_m: float
+    parts: tuple[PartSizes, ...]
+    widths: tuple[GirdleWidth, ...]
+    sides_alike: bool
+    """Whether both sides are edited at once."""
+    edited: bool
+    """Whether these sizes are not applied yet."""
+    has_former: bool
+    """Whether the person had other sizes before."""
+    outcome: str
+    """Result of the last change, or empty."""
+    height_limits_m: tuple[float, float]
+    size_limits_m: tuple[float, float]
+    """Least and largest length, distance, half depth or half width."""

@@ -1,0 +1,95 @@
+"""Thumbnails of stored poses: one person on one frame, in the view that shows a limb best."""
+
+import time
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from app.control.controller import Controller
+from app.drawing import thumbnails
+from app.session.footage_crops import FootageCrops
+from tracker.body.limbs import limbs
+from tracker.body.model import BodyModel, PosedBody
+
+_CACHED = 256
+"""Number of thumbnails that are kept, some 8 kB each."""
+_PAUSE_S, _MAX_PAUSE_S = 0.02, 1.0
+"""How long a thumbnail waits at a time, and at most, while pictures are made or a pose is dragged."""
+
+
+class _Wanted(NamedTuple):
+    """What a thumbnail depends on. Bodies are compared by identity, so that a changed body or pose makes another."""
+
+    frame: int
+    person: int
+    """Index among the bodies."""
+    limb: int | None
+    bodies: tuple[BodyModel, ...]
+    """Of all people with a pose on the frame."""
+    poses: tuple[bytes, ...]
+    """Their values as float64, which can be hashed."""
+    colors: tuple[str, ...]
+
+
+class Thumbnails:
+    """Makes thumbnails in the thread of its caller; only one at a time. It changes no state."""
+
+    def __init__(self, controller: Controller, footage: FootageCrops) -> None:
+        """Make none yet.
+
+        Args:
+            controller: of the session.
+            footage: gives the images.
+        """
+        self._controller, self._footage = controller, footage
+        self._drawn = lru_cache(_CACHED)(self._draw)
+
+    def jpeg(self, person: int, frame: int, limb: int | None) -> bytes | None:
+        """Return a thumbnail of a stored pose as JPEG; None if there is no such pose or no view shows it.
+
+        Args:
+            person: index of the person.
+            frame: of the pose.
+            limb: index of the limb of the person's body that stands out; None, or one that it lacks, for none.
+
+        Raises:
+            RecordingError: the footage cannot be read.
+        """
+        stored = self._controller.stored_poses.on_frame(frame)
+        if person not in stored:
+            return None
+        if limb is not None and not 0 <= limb < len(limbs(stored[person].model)):
+            limb = None
+        bodies = tuple(stored.values())
+        colors = tuple(self._controller.session.people[i].color for i in stored)
+        return self._drawn(
+            _Wanted(
+                frame, list(stored).index(person), limb, tuple(b.model for b in bodies),
+                tuple(b.values.tobytes() for b in bodies), colors,
+            )
+        )  # fmt: skip
+
+    def close(self) -> None:
+        """Release the footage."""
+        self._footage.close()
+
+    def _draw(self, wanted: _Wanted) -> bytes | None:
+        bodies = [PosedBody(m, np.frombuffer(v)) for m, v in zip(wanted.bodies, wanted.poses, strict=True)]
+        self._give_way()
+        cameras = self._footage.cameras
+        crop = thumbnails.choose_crop(bodies, wanted.person, wanted.limb, cameras)
+        if crop is None:
+            return None
+        image = self._footage.image(crop.camera, wanted.frame)
+        self._give_way()
+        limb = thumbnails.limb_parts(bodies, wanted.person, wanted.limb)
+        return thumbnails.thumbnail(image, cameras[crop.camera], crop.region, bodies, wanted.colors, limb)
+
+    def _give_way(self) -> None:
+        """Wait while pictures of the shown frame are made or a pose is dragged, for a second at most."""
+        end = time.monotonic() + _MAX_PAUSE_S
+        while time.monotonic() < end and (
+            self._controller.frames.is_making_pictures or self._controller.state.is_dragging
+        ):
+            time.sleep(_PAUSE_S)

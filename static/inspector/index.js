@@ -1,0 +1,58 @@
+/**
+ * Inspector: a column beside the views with the selected joint, body sizes, settings and what the 3-D view shows.
+ *
+ * The room imports `widgets`, types of `model` and `scene`, and `posing`.
+ */
+
+import { alt, inArea } from "../widgets/key_matching.js";
+import { BodySection } from "./body_section.js";
+import { Inspector } from "./inspector.js";
+import { jointSection } from "./joint_section.js";
+import { searchSection } from "./search_section.js";
+import { trackSection } from "./track_section.js";
+import { viewSection } from "./view_section.js";
+
+/** @type {{choice: import("../model/theme.js").ThemeChoice, label: string}[]} */
+const THEMES = [
+  { choice: "dark", label: "Dark theme" },
+  { choice: "light", label: "Light theme" },
+  { choice: "system", label: "System theme" },
+];
+
+/** @typedef {ReturnType<typeof mount>} InspectorRoom */
+
+/**
+ * Build the column.
+ *
+ * @param {import("../model/index.js").Context} context
+ * @param {import("../posing/index.js").PosingRoom} posing
+ * @param {import("../scene/index.js").SceneRoom} scene
+ */
+export function mount(context, posing, scene) {
+  const sections = [
+    jointSection(context, posing),
+    new BodySection(context),
+    trackSection(context),
+    searchSection(context),
+    viewSection(context, scene),
+  ];
+  const inspector = new Inspector(context.store, sections);
+  const bindings = inArea("Inspector", [
+    { keys: ["Alt I"], label: "Inspector: body sizes and settings (toggle)", matches: alt("KeyI", false), run: () => inspector.toggle() },
+    ...sections.map(({ id, title, hint }) => ({
+      keys: [],
+      label: id === "view" ? "View settings: theme, 3-D view" : title,
+      words: `${hint} inspector settings`,
+      matches: () => false,
+      run: () => inspector.reveal(id),
+    })),
+    ...THEMES.map(({ choice, label }) => ({
+      keys: [],
+      label,
+      words: "colour scheme mode appearance",
+      matches: () => false,
+      run: () => context.themes.choose(choice),
+    })),
+  ]);
+  return { inspector, bindings };
+}

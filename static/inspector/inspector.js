@@ -1,0 +1,108 @@
+/** Inspector: a column with collapsible sections beside the views. What is open is stored. */
+
+import { button, byId } from "../widgets/elements.js";
+
+const STORED = "quadrille.inspector";
+
+/**
+ * @typedef {object} Section
+ * @property {string} id
+ * @property {string} title
+ * @property {string} hint what it is for
+ * @property {HTMLElement} body
+ * @property {(changed: Set<keyof import("../model/store.js").Facts>) => void} update
+ */
+
+export class Inspector {
+  #column = byId("inspector", HTMLElement);
+  #button;
+  /** @type {Map<string, {section: Section, fold: HTMLDetailsElement}>} */
+  #sections = new Map();
+  #stored = restored();
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {Section[]} sections from top to bottom
+   */
+  constructor(store, sections) {
+    this.#button = button("show-inspector", () => this.toggle());
+    for (const section of sections) this.#add(section);
+    this.#show();
+    store.subscribe((changed) => {
+      if (changed.has("connected")) this.#column.inert = !store.facts.connected;
+      for (const { section } of this.#sections.values()) section.update(changed);
+    });
+  }
+
+  toggle() {
+    this.#stored.open = !this.#stored.open;
+    this.#show();
+    this.#keep();
+  }
+
+  /**
+   * Open a section and focus a control of it.
+   *
+   * @param {string} id
+   * @param {HTMLElement} [row] by default the first one
+   */
+  reveal(id, row) {
+    const found = this.#sections.get(id);
+    if (!found) return;
+    this.#stored.open = true;
+    found.fold.open = true;
+    this.#show();
+    this.#keep();
+    const target = row ?? found.section.body;
+    (row ?? found.fold).scrollIntoView({ block: "nearest" });
+    /** @type {HTMLElement | null} */ (target.querySelector("input:enabled, select:enabled, button:enabled"))?.focus();
+  }
+
+  /** One command for each section and each row, which opens it; none changes anything. */
+  commands() {
+    return [...this.#sections.values()].flatMap(({ section }) => {
+      const rows = /** @type {HTMLElement[]} */ ([...section.body.querySelectorAll(".row:not([hidden])")]);
+      return rows.map((row) => {
+        const label = row.querySelector(".row-label")?.textContent ?? "";
+        return { area: section.title, label, words: `${row.title} setting`, run: () => this.reveal(section.id, row) };
+      });
+    });
+  }
+
+  /** @param {Section} section */
+  #add(section) {
+    const fold = document.createElement("details");
+    fold.className = "section";
+    fold.dataset.section = section.id;
+    fold.open = this.#stored.sections.includes(section.id);
+    const head = document.createElement("summary");
+    head.textContent = section.title;
+    head.title = section.hint;
+    section.body.classList.add("section-body");
+    fold.append(head, section.body);
+    fold.addEventListener("toggle", () => this.#keep());
+    this.#column.append(fold);
+    this.#sections.set(section.id, { section, fold });
+  }
+
+  #show() {
+    this.#column.hidden = !this.#stored.open;
+    this.#button.setAttribute("aria-pressed", String(this.#stored.open));
+  }
+
+  #keep() {
+    this.#stored.sections = [...this.#sections].filter(([, { fold }]) => fold.open).map(([id]) => id);
+    localStorage.setItem(STORED, JSON.stringify(this.#stored));
+  }
+}
+
+/** @returns {{open: boolean, sections: string[]}} */
+function restored() {
+  try {
+    const found = JSON.parse(localStorage.getItem(STORED) ?? "null");
+    if (found && Array.isArray(found.sections)) return { open: found.open === true, sections: found.sections };
+  } catch {
+    // Something else has written it.
+  }
+  return { open: false, sections: ["body"] };
+}

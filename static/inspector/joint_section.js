@@ -1,0 +1,90 @@
+/** Degrees of freedom of the selected joint, with sliders over their limits. */
+
+import { meaning } from "../posing/dof_names.js";
+import { capital, displayName } from "../widgets/text.js";
+import { boundedField } from "./rows.js";
+
+const UNITS = { deg: "°", cm: "cm" };
+/** Range of the slider of an angle without limits, degrees. */
+const FULL_TURN = { low: -180, high: 180 };
+const MAX_CM = 1e5;
+
+/** @typedef {{dof: number, field: ReturnType<typeof boundedField>, slider: HTMLInputElement | null, element: HTMLElement}} Row */
+
+/**
+ * @param {import("../model/index.js").Context} context
+ * @param {import("../posing/index.js").PosingRoom} room
+ * @returns {import("./inspector.js").Section}
+ */
+export function jointSection({ store, notify }, { posing }) {
+  const body = document.createElement("div");
+  /** @type {Row[]} */
+  let rows = [];
+  let built = "";
+  const refuse = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
+
+  /**
+   * @param {import("../model/protocol.js").DofInfo} info
+   * @param {number} dof
+   * @returns {Row}
+   */
+  const makeRow = (info, dof) => {
+    const element = document.createElement("label");
+    element.className = "row is-joint";
+    const unit = UNITS[info.unit];
+    const limits = info.low === null || info.high === null ? "no limits" : `from ${info.low} to ${info.high} ${unit}`;
+    const effect = meaning(info);
+    element.title = `${displayName(info.joint)} ${info.name}${effect && `: ${effect}`}; ${limits}`;
+    const head = Object.assign(document.createElement("span"), { className: "row-label", textContent: capital(info.name) });
+    const [low, high] = info.unit === "cm" ? [-MAX_CM, MAX_CM] : [info.low ?? -360, info.high ?? 360];
+    const field = boundedField({
+      name: `${displayName(info.joint)} ${info.name}, ${unit}`,
+      low: low - 0.05,
+      high: high + 0.05,
+      step: posing.steps[info.unit],
+      change: (value) => value !== null && posing.set(dof, value),
+      refuse,
+    });
+    element.append(head, field.element, Object.assign(document.createElement("span"), { className: "row-unit", textContent: unit }));
+    const slider = info.unit === "deg" ? document.createElement("input") : null;
+    if (slider) {
+      const range = info.low === null || info.high === null ? FULL_TURN : { low: info.low, high: info.high };
+      Object.assign(slider, { type: "range", min: String(range.low), max: String(range.high), step: "0.5" });
+      slider.setAttribute("aria-label", `${displayName(info.joint)} ${info.name}`);
+      slider.addEventListener("input", () => posing.slide(dof, Number(slider.value)));
+      element.append(slider);
+    }
+    return { dof, field, slider, element };
+  };
+
+  const show = () => {
+    const { person, point, dofs } = posing;
+    const { state } = store.facts;
+    if (!person || !state || !point) return;
+    const shape = JSON.stringify([state.person, point, dofs]);
+    if (shape !== built) {
+      built = shape;
+      const title = document.createElement("p");
+      title.className = "section-note";
+      title.textContent = dofs.length ? capital(displayName(point)) : `The ${displayName(point)} has no angles of its own; drag it in a view.`;
+      rows = dofs.map((dof) => makeRow(person.dofs[dof], dof));
+      body.replaceChildren(title, ...rows.map(({ element }) => element));
+    }
+    for (const { dof, field, slider } of rows) {
+      const value = Math.round(10 * (state.dofs[dof] ?? 0)) / 10;
+      const isLocked = state.locked.includes(dof);
+      field.show(value);
+      field.element.disabled = isLocked;
+      if (!slider) continue;
+      slider.disabled = isLocked;
+      if (document.activeElement !== slider || !slider.matches(":active")) slider.value = String(value);
+    }
+  };
+  return {
+    id: "joint",
+    title: "Joint",
+    hint: "Angles of the selected joint (J selects the next one)",
+    body,
+    update: (changed) => (changed.has("state") || changed.has("session")) && show(),
+  };
+}

@@ -1,0 +1,231 @@
+/** Rows of the inspector: a label, a control and a unit. Each shows the program's value unless the user is typing. */
+
+import { slider } from "../widgets/popovers.js";
+import { numberField } from "../widgets/number_field.js";
+
+/** Shortest interval of messages while a slider is moved, ms. */
+const SEND_MS = 80;
+
+/**
+ * @typedef {{element: HTMLElement, show: (value: number | null, isChanged?: boolean) => void, limits: (low: number, high: number) => void}} NumberRow
+ * @typedef {(text: string) => void} Refuse shows why a value is refused
+ */
+
+/**
+ * @param {{label: string, title: string, unit?: string, low: number, high: number, step: number, auto?: string,
+ *   change: (value: number | null) => void, refuse: Refuse}} options auto: shown for no value, which is allowed then
+ * @returns {NumberRow}
+ */
+export function numberRow({ label, title, unit = "", low, high, step, auto, change, refuse }) {
+  const { element, head } = row("label", label, title);
+  const field = boundedField({ name: `${label}${unit && `, ${unit}`}`, low, high, step, allowsNone: auto !== undefined, change, refuse });
+  if (auto !== undefined) field.element.placeholder = auto;
+  const end = document.createElement("span");
+  end.className = "row-unit";
+  end.textContent = unit;
+  element.append(field.element, end);
+  return {
+    element,
+    limits: field.limits,
+    show(value, isChanged = false) {
+      field.show(value);
+      head.classList.toggle("is-changed", isChanged);
+    },
+  };
+}
+
+/**
+ * Make a number field that refuses values outside its limits and steps with the arrow keys. Without `digits` it shows as
+ * few as it can.
+ *
+ * @param {{name: string, low: number, high: number, step: number, digits?: number, allowsNone?: boolean,
+ *   change: (value: number | null) => void, refuse: Refuse}} options
+ */
+export function boundedField({ name, low, high, step, digits, allowsNone = false, change, refuse }) {
+  let shown = NaN;
+  const within = (/** @type {number} */ value) => value >= low - 1e-9 && value <= high + 1e-9;
+  const field = numberField({
+    name,
+    take(text) {
+      if (text === "" && allowsNone) {
+        change(null);
+        return null;
+      }
+      const value = Number(text);
+      if (text === "" || !within(value)) return `${name}: expected a number from ${tidy(low)} to ${tidy(high)}, found “${text}”.`;
+      change(value);
+      return null;
+    },
+    refuse,
+    step: (factor) => {
+      const to = Math.min(high, Math.max(low, (Number.isFinite(shown) ? shown : low) + factor * step));
+      if (to !== shown) change(to);
+    },
+  });
+  return {
+    element: field.element,
+    /** @param {number | null} value */
+    show(value) {
+      shown = value ?? NaN;
+      field.show(value === null ? "" : digits === undefined ? tidy(value) : value.toFixed(digits));
+    },
+    /**
+     * @param {number} least
+     * @param {number} largest
+     */
+    limits(least, largest) {
+      [low, high] = [least, largest];
+    },
+  };
+}
+
+/**
+ * @param {{label: string, title: string, take: (text: string) => string | null, refuse: Refuse}} options take: applies the
+ *   text, or returns why it is invalid
+ */
+export function textRow({ label, title, take, refuse }) {
+  const { element, head } = row("label", label, title);
+  const field = numberField({ name: label, take, refuse, step: null });
+  field.element.classList.add("is-wide");
+  element.append(field.element);
+  return {
+    element,
+    /**
+     * @param {string} text
+     * @param {boolean} isChanged
+     */
+    show(text, isChanged) {
+      field.show(text);
+      head.classList.toggle("is-changed", isChanged);
+    },
+  };
+}
+
+/** @param {{label: string, title: string, change: (on: boolean) => void}} options */
+export function checkRow({ label, title, change }) {
+  const { element, head } = row("label", label, title);
+  const input = document.createElement("input");
+  input.type = "checkbox";
+  input.addEventListener("change", () => change(input.checked));
+  element.append(input);
+  return {
+    element,
+    /**
+     * @param {boolean} on
+     * @param {boolean} [isChanged]
+     */
+    show(on, isChanged = false) {
+      input.checked = on;
+      head.classList.toggle("is-changed", isChanged);
+    },
+  };
+}
+
+/**
+ * @template {string} T
+ * @param {{label: string, title: string, options: [T, string][], change: (value: T) => void}} options values with labels
+ */
+export function choiceRow({ label, title, options, change }) {
+  const { element, head } = row("label", label, title);
+  const select = document.createElement("select");
+  const fill = (/** @type {[string, string][]} */ choices) => select.replaceChildren(...choices.map(([value, text]) => new Option(text, value)));
+  fill(options);
+  select.addEventListener("change", () => change(/** @type {T} */ (select.value)));
+  element.append(select);
+  return {
+    element,
+    select,
+    fill,
+    /**
+     * @param {T} value
+     * @param {boolean} [isChanged]
+     */
+    show(value, isChanged = false) {
+      select.value = value;
+      head.classList.toggle("is-changed", isChanged);
+    },
+  };
+}
+
+/**
+ * @param {{label: string, title: string, min: number, max: number, step: number, format: (value: number) => string,
+ *   change: (value: number) => void}} options
+ */
+export function sliderRow({ label, title, min, max, step, format, change }) {
+  const { element } = row("label", label, title);
+  const send = throttled(change);
+  const made = slider({ label, title, min, max, step, format, onInput: send });
+  element.append(made.input, made.value);
+  return {
+    element,
+    input: made.input,
+    /** @param {number} value */
+    show(value) {
+      if (!send.isBusy()) made.show(value);
+    },
+  };
+}
+
+/**
+ * @param {string} text
+ * @param {string} title
+ * @param {() => void} run
+ */
+export function textButton(text, title, run) {
+  const element = document.createElement("button");
+  Object.assign(element, { type: "button", textContent: text, title });
+  element.addEventListener("click", (event) => {
+    if (event.detail > 0) element.blur();
+    run();
+  });
+  return element;
+}
+
+/**
+ * Text with few digits: no trailing zeros, no rounding errors of converted units.
+ *
+ * @param {number} value
+ */
+export function tidy(value) {
+  return String(Number(value.toFixed(2)));
+}
+
+/**
+ * @param {"label" | "div"} kind
+ * @param {string} label
+ * @param {string} title
+ */
+function row(kind, label, title) {
+  const element = document.createElement(kind);
+  element.className = "row";
+  element.title = title;
+  const head = document.createElement("span");
+  head.className = "row-label";
+  head.textContent = label;
+  element.append(head);
+  return { element, head };
+}
+
+/**
+ * Pass on the newest value at most every `SEND_MS`.
+ *
+ * @param {(value: number) => void} change
+ */
+function throttled(change) {
+  let sentAt = -Infinity;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  let timer;
+  const send = (/** @type {number} */ value) => {
+    clearTimeout(timer);
+    const wait = sentAt + SEND_MS - performance.now();
+    const now = () => {
+      sentAt = performance.now();
+      change(value);
+    };
+    if (wait > 0) timer = setTimeout(now, wait);
+    else now();
+  };
+  /** Whether the user moved it so lately that an older value of the program would make it jump. */
+  send.isBusy = () => performance.now() < sentAt + 5 * SEND_MS;
+  return send;
+}

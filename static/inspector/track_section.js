@@ -1,0 +1,80 @@
+/** Settings of the tracker. */
+
+import { checkRow, choiceRow, numberRow, textButton } from "./rows.js";
+
+/** @typedef {import("../model/protocol.js").TrackValues} TrackValues */
+
+/** @type {Record<"0" | "1" | "2", string>} by degree of the motion model */
+const ORDERS = { 0: "Stays in place", 1: "Constant velocity", 2: "Constant acceleration" };
+
+/**
+ * @param {import("../model/index.js").Context} context
+ * @returns {import("./inspector.js").Section}
+ */
+export function trackSection({ store, send, notify }) {
+  const set = (/** @type {Partial<TrackValues>} */ changes) => send({ type: "track_settings", changes });
+  const refuse = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
+  const estimate = choiceRow({
+    label: "Method",
+    title: "How the pose of a frame is found from its prediction. Refinement fits contours to edges and searches only what it cannot fit",
+    options: [
+      ["refine", "Refine, then search"],
+      ["search", "Search only (GD96)"],
+    ],
+    change: (value) => set({ estimate: value }),
+  });
+  const order = choiceRow({
+    label: "Prediction",
+    title: "Motion model that predicts the pose of the next frame. GD96 uses constant acceleration, which overshoots on noisy poses",
+    options: [
+      ["0", ORDERS[0]],
+      ["1", ORDERS[1]],
+      ["2", ORDERS[2]],
+    ],
+    change: (value) => set({ order: Number(value) }),
+  });
+  const past = numberRow({
+    label: "Past poses",
+    title: "Number of poses from which the motion is predicted, 1 to 8",
+    low: 1,
+    high: 8,
+    step: 1,
+    change: (value) => set({ past_poses: Math.round(value ?? 1) }),
+    refuse,
+  });
+  const recover = checkRow({
+    label: "Search lost limbs",
+    title: "Search for a limb that is not where edges and colours are",
+    change: (on) => set({ recover: on }),
+  });
+  const backward = checkRow({
+    label: "Backward pass",
+    title: "At the end of a run, track lost people backward from the frame where they were found again",
+    change: (on) => set({ backward_pass: on }),
+  });
+  const reset = textButton("Reset", "Restore the default track settings", () => {
+    const { settings } = store.facts;
+    if (settings) set(settings.track_default);
+  });
+  const body = document.createElement("div");
+  body.append(estimate.element, order.element, past.element, recover.element, backward.element, reset);
+
+  const show = () => {
+    const { settings } = store.facts;
+    if (!settings) return;
+    const { track, track_default: initial } = settings;
+    estimate.show(track.estimate, track.estimate !== initial.estimate);
+    order.show(/** @type {"0"} */ (String(track.order)), track.order !== initial.order);
+    past.show(track.past_poses, track.past_poses !== initial.past_poses);
+    recover.show(track.recover, track.recover !== initial.recover);
+    backward.show(track.backward_pass, track.backward_pass !== initial.backward_pass);
+    reset.disabled = JSON.stringify(track) === JSON.stringify(initial);
+  };
+  return {
+    id: "track",
+    title: "Track settings",
+    hint: "How the tracker (T) finds the pose of each frame",
+    body,
+    update: (changed) => changed.has("settings") && show(),
+  };
+}

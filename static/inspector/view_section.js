@@ -1,0 +1,172 @@
+/** Theme of the page, and what the 3-D view shows: layers, the camera to look through, the floor and trails. */
+
+import { displayName } from "../widgets/text.js";
+import { checkRow, choiceRow, sliderRow, textButton } from "./rows.js";
+
+const FREE = "free";
+const MAX_TRAIL_FRAMES = 250;
+
+/** @type {[import("../model/theme.js").ThemeChoice, string][]} */
+const THEMES = [
+  ["system", "As the system"],
+  ["dark", "Dark"],
+  ["light", "Light"],
+];
+
+/** @typedef {"bodies" | "cameras" | "images" | "floor" | "gizmos" | "ghost"} Layer */
+
+/** @type {{name: Layer, label: string, title: string}[]} */
+const LAYERS = [
+  { name: "bodies", label: "Bodies", title: "Draw the bodies in the 3-D view" },
+  { name: "cameras", label: "Cameras", title: "Draw the cameras; a click on one looks through it" },
+  { name: "images", label: "Camera images", title: "Show the image of each camera, a moment after the frame changes" },
+  { name: "floor", label: "Floor grid", title: "Draw a grid on the floor with a line every 50 cm" },
+  { name: "gizmos", label: "Gizmos", title: "Draw the handles that move the body and turn the selected joint" },
+  { name: "ghost", label: "Prediction", title: "Draw in grey the pose that the tracker predicts for this frame from the poses before it" },
+];
+
+/**
+ * @param {import("../model/index.js").Context} context
+ * @param {import("../scene/index.js").SceneRoom} scene
+ * @returns {import("./inspector.js").Section}
+ */
+export function viewSection({ store, send, themes }, { floor }) {
+  const set = (/** @type {import("../model/protocol.js").View3dChanges} */ changes) => send({ type: "view_3d", changes });
+  const theme = choiceRow({
+    label: "Theme",
+    title: "Colour scheme of the page and the 3-D view; kept in this browser",
+    options: THEMES,
+    change: (value) => themes.choose(value),
+  });
+  const camera = choiceRow({
+    label: "Look through",
+    title: "Look through a camera, its image behind the bodies (Y: the camera under the pointer). Turning the view leaves the camera",
+    options: /** @type {[string, string][]} */ ([[FREE, "Free view"]]),
+    change: (value) => send({ type: "snap", camera: value === FREE ? null : Number(value) }),
+  });
+  const layers = LAYERS.map(({ name, label, title }) => ({
+    name,
+    row: checkRow({ label, title, change: (on) => set({ [name]: on }) }),
+  }));
+  const colors = choiceRow({
+    label: "Colours",
+    title: "Each part of a body, or each person, in a colour of its own",
+    options: [
+      ["parts", "By part"],
+      ["people", "By person"],
+    ],
+    change: (value) => set({ colors: value }),
+  });
+  const opacity = sliderRow({
+    label: "Opacity",
+    title: "Opacity of the bodies. Lower it to see what they hide",
+    min: 0.1,
+    max: 1,
+    step: 0.05,
+    format: (value) => `${Math.round(100 * value)}%`,
+    change: (value) => set({ opacity: value }),
+  });
+  const prediction = note();
+  const floorText = note();
+  const setFloor = textButton("Set floor…", "Click three points of the floor in the views (Shift+Y)", () => floor.toggle());
+  const formerFloor = textButton("Previous floor", "Restore the floor before the last change", () => floor.revert());
+  const trails = sliderRow({
+    label: "Trail length",
+    title: "Length of a trail to either side of the shown frame, frames: blue before it, orange after it",
+    min: 1,
+    max: MAX_TRAIL_FRAMES,
+    step: 1,
+    format: String,
+    change: (value) => set({ trail_frames: value }),
+  });
+  const points = document.createElement("div");
+  points.className = "trail-points";
+  points.setAttribute("role", "group");
+  points.setAttribute("aria-label", "Points with a trail");
+  const noTrails = textButton("No trails", "Remove all trails", () => set({ trail_points: [] }));
+  const body = document.createElement("div");
+  const [bodies, ...others] = layers.map(({ row }) => row.element);
+  body.append(
+    theme.element, heading("3-D view"), camera.element, bodies, colors.element, opacity.element, ...others, prediction,
+    heading("Floor"), floorText, buttons(setFloor, formerFloor),
+    heading("Trails"), trails.element, points, buttons(noTrails),
+  ); // prettier-ignore
+  let built = "";
+
+  const show = () => {
+    const { view3d, state, session, theme: chosen } = store.facts;
+    theme.show(chosen.choice);
+    if (session) camera.fill([[FREE, "Free view"], ...session.cameras.map(({ name }, i) => /** @type {[string, string]} */ ([String(i), name]))]);
+    camera.show(state?.snapped == null ? FREE : String(state.snapped));
+    if (!view3d) return;
+    const { view } = view3d;
+    for (const { name, row } of layers) row.show(view[name]);
+    colors.show(view.colors);
+    opacity.show(view.opacity);
+    prediction.textContent = view3d.prediction && `Prediction ${view3d.prediction}`;
+    prediction.hidden = !view3d.prediction;
+    floorText.textContent = describe(view3d.floor);
+    formerFloor.disabled = !view3d.floor.has_former;
+    trails.show(view.trail_frames);
+    noTrails.disabled = view.trail_points.length === 0;
+    if (built !== view3d.trail_points.join()) {
+      built = view3d.trail_points.join();
+      points.replaceChildren(...view3d.trail_points.map((name) => pointChoice(name, (on) => choose(name, on))));
+    }
+    for (const box of points.querySelectorAll("input")) box.checked = view.trail_points.includes(box.value);
+  };
+  const choose = (/** @type {string} */ name, /** @type {boolean} */ on) => {
+    const chosen = store.facts.view3d?.view.trail_points ?? [];
+    set({ trail_points: on ? [...chosen, name] : chosen.filter((other) => other !== name) });
+  };
+  return {
+    id: "view",
+    title: "View",
+    hint: "Theme of the page, and what the 3-D view shows",
+    body,
+    update: (changed) => ["view3d", "state", "session", "theme"].some((fact) => changed.has(/** @type {"state"} */ (fact))) && show(),
+  };
+}
+
+/**
+ * @param {string} name
+ * @param {(on: boolean) => void} change
+ */
+function pointChoice(name, change) {
+  const label = document.createElement("label");
+  label.title = `Trail of the ${displayName(name)}`;
+  const input = document.createElement("input");
+  Object.assign(input, { type: "checkbox", value: name });
+  input.addEventListener("change", () => change(input.checked));
+  const text = document.createElement("span");
+  text.textContent = displayName(name);
+  label.append(input, text);
+  return label;
+}
+
+/** @param {import("../model/protocol.js").FloorInfo} floor */
+function describe({ up, tilt_deg, height_m }) {
+  if (tilt_deg === null || height_m === null) return `From the calibration, ${up} is up`;
+  return `Set by hand: ${tilt_deg.toFixed(1)}° off ${up}, at ${(100 * height_m).toFixed(1)} cm`;
+}
+
+/** @param {string} text */
+function heading(text) {
+  const element = document.createElement("h4");
+  element.textContent = text;
+  return element;
+}
+
+function note() {
+  const element = document.createElement("p");
+  element.className = "section-note";
+  return element;
+}
+
+/** @param {HTMLElement[]} all */
+function buttons(...all) {
+  const element = document.createElement("div");
+  element.className = "section-buttons";
+  element.append(...all);
+  return element;
+}

@@ -1,0 +1,139 @@
+/** Popover that opens another session: a recent one, or a folder by its path, which is completed as the user types. */
+
+import { byId } from "../widgets/elements.js";
+import { opensPopover, togglePopover } from "../widgets/popovers.js";
+import { NewSession } from "./new_session.js";
+import { completePaths, postJson } from "./session_requests.js";
+
+const POLL_MS = 300;
+
+/** @typedef {{refusal: string | null, folder: string, recent: {folder: string, name: string, opened: string}[]}} Listed */
+
+export class Sessions {
+  #panel = byId("sessions-panel", HTMLElement);
+  #open = byId("session-name", HTMLButtonElement);
+  #folder = byId("session-folder", HTMLInputElement);
+  #list = byId("recent-sessions", HTMLElement);
+  #note = byId("sessions-note", HTMLOutputElement);
+  #form = byId("open-session", HTMLFormElement);
+
+  #store;
+  #create;
+  /** Folder of the open session. */
+  #present = "";
+
+  /** @param {import("../model/store.js").Store} store */
+  constructor(store) {
+    this.#store = store;
+    opensPopover(this.#panel, this.#open, () => this.toggle());
+    this.#form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      void this.#choose(this.#folder.value);
+    });
+    this.#create = new NewSession((folder) => {
+      this.toggle();
+      void this.#choose(folder);
+    });
+    byId("show-new-session", HTMLButtonElement).addEventListener("click", () => this.showNew());
+    completePaths(this.#folder, byId("session-folders", HTMLDataListElement));
+    /** @type {string | undefined} */
+    let first;
+    store.subscribe((changed) => {
+      if (!changed.has("session")) return;
+      first ??= store.facts.session?.name;
+      // Another page has opened another session: everything here belongs to the former one.
+      if (first !== store.facts.session?.name) location.reload();
+    });
+  }
+
+  toggle() {
+    togglePopover(this.#panel, this.#open);
+    if (!this.#panel.matches(":popover-open")) return;
+    this.#say("");
+    this.#folder.focus();
+    void this.#fill();
+  }
+
+  /** Show the form of a new session. */
+  showNew() {
+    if (this.#panel.matches(":popover-open")) this.#panel.hidePopover();
+    this.#create.show();
+  }
+
+  async #fill() {
+    /** @type {Listed} */
+    let listed = { refusal: "The program does not answer.", folder: "", recent: [] };
+    try {
+      listed = await (await fetch("sessions")).json();
+    } catch {
+      // Said in the panel.
+    }
+    this.#present = listed.folder;
+    for (const control of [...this.#form.elements, byId("show-new-session", HTMLButtonElement)]) {
+      /** @type {HTMLInputElement} */ (control).disabled = listed.refusal !== null;
+    }
+    if (listed.refusal) this.#say(listed.refusal, true);
+    this.#list.replaceChildren(...listed.recent.map((one) => this.#row(one)));
+    if (!listed.recent.length && !listed.refusal) this.#say("No other session was opened before.");
+    if (document.activeElement === document.body) this.#folder.focus();
+  }
+
+  /** @param {Listed["recent"][number]} session */
+  #row({ folder, name, opened }) {
+    const item = document.createElement("li");
+    const open = document.createElement("button");
+    open.type = "button";
+    open.title = `Close this session and open ${folder}`;
+    const where = document.createElement("small");
+    where.append(Object.assign(document.createElement("bdi"), { textContent: folder }));
+    const when = document.createElement("time");
+    when.dateTime = opened;
+    when.textContent = new Date(opened).toLocaleDateString([], { day: "numeric", month: "short" });
+    const title = document.createElement("b");
+    title.textContent = name;
+    open.append(title, when, where);
+    open.addEventListener("click", () => void this.#choose(folder));
+    item.append(open);
+    return item;
+  }
+
+  /** @param {string} folder */
+  async #choose(folder) {
+    this.#say("Checking…");
+    try {
+      await postJson("sessions/open", { folder }, (answer) => this.#store.set({ opening: JSON.parse(answer).name }));
+      this.#panel.hidePopover();
+    } catch (error) {
+      this.#say(error instanceof Error ? error.message : String(error), true);
+      return;
+    }
+    await untilAnotherIsOpen(this.#present);
+    location.reload();
+  }
+
+  /**
+   * @param {string} text
+   * @param {boolean} isFailure
+   */
+  #say(text, isFailure = false) {
+    this.#note.textContent = text;
+    this.#note.classList.toggle("is-failed", isFailure);
+  }
+}
+
+/**
+ * Wait until the program has been replaced by one that serves another session.
+ *
+ * @param {string} present folder of the session that is being closed
+ */
+async function untilAnotherIsOpen(present) {
+  for (;;) {
+    await new Promise((resolve) => setTimeout(resolve, POLL_MS));
+    try {
+      const { folder } = await (await fetch("sessions")).json();
+      if (folder !== present) return;
+    } catch {
+      // The program is starting.
+    }
+  }
+}

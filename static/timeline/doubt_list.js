@@ -1,0 +1,161 @@
+/** Tab of the drawer that lists doubtful and lost poses with thumbnails, the most severe first. */
+
+import { byId, iconButton } from "../widgets/elements.js";
+import { count, displayName, percent } from "../widgets/text.js";
+import { countDoubts } from "./doubts.js";
+import { ThumbnailLoader } from "./thumbnail_loader.js";
+
+/** Largest number of entries that are listed. The others follow as these are resolved. */
+const MAX_LISTED = 200;
+const TICK = "m3 8.5 3.5 3.5L13 4.5";
+
+/** @typedef {import("./doubts.js").Doubt} Doubt */
+
+export class DoubtList {
+  #store;
+  #queue;
+  #panel = byId("doubts", HTMLElement);
+  #list = byId("doubt-list", HTMLOListElement);
+  #empty = byId("doubts-empty", HTMLElement);
+  #controls = byId("doubt-controls", HTMLElement);
+  #tabCount = byId("doubts-count", HTMLElement);
+  #loader = new ThumbnailLoader(this.#panel);
+  /** @type {Map<string, HTMLLIElement>} rows by what they show */
+  #rows = new Map();
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {import("./doubt_queue.js").DoubtQueue} queue
+   */
+  constructor(store, queue) {
+    this.#store = store;
+    this.#queue = queue;
+    /** @type {(keyof import("../model/store.js").Facts)[]} */
+    const listed = ["drawer", "timeline", "lanes", "session"];
+    store.subscribe((changed) => {
+      const isOpen = store.facts.drawer === "doubts";
+      this.#panel.hidden = this.#controls.hidden = !isOpen;
+      if (!isOpen) return;
+      if (listed.some((fact) => changed.has(fact))) this.#show();
+      if (listed.some((fact) => changed.has(fact)) || changed.has("target") || changed.has("state")) this.#mark();
+    });
+  }
+
+  #show() {
+    const { doubts } = this.#queue;
+    const shown = doubts.slice(0, MAX_LISTED);
+    const known = this.#rows;
+    this.#rows = new Map(shown.map((doubt) => [this.#key(doubt), known.get(this.#key(doubt)) ?? this.#row(doubt)]));
+    for (const [key, row] of known) {
+      const image = row.querySelector("img");
+      if (!this.#rows.has(key) && image) this.#loader.forget(image);
+    }
+    const rows = [...this.#rows.values()];
+    if (rows.length !== this.#list.children.length || rows.some((row, i) => row !== this.#list.children[i])) {
+      const focused = this.#list.contains(document.activeElement) ? document.activeElement : null;
+      const at = focused ? [...this.#list.children].findIndex((row) => row.contains(focused)) : -1;
+      this.#list.replaceChildren(...rows);
+      // Where the focused entry was resolved, the next one takes its place.
+      if (at >= 0) (focused?.isConnected ? /** @type {HTMLElement} */ (focused) : rows[Math.min(at, rows.length - 1)]?.querySelector("button"))?.focus();
+    }
+    const hidden = doubts.length - shown.length;
+    this.#tabCount.textContent =
+      doubts.length === 0 ? "" : `${count(doubts.length)} to check${hidden > 0 ? `, the ${count(MAX_LISTED)} most severe are listed` : ", most severe first"}`;
+    this.#empty.hidden = doubts.length > 0;
+    if (doubts.length === 0) this.#empty.textContent = this.#emptyText();
+  }
+
+  #emptyText() {
+    const { timeline } = this.#store.facts;
+    const { all, resolved } = countDoubts(this.#store.facts);
+    if (all > 0) return `All ${count(resolved)} doubtful and lost poses are confirmed or reviewed.`;
+    if (timeline.statuses.some((status) => status > 0)) return "No pose is doubtful or lost.";
+    return "No frame has been tracked. Press T to track; doubtful and lost poses are listed here.";
+  }
+
+  /** Mark the entry of the current frame. */
+  #mark() {
+    const current = this.#queue.current;
+    const key = current ? this.#key(current) : null;
+    for (const [own, row] of this.#rows) {
+      const isCurrent = own === key;
+      if (row.classList.contains("is-current") === isCurrent) continue;
+      row.classList.toggle("is-current", isCurrent);
+      row.querySelector("button")?.setAttribute("aria-current", String(isCurrent));
+      if (isCurrent) row.scrollIntoView({ block: "nearest" });
+    }
+  }
+
+  /** @param {Doubt} doubt */
+  #key({ person, first, last, worst, status, limbs }) {
+    const cost = this.#cellsOf(person)?.costs[worst];
+    return [person, first, last, worst, status, cost, ...limbs.map(({ name, lost }) => `${name} ${lost}`)].join("|");
+  }
+
+  /** @param {number} person */
+  #cellsOf(person) {
+    const { lanes, timeline } = this.#store.facts;
+    return lanes.length > 0 ? lanes[person] : timeline;
+  }
+
+  /**
+   * @param {Doubt} doubt
+   * @returns {HTMLLIElement}
+   */
+  #row(doubt) {
+    const { session } = this.#store.facts;
+    const { person, first, last, worst, status, limbs, limb } = doubt;
+    const info = session?.people[person];
+    const row = document.createElement("li");
+    const go = document.createElement("button");
+    go.type = "button";
+    go.className = "doubt";
+    go.dataset.noCommand = "";
+    const image = document.createElement("img");
+    image.alt = "";
+    image.draggable = false;
+    const cost = this.#cellsOf(person)?.costs[worst] ?? 0;
+    this.#loader.watch(image, `thumbnail/${person}/${worst}?${limb === null ? "" : `limb=${limb}&`}v=${cost}`);
+    const text = document.createElement("span");
+    text.className = "doubt-text";
+    const frames = first === last ? `frame ${first}` : `frames ${first}–${last}`;
+    const remark = this.#cellsOf(person)?.get(worst)?.remark ?? "";
+    const why = limbs.length ? limbs.slice(0, 2).map(({ name, lost }) => `${name} ${percent(lost)}`) : [displayName(remark) || "pose uncertain"];
+    text.append(
+      line("status-badge", status, `is-${status}`),
+      ...((session?.people.length ?? 1) > 1 && info ? [named(info)] : []),
+      ...why.map((words) => line("doubt-limb", words)),
+      line("quiet", frames),
+    );
+    go.append(image, text);
+    go.title = `Go to frame ${worst}, the worst of ${frames}`;
+    go.addEventListener("click", (event) => {
+      if (event.detail > 0) go.blur();
+      this.#queue.visit(doubt);
+    });
+    const accept = iconButton(TICK, `Accept: mark ${frames} as reviewed (Alt+Enter)`, () => this.#queue.accept(doubt));
+    accept.classList.add("doubt-accept");
+    row.append(go, accept);
+    return row;
+  }
+}
+
+/**
+ * @param {string} kind class
+ * @param {string} text
+ * @param {string} [more] another class
+ */
+function line(kind, text, more) {
+  const one = document.createElement("span");
+  one.className = kind;
+  if (more) one.classList.add(more);
+  one.textContent = text;
+  return one;
+}
+
+/** @param {import("../model/protocol.js").PersonInfo} person */
+function named({ name, color }) {
+  const one = line("person-name", name);
+  one.style.setProperty("--person", color);
+  return one;
+}

@@ -1,0 +1,150 @@
+"""Before and after of fits and searches: what is compared, how long it holds, and where the page warns."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gestures import PAGE, drag, pixel_of, wait_for
+
+from app.control.session import comparing
+from app.drawing import overlays
+from app.page import messages
+from app.state.page_view import View
+from tracker.errors import TrackerError
+from tracker.search.best_first import SearchSettings
+from tracker.tracking.chamfer.settings import TrackSettings
+
+QUICK = TrackSettings(search=SearchSettings(passes=(1.0,), max_expansions=3))
+CONTOURS = View(frozenset({"contours"}), (1, 1, 1, 1), False)
+
+
+@pytest.fixture
+def fitted(opened):
+    controller = opened()
+    drag(controller, "left_wrist", (20.0, 5.0))
+    before = controller.state
+    controller.pinning.fit(0)
+    return controller, before
+
+
+def test_a_fit_is_compared_with_the_pose_before_it(fitted):
+    controller, before = fitted
+    state = controller.state
+    told = messages.state(controller.session, state).compared
+    assert (told.work, told.is_before_shown) == ("fit", False)
+    assert told.before_px == pytest.approx(before.cost_px)
+    assert told.after_px == state.cost_px < told.before_px
+    assert told.before_view_costs_px == pytest.approx(before.view_costs_px)
+    assert told.after_view_costs_px == state.view_costs_px
+
+
+def test_the_views_show_the_pose_before_and_nothing_is_undone(fitted):
+    controller, before = fitted
+    result, undo = controller.state, controller.state.undo
+    controller.comparing.show_before(True)
+    state = controller.state
+    assert state.drawn.poses[0] is before.poses[0]
+    assert messages.state(controller.session, state).cost_px == pytest.approx(before.cost_px)
+    assert (state.people, state.undo, state.saved) == (result.people, undo, True)
+    kinds = {p.kind for p in overlays.paths(controller.session_of(state), state, CONTOURS, None)}
+    assert "result" in kinds  # the result, to see where they differ
+    assert not state.is_stored_drawn
+    controller.comparing.show_before(False)
+    assert controller.state.drawn is controller.state
+
+
+@pytest.mark.parametrize("change", ["undo", "drag", "seek", "size"])
+def test_a_comparison_ends_with_the_result(fitted, change):
+    controller, _ = fitted
+    controller.comparing.show_before(True)
+    if change == "undo":
+        controller.history.undo()
+    elif change == "drag":
+        drag(controller, "left_wrist", (5.0, 0.0))
+    elif change == "seek":
+        controller.navigation.seek(3)
+    else:
+        controller.body_sizes.set_height(0, 1.1 * controller.models[0].height_m)
+        controller.body_sizes.apply(0, refit=True)
+    assert controller.state.compared is None
+    assert controller.state.drawn is controller.state
+    with pytest.raises(TrackerError, match="fit or search"):
+        controller.comparing.show_before(True)
+
+
+def test_a_comparison_is_back_with_its_result(fitted):
+    controller, _ = fitted
+    noted = controller.state.compared
+    controller.history.undo()
+    controller.history.redo()
+    assert controller.state.compared is noted
+    controller.navigation.seek(1)
+    controller.navigation.seek(0)
+    assert controller.state.compared is noted
+
+
+def test_a_search_is_compared_with_its_start(opened):
+    controller = opened()
+    before = controller.state
+    controller.search.set_settings(QUICK)
+    controller.search.step()
+    wait_for(lambda: controller.state.compared is not None)
+    first = controller.state.compared
+    controller.search.run()
+    wait_for(lambda: controller.state.search.message)
+    with controller.lock:
+        last = controller.state.compared
+    assert (first.work, first.number) == ("search", last.number)
+    assert last.before[0].values is before.poses[0]
+    assert last.before_px == pytest.approx(before.cost_px)
+    assert last.after_px < last.before_px
+    controller.comparing.show_before(True)
+    controller.replay.show(1, 0)
+    assert not controller.state.compared.is_before_shown
+
+
+def test_a_fit_that_leaves_a_placed_joint_is_reported(fitted):
+    controller, _ = fitted  # the wrist alone was placed, beside the person: the fit takes it away
+    assert "left the left wrist 25 cm from where you placed it" in controller.state.compared.warning
+    assert "body's sizes" in controller.state.compared.warning
+    controller.held_points.set(0, None, held=False)
+    drag(controller, "torso", (3.0, 0.0))
+    controller.pinning.fit(0)
+    assert controller.state.compared.warning == ""  # nothing is held
+
+
+def test_a_fit_that_leaves_a_pin_is_reported(fitted):
+    controller, _ = fitted
+    noted = controller.state.compared
+    controller.held_points.set(0, None, held=False)
+    u, v = pixel_of(controller, "right_wrist", camera=1)
+    for off_px, is_left in ((1.0, False), (40.0, True)):
+        controller.pinning.begin(PAGE, 0, 1, 0, "right_wrist", (u + off_px, v), live=False)
+        controller.pinning.end(PAGE)
+        left = comparing._farthest_left(controller._session_state, noted, [0])
+        assert (left is not None and left[0] == "right wrist" and 0.1 < left[1] < 1.0) == is_left
+
+
+def test_a_placement_in_one_view_says_nothing_of_depth():
+    eye, was = np.array([0.0, -4.0, 1.0]), np.array([0.0, 0.0, 1.0])
+    assert comparing._across(was, np.array([0.0, 0.5, 1.0]), eye) == pytest.approx(0.0)
+    assert comparing._across(was, np.array([0.1, 0.5, 1.0]), eye) == pytest.approx(0.1)
+    assert comparing._across(was, np.array([0.0, 0.5, 1.0]), None) == pytest.approx(0.5)
+
+
+def test_costs_that_disagree_are_reported(fitted):
+    controller, _ = fitted
+    for before_px, after_px, views_before, views_after, words in [
+        (5.0, 5.4, (5.0, 5.0), (5.4, 5.4), "raised the cost from 5.00 to 5.40 px; undo it"),
+        (5.0, 4.6, (5.0, 5.0), (6.0, 3.2), "raised that of FRONT from 5.00 to 6.00"),
+        (5.0, 4.6, (5.0, 5.0), (5.2, 4.0), ""),
+        (5.0, 4.6, (1.0, None), (1.25, 5.0), ""),  # a large share of little
+        (None, None, (), (), ""),
+    ]:
+        noted = replace(
+            controller.state.compared,
+            before_px=before_px, after_px=after_px,
+            before_view_costs_px=views_before, after_view_costs_px=views_after,
+        )  # fmt: skip
+        warning = comparing._warning(controller._session_state, noted, [])
+        assert (words in warning) if words else warning == ""

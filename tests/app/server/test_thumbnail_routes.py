@@ -1,0 +1,97 @@
+"""Requests for thumbnails: one at a time beside everything else, bounded, and only of this page."""
+
+import asyncio
+import threading
+
+import aiohttp
+import pytest
+from serving import listening
+
+from app.server import server, thumbnail_routes
+from app.server.access import Access
+from app.server.thumbnail_routes import ThumbnailRoutes
+from tracker.errors import RecordingError
+
+JPEG = b"\xff\xd8 a picture"
+
+
+class Nobody:
+    async def serve(self, socket):
+        pass
+
+
+class Maker:
+    """Makes thumbnails when it is let go."""
+
+    def __init__(self):
+        self.asked, self.free, self.is_busy = [], threading.Event(), False
+        self.free.set()
+
+    def make(self, person, frame, limb):
+        self.asked.append((person, frame, limb))
+        assert self.free.wait(10)
+        if frame == 404:
+            return None
+        if frame == 500:
+            raise RecordingError("the drive is away")
+        return JPEG
+
+
+@pytest.fixture
+async def client(tmp_path):
+    maker = Maker()
+    app = server.create_app(Nobody(), tmp_path / "nobody", Access(), server.static_folder())
+    ThumbnailRoutes(maker.make, lambda: maker.is_busy).add_to(app)
+    async with listening(app) as port, aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session:
+        yield session, maker
+        maker.free.set()
+
+
+async def status(session, path, **headers):
+    async with session.get(path, headers=headers) as response:
+        return response.status
+
+
+async def test_a_thumbnail_is_sent_as_jpeg(client):
+    session, maker = client
+    async with session.get("/thumbnail/1/31?limb=2&v=3.5") as response:
+        assert (response.status, response.content_type, await response.read()) == (200, "image/jpeg", JPEG)
+    assert await status(session, "/thumbnail/0/7") == 200
+    assert maker.asked == [(1, 31, 2), (0, 7, None)]
+    assert await status(session, "/thumbnail/0/404") == 404
+    assert await status(session, "/thumbnail/0/500") == 503
+    for wrong in ("/thumbnail/x/1", "/thumbnail/0/-1", "/thumbnail/0/1?limb=a", f"/thumbnail/0/{10**12}"):
+        assert await status(session, wrong) == 404
+    assert await status(session, "/thumbnail/0/1", **{"Sec-Fetch-Site": "cross-site"}) == 403
+
+
+async def test_nothing_waits_for_a_thumbnail(client, monkeypatch):
+    session, maker = client
+    monkeypatch.setattr(thumbnail_routes, "_MAX_WAITING", 3)
+    maker.free.clear()
+    async with asyncio.timeout(10):
+        waiting = [asyncio.create_task(status(session, f"/thumbnail/0/{frame}")) for frame in range(3)]
+        while not maker.asked:
+            await asyncio.sleep(0.01)
+        assert await status(session, "/static/icon.svg") == 200  # the page is served meanwhile
+        assert len(maker.asked) == 1  # one at a time
+        assert await status(session, "/thumbnail/0/9") == 503  # too many
+        maker.free.set()
+        assert await asyncio.gather(*waiting) == [200] * 3
+        maker.is_busy = True
+        assert await status(session, "/thumbnail/0/1") == 503
+
+
+async def test_a_thumbnail_that_nobody_waits_for_is_not_made(client):
+    session, maker = client
+    maker.free.clear()
+    async with asyncio.timeout(10):
+        first, second = [asyncio.create_task(status(session, f"/thumbnail/0/{frame}")) for frame in (1, 2)]
+        while not maker.asked:
+            await asyncio.sleep(0.01)
+        second.cancel()
+        await asyncio.sleep(0.1)
+        maker.free.set()
+        assert await first == 200
+        assert await status(session, "/thumbnail/0/3") == 200
+    assert [frame for _, frame, _ in maker.asked] == [1, 3]

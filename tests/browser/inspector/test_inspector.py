@@ -1,0 +1,195 @@
+"""The inspector: sections, fields, what they ask of the program, and its room beside the views."""
+
+import pytest
+from page_driver import shows, until
+
+
+async def opened(page, *sections):
+    """Open the inspector by its key, with some sections open."""
+    await page.keyboard.press("Alt+i")
+    await page.evaluate(
+        "(open) => document.querySelectorAll('.section').forEach((s) => (s.open = open.includes(s.dataset.section)))",
+        sections,
+    )
+    await page.locator("#inspector").wait_for()
+
+
+def row(page, label):
+    return page.locator(".row", has=page.get_by_text(label, exact=True))
+
+
+async def test_settings_are_changed_marked_and_reset(page, endpoint):
+    await opened(page, "track", "search")
+    await row(page, "Prediction").locator("select").select_option("2")
+    await row(page, "Search lost limbs").locator("input").uncheck()
+    angle = row(page, "Angle bound").locator("input")
+    assert await angle.input_value() == "15"
+    await angle.fill("20")
+    await page.keyboard.press("Enter")
+    await row(page, "Passes").locator("input").fill("1, 0.5")
+    await page.keyboard.press("Enter")
+    await until(lambda: len(endpoint.received) == 4)
+    order, recover, bound, passes = endpoint.received
+    assert order == {"type": "track_settings", "changes": {"order": 2}}
+    assert recover == {"type": "track_settings", "changes": {"recover": False}}
+    assert bound["changes"]["bound_rad"] == pytest.approx(0.349066)
+    assert passes == {"type": "search_settings", "changes": {"passes": [1, 0.5]}}
+    endpoint.settings["search"]["bound_rad"] = 0.349066
+    await endpoint.broadcast(endpoint.settings)
+    await shows(page, "document.querySelectorAll('.row-label.is-changed').length === 1")
+    await page.locator("[data-section=search] button", has_text="Reset").click()
+    await until(lambda: len(endpoint.received) == 5)
+    assert endpoint.received[-1]["changes"] == endpoint.settings["search_default"]
+
+
+async def test_a_value_out_of_range_is_refused_with_its_range(page, endpoint):
+    await opened(page, "track", "body")
+    for label, value, told in (("Past poses", "9", "from 1 to 8"), ("Height", "900", "from 30 to 300")):
+        field = row(page, label).locator("input")
+        await field.fill(value)
+        await page.keyboard.press("Enter")
+        await shows(page, f"document.querySelector('#notices').textContent.includes('{told}')")
+        assert await field.get_attribute("aria-invalid") == "true"
+        await page.keyboard.press("Escape")
+    assert endpoint.received == []
+
+
+async def test_sizes_are_entered_in_centimetres_then_applied(page, endpoint):
+    await opened(page, "body")
+    table = page.locator(".size-table")
+    labels = await table.locator(".size-label").all_inner_texts()
+    assert [label for label in labels if label] == ["Length", "Depth", "Width", "Torso", "Forearm", "Hips"]
+    await table.get_by_label("Forearm: thickness from side to side").fill("14")
+    await page.keyboard.press("Enter")
+    await table.get_by_label("Distance between the two hip joints").press("ArrowUp")
+    await until(lambda: len(endpoint.heard("body_sizes")) == 2)
+    assert endpoint.received == [
+        {"type": "body_sizes", "person": 0, "action": "part", "part": "left_forearm", "half_width_m": 0.07},
+        {"type": "body_sizes", "person": 0, "action": "width", "girdle": "hip", "width_m": pytest.approx(0.175)},
+    ]
+    apply = page.locator("[data-section=body]").get_by_role("button", name="Apply")
+    assert await apply.is_disabled()
+    endpoint.body_sizes |= {"edited": True, "sides_alike": False}
+    await endpoint.broadcast(endpoint.body_sizes)
+    await shows(page, "document.querySelector('.size-table').textContent.includes('Right forearm')")
+    assert "Not applied yet" in await page.locator("[data-section=body] [role=status]").inner_text()
+    await row(page, "Keyframes").locator("select").select_option("keep")
+    await apply.click()
+    await until(lambda: len(endpoint.received) == 3)
+    assert endpoint.received[-1] == {"type": "body_sizes", "person": 0, "action": "apply", "refit": False}
+
+
+async def test_the_3d_view_is_chosen(page, endpoint):
+    await opened(page, "view")
+    await row(page, "Floor grid").locator("input").uncheck()
+    await row(page, "Look through").locator("select").select_option(label="RIGHT")
+    await page.locator(".trail-points").get_by_label("head").check()
+    await row(page, "Opacity").locator("input").fill("0.5")
+    await page.get_by_role("button", name="Set floor…").click()
+    await until(lambda: len(endpoint.received) == 5)
+    assert endpoint.received == [
+        {"type": "view_3d", "changes": {"floor": False}},
+        {"type": "snap", "camera": 1},
+        {"type": "view_3d", "changes": {"trail_points": ["head"]}},
+        {"type": "view_3d", "changes": {"opacity": 0.5}},
+        {"type": "floor", "action": "begin"},
+    ]
+
+
+async def test_angles_of_the_joint_have_whole_names_and_sliders(page, endpoint):
+    await opened(page, "joint")
+    names = await page.locator("[data-section=joint] .row-label").all_inner_texts()
+    assert names == ["X", "Y", "Z", "Abduction", "Elevation", "Twist"]
+    await row(page, "Twist").locator("[type=range]").fill("45")
+    await until(lambda: endpoint.received)
+    assert endpoint.received[0] == {
+        "type": "pose", "frame": 12, "person": 0, "action": "set", "dof": 6, "value": 45,
+    }  # fmt: skip
+
+
+@pytest.mark.endpoint(n_people=2)
+async def test_it_leaves_the_views_room_and_stays_open_after_a_reload(page):
+    await page.set_viewport_size({"width": 1280, "height": 720})
+    boxes = {}
+    for state in ("closed", "open"):
+        boxes[state] = [await page.locator(f"#{name}").bounding_box() for name in ("panes", "scene")]
+        if state == "closed":
+            await page.locator("#show-inspector").click()
+            await page.locator("#inspector").wait_for()
+    panes, scene = boxes["open"]
+    inspector = await page.locator("#inspector").bounding_box()
+    assert panes["width"] >= 690
+    assert scene["width"] >= 290
+    assert boxes["closed"][0]["width"] >= panes["width"]
+    assert inspector["x"] >= scene["x"] + scene["width"] - 1
+    assert inspector["x"] + inspector["width"] <= 1280
+    last = await page.locator("#show-key-list").bounding_box()
+    assert last["x"] + last["width"] <= 1280
+    await page.locator("[data-section=search] summary").click()
+    await page.reload()
+    await shows(page, "window.quadrille?.state.settings && document.querySelector('[data-section=search]').open")
+    assert await page.locator("#inspector").is_visible()
+    assert await page.locator("#inspector").evaluate("(one) => one.scrollWidth <= one.clientWidth")
+
+
+FOUND = {
+    "body": ("Body sizes", "Height, cm"),
+    "sizes": ("Body sizes", "Height, cm"),
+    "settings": ("Track settings", "How the pose"),
+    "track settings": ("Track settings", "How the pose"),
+    "search settings": ("Search settings", "Angle bound, °"),
+    "angle bound": ("Angle bound", "Angle bound, °"),
+}
+
+
+async def test_the_palette_leads_to_sections_and_rows(page, endpoint):
+    for query, (label, focused) in FOUND.items():
+        await page.keyboard.press("Control+k")
+        await page.keyboard.type(query)
+        assert await page.locator("#palette-list li > span").first.inner_text() == label
+        await page.keyboard.press("Enter")
+        name = "(document.activeElement.ariaLabel ?? document.activeElement.closest('label').title)"
+        await shows(page, f"{name}.startsWith('{focused}')")
+    assert endpoint.received == []
+
+
+FIRST = {
+    "dark": "Dark theme",
+    "light": "Light theme",
+    "theme": "Theme",
+    "zoom": "Zoom all views to the people",
+    "track": "Track forward",
+    "search": "Search panel",
+}
+
+
+async def test_words_of_a_beginner_find_something(page):
+    await page.keyboard.press("Control+k")
+    for query, label in FIRST.items():
+        await page.locator("#palette-query").fill(query)
+        assert await page.locator("#palette-list li > span").first.inner_text() == label, query
+
+
+GROUND = "getComputedStyle(document.querySelector('#scene')).backgroundColor"
+
+
+async def test_a_theme_is_chosen_kept_and_recolours_the_3d_view_as_it_stands(page, endpoint):
+    frame = page.frame_locator("#scene").locator("body")
+    await frame.evaluate("() => (window.isLoadedOnce = true)")
+    dark = await page.evaluate(GROUND)
+    await page.keyboard.press("Control+k")
+    await page.keyboard.type("light")
+    await page.keyboard.press("Enter")
+    await shows(page, f"{GROUND} !== '{dark}'")
+    light = await page.evaluate(GROUND)
+    assert await frame.evaluate("(body) => getComputedStyle(body).backgroundColor") == light
+    assert await frame.evaluate("() => window.isLoadedOnce")
+    await page.reload()
+    await shows(page, "window.quadrille?.state.overlay")
+    assert await page.evaluate(GROUND) == light
+    await opened(page, "view")
+    theme = row(page, "Theme").locator("select")
+    assert await theme.input_value() == "light"
+    await theme.select_option("system")
+    await shows(page, f"{GROUND} === '{dark}'")
+    assert endpoint.received == []

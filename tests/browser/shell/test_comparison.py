@@ -1,0 +1,54 @@
+"""Before and after of a fit or search in the page: costs, the key that shows the pose before, the warning."""
+
+from page_driver import shows, until
+
+WARNING = "The fit lowered the cost but left the left wrist 8 cm from where you placed it."
+COMPARED = {
+    "number": 4, "work": "fit", "before_px": 5.74, "after_px": 5.44, "before_view_costs_px": [6.0, 5.0, 5.9, None],
+    "after_view_costs_px": [5.0, 5.6, 5.9, None], "warning": "", "is_before_shown": False,
+}  # fmt: skip
+TEXT = "document.querySelector('#show-comparison').textContent"
+
+
+async def test_costs_before_and_after_are_shown_and_one_key_shows_the_pose_before(page, endpoint):
+    assert not await page.locator("#show-comparison").is_visible()
+    endpoint.state |= {"compared": COMPARED, "cost_px": 5.44}
+    await endpoint.broadcast(endpoint.state)
+    await shows(page, f"{TEXT} === '5.74 →'")
+    await page.locator("#show-comparison").click()
+    rows = await page.locator("#comparison-views tr").all_inner_texts()
+    assert [row.split() for row in rows] == [
+        ["FRONT", "6.00", "5.00", "▼", "−1.00"],
+        ["RIGHT", "5.00", "5.60", "▲", "+0.60"],
+        ["BACK", "5.90", "5.90", "0.00"],
+        ["LEFT", "–", "–"],
+        ["Mean", "5.74", "5.44", "▼", "−0.30"],
+    ]
+    await page.keyboard.press("Escape")
+    await page.keyboard.press("Shift+B")
+    await shows(page, "!document.querySelector('#before-badge').hidden")
+    assert "Before the fit: 5.74 px" in await page.locator("#before-badge").inner_text()
+    assert await page.locator("#toggle-before").get_attribute("aria-pressed") == "true"
+    await page.keyboard.press("Escape")
+    await shows(page, "document.querySelector('#before-badge').hidden")
+    assert [m["shown"] for m in endpoint.heard("before")] == [True, False]
+    endpoint.state["compared"] = None  # the pose has changed since
+    await endpoint.broadcast(endpoint.state)
+    await page.locator("#show-comparison").wait_for(state="hidden")
+    await page.keyboard.press("Shift+B")
+    await until(lambda: len(endpoint.heard("before")) == 2)
+
+
+async def test_a_result_that_disagrees_with_the_placement_is_reported_once(page, endpoint):
+    endpoint.state["compared"] = COMPARED
+    await endpoint.broadcast(endpoint.state)
+    await shows(page, f"{TEXT} !== ''")
+    for _ in range(2):
+        endpoint.state["compared"] = COMPARED | {"number": 5, "warning": WARNING}
+        await endpoint.broadcast(endpoint.state)
+        await shows(page, "quadrille.state.state.compared.number === 5")
+    notices = page.locator("#notices .notice", has_text="left wrist 8 cm")
+    await notices.wait_for()
+    assert await notices.count() == 1
+    await page.locator("#show-comparison").click()
+    assert await page.locator("#comparison-warning").inner_text() == WARNING
