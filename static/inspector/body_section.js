@@ -196,7 +196,7 @@ export class BodySection {
  * @param {boolean} hasOtherSizes whether the pose of the frame belongs to another body
  */
 function note({ edited, outcome }, hasOtherSizes) {
-  if (edited) return "Not applied yet: the blue outline in the views shows these sizes.";
+  if (edited) return "Not applied yet: the second outline in the views shows these sizes.";
   return outcome || (hasOtherSizes ? "The pose of this frame belongs to other sizes and is shown with them." : "");
 }
 

@@ -41,7 +41,7 @@ export function jointSection({ store, notify }, { posing }) {
       name: `${displayName(info.joint)} ${info.name}, ${unit}`,
       low: low - 0.05,
       high: high + 0.05,
-      step: posing.steps[info.unit],
+      step: () => posing.steps[info.unit],
       change: (value) => value !== null && posing.set(dof, value),
       refuse,
     });

@@ -38,7 +38,7 @@ export function numberRow({ label, title, unit = "", low, high, step, auto, chan
  * Make a number field that refuses values outside its limits and steps with the arrow keys. Without `digits` it shows as
  * few as it can.
  *
- * @param {{name: string, low: number, high: number, step: number, digits?: number, allowsNone?: boolean,
+ * @param {{name: string, low: number, high: number, step: number | (() => number), digits?: number, allowsNone?: boolean,
  *   change: (value: number | null) => void, refuse: Refuse}} options
  */
 export function boundedField({ name, low, high, step, digits, allowsNone = false, change, refuse }) {
@@ -58,7 +58,8 @@ export function boundedField({ name, low, high, step, digits, allowsNone = false
     },
     refuse,
     step: (factor) => {
-      const to = Math.min(high, Math.max(low, (Number.isFinite(shown) ? shown : low) + factor * step));
+      const by = typeof step === "function" ? step() : step;
+      const to = Math.min(high, Math.max(low, (Number.isFinite(shown) ? shown : low) + factor * by));
       if (to !== shown) change(to);
     },
   });

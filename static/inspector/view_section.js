@@ -22,7 +22,7 @@ const LAYERS = [
   { name: "images", label: "Camera images", title: "Show the image of each camera, a moment after the frame changes" },
   { name: "floor", label: "Floor grid", title: "Draw a grid on the floor with a line every 50 cm" },
   { name: "gizmos", label: "Gizmos", title: "Draw the handles that move the body and turn the selected joint" },
-  { name: "ghost", label: "Prediction", title: "Draw in grey the pose that the tracker predicts for this frame from the poses before it" },
+  { name: "ghost", label: "Predicted pose", title: "Draw in grey the pose that the tracker predicts for this frame from the poses before it" },
 ];
 
 /**
@@ -92,11 +92,16 @@ export function viewSection({ store, send, themes }, { floor }) {
     heading("Trails"), trails.element, points, buttons(noTrails),
   ); // prettier-ignore
   let built = "";
+  let listed = "";
 
   const show = () => {
     const { view3d, state, session, theme: chosen } = store.facts;
     theme.show(chosen.choice);
-    if (session) camera.fill([[FREE, "Free view"], ...session.cameras.map(({ name }, i) => /** @type {[string, string]} */ ([String(i), name]))]);
+    const cameras = session?.cameras.map(({ name }) => name) ?? [];
+    if (cameras.join("\n") !== listed) {
+      listed = cameras.join("\n"); // an open list of choices must not be replaced
+      camera.fill([[FREE, "Free view"], ...cameras.map((name, i) => /** @type {[string, string]} */ ([String(i), name]))]);
+    }
     camera.show(state?.snapped == null ? FREE : String(state.snapped));
     if (!view3d) return;
     const { view } = view3d;

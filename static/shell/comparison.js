@@ -13,6 +13,8 @@ export class Comparison {
   #notify;
   #before = byId("show-comparison", HTMLButtonElement);
   #toggle;
+  #toggleHere;
+  #cost = /** @type {HTMLElement} */ (document.querySelector(".cost"));
   #badge = byId("before-badge", HTMLElement);
   #panel = byId("comparison-panel", HTMLElement);
   #title = byId("comparison-title", HTMLElement);
@@ -30,7 +32,8 @@ export class Comparison {
     this.#store = store;
     this.#notify = notify;
     this.#toggle = button("toggle-before", () => actions.toggleBefore());
-    opensPopover(this.#panel, this.#before, () => togglePopover(this.#panel, this.#before));
+    this.#toggleHere = button("toggle-before-here", () => actions.toggleBefore());
+    opensPopover(this.#panel, this.#before, () => togglePopover(this.#panel, this.#cost));
     store.subscribe((changed) => {
       if (changed.has("state") || changed.has("connected")) this.#show();
     });
@@ -41,7 +44,7 @@ export class Comparison {
     const last = state?.compared ?? null;
     const isBefore = !!last?.is_before_shown && !state?.replay;
     this.#before.hidden = this.#toggle.hidden = !last;
-    this.#toggle.disabled = !connected;
+    this.#toggle.disabled = this.#toggleHere.disabled = !connected;
     this.#toggle.setAttribute("aria-pressed", String(isBefore));
     this.#badge.hidden = !isBefore;
     if (!state || !last) {
@@ -55,7 +58,8 @@ export class Comparison {
     this.#before.title = `Cost before and after the ${last.work}: ${costs(last.before_px, last.after_px)}. Click for each view`;
     this.#badge.textContent = `Before the ${last.work}: ${px(last.before_px)} · Shift+B shows the result`;
     const label = isBefore ? `Show the result of the ${last.work}` : `Show the pose before the ${last.work}`;
-    this.#toggle.title = `${label} (Shift+B)`;
+    this.#toggle.title = this.#toggleHere.title = `${label} (Shift+B)`;
+    this.#toggleHere.textContent = isBefore ? "Show result" : "Show before";
     this.#toggle.setAttribute("aria-label", label);
     this.#list(last);
     this.#warn(last);

@@ -55,7 +55,7 @@ export function mount(context, rooms) {
   const history = new HistoryList(store, send);
   new ExportPanel(store, context.notify);
   new SavedMark(store, send);
-  const sessions = new Sessions(store);
+  const sessions = new Sessions(store, context.notify);
   new Announcer(byId("announcer", HTMLElement), store);
   const firstSteps = new FirstSteps(store);
   const palette = new Palette({ store, navigation, grid, posing, layers, actions, inspector: rooms.inspector.inspector, away: reasons.away });

@@ -6,6 +6,8 @@ import { NewSession } from "./new_session.js";
 import { completePaths, postJson } from "./session_requests.js";
 
 const POLL_MS = 300;
+/** A slow disk and an old processor need half of it. */
+const PATIENCE_MS = 60_000;
 
 /** @typedef {{refusal: string | null, folder: string, recent: {folder: string, name: string, opened: string}[]}} Listed */
 
@@ -22,9 +24,15 @@ export class Sessions {
   /** Folder of the open session. */
   #present = "";
 
-  /** @param {import("../model/store.js").Store} store */
-  constructor(store) {
+  #notify;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {(notice: import("../model/protocol.js").NoticeMessage) => void} notify
+   */
+  constructor(store, notify) {
     this.#store = store;
+    this.#notify = notify;
     opensPopover(this.#panel, this.#open, () => this.toggle());
     this.#form.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -107,8 +115,13 @@ export class Sessions {
       this.#say(error instanceof Error ? error.message : String(error), true);
       return;
     }
-    await untilAnotherIsOpen(this.#present);
-    location.reload();
+    if (await untilAnotherIsOpen(this.#present)) {
+      location.reload();
+      return;
+    }
+    const text = `Expected ${this.#store.facts.opening} to be open by now. The terminal of the program says what is wrong.`;
+    this.#store.set({ opening: null });
+    this.#notify({ type: "notice", level: "error", text });
   }
 
   /**
@@ -122,18 +135,20 @@ export class Sessions {
 }
 
 /**
- * Wait until the program has been replaced by one that serves another session.
+ * Wait until the program has been replaced by one that serves another session. Returns whether it has in time.
  *
  * @param {string} present folder of the session that is being closed
  */
 async function untilAnotherIsOpen(present) {
-  for (;;) {
+  const deadline = performance.now() + PATIENCE_MS;
+  while (performance.now() < deadline) {
     await new Promise((resolve) => setTimeout(resolve, POLL_MS));
     try {
       const { folder } = await (await fetch("sessions")).json();
-      if (folder !== present) return;
+      if (folder !== present) return true;
     } catch {
       // The program is starting.
     }
   }
+  return false;
 }

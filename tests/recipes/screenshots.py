@@ -7,7 +7,6 @@ docs/tutorial.md shows, as JPEG.
 
 import argparse
 import asyncio
-import contextlib
 import shutil
 import sys
 import tempfile
@@ -22,7 +21,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
 from chromium import FLAGS, chromium_path
 from page_driver import handle_of, shows, to_client
-from playwright.async_api import Browser, Page, TimeoutError, async_playwright
+from playwright.async_api import Browser, Page, async_playwright
 from program import ROOT, Program
 
 from tracker.evaluation.references import read_joints
@@ -156,8 +155,6 @@ async def fitted(page: Page) -> None:
     """Two people placed by hand, then fitted."""
     await page.keyboard.press("g")
     await shows(page, "/fit/i.test(quadrille.state.state.undo ?? '')", 60)
-    # What the 3-D view says of machines without a graphics card is no part of the picture.
-    await page.frame_locator("#scene").locator(".mantine-Notification-closeButton").first.click(timeout=60_000)
 
 
 async def before_fit(page: Page) -> None:
@@ -178,6 +175,39 @@ async def doubts(page: Page) -> None:
     await shows(
         page, "[...document.querySelectorAll('.doubt img')].slice(0, 3).every((one) => one.naturalWidth > 0)", 60
     )
+
+
+async def inspector(page: Page) -> None:
+    """Other sizes that are not applied yet, and the settings below them."""
+    await page.keyboard.press("Alt+i")
+    upper_arm = page.get_by_label("Upper arm: length between its joints, cm")
+    await upper_arm.fill("36")
+    await page.keyboard.press("Enter")
+    await shows(page, "quadrille.state.bodySizes.edited", 20)
+
+
+async def settings(page: Page) -> None:
+    """Settings of tracker, search and view."""
+    await page.keyboard.press("Alt+i")
+    for section in ("body", "track", "search", "view"):
+        await page.click(f"[data-section={section}] summary")
+
+
+async def sessions(page: Page) -> None:
+    """What opens another session."""
+    await page.keyboard.press("Control+o")
+
+
+async def new_session(page: Page) -> None:
+    """The form of a new session, with the first check that fails."""
+    await page.keyboard.press("Control+k")
+    await page.keyboard.type("new session")
+    await page.keyboard.press("Enter")
+    for name, value in {"footage": SAMPLES / "tango", "calibration": SAMPLES / "tango" / "calibration.toml"}.items():
+        await page.fill(f"#new-{name}", str(value))
+    await page.fill("#new-folder", str(SAMPLES))
+    await page.keyboard.press("Enter")
+    await page.locator("#new-session-checks .is-failed").wait_for()
 
 
 async def filled(page: Page) -> None:
@@ -210,11 +240,17 @@ SCREENS = [
     Screenshot("before-fit", "near", before_fit),
     Screenshot("doubts", "tango", doubts),
     Screenshot("doubts-light-large", "tango", doubts, LARGE, "light"),
+    Screenshot("inspector", "placed", inspector),
+    Screenshot("inspector-light-large", "tango", inspector, LARGE, "light"),
+    Screenshot("settings", "tango", settings),
+    Screenshot("settings-light-large", "placed", settings, LARGE, "light"),
+    Screenshot("sessions", "placed", sessions),
+    Screenshot("new-session", "fresh", new_session),
     Screenshot("two-people", "tango", nothing),
     Screenshot("page", "tango", fitted, (1600, 900)),
 ]
 
-TUTORIAL = ("empty", "posing", "pins", "search-replay", "landscape", "curves", "palette")
+TUTORIAL = ("empty", "inspector", "posing", "pins", "search-replay", "landscape", "curves", "palette")
 
 
 def make_sessions(folder: Path, wanted: set[str]) -> dict[str, Path]:
@@ -257,7 +293,7 @@ def place(session: Session, near: bool) -> None:
 async def opened(browser: Browser, folder: Path, screen: Screenshot):
     """The page of a session, with its first frame and its cost on the screen."""
     with tempfile.TemporaryDirectory() as name:
-        program = Program(shutil.copytree(folder, Path(name) / folder.name))
+        program = Program(shutil.copytree(folder, Path(name) / folder.name), has_token=True)
         await program.start()
         context = await browser.new_context(
             viewport={"width": screen.size[0], "height": screen.size[1]}, color_scheme=screen.scheme
@@ -270,13 +306,6 @@ async def opened(browser: Browser, folder: Path, screen: Screenshot):
         finally:
             await context.close()
             await program.kill()
-
-
-async def _close_rendering_card(page: Page) -> None:
-    """Close viser's remark that the browser renders in software: few users see it."""
-    button = page.frame_locator("#scene").locator(".mantine-Notification-closeButton")
-    with contextlib.suppress(TimeoutError):
-        await button.click(timeout=20_000)
 
 
 async def take(out: Path, only: str, tutorial: bool) -> None:
@@ -292,7 +321,6 @@ async def take(out: Path, only: str, tutorial: bool) -> None:
                 async with opened(browser, sessions[screen.session], screen) as page:
                     if screen.session != "fresh":
                         await page.click("#close-first-steps")
-                    await _close_rendering_card(page)
                     await screen.act(page)
                     await asyncio.sleep(SETTLE_S)
                     await page.screenshot(path=path, timeout=120_000, **({"quality": 80} if tutorial else {}))

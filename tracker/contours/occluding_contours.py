@@ -83,7 +83,7 @@ def contour_buffer(camera: Camera, n_bodies: int, piece_px: float = PIECE_PX) ->
     )  # fmt: skip
 
 
-@njit(inline="always", **FAST_MATH)
+@njit(**FAST_MATH)
 def mark_all_occluded(n_parts: int, surfaces: Surfaces, out: Pieces) -> None:
     """Mark the pieces that parts occlude of one another.
 
@@ -136,7 +136,7 @@ def focal_px(P: Array) -> float:
     return np.sqrt(P[0, 0] ** 2 + P[0, 1] ** 2 + P[0, 2] ** 2)
 
 
-@njit(inline="always", **FAST_MATH)
+@njit(**FAST_MATH)
 def trace_part(
     part: int, P: Array, focal: float, surfaces: Surfaces, piece_px: float, n: int, edge: int, out: Pieces
 ) -> tuple[int, int]:  # fmt: skip
@@ -167,7 +167,7 @@ def trace_part(
 def trace_pieces(P: Array, eye: Array, surfaces: Surfaces, piece_px: float, out: Pieces) -> int:
     """Fill the pieces of placed parts in one view and return their number; see `trace_view`."""
     n_parts, focal = surfaces.radii.shape[0], focal_px(P)
-    n = edge = 0
+    n = edge = np.int64(0)  # a literal would compile `trace_part` once more
     place_eye(eye, out)
     for part in range(n_parts):
         out.firsts[part], out.is_static[part] = n, False
@@ -176,7 +176,7 @@ def trace_pieces(P: Array, eye: Array, surfaces: Surfaces, piece_px: float, out:
     for i in range(n):
         out.occluded[i] = False
     mark_all_occluded(n_parts, surfaces, out)
-    return n
+    return int(n)
 
 
 @njit(nogil=True, cache=True)

@@ -94,7 +94,7 @@ def trace_static(
 ) -> None:
     """Fill the pieces of the static parts in one view, as if the moving parts did not exist; parts are placed."""
     n_parts, focal = static.moves.shape[0], focal_px(P)
-    n = edge = 0
+    n = edge = np.int64(0)
     place_eye(eye, out)
     for part in range(n_parts):
         out.firsts[part], out.is_static[part] = n, False
@@ -132,7 +132,7 @@ def trace_moving_parts(
     """Fill the pieces of one view as `occluding_contours.trace_pieces` does; static parts come from the cache."""
     n_parts, room = static.moves.shape[0], out.edges.shape[0]
     # Cached edges keep their numbers, which are smaller.
-    n, edge, focal = 0, n_parts * MAX_POINTS, focal_px(P)
+    n, edge, focal = np.int64(0), n_parts * MAX_POINTS, focal_px(P)
     place_eye(eye, out)
     for part in range(n_parts):
         out.firsts[part], out.is_static[part] = n, not static.moves[part]
@@ -154,7 +154,7 @@ def trace_moving_parts(
         n += int(count)
     out.firsts[n_parts] = n
     mark_all_occluded(n_parts, surfaces, out)
-    return n
+    return int(n)
 
 
 @njit(**FAST_MATH)

@@ -144,12 +144,15 @@ def _descend(
         if cost_there >= cost:
             break
         gained, cost = cost - cost_there, cost_there
-        pose[:] = trial
+        for k in range(n):  # an assignment to a slice takes a second to compile
+            pose[k] = trial[k]
         here, there = there, here
         damping = max(MIN_DAMPING, damping / 10.0)
         if moved < tolerance or gained < gain:
             break
-    hessian[:] = here.hessian
+    for i in range(n):
+        for k in range(n):
+            hessian[i, k] = here.hessian[i, k]
     return cost, iterations
 
 
@@ -158,7 +161,7 @@ def _room(n: int) -> _Linear:
     return _Linear(np.empty(n), np.empty((n, n)), np.empty((n, 3)), np.empty((n, 3)))
 
 
-@njit(inline="always", nogil=True, cache=True)
+@njit(nogil=True, cache=True)
 def _linearize(blocks: _Blocks, pose: Array, out: _Linear) -> float:
     """Fill the normal equations of all blocks at a pose, (n_dofs,); return the cost."""
     term, n = blocks.contours, pose.shape[0]

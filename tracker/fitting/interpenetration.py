@@ -208,7 +208,10 @@ def add_penetration(
     if term.Ts.shape[0] == 0:
         return 0.0
     own = kinematics.Ts_world_part
-    term.Ts[term.first : term.first + own.shape[0]] = own
+    for part in range(own.shape[0]):
+        for i in range(4):
+            for k in range(4):
+                term.Ts[term.first + part, i, k] = own[part, i, k]
     n = _list_contacts(term)
     rows, parts = term.rows[:n], term.parts[:n]
     return _accumulate(rows, parts, term.first, term.weight, kinematics, is_length, moves, gradient, hessian)

@@ -119,7 +119,7 @@ def _keep_within(
 
     Segments and distances are buffers, (M,) and (N,).
     """
-    n = 0
+    n = np.int64(0)
     for i in range(pieces.shape[0]):
         if not hidden[i]:
             segments.u[n], segments.v[n] = pieces[i, 0], pieces[i, 1]

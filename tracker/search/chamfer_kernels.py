@@ -173,9 +173,10 @@ def trace_views(
     for view in range(P.shape[0]):
         n = trace_pieces(P[view], eyes[view], surfaces, PIECE_PX, pieces)
         out.firsts[view] = at
-        out.ends[:, at : at + n] = pieces.ends[:, :n]
-        out.occluded[at : at + n] = pieces.occluded[:n]
-        out.edges[at : at + n] = pieces.edges[:n]
+        for i in range(n):
+            for k in range(4):
+                out.ends[k, at + i] = pieces.ends[k, i]
+            out.occluded[at + i], out.edges[at + i] = pieces.occluded[i], pieces.edges[i]
         at += n
     out.firsts[P.shape[0]] = at
     return at

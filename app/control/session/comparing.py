@@ -17,7 +17,7 @@ _LEFT_M = 0.06
 """Distance from its placement at which a joint counts as left, metres. Fits of the samples stay below it with bodies of
 the right size and placements off by 15 mm; with bodies an eighth too large or too small they exceed it."""
 _RISE_SHARE, _RISE_PX = 0.15, 0.3
-"""Rise of the cost of a view that counts, as a share and in px. It must exceed both."""
+"""Rise of the cost of a view, or of a fit to pins, that counts, as a share and in px. It must exceed both."""
 _WORSE_PX = 0.05
 """Rise of the mean cost that counts, px."""
 
@@ -100,8 +100,13 @@ def note_comparison(
 def _warning(session_state: SessionState, noted: PoseComparison, moved: Sequence[int]) -> str:
     """Return where the result disagrees with the user's placement or between views, as a sentence; empty if nowhere."""
     work, before_px, after_px = noted.work, noted.before_px, noted.after_px
-    if before_px is not None and after_px is not None and after_px > before_px + _WORSE_PX:
-        is_pinned = any(session_state.state.pins[person] for person in moved)
+    is_pinned = any(session_state.state.pins[person] for person in moved)
+    # Pins are set where edges mislead: some rise of the cost is what they are for.
+    if (
+        before_px is not None
+        and after_px is not None
+        and (_is_much_more(before_px, after_px) if is_pinned else after_px > before_px + _WORSE_PX)
+    ):
         why = ": pins and edges disagree; check the pins" if is_pinned else "; undo it"
         return f"The {work} raised the cost from {before_px:.2f} to {after_px:.2f} px{why}, or check the body's sizes."
     left = _farthest_left(session_state, noted, moved)
@@ -160,11 +165,15 @@ def _across(was: Array, now: Array, eye: Array | None) -> float:
     return float(np.linalg.norm(off - (off @ sight) * sight))
 
 
+def _is_much_more(was_px: float, now_px: float) -> bool:
+    return now_px > was_px + _RISE_PX and now_px > (1 + _RISE_SHARE) * was_px
+
+
 def _most_risen(noted: PoseComparison) -> tuple[int, float, float] | None:
     """Return the view whose cost rose most by share, and its costs before and after, px; None if none rose by much."""
     risen = [
         (now / max(1e-9, was), i, was, now)
         for i, (was, now) in enumerate(zip(noted.before_view_costs_px, noted.after_view_costs_px, strict=False))
-        if was is not None and now is not None and now > was + _RISE_PX and now > (1 + _RISE_SHARE) * was
+        if was is not None and now is not None and _is_much_more(was, now)
     ]
     return max(risen)[1:] if risen else None

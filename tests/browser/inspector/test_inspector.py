@@ -82,6 +82,8 @@ async def test_sizes_are_entered_in_centimetres_then_applied(page, endpoint):
 async def test_the_3d_view_is_chosen(page, endpoint):
     await opened(page, "view")
     await row(page, "Floor grid").locator("input").uncheck()
+    choice = row(page, "Look through").locator("option").nth(2)
+    await choice.evaluate("(option) => (window.option = option)")
     await row(page, "Look through").locator("select").select_option(label="RIGHT")
     await page.locator(".trail-points").get_by_label("head").check()
     await row(page, "Opacity").locator("input").fill("0.5")
@@ -94,6 +96,8 @@ async def test_the_3d_view_is_chosen(page, endpoint):
         {"type": "view_3d", "changes": {"opacity": 0.5}},
         {"type": "floor", "action": "begin"},
     ]
+    await shows(page, "quadrille.state.state.snapped === 1")
+    assert await choice.evaluate("(option) => option === window.option")  # an open list stays open
 
 
 async def test_angles_of_the_joint_have_whole_names_and_sliders(page, endpoint):

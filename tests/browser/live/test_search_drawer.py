@@ -135,7 +135,7 @@ async def test_runs_are_compared_in_cost_and_pose_and_one_is_taken(page):
     await page.locator("#notices").get_by_text("expected theta to be above 0 px").wait_for()
     await theta.fill("9")
     await theta.press("Enter")
-    await shows(page, "quadrille.state.searchSetup.theta_px === 9", 10)
+    await shows(page, "quadrille.state.settings.search.theta_px === 9", 10)
     await page.keyboard.press("Shift+F")
     await shows(page, f"{RUNS}.length === 2 && {OVER}", 60)
     rows = page.locator(".run-row")
@@ -153,7 +153,7 @@ async def test_runs_are_compared_in_cost_and_pose_and_one_is_taken(page):
     await shows(page, "quadrille.state.state.redo?.startsWith('take run')", 10)
     await theta.fill("")
     await theta.press("Enter")
-    await shows(page, "quadrille.state.searchSetup.theta_px === null", 10)
+    await shows(page, "quadrille.state.settings.search.theta_px === null", 10)
 
 
 async def test_a_candidate_is_seen_under_the_pointer_and_taken_by_a_click(page):

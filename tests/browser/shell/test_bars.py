@@ -43,6 +43,7 @@ async def test_a_field_that_is_done_gives_the_keys_back(page, endpoint):
     await page.keyboard.press("f")
     await until(lambda: [m["action"] for m in endpoint.heard("search")] == ["frame"])
     await page.mouse.click(*await to_client(page, 0, *await handle_of(page, 0, "l_elbow")))
+    await shows(page, "document.querySelector('#joint-bar .number-field').ariaLabel.startsWith('l elbow')")
     field = page.locator("#joint-bar .number-field").first
     await field.fill("40")
     await page.keyboard.press("Enter")

@@ -1,5 +1,6 @@
 """Before and after of a fit or search in the page: costs, the key that shows the pose before, the warning."""
 
+import pytest
 from page_driver import shows, until
 
 WARNING = "The fit lowered the cost but left the left wrist 8 cm from where you placed it."
@@ -37,6 +38,20 @@ async def test_costs_before_and_after_are_shown_and_one_key_shows_the_pose_befor
     await page.locator("#show-comparison").wait_for(state="hidden")
     await page.keyboard.press("Shift+B")
     await until(lambda: len(endpoint.heard("before")) == 2)
+
+
+@pytest.mark.endpoint(n_people=2)
+async def test_the_top_bar_has_room_for_a_comparison(page, endpoint):
+    job = endpoint.idle_job("done: 12,345 poses scored")
+    endpoint.state |= {"compared": COMPARED | {"before_px": 15.74}, "cost_px": 15.44, "job": job}
+    await endpoint.broadcast(endpoint.state)
+    await shows(page, f"{TEXT} === '15.74 →'")
+    for width in (1280, 1920):
+        await page.set_viewport_size({"width": width, "height": 720})
+        await shows(page, f"innerWidth === {width}")
+        boxes = [await one.bounding_box() for one in await page.locator(".top-bar button:visible").all()]
+        assert max(box["x"] + box["width"] for box in boxes) <= width
+        assert max(box["y"] + box["height"] for box in boxes) <= 48
 
 
 async def test_a_result_that_disagrees_with_the_placement_is_reported_once(page, endpoint):

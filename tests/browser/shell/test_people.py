@@ -86,6 +86,7 @@ LANE = """([lane, frame]) => {
 
 
 async def test_a_lane_has_the_colour_of_its_person_and_the_pattern_of_the_status(couple):
+    await shows(couple, "document.querySelector('#timeline canvas').width === 1280 * devicePixelRatio")
     for lane, color in enumerate(COLORS):
         plain, doubtful, lost = [await couple.evaluate(LANE, [lane, frame]) for frame in (15, 31, 50)]
         assert plain == [[color], 0.0]

@@ -148,3 +148,12 @@ def test_costs_that_disagree_are_reported(fitted):
         )  # fmt: skip
         warning = comparing._warning(controller._session_state, noted, [])
         assert (words in warning) if words else warning == ""
+    place = tuple(pixel_of(controller, "right_wrist"))
+    controller.pinning.begin(PAGE, 0, 0, 0, "right_wrist", place, live=False)
+    controller.pinning.end(PAGE)
+    controller.held_points.set(0, None, held=False)
+    for after_px, words in ((5.4, ""), (6.0, "pins and edges disagree")):  # pins may raise the cost a little
+        costs = {"before_view_costs_px": (), "after_view_costs_px": ()}
+        noted = replace(controller.state.comparison, before_px=5.0, after_px=after_px, **costs)
+        warning = comparing._warning(controller._session_state, noted, [0])
+        assert (words in warning) if words else warning == ""
