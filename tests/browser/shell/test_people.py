@@ -117,8 +117,8 @@ async def test_each_has_a_lane_and_two_poses_as_good_are_gone_to(couple, endpoin
 
 async def test_bars_and_legend_tell_what_is_visible_of_the_person_worked_on(couple, endpoint):
     cell = {
-        "source": "manual", "cost_px": 1.0, "keyframe": True, "status": "", "remark": "", "reviewed": False, "limbs_lost": [],
-        "ambiguous": False,
+        "source": "manual", "cost_px": 1.0, "keyframe": True, "status": "", "remark": "", "reviewed": False,
+        "ambiguous": False, "limbs_lost": [],
     }  # fmt: skip
     for person, is_keyframe in ((None, True), (0, False), (1, True)):
         cells = {12: cell | {"keyframe": is_keyframe}}
