@@ -106,6 +106,8 @@ class Handle:
     v: float
     visible: bool
     """False for an occluded joint."""
+    hidden_by: int | None
+    """Index of another person who occludes it, where the own body does not; null otherwise."""
     held: bool
     """Whether it stays in place while others are dragged."""
     side: Side
@@ -165,14 +167,41 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
     out, hidden_by_view = [], part_edges.points_occluded(bodies, list(seen.values()), np.concatenate(points))
     for (index, camera), hidden in zip(seen.items(), hidden_by_view, strict=True):
         first = 0
+        occluders = _other_occluders(bodies, camera, hidden)
         for person, body in enumerate(bodies):
             px, held = camera.project(points[person]), state.held_points(person)
             for i, name in enumerate(body.model.point_names):
                 if person not in state.visibility.hidden and np.all(np.isfinite(px[i])):
                     u, v = float(px[i, 0]), float(px[i, 1])
-                    out.append(Handle(index, person, name, u, v, not hidden[first + i], name in held, side_of(name)))
+                    by, is_held = occluders[first + i], name in held
+                    out.append(Handle(index, person, name, u, v, not hidden[first + i], by, is_held, side_of(name)))
             first += len(px)
     return out
+
+
+def _other_occluders(bodies: Sequence[PosedBody], camera: Camera, hidden: Mask) -> list[int | None]:
+    """Return for each point of all bodies the index of another body that occludes it, if its own does not.
+
+    Args:
+        bodies: all bodies in the scene.
+        camera: the view.
+        hidden: whether each point is occluded, (n,).
+    """
+    found: list[int | None] = [None] * len(hidden)
+    first = 0
+    for person, body in enumerate(bodies):
+        points = body.points_world
+        rest = first + np.flatnonzero(hidden[first : first + len(points)])
+        others = [i for i in range(len(bodies)) if i != person]
+        if others and len(rest):
+            rest = rest[~part_edges.points_occluded([body], [camera], points[rest - first])[0]]
+        for other in others:
+            if len(rest):
+                is_behind = part_edges.points_occluded([body, bodies[other]], [camera], points[rest - first])[0]
+                for point in rest[is_behind]:
+                    found[point] = other if found[point] is None else found[point]
+        first += len(points)
+    return found
 
 
 def out_of_reach(session: Session, state: State) -> OutOfReach | None:

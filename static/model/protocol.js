@@ -153,8 +153,8 @@
  * @typedef {{camera: number, person: number, kind: PathKind, color: string, side: Side, first: number, count: number}}
  *   Path
  * @typedef {{camera: number, person: number, part: number, depth: number, first: number, count: number}} Outline
- * @typedef {{camera: number, person: number, point: string, u: number, v: number, visible: boolean, held: boolean,
- *   side: Side}} Handle
+ * @typedef {{camera: number, person: number, point: string, u: number, v: number, visible: boolean, hidden_by: number |
+ *   null, held: boolean, side: Side}} Handle
  * @typedef {{camera: number, person: number, point: string, u: number, v: number, point_u: number, point_v: number,
  *   distance_m: number}} OutOfReach
  * @typedef {{camera: number, person: number, point: string, u: number, v: number, model_u: number | null, model_v:

@@ -20,6 +20,16 @@ export function isDimmed(state, person) {
 }
 
 /**
+ * Whether a joint is drawn as visible: nothing occludes it, or only a dimmed person does.
+ *
+ * @param {import("./protocol.js").StateMessage | null} state
+ * @param {import("./protocol.js").Handle} handle
+ */
+export function isInSight(state, { visible, hidden_by }) {
+  return visible || (hidden_by !== null && isDimmed(state, hidden_by));
+}
+
+/**
  * Cells of the person worked on.
  *
  * @param {import("./store.js").Facts} facts

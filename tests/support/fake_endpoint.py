@@ -153,6 +153,7 @@ class FakeEndpoint:
         self.before_drag = self.out_of_reach = None
         self.held_joints = set()
         self.sides_line = False  # whether there is a line of each side
+        self.hider = None  # index of the person who occludes what is not visible
         self.other_kind = None  # kind of another pose that is drawn
         self.seq = 0
         self.epipolar_of = None
@@ -519,6 +520,7 @@ class FakeEndpoint:
                     visible = (name.startswith("l_"), name.startswith("r_"))[camera % 2] or name in ("torso", "head")
                     handles.append({
                         "camera": camera, "person": p, "point": name, "u": u, "v": v, "visible": visible,
+                        "hidden_by": None if visible or self.hider is None else self.hider,
                         "held": (p, name) in self.held_joints, "side": SIDES.get(name[:2], ""),
                     })  # fmt: skip
             if self.epipolar_of and self.epipolar_of[0] != camera:

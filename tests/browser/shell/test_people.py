@@ -148,3 +148,15 @@ async def test_bars_and_legend_tell_what_is_visible_of_the_person_worked_on(coup
     await couple.keyboard.press("Shift+Digit6")
     await shows(couple, "document.querySelectorAll('#pose-legend svg').length === 1")
     assert "contours are hidden" in await legend.inner_text()
+
+
+async def test_a_joint_tells_by_whom_it_is_hidden_and_solo_shows_it(couple, endpoint):
+    endpoint.hider = 1
+    await endpoint.send_overlay()
+    await couple.mouse.click(*await to_client(couple, 0, *await handle_of(couple, 0, "r_wrist", 0)))
+    corner = couple.locator(".pane-joint").first
+    await shows(couple, "document.querySelector('.pane-joint').innerText.includes('hidden by person 1')")
+    assert "is occluded by person 1" in await corner.get_attribute("title")
+    await couple.keyboard.press("Shift+A")
+    await shows(couple, "document.querySelector('.pane-joint').innerText.includes('behind person 1')")
+    assert "who is dimmed" in await corner.get_attribute("title")
