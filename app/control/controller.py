@@ -84,7 +84,7 @@ class Controller:
         self.comparing = Comparing(session_state)
         """Shows the poses before the last fit or search."""
         activities.add_gesture(self.comparing.leave)
-        self.navigation = Navigation(session_state, activities, self.search, self.replay, self.tracking)
+        self.navigation = Navigation(session_state, activities, self.search, self.tracking)
         """Chooses the shown frame and the selection."""
         self.stored_poses = StoredPoses(session_state)
         """Reads the stored poses."""

@@ -1,6 +1,5 @@
 """Choose the shown frame, the selected person and the selected point."""
 
-from app.control.search.replay import Replay
 from app.control.search.searching import SearchRunner
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
@@ -15,7 +14,6 @@ class Navigation:
         session_state: SessionState,
         activities: Activities,
         search: SearchRunner,
-        replay: Replay,
         tracking: Tracking,
     ) -> None:
         """Navigate in this session.
@@ -24,11 +22,10 @@ class Navigation:
             session_state: holds the state.
             activities: finishes gestures.
             search: ends with the frame that it is about.
-            replay: likewise.
             tracking: continues when another frame is shown, but no longer shows its frames.
         """
         self._session_state, self._activities = session_state, activities
-        self._search, self._replay, self._tracking = search, replay, tracking
+        self._search, self._tracking = search, tracking
 
     def seek(self, frame: int) -> None:
         """Show a frame. A gesture ends and a search is discarded; a running tracker continues and is not followed."""
@@ -40,7 +37,6 @@ class Navigation:
         with session_state.lock:
             self._activities.finish_gestures()
             self._search.forget()
-            self._replay.forget()
             self._tracking.flush()
             state = session_state.state
             session_state.show_frame(frame, follow=state.follow and not state.track.running)

@@ -34,7 +34,7 @@ def floor_lines(session: Session, state: State) -> list[Path]:
         lines = _lines_of_sight(picking, index, views)
         if lines:
             # Paths of this kind are drawn whatever the layers: they show where to click.
-            out.append(Path(index, 0, "ghost", EPIPOLAR_COLOR, np.array(lines, dtype=np.float32).reshape(-1, 4)))
+            out.append(Path(index, 0, "floor_sight", EPIPOLAR_COLOR, np.array(lines, dtype=np.float32).reshape(-1, 4)))
     return out
 
 

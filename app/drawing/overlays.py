@@ -33,7 +33,9 @@ PART_EDGE_COLOR = "#9aa3ad"
 EPIPOLAR_COLOR = "#ffd54a"
 ACCEPTED_COLOR = "#35e0c8"
 REJECTED_COLOR = "#ff4fa3"
-_PERSON_KINDS = ("model", "hidden", "facing", "facing_away", "candidate", "ghost")
+_PERSON_KINDS = (
+    "model", "hidden", "facing", "facing_away", "candidate", "compared", "preview", "alternative", "new_sizes",
+)  # fmt: skip
 """Kinds of lines that belong to a person, and are left out when the person is hidden."""
 _SHORT_M = 0.01
 """Smallest distance from the pointer's line of sight that counts as out of reach, metres."""
@@ -47,12 +49,17 @@ PathKind = Literal[
     "facing",
     "facing_away",
     "candidate",
-    "ghost",
+    "compared",
+    "preview",
+    "alternative",
+    "new_sizes",
+    "result",
     "part_edge",
     "epipolar",
     "accepted",
     "rejected",
     "floor",
+    "floor_sight",
 ]
 Side = Literal["left", "right", ""]
 SIDES: tuple[Side, ...] = get_args(Side)
@@ -99,6 +106,8 @@ class Handle:
     v: float
     visible: bool
     """False for an occluded joint."""
+    hidden_by: int | None
+    """Index of another person who occludes it, where the own body does not; null otherwise."""
     held: bool
     """Whether it stays in place while others are dragged."""
     side: Side
@@ -120,10 +129,12 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     tried = state.search.candidate if state.search.running or state.search_view.replay is not None else None
     drafted, others = _with_draft(state, bodies), _alternatives(state, bodies)
     result = stored.poses if state is not stored and state.search_view.replay is None else None
-    ghosts = (
-        (state.search_view.compared, COMPARED_COLOR),
-        (state.search_view.preview, PREVIEW_COLOR),
-        (result, COMPARED_COLOR),
+    preview = state.search_view.preview
+    outlined: tuple[tuple[PathKind, tuple[Array, ...] | None, str], ...] = (
+        ("candidate", tried if "contours" in view.layers else None, CANDIDATE_COLOR),
+        ("compared", state.search_view.compared, COMPARED_COLOR),
+        ("preview", None if preview is None else preview.poses, PREVIEW_COLOR),
+        ("result", result, COMPARED_COLOR),
     )
     for index in sorted(view.cameras):
         camera = session.cameras[index].camera.pinhole
@@ -135,15 +146,13 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         if "contours" in view.layers:
             out += _facing(session, bodies, camera, index)
         if state.draft is not None:
-            out += _ghosts({state.draft.person}, drafted, camera, index, PREVIEW_COLOR)
+            out += _some({state.draft.person}, drafted, camera, index, "new_sizes", PREVIEW_COLOR)
         if others:
             changed = {i for i, (now, other) in enumerate(zip(bodies, others, strict=True)) if now is not other}
-            out += _ghosts(changed, others, camera, index, OTHER_COLOR)
-        if "contours" in view.layers and tried is not None:
-            out += _outlined(session, tried, camera, index, "candidate", CANDIDATE_COLOR)
-        for ghost, color in ghosts:
-            if ghost is not None:
-                out += _outlined(session, ghost, camera, index, "ghost", color)
+            out += _some(changed, others, camera, index, "alternative", OTHER_COLOR)
+        for kind, poses, color in outlined:
+            if poses is not None:
+                out += _outlined(session, poses, camera, index, kind, color)
         if "part_edges" in view.layers:
             out.append(Path(index, 0, "part_edge", PART_EDGE_COLOR, part_edges.part_edges(bodies, camera)))
         if views is not None:
@@ -165,14 +174,41 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
     out = []
     for (index, camera), hidden in zip(seen.items(), hidden_by_view, strict=True):
         first = 0
+        occluders = _other_occluders(bodies, camera, hidden)
         for person, body in enumerate(bodies):
             px, held = camera.project(points[person]), state.held_points(person)
             for i, name in enumerate(body.model.point_names):
                 if person not in state.visibility.hidden and np.all(np.isfinite(px[i])):
                     u, v = float(px[i, 0]), float(px[i, 1])
-                    out.append(Handle(index, person, name, u, v, not hidden[first + i], name in held, side_of(name)))
+                    by, is_held = occluders[first + i], name in held
+                    out.append(Handle(index, person, name, u, v, not hidden[first + i], by, is_held, side_of(name)))
             first += len(px)
     return out
+
+
+def _other_occluders(bodies: Sequence[PosedBody], camera: Camera, hidden: Mask) -> list[int | None]:
+    """Return for each point of all bodies the index of another body that occludes it, if its own does not.
+
+    Args:
+        bodies: all bodies in the scene.
+        camera: the view.
+        hidden: whether each point is occluded, (n,).
+    """
+    found: list[int | None] = [None] * len(hidden)
+    first = 0
+    for person, body in enumerate(bodies):
+        points = body.points_world
+        rest = first + np.flatnonzero(hidden[first : first + len(points)])
+        others = [i for i in range(len(bodies)) if i != person]
+        if others and len(rest):
+            rest = rest[~part_edges.points_occluded([body], [camera], points[rest - first])[0]]
+        for other in others:
+            if len(rest):
+                is_behind = part_edges.points_occluded([body, bodies[other]], [camera], points[rest - first])[0]
+                for point in rest[is_behind]:
+                    found[point] = other if found[point] is None else found[point]
+        first += len(points)
+    return found
 
 
 def out_of_reach(session: Session, state: State) -> OutOfReach | None:
@@ -268,10 +304,12 @@ def _alternatives(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
     ]
 
 
-def _ghosts(chosen: Collection[int], people: Sequence[PosedBody], camera: Camera, index: int, color: str) -> list[Path]:
+def _some(
+    chosen: Collection[int], people: Sequence[PosedBody], camera: Camera, index: int, kind: PathKind, color: str
+) -> list[Path]:
     """Draw the visible contours of some people, given by index, among all people."""
     contour = _traced(people, camera)
-    found = _by_person(people, contour, ~contour.occluded, index, "ghost", [color] * len(people))
+    found = _by_person(people, contour, ~contour.occluded, index, kind, [color] * len(people))
     return [path for path in found if path.person in chosen]
 
 

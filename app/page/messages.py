@@ -17,7 +17,7 @@ from app.state.comparison import PoseComparison
 from app.state.floor_picking import Picking
 from app.state.page_view import View
 from app.state.progress import TrackState
-from app.state.search import ReplayState, SearchState
+from app.state.search import PreviewState, ReplayState, SearchState
 from app.state.state import State
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.evidence.view_evidence import ViewEvidence
@@ -94,6 +94,8 @@ def state(session: Session, state: State) -> wire.StateMessage:
         other_sizes=state.revisions[state.person] != state.present[state.person],
         job=_job(state.search),
         replay=_replay(state.search_view.replay),
+        compared_run=state.search_view.compared_run,
+        preview=_preview(state.search_view.preview),
         compared=_compared(state.compared),
         track=_track(state.track),
         range=wire.RangeWork(
@@ -257,6 +259,10 @@ def _job(job: SearchState) -> wire.Job:
 
 def _replay(replay: ReplayState | None) -> wire.ReplayedStep | None:
     return None if replay is None else wire.ReplayedStep(replay.run, replay.step, replay.steps, replay.stage)
+
+
+def _preview(preview: PreviewState | None) -> wire.PreviewedCandidate | None:
+    return None if preview is None else wire.PreviewedCandidate(preview.run, preview.candidate)
 
 
 def _compared(last: PoseComparison | None) -> wire.Compared | None:

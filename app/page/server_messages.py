@@ -175,6 +175,14 @@ class ReplayedStep(Part, frozen=True):
     stage: str | None
 
 
+class PreviewedCandidate(Part, frozen=True):
+    """The candidate of a search that is drawn over the views."""
+
+    run: int
+    candidate: int
+    """Index among the best candidates of the run."""
+
+
 class Compared(Part, frozen=True):
     """The last fit or search, while its result is shown unchanged."""
 
@@ -252,6 +260,9 @@ class StateMessage(Message, frozen=True, tag="state"):
     job: Job
     replay: ReplayedStep | None
     """While one is shown, the costs are those of the step, and the overlay shows its best and its candidate."""
+    compared_run: int | None
+    """Number of the run whose result is drawn."""
+    preview: PreviewedCandidate | None
     compared: Compared | None
     """Null where there is no such result, or it has changed."""
     track: Track

@@ -22,7 +22,8 @@ class ShownPose:
     part_costs_px: tuple[float | None, ...] = ()
     """Cost of each part, px; None for an unseen part, empty where unknown."""
     sources: tuple[str, ...] = ()
-    """Source of each value of a pose that is not stored yet, (n_values,); empty if `source` applies to all."""
+    """Source of each value of a pose that is not stored yet, (n_values,), where '' keeps the stored one; empty if
+    `source` applies to the values that changed."""
     revision: int | None = None
     """Model revision of a stored pose; None for a pose that is not stored as shown."""
     alternatives: tuple[Array, ...] = ()

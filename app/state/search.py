@@ -55,14 +55,26 @@ class ReplayState:
 
 
 @dataclass(frozen=True, eq=False)
+class PreviewState:
+    """A candidate of a search, drawn over the stored poses."""
+
+    run: int
+    """Number of the run."""
+    candidate: int
+    """Index among the best candidates of the run."""
+    poses: tuple[Array, ...]
+    """Pose of each person."""
+
+
+@dataclass(frozen=True, eq=False)
 class SearchView:
     """How searches are watched: the speed of a running one, and what is drawn of recorded ones."""
 
     speed: float | None = None
     """Expansions per second; None for full speed."""
     replay: ReplayState | None = None
-    preview: tuple[Array, ...] | None = None
-    """Poses of the list entry under the pointer, drawn over the stored ones."""
+    preview: PreviewState | None = None
+    """The list entry under the pointer."""
     compared: tuple[Array, ...] | None = None
     """Result of another run, drawn over the stored poses."""
     compared_run: int | None = None

@@ -176,11 +176,7 @@ class Saver:
             stored = self._readable(self.record, person, state.frame, None)
             if shown.source is None or (stored is not None and _is_same(stored, shown, revision)):
                 continue
-            sources = shown.sources or (source,) * len(shown.values)
-            if stored is not None and len(stored.values) == len(shown.values):
-                unchanged = stored.values == shown.values
-                pairs = zip(unchanged, stored.sources, sources, strict=True)
-                sources = tuple(old if same else new for same, old, new in pairs)
+            sources = _sources_of(stored, shown, source)
             record = PoseRecord(
                 shown.values,
                 sources,
@@ -194,6 +190,19 @@ class Saver:
                 record = _with_marks_of(stored, record)
             changes.append(PoseChange(self._session.people[person].name, state.frame, record))
         return self.write(f"{label}, frame {state.frame}", changes, amend, by_program=False)
+
+    def with_stored_sources(self, state: State) -> tuple[ShownPose, ...]:
+        """Return the people of a state with the sources that are stored of their poses, as `pose` returns them.
+
+        A source that is given to `save` applies to the values that changed; the others keep theirs.
+        """
+        people = []
+        for person, (shown, revision) in enumerate(zip(state.people, state.revisions, strict=True)):
+            stored = None if shown.source is None else self._readable(self.record, person, state.frame, None)
+            is_stored = stored is not None and _is_same(stored, shown, revision)
+            source = _main_source(stored.sources) if stored is not None and is_stored else shown.source
+            people.append(shown if source == shown.source else replace(shown, source=source))
+        return tuple(people)
 
     def write(
         self, label: str, changes: Sequence[Change], amend: int | None, by_program: bool, even_empty: bool = False
@@ -341,6 +350,15 @@ class Saver:
         self.retry()
         if self.error is not None:
             raise SessionError(f"the history cannot move while an edit is not saved: {self.error}")
+
+
+def _sources_of(stored: PoseRecord | None, shown: ShownPose, source: str) -> tuple[str, ...]:
+    """Return the source of each value of a shown pose; values that an edit did not concern keep theirs."""
+    given = shown.sources or (source,) * len(shown.values)
+    if stored is None or len(stored.values) != len(shown.values):
+        return tuple(new or source for new in given)
+    is_kept = [not new for new in given] if shown.sources else stored.values == shown.values
+    return tuple(old if kept else new for kept, old, new in zip(is_kept, stored.sources, given, strict=True))
 
 
 def _with_marks_of(stored: PoseRecord | None, record: PoseRecord) -> PoseRecord:

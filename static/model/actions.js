@@ -1,6 +1,6 @@
 /** Actions of the user that send messages, shared by buttons and keys. */
 
-import { scopePerson, hasTrack } from "./selectors.js";
+import { scopePerson, hasTrack, personCells } from "./selectors.js";
 
 export class Actions {
   #store;
@@ -114,8 +114,8 @@ export class Actions {
 
   /** Remove the marks of the active person's pose on the current frame. */
   unmark() {
-    const { connected, state, target, timeline } = this.#store.facts;
-    if (!connected || !state || !timeline.has(target)) return;
+    const { connected, state, target } = this.#store.facts;
+    if (!connected || !state || !personCells(this.#store.facts).has(target)) return;
     this.#send({ type: "range", action: "none", first: target, last: target, person: state.person });
   }
 

@@ -11,8 +11,8 @@
  *   "none"} RangeAction
  * @typedef {"move" | "turn" | "push" | "bend"} DragMode
  * @typedef {"start" | "move" | "end" | "cancel"} GesturePhase
- * @typedef {"model" | "hidden" | "facing" | "facing_away" | "candidate" | "ghost" | "part_edge" | "epipolar" |
- *   "accepted" | "rejected" | "floor"} PathKind
+ * @typedef {"model" | "hidden" | "facing" | "facing_away" | "candidate" | "compared" | "preview" | "alternative" |
+ *   "new_sizes" | "result" | "part_edge" | "epipolar" | "accepted" | "rejected" | "floor" | "floor_sight"} PathKind
  * @typedef {"running" | "paused" | "over"} RunState
  * @typedef {"left" | "right" | ""} Side
  * @typedef {{type: "seek", frame: number}} Seek
@@ -96,6 +96,7 @@
  * @typedef {{running: boolean, kind: string | null, stage: string | null, stages: string[], evaluations: number,
  *   per_second: number, best_px: number | null, message: string}} Job
  * @typedef {{run: number, step: number, steps: number, stage: string | null}} ReplayedStep
+ * @typedef {{run: number, candidate: number}} PreviewedCandidate
  * @typedef {{number: number, work: "fit" | "search", before_px: number | null, after_px: number | null,
  *   before_view_costs_px: (number | null)[], after_view_costs_px: (number | null)[], warning: string, is_before_shown:
  *   boolean}} Compared
@@ -108,9 +109,10 @@
  * @typedef {{type: "state", frame: number, person: number, point: string | null, people: PersonState[], solo: boolean,
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
  *   part_costs_px: (number | null)[], dofs: number[], locked: number[], other_sizes: boolean, job: Job, replay:
- *   ReplayedStep | null, compared: Compared | null, track: Track, range: RangeWork, follow: boolean, snapped: number |
- *   null, floor: FloorPicking | null, footage: FootageProgress, compiling: string | null, undo: string | null, redo:
- *   string | null, saved: boolean, save_error: string | null}} StateMessage
+ *   ReplayedStep | null, compared_run: number | null, preview: PreviewedCandidate | null, compared: Compared | null,
+ *   track: Track, range: RangeWork, follow: boolean, snapped: number | null, floor: FloorPicking | null, footage:
+ *   FootageProgress, compiling: string | null, undo: string | null, redo: string | null, saved: boolean, save_error:
+ *   string | null}} StateMessage
  * @typedef {{edit: number, label: string, author: string, time: string, undone: boolean}} HistoryEntry
  * @typedef {{type: "history", entries: HistoryEntry[], later: boolean, earlier: boolean}} HistoryMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
@@ -151,8 +153,8 @@
  * @typedef {{camera: number, person: number, kind: PathKind, color: string, side: Side, first: number, count: number}}
  *   Path
  * @typedef {{camera: number, person: number, part: number, depth: number, first: number, count: number}} Outline
- * @typedef {{camera: number, person: number, point: string, u: number, v: number, visible: boolean, held: boolean,
- *   side: Side}} Handle
+ * @typedef {{camera: number, person: number, point: string, u: number, v: number, visible: boolean, hidden_by: number |
+ *   null, held: boolean, side: Side}} Handle
  * @typedef {{camera: number, person: number, point: string, u: number, v: number, point_u: number, point_v: number,
  *   distance_m: number}} OutOfReach
  * @typedef {{camera: number, person: number, point: string, u: number, v: number, model_u: number | null, model_v:

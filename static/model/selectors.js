@@ -20,6 +20,25 @@ export function isDimmed(state, person) {
 }
 
 /**
+ * Whether a joint is drawn as visible: nothing occludes it, or only a dimmed person does.
+ *
+ * @param {import("./protocol.js").StateMessage | null} state
+ * @param {import("./protocol.js").Handle} handle
+ */
+export function isInSight(state, { visible, hidden_by }) {
+  return visible || (hidden_by !== null && isDimmed(state, hidden_by));
+}
+
+/**
+ * Cells of the person worked on.
+ *
+ * @param {import("./store.js").Facts} facts
+ */
+export function personCells({ lanes, timeline, state }) {
+  return (state && lanes[state.person]) ?? timeline;
+}
+
+/**
  * Whether a search is running, or paused between two steps.
  *
  * @param {import("./protocol.js").StateMessage | null} state
@@ -35,4 +54,15 @@ export function hasSearch(state) {
  */
 export function hasTrack(state) {
   return !!state && state.track.first !== null;
+}
+
+/**
+ * What the Stop button of a search does.
+ *
+ * @param {boolean} isRunning whether the search is running
+ */
+export function stopTitle(isRunning) {
+  return isRunning
+    ? "Pause the search and keep the best pose; Step, Stage or Frame continue it (Esc)"
+    : "End the paused search and keep the best pose (Esc)";
 }

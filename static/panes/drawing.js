@@ -24,6 +24,8 @@ const CORNERS_PX = 44;
 const REACH_DASH = [3, 3];
 /** Dashes of right limbs: sides differ in line, people in colour. */
 const RIGHT_DASH = [9, 4];
+/** Border of joints behind a dimmed person. */
+const BEHIND_DASH = [2, 2.5];
 /** Opacity of dimmed people. */
 const DIMMED = 0.3;
 
@@ -34,18 +36,23 @@ const DIMMED = 0.3;
  *   ofPerson?: boolean}} LineStyle ofPerson: whether they are dimmed with their person
  * @type {Record<import("../model/protocol.js").Path["kind"], LineStyle>}
  */
-const LINE_STYLES = {
+export const LINE_STYLES = {
   model: { width: 1.75, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
   hidden: { width: 1.25, dash: [4, 4], layer: "hidden", hasHalo: false, ofPerson: true },
   facing: { width: 2.25, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
   facing_away: { width: 2.25, dash: [3, 4], layer: "contours", hasHalo: true, ofPerson: true },
   candidate: { width: 1.25, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
-  ghost: { width: 1.5, dash: [5, 4], layer: null, hasHalo: true, ofPerson: true },
+  compared: { width: 1.5, dash: [6, 4], layer: null, hasHalo: true, ofPerson: true },
+  preview: { width: 1.75, dash: [2, 4], layer: null, hasHalo: true, ofPerson: true },
+  result: { width: 1.5, dash: [6, 4], layer: null, hasHalo: true, ofPerson: true },
+  alternative: { width: 1.5, dash: [9, 4, 2, 4], layer: null, hasHalo: true, ofPerson: true },
+  new_sizes: { width: 1.5, dash: [9, 4, 2, 4, 2, 4], layer: null, hasHalo: true, ofPerson: true },
   part_edge: { width: 1, dash: [], layer: "part_edges", hasHalo: true },
   epipolar: { width: 1.25, dash: [6, 4], layer: "epipolar", hasHalo: true },
   // Halos would merge thousands of short lines into one area.
   accepted: { width: 1.5, dash: [], layer: "accepted", hasHalo: false },
   floor: { width: 1.25, dash: [], layer: null, hasHalo: true },
+  floor_sight: { width: 1.5, dash: [5, 4], layer: null, hasHalo: true },
   rejected: { width: 1, dash: [], layer: "rejected", hasHalo: false },
 };
 
@@ -209,14 +216,16 @@ export function drawSkeleton(context, placed, people, opacity) {
 }
 
 /**
- * Draw a joint: a square for the torso, a diamond on the right of the body, else a disc. A ring marks a held joint.
+ * Draw a joint: a square for the torso, a diamond on the right of the body, else a disc. A ring marks a held joint. A joint
+ * behind a dimmed person has a dashed border.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {PlacedHandle} placed
  * @param {string} color
  * @param {"plain" | "selected" | "hovered"} emphasis
+ * @param {boolean} isSeen whether it is drawn as visible
  */
-export function drawHandle(context, { handle, x, y }, color, emphasis) {
+export function drawHandle(context, { handle, x, y }, color, emphasis, isSeen = handle.visible) {
   const outline = handleOutline(handle, x, y, emphasis === "hovered" ? 1.5 : 0);
   if (handle.held) {
     const ring = new Path2D();
@@ -227,13 +236,15 @@ export function drawHandle(context, { handle, x, y }, color, emphasis) {
   context.strokeStyle = HALO;
   context.lineWidth = 3.5;
   context.stroke(outline);
-  if (handle.visible) {
+  if (isSeen) {
     context.fillStyle = color;
     context.fill(outline);
   }
-  context.strokeStyle = handle.visible || emphasis !== "plain" ? "#fff" : color;
+  context.strokeStyle = isSeen || emphasis !== "plain" ? "#fff" : color;
   context.lineWidth = emphasis === "plain" ? 1.25 : 2.25;
+  if (isSeen && !handle.visible) context.setLineDash(BEHIND_DASH);
   context.stroke(outline);
+  context.setLineDash([]);
 }
 
 /**

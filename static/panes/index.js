@@ -12,6 +12,7 @@ import { LayersMenu } from "./layers_menu.js";
 import { paneBindings } from "./pane_keys.js";
 import { PaneGrid } from "./pane_grid.js";
 import { PlaceholderFrames } from "./placeholder_frames.js";
+import { PoseLegend } from "./pose_legend.js";
 
 /** @typedef {ReturnType<typeof mount>} Panes */
 
@@ -28,5 +29,6 @@ export function mount({ store, send, latency, layers, imageTones, recentImages }
   grid.addPointerTarget(gestures);
   new PlaceholderFrames(store, recentImages);
   new ViewRequest(store, send);
+  new PoseLegend(store);
   return { grid, gestures, bindings: paneBindings({ grid, gestures, layers, layersMenu }) };
 }

@@ -13,7 +13,8 @@ import { displayName } from "../widgets/text.js";
  */
 export function jointLabel({ handle }, overlapping, people) {
   const turns = people[handle.person]?.heading.includes(handle.point) ?? false;
-  const notes = [turns && "turns the body", !handle.visible && "hidden", handle.held && "held"].filter(Boolean);
+  const by = handle.hidden_by === null ? "" : ` by ${people[handle.hidden_by]?.name}`;
+  const notes = [turns && "turns the body", !handle.visible && `hidden${by}`, handle.held && "held"].filter(Boolean);
   const first = named(handle, overlapping, people) + (notes.length ? ` (${notes.join(", ")})` : "");
   const others = overlapping.filter((one) => one.handle !== handle);
   return [first, ...others.map((one) => `Alt+O or click: ${named(one.handle, overlapping, people)}`)];

@@ -4,7 +4,7 @@ import * as drawing from "./drawing.js";
 import { drawPins } from "./pin_drawing.js";
 import { decluttered } from "./declutter.js";
 import { jointLabel } from "./joint_label.js";
-import { isDimmed } from "../model/selectors.js";
+import { isDimmed, isInSight } from "../model/selectors.js";
 import { PICTURE_LAYERS } from "../model/layers.js";
 import { isPlain } from "../model/image_tone.js";
 import { PaneCorner } from "./pane_corner.js";
@@ -212,11 +212,12 @@ export class Pane {
 
   /** @param {import("../model/protocol.js").StateMessage} state */
   #showJoint({ person, point }) {
-    const { overlay } = this.#store.facts;
+    const { overlay, session } = this.#store.facts;
     const handle = overlay?.handles.find((h) => h.camera === this.#camera && h.person === person && h.point === point);
     const { width, height } = this.#info;
     const isInside = handle && handle.u >= -0.5 && handle.v >= -0.5 && handle.u < width - 0.5 && handle.v < height - 0.5;
-    this.#corner.showJoint(point, !isInside ? "outside" : handle.visible ? "visible" : "hidden");
+    const by = handle && handle.hidden_by !== null ? session?.people[handle.hidden_by].name : undefined;
+    this.#corner.showJoint(point, !isInside ? "outside" : isInSight(this.#store.facts.state, handle) ? "visible" : "hidden", by);
   }
 
   /**
@@ -243,7 +244,7 @@ export class Pane {
       const isSelected = state.person === one.handle.person && state.point === one.handle.point;
       if (isHovered && hover?.camera === this.#camera) named = one;
       const color = people[one.handle.person]?.color ?? "#fff";
-      drawing.drawHandle(context, one, color, isHovered ? "hovered" : isSelected ? "selected" : "plain");
+      drawing.drawHandle(context, one, color, isHovered ? "hovered" : isSelected ? "selected" : "plain", isInSight(state, one.handle));
     }
     context.globalAlpha = 1;
     if (named && !overlay?.out_of_reach) drawing.drawLabel(context, this.#labelOf(named, people), named, this.#size.width);

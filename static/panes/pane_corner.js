@@ -107,14 +107,16 @@ export class PaneCorner {
   /**
    * @param {string | null} joint name of the selected joint
    * @param {Visibility} visibility
+   * @param {string} [by] name of the other person who occludes it
    */
-  showJoint(joint, visibility) {
+  showJoint(joint, visibility, by) {
     this.#joint.hidden = joint === null;
-    if (joint === null || this.#joint.dataset.is === `${joint} ${visibility}`) return;
-    this.#joint.dataset.is = `${joint} ${visibility}`;
+    if (joint === null || this.#joint.dataset.is === `${joint} ${visibility} ${by}`) return;
+    this.#joint.dataset.is = `${joint} ${visibility} ${by}`;
     this.#mark.textContent = MARKS[visibility];
-    this.#word.textContent = visibility;
-    this.#joint.title = `The ${displayName(joint)} ${MEANINGS[visibility]}`;
+    this.#word.textContent = !by ? visibility : visibility === "hidden" ? `hidden by ${by}` : `behind ${by}`;
+    const meaning = !by ? MEANINGS[visibility] : `is occluded by ${by}${visibility === "visible" ? ", who is dimmed" : ""}`;
+    this.#joint.title = `The ${displayName(joint)} ${meaning}`;
   }
 
   /**

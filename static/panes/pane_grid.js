@@ -1,6 +1,7 @@
 /** Grid of the panes of all cameras, or one pane that fills it. */
 
 import { layOut } from "./grid_layout.js";
+import { keepViews, keptViews } from "./kept_views.js";
 import { Pane } from "./pane.js";
 
 /** Two digits within this time form one number. */
@@ -163,11 +164,16 @@ export class PaneGrid {
     const described = JSON.stringify(cameras);
     if (described === this.#cameras) return;
     this.#cameras = described;
+    const kept = keptViews(this.#store.facts.session?.name ?? "");
     this.panes = cameras.map((info, camera) => {
       const pane = new Pane(this.#store, camera, info, {
-        viewChanged: () => this.#refine(),
+        viewChanged: () => {
+          this.#refine();
+          this.#keep();
+        },
         openToneMenu: this.#openToneMenu,
       });
+      pane.view.restore(kept[info.name]);
       for (const target of this.#pointerTargets) target.watch(pane, camera);
       pane.element.addEventListener("dblclick", (event) => {
         if (!(event.target instanceof Element && event.target.closest("button"))) this.toggleFill(camera);
@@ -177,6 +183,14 @@ export class PaneGrid {
     this.#element.replaceChildren(...this.panes.map((pane) => pane.element));
     this.#store.set({ filled: null });
     this.#layOut();
+  }
+
+  /** Keep the zoom of all views. */
+  #keep() {
+    const { session } = this.#store.facts;
+    if (!session) return;
+    const names = session.cameras.map(({ name }) => name);
+    keepViews(session.name, Object.fromEntries(this.panes.map((pane, camera) => [names[camera], pane.view.choice])));
   }
 
   #layOut() {

@@ -51,6 +51,24 @@ export class PaneView {
     return { x, y, width: this.#image.width * this.scale, height: this.#image.height * this.scale };
   }
 
+  /** What the user has zoomed to, to be restored; null for the whole image. */
+  get choice() {
+    return this.isReset ? null : { zoom: this.zoom, ...this.#center };
+  }
+
+  /**
+   * Restore a choice. Anything else shows the whole image.
+   *
+   * @param {{zoom?: unknown, u?: unknown, v?: unknown} | null | undefined} choice
+   */
+  restore(choice) {
+    this.reset();
+    const { zoom, u, v } = choice ?? {};
+    if (!Number.isFinite(zoom) || !Number.isFinite(u) || !Number.isFinite(v)) return;
+    this.zoom = Math.max(MIN_ZOOM, Math.min(MAX_ZOOM, Number(zoom)));
+    this.#moveCenter(Number(u) - this.#center.u, Number(v) - this.#center.v);
+  }
+
   get isReset() {
     const { u, v } = this.#middle();
     return this.zoom === 1 && this.#center.u === u && this.#center.v === v;

@@ -1,5 +1,6 @@
 /** Menu of poses to copy: of other people, of the neighbouring frames and of the nearest keyframes. */
 
+import { personCells } from "../model/selectors.js";
 import { byId } from "../widgets/elements.js";
 
 const MAX_KEYFRAMES = 12;
@@ -30,10 +31,11 @@ export class CopyMenu {
   }
 
   #open() {
-    const { shown, session, timeline, state } = this.#store.facts;
+    const { shown, session, state } = this.#store.facts;
     if (!shown || !session) return;
     const here = shown.frame;
-    const keyframes = [...timeline]
+    const cells = personCells(this.#store.facts);
+    const keyframes = [...cells]
       .filter(([frame, cell]) => cell.keyframe && frame !== here)
       .map(([frame]) => frame)
       .sort((a, b) => Math.abs(a - here) - Math.abs(b - here))
@@ -42,8 +44,8 @@ export class CopyMenu {
     const others = [...session.people.entries()].filter(([person]) => person !== (state?.person ?? 0));
     const items = [
       ...others.map(([person, { name }]) => this.#ofPerson(name, person)),
-      this.#item("Previous frame", "Alt+,", here - 1, timeline.has(here - 1)),
-      this.#item("Next frame", "Alt+.", here + 1, timeline.has(here + 1)),
+      this.#item("Previous frame", "Alt+,", here - 1, cells.has(here - 1)),
+      this.#item("Next frame", "Alt+.", here + 1, cells.has(here + 1)),
       ...keyframes.map((frame) => this.#item(`Keyframe ${frame}`, away(frame - here), frame, true)),
     ];
     this.#menu.replaceChildren(...items);

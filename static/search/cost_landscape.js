@@ -50,6 +50,7 @@ export class CostLandscape {
       if (changed.has("drawer")) this.#open();
       if (!this.#isOpen) return;
       if (changed.has("connected") && store.facts.connected) send({ type: "watch", tab: "landscape" });
+      if (changed.has("drawer") || changed.has("dof") || changed.has("connected")) this.#followSelection();
       if (changed.has("landscape") || changed.has("session")) this.#show();
     });
     new ResizeObserver(() => this.#draw()).observe(this.#element);
@@ -66,6 +67,13 @@ export class CostLandscape {
     this.#isOpen = isOpen;
     if (connected && (isOpen || drawer !== "search")) this.#send({ type: "watch", tab: isOpen ? "landscape" : null });
     if (isOpen) this.#show();
+  }
+
+  /** Show the degree of freedom that the keys change, if a joint is selected. */
+  #followSelection() {
+    const { state, session, dof, connected } = this.#store.facts;
+    const info = state?.point && dof !== null ? session?.people[state.person].dofs[dof] : undefined;
+    if (info && connected) this.#send({ type: "landscape", dof: `${info.joint}.${info.name}` });
   }
 
   #listen() {

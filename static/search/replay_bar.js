@@ -11,7 +11,6 @@ export class ReplayBar {
   #send;
   #slider = document.createElement("input");
   #text = document.createElement("output");
-  #badge = byId("replay-badge", HTMLElement);
   #buttons;
   #leave;
   #play;
@@ -51,14 +50,6 @@ export class ReplayBar {
     group.className = "group";
     group.append(...this.#buttons);
     byId("replay-bar", HTMLElement).append(group, slider, this.#text, this.#leave);
-    store.subscribe((changed) => changed.has("state") && this.#showBadge());
-  }
-
-  /** Show in the panes that a replay is displayed, also while the drawer is closed. */
-  #showBadge() {
-    const replay = this.#store.facts.state?.replay;
-    this.#badge.hidden = !replay;
-    if (replay) this.#badge.textContent = `Replay of run ${replay.run}, step ${replay.step + 1} of ${replay.steps} · Esc to exit`;
   }
 
   /** @param {Set<keyof import("../model/store.js").Facts>} changed */

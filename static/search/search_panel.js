@@ -1,6 +1,6 @@
 /** Search tab of the drawer: its controls, and the views below them. */
 
-import { hasSearch, hasTrack } from "../model/selectors.js";
+import { hasSearch, hasTrack, stopTitle } from "../model/selectors.js";
 import { CandidateStrip } from "./candidate_strip.js";
 import { CostCurve } from "./cost_curve.js";
 import { byId } from "../widgets/elements.js";
@@ -130,6 +130,7 @@ export class SearchPanel {
     track.disabled = !isReady;
     track.textContent = state?.track.running ? "Pause" : "Track";
     stop.disabled = !isReady || !(hasSearch(state) || hasTrack(state));
+    stop.title = hasTrack(state) ? "Stop tracking and keep the results (Esc)" : stopTitle(isRunning);
     if (settings) this.#theta.show(settings.search.theta_px);
     if (searchSetup) {
       if (document.activeElement !== this.#speed) this.#speed.value = String(searchSetup.speed ?? 0);

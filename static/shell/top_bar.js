@@ -1,6 +1,6 @@
 /** Top bar: session, search or tracking progress, cost, undo and redo. */
 
-import { hasSearch, hasTrack } from "../model/selectors.js";
+import { hasSearch, hasTrack, stopTitle } from "../model/selectors.js";
 import { button, byId } from "../widgets/elements.js";
 import { count, displayName, px } from "../widgets/text.js";
 
@@ -48,6 +48,7 @@ export class TopBar {
     const isRunning = !!state?.job.running;
     this.#step.disabled = this.#frame.disabled = !isReady || isRunning;
     this.#stop.disabled = !isReady || !hasSearch(state);
+    this.#stop.title = stopTitle(isRunning);
     this.#undo.disabled = !isReady || state.undo === null;
     this.#redo.disabled = !isReady || state.redo === null;
     if (!state) return;
@@ -65,7 +66,8 @@ export class TopBar {
     const isActive = job.running || job.kind !== null;
     const at = isActive && job.stage !== null ? job.stages.indexOf(job.stage) : -1;
     const stage = displayName(job.stage ?? "starting");
-    this.#stage.textContent = isActive ? `${stage} · ${count(job.evaluations)} poses` : job.message;
+    const paused = job.running ? "" : "paused · ";
+    this.#stage.textContent = isActive ? `${paused}${stage} · ${count(job.evaluations)} poses` : job.message;
     this.#stage.title = this.#stage.textContent;
     this.#figures.textContent = isActive ? `best ${px(job.best_px)} · ${count(job.per_second)}/s` : "";
     this.#stages.replaceChildren(

@@ -2,6 +2,7 @@
 
 import { button, byId } from "../widgets/elements.js";
 import { clock } from "../widgets/text.js";
+import { personCells } from "../model/selectors.js";
 import { SOURCES, STATUSES as CELL_STATUSES } from "../model/cells.js";
 import { STATUSES } from "./timeline_drawing.js";
 
@@ -55,7 +56,7 @@ export class Transport {
       if (changed.has("target") || changed.has("session")) this.#showFrame();
       if (changed.has("playing")) this.#showPlaying();
       if (changed.has("rate") || changed.has("loops") || changed.has("everyFrame")) this.#showHow();
-      if (["state", "timeline", "target", "connected"].some((f) => changed.has(/** @type {"state"} */ (f)))) {
+      if (["state", "timeline", "lanes", "target", "connected"].some((f) => changed.has(/** @type {"state"} */ (f)))) {
         this.#showSource();
       }
       if (changed.has("timeline")) this.#showLegend();
@@ -89,14 +90,16 @@ export class Transport {
   }
 
   #showSource() {
-    const source = this.#store.facts.state?.source ?? null;
-    const other = this.#store.facts.state?.other_sizes ?? false;
-    this.#source.textContent = source === null ? "No pose" : `Pose: ${source}${other ? ", earlier body sizes" : ""}`;
-    this.#source.title = other
-      ? "This pose was made with other body sizes and is shown with them. To convert keyframes: panel Body, Refit keyframes, Apply"
-      : "";
-    const { timeline, target, connected, state } = this.#store.facts;
-    const cell = timeline.get(target);
+    const { target, connected, state, session } = this.#store.facts;
+    const source = state?.source ?? null;
+    const other = state?.other_sizes ?? false;
+    const name = session && session.people.length > 1 && state ? session.people[state.person].name : "";
+    const what = state?.replay ? "replay" : `${source}${other ? ", earlier body sizes" : ""}`;
+    this.#source.textContent = source === null && !state?.replay ? `${name && `${name}: `}No pose` : `${name || "Pose"}: ${what}`;
+    const converted = "To convert keyframes: panel Body, Refit keyframes, Apply";
+    const made = `This pose was made with other body sizes and is shown with them. ${converted}`;
+    this.#source.title = other ? made : `Source of the pose${name && ` of ${name}`}, as stored: the most manual one of its values`;
+    const cell = personCells(this.#store.facts).get(target);
     this.#keyframe.disabled = !connected || !state;
     this.#reviewed.disabled = !connected || !cell || cell.keyframe;
     this.#keyframe.setAttribute("aria-pressed", String(!!cell?.keyframe));

@@ -153,6 +153,8 @@ class FakeEndpoint:
         self.before_drag = self.out_of_reach = None
         self.held_joints = set()
         self.sides_line = False  # whether there is a line of each side
+        self.hider = None  # index of the person who occludes what is not visible
+        self.other_kind = None  # kind of another pose that is drawn
         self.seq = 0
         self.epipolar_of = None
         self.set_numbers = itertools.count(1)
@@ -162,7 +164,8 @@ class FakeEndpoint:
         self.state = {
             "type": "state", "frame": 12, "person": 0, "point": None,
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
-            "source": "manual", "status": "", "remark": "", "part_costs_px": [], "replay": None, "compared": None,
+            "source": "manual", "status": "", "remark": "", "part_costs_px": [], "replay": None,
+            "compared": None, "compared_run": None, "preview": None,
             "job": self.idle_job(""),
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "dofs": [1.0, 2.0, 90.0, 30.0, 4.0, 5.0, 6.0], "locked": [], "other_sizes": False, "solo": False,
@@ -506,6 +509,8 @@ class FakeEndpoint:
                     add(camera, person, "model", COLORS[person], HIDDEN_LINE, "right")
                 if "hidden" in self.views[-1]["layers"]:
                     add(camera, person, "hidden", COLORS[person], HIDDEN_LINE)
+                if self.other_kind:
+                    add(camera, person, self.other_kind, "#ff9df2", self.outline(camera, person, 0.2))
                 if candidate is not None:
                     add(camera, person, "candidate", "#ffffff", self.outline(camera, person, candidate))
                 for (p, name), at in self.pose.items():
@@ -515,6 +520,7 @@ class FakeEndpoint:
                     visible = (name.startswith("l_"), name.startswith("r_"))[camera % 2] or name in ("torso", "head")
                     handles.append({
                         "camera": camera, "person": p, "point": name, "u": u, "v": v, "visible": visible,
+                        "hidden_by": None if visible or self.hider is None else self.hider,
                         "held": (p, name) in self.held_joints, "side": SIDES.get(name[:2], ""),
                     })  # fmt: skip
             if self.epipolar_of and self.epipolar_of[0] != camera:

@@ -211,7 +211,13 @@ class Pinning:
         )
         people = list(start)
         for person in fitted:
-            sources = tuple("pinned" if by_pin else "fitted" for by_pin in found.pinned[person])
+            free = session_state.free_sources(person, "fitted")
+            if views is None:  # only what moved was fitted
+                free = tuple(
+                    s if moved else ""
+                    for s, moved in zip(free, found.poses[person] != start[person].values, strict=True)
+                )
+            sources = tuple("pinned" if pinned else s for s, pinned in zip(free, found.pinned[person], strict=True))
             doubt = ("", "") if person in vouched else (start[person].status, start[person].remark)
             source = "pinned" if pins[person] else "fitted"
             people[person] = ShownPose(found.poses[person], source, *doubt, sources=sources)

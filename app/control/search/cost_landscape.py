@@ -15,6 +15,7 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array
+from tracker.posing.edits import joint_of
 from tracker.tracking.chamfer.settings import TrackSettings, pose_cost
 
 SAMPLES = 121
@@ -37,7 +38,7 @@ class CostLandscapes:
         self._session_state, self._activities = session_state, activities
         self._pages: set[int] = set()
         self._pages_lock = threading.Lock()
-        self._dof: str | None = None
+        self._chosen: tuple[int, str | None, str] | None = None  # selected person and point, name of the dof
         self._computed: tuple[object, ...] = ()
         self._latest = LatestWinsWorker(self._compute, "landscape", _REST_S)
         session_state.subscribe(self._changed)
@@ -47,25 +48,28 @@ class CostLandscapes:
 
         Args:
             page: number of the page.
-            looks: whether it displays it.
+            looks: whether it displays it. The landscape then begins with the selected point.
         """
         with self._pages_lock:
+            if looks and page not in self._pages:
+                self._chosen = None
             (self._pages.add if looks else self._pages.discard)(page)
         if looks:
             self._latest.offer(self._session_state.state)
 
     def choose(self, dof: str) -> None:
-        """Choose another degree of freedom of the selected person, by its name.
+        """Choose a degree of freedom of the selected person, by its name, until another point is selected.
 
         Raises:
             TrackerError: the body has no degree of freedom of that name.
         """
-        model = self._session_state.models[self._session_state.state.person]
+        state = self._session_state.state
+        model = state.models[state.person]
         if dof not in model.dof_names:
             raise TrackerError(
                 f"expected a degree of freedom such as {model.dof_names[0]}, found '{dof}'; choose one from the list"
             )
-        self._dof = dof
+        self._chosen = state.person, state.point, dof
         self._latest.offer(self._session_state.state)
 
     def set_value(self, person: int, dof: int, value: float) -> None:
@@ -111,10 +115,12 @@ class CostLandscapes:
         self._session_state.set(landscape=found)
 
     def _dof_of(self, model: BodyModel, state: State) -> int:
-        """Return the chosen degree of freedom, else one of the selected joint, else one of a limb."""
-        if self._dof in model.dof_names:
-            return model.dof_names.index(self._dof)
-        of_point = [d for d, name in enumerate(model.dof_names) if name.partition(".")[0] == state.point]
+        """Return the degree of freedom chosen for the selected point, else one of its joint, else one of a limb."""
+        if self._chosen is not None and self._chosen[:2] == (state.person, state.point):
+            return model.dof_names.index(self._chosen[2])
+        of_point = (
+            [] if state.point is None else np.flatnonzero(model.dof_joint == joint_of(model, state.point)).tolist()
+        )
         limbs = [d for d in range(model.n_dofs) if model.dof_joint[d] > 0]
         return (of_point or limbs or [0])[0]
 

@@ -9,7 +9,7 @@ from app.control.session.activities import Activities
 from app.control.session.comparing import leave_before
 from app.control.session.session_state import SessionState
 from app.state.people import ShownPose
-from app.state.search import ReplayState, SearchView
+from app.state.search import PreviewState, ReplayState, SearchView
 from app.state.state import finite_or_none
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
@@ -28,6 +28,7 @@ class Replay:
         """
         self._session_state, self._runs, self._activities = session_state, runs, activities
         activities.add_gesture(self.leave)
+        runs.on_discard = self._forget_discarded
 
     def runs(self) -> list[SearchRun]:
         """Return the runs of the shown frame, oldest first; the caller holds the session's lock."""
@@ -70,11 +71,6 @@ class Replay:
             if self._view.replay is not None or self._view.preview is not None:
                 self._set_view(replace(self._view, replay=None, preview=None))
 
-    def forget(self) -> None:
-        """End replay, preview and comparison, because another frame is shown."""
-        with self._session_state.lock:
-            self._set_view(SearchView(speed=self._view.speed))
-
     def compare(self, number: int | None) -> None:
         """Draw the result of a run over the views; None ends this.
 
@@ -89,10 +85,10 @@ class Replay:
         """Draw a candidate of a run over the views; None, or an outdated index, draws none."""
         with self._session_state.lock:
             run = self._runs.find(number)
-            poses = None
+            shown = None
             if run is not None and candidate is not None and 0 <= candidate < len(run.candidates):
-                poses = run.candidates[candidate].poses
-            self._set_view(replace(self._view, preview=poses))
+                shown = PreviewState(number, candidate, run.candidates[candidate].poses)
+            self._set_view(replace(self._view, preview=shown))
 
     def take(self, number: int, candidate: int | None) -> None:
         """Take over a candidate of a run, or its result if the candidate is None; one entry of the history.
@@ -111,6 +107,19 @@ class Replay:
         with self._activities.editing():
             if run.frame == self._session_state.state.frame:
                 self._adopt(poses, label)
+
+    def _forget_discarded(self) -> None:
+        """End replay, preview and comparison of runs that are no longer recorded."""
+        with self._session_state.lock:
+            view = self._view
+            if view.compared_run is not None and self._runs.find(view.compared_run) is None:
+                view = replace(view, compared=None, compared_run=None)
+            if view.preview is not None and self._runs.find(view.preview.run) is None:
+                view = replace(view, preview=None)
+            if view.replay is not None and self._runs.find(view.replay.run) is None:
+                view = replace(view, replay=None)
+            if view is not self._view:
+                self._set_view(view)
 
     def _adopt(self, poses: tuple[Array, ...], label: str) -> None:
         session_state = self._session_state

@@ -1,6 +1,6 @@
 """Record every step of the last searches, so that they can be replayed and compared."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -171,6 +171,8 @@ class SearchRuns:
         """Begin without runs."""
         self._runs: dict[int, list[SearchRun]] = {}
         self._number = 0
+        self.on_discard: Callable[[], None] = lambda: None
+        """Called after runs were discarded."""
 
     def begin(
         self,
@@ -188,11 +190,13 @@ class SearchRuns:
         self._runs[frame] = [*of_frame, run][-_MAX_RUNS:]  # as the newest frame of the dict
         while len(self._runs) > _MAX_FRAMES:
             del self._runs[next(iter(self._runs))]
+        self.on_discard()
         return run
 
     def clear(self) -> None:
         """Discard all runs."""
         self._runs.clear()
+        self.on_discard()
 
     def of_frame(self, frame: int) -> list[SearchRun]:
         """Return the runs of a frame, oldest first."""

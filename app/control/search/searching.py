@@ -12,11 +12,11 @@ from app.control.session.comparing import note_comparison
 from app.control.session.session_state import SessionState
 from app.runtime.jobs import Job
 from app.state.people import ShownPose
-from app.state.search import SearchState
+from app.state.search import SearchState, SearchView
 from app.state.state import Costs, finite_or_none
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
-from tracker.search.best_first import SearchStep, stages
+from tracker.search.best_first import SearchStep, Stage, stages
 from tracker.tracking.chamfer.settings import TrackSettings, search_frame
 from tracker.tracking.subjects import Subjects
 
@@ -39,6 +39,8 @@ class SearchRunner:
         activities.add_job(self, on_shown_frame=True)
         self._job: Job[SearchStep] | None = None
         self._run: SearchRun | None = None
+        self._sources: list[tuple[str, ...]] = []  # of the values of each person; '' for those not searched yet
+        self._stage: Stage | None = None
         self._person: int | None = None  # the only person searched; None for all people
         self._before: tuple[tuple[ShownPose, ...], Costs] | None = None  # the poses before the search and their costs
 
@@ -124,8 +126,12 @@ class SearchRunner:
         self._session_state.set(search=SearchState())
 
     def stop(self) -> None:
-        """Pause a running search with its best poses on disk; it can be continued."""
+        """Pause a running search with its best poses on disk; end a paused one. The caller must not hold the lock."""
+        was_running = self.running
         self.halt()
+        with self._session_state.lock:
+            if self._job is not None and not (was_running or self.running or self._job.ended):
+                self._end()
 
     def _go(
         self, until: Callable[[SearchStep], bool], person: int | None, start: tuple[Array, ...] | None = None
@@ -162,6 +168,8 @@ class SearchRunner:
             )
             job.pace(_rest_s(state.search_view.speed))
             self._job, self._run, self._person, session_state.open_edit_owner = job, run, person, None
+            self._sources = [("",) * len(p) for p in poses]
+            self._stage = None
             self._before = people, costs
             session_state.set(search=SearchState(kind="search", stages=tuple(s.name for s in run.stages)))
         return self._job
@@ -172,9 +180,11 @@ class SearchRunner:
             if job is not self._job or self._run is None:
                 return
             self._run.add(step, seconds)
+            if step.stage is not self._stage:
+                self._note_stage(step.stage)
             people = tuple(
                 p if self._is_fixed(i) or (p.source is not None and np.array_equal(p.values, best))
-                else ShownPose(best, "searched")
+                else ShownPose(best, self._source_of(p, job), sources=self._sources[i])
                 for i, (p, best) in enumerate(zip(session_state.state.people, step.best, strict=True))
             )  # fmt: skip
             shown = replace(
@@ -184,7 +194,10 @@ class SearchRunner:
             )  # fmt: skip
             changed = any(a is not b for a, b in zip(people, session_state.state.people, strict=True))
             view_costs_px = tuple(finite_or_none(c) for c in step.best_view_costs_px)
-            session_state.set(people=people, search=shown, cost_px=step.best_px, view_costs_px=view_costs_px)
+            session_state.set(
+                people=people, search=shown, search_view=self._compared_with(self._run),
+                cost_px=step.best_px, view_costs_px=view_costs_px,
+            )  # fmt: skip
             if changed and time.monotonic() - session_state.last_save > _SAVE_S:
                 session_state.save("search", "searched", job)
 
@@ -216,6 +229,18 @@ class SearchRunner:
                 self._compare()
             self._save(job)
 
+    def _end(self) -> None:
+        """Discard a paused search at the user's request; its best poses stay."""
+        session_state = self._session_state
+        message = f"stopped: {session_state.state.search.evaluations} poses scored"
+        self.forget()
+        session_state.set(search=SearchState(message=message), **session_state.costs(session_state.state.poses))
+
+    def _compared_with(self, run: SearchRun) -> SearchView:
+        """Return the search view; where a continued run is drawn for comparison, with its new result."""
+        view = self._session_state.state.search_view
+        return replace(view, compared=run.best) if view.compared_run == run.number else view
+
     def _compare(self) -> None:
         """Compare the shown poses with those before the search."""
         if self._before is not None:
@@ -229,8 +254,19 @@ class SearchRunner:
         """Return whether only another person is searched, so that this person's pose stays as it is."""
         return self._person is not None and person != self._person
 
+    def _note_stage(self, stage: Stage) -> None:
+        """Note that a stage searches its values: they have this source even where the search leaves them unchanged."""
+        found = self._session_state.free_sources(stage.person, "searched", stage.group.dofs)
+        known = self._sources[stage.person]
+        self._sources[stage.person] = tuple(new or old for new, old in zip(found, known, strict=True))
+        self._stage = stage
+
+    def _source_of(self, shown: ShownPose, job: Job[SearchStep]) -> str:
+        """Return the source of a searched pose; once saved it counts the values that are not searched."""
+        return shown.source if shown.source and self._session_state.open_edit_owner is job else "searched"
+
     def _save(self, job: Job[SearchStep]) -> None:
-        if any(p.source == "searched" for p in self._session_state.state.people):
+        if not self._session_state.is_shown_stored(self._session_state.state):
             self._session_state.save("search", "searched", job)
 
 

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from app.session.frame_cache import FrameCache
 from app.state.people import ShownPose
+from app.state.search import SearchView
 from app.state.state import Costs, ShownFrame, State, StateChanges, finite_or_none
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel
 from tracker.compute.kernel_cache import STAGES
 from tracker.errors import TrackerError
-from tracker.fitting.gauss_newton import with_locked_dofs
+from tracker.fitting.gauss_newton import value_mask, with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.triangulation import PointObservation
@@ -85,6 +86,18 @@ class SessionState:
         """Return which degrees of freedom of a person are not locked, (n_dofs,)."""
         return active_dofs(self.present[person], self.state.locked[person])
 
+    def free_sources(self, person: int, source: str, dofs: Collection[str] | None = None) -> tuple[str, ...]:
+        """Return a source for each value of a person that an edit concerns, (n_values,); '' for the others.
+
+        Args:
+            person: index of the person.
+            source: of these values.
+            dofs: names of the degrees of freedom that the edit is about, of which locked ones stay; None for all.
+        """
+        model = self.models[person]
+        concerned = self.active_dofs(person) & np.isin(model.dof_names, list(model.dof_names if dofs is None else dofs))
+        return tuple(source if one else "" for one in value_mask(model, concerned))
+
     def drag_constraints(self, person: int) -> Constraints:
         """Return what a drag of a person leaves alone: locks, held points, the vertical."""
         here = [h for h in self.state.held if (h.frame, h.person) == (self.state.frame, person)]
@@ -135,14 +148,17 @@ class SessionState:
         return unsubscribe
 
     def set(self, **changes: Unpack[StateChanges]) -> None:
-        """Change fields of the state and call the views. A new frame brings its pins unless they are given.
+        """Change fields of the state and call the views.
 
+        A new frame brings its pins unless they are given, and ends replay, preview and comparison of recorded searches.
         Whether all is saved follows from the other fields: no path that edits can forget it.
         """
         with self.lock:
             frame = changes.get("frame", self.state.frame)
             if frame != self.state.frame and "pins" not in changes:
                 changes["pins"] = self._load_pins(frame)
+            if frame != self.state.frame and "search_view" not in changes:
+                changes["search_view"] = SearchView(speed=self.state.search_view.speed)
             state = replace(self.state, **changes)
             self.state = replace(state, saved=self._is_saved(state))
             for view in list(self._subscribers):
@@ -241,6 +257,9 @@ class SessionState:
         goes_on = gesture is not None and (self.open_edit_owner is gesture or self.open_edit_owner == gesture)
         amend = self._edit if goes_on else None
         self._edit = self.saver.save(self.state, label, source, amend, vouched)
+        people = self.saver.with_stored_sources(self.state)
+        if any(shown is not before for shown, before in zip(people, self.state.people, strict=True)):
+            self.set(people=people)
         self.open_edit_owner, self.last_save = gesture, time.monotonic()
         self.note_stored()
         self.refresh_saving()

@@ -154,3 +154,19 @@ def test_only_the_views_that_a_page_sees_are_drawn(controller):
     seen = view_of("contours", "accepted", reductions=(0, 0, 2, 0))
     assert {p.camera for p in drawn(controller, controller.state, view=seen)} == {2}
     assert {h.camera for h in overlays.handles(controller.session, controller.state, seen.cameras)} == {2}
+
+
+def test_a_joint_behind_another_person_says_by_whom_it_is_hidden(couple):
+    state, camera = couple.state, couple.session.cameras[0].camera.pinhole
+    ann = state.people[0].values
+    bob = ann.copy()
+    to_camera = camera.center_world - ann[:3]
+    bob[:3] += 0.7 * to_camera / np.linalg.norm(to_camera)
+    state = replace(state, people=(ShownPose(ann, "manual"), ShownPose(bob, "manual")))
+    alone = overlays.handles(couple.session, replace(state, people=(state.people[0], couple.state.people[1])), [0])
+    visible = {h.point for h in alone if h.person == 0 and h.visible}
+    found = overlays.handles(couple.session, state, [0])
+    assert {h.hidden_by for h in found if h.person == 0 and h.point in visible and not h.visible} == {1}
+    assert [h for h in found if h.person == 0 and h.point in visible and not h.visible]
+    assert {h.hidden_by for h in found if h.person == 1} == {None}
+    assert {h.hidden_by for h in found if h.visible} == {None}

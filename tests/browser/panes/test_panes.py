@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 from fake_endpoint import project
-from page_driver import dragging, handle_of, shows, state_of, to_client, until
+from page_driver import OPENED, dragging, handle_of, shows, state_of, to_client, until
 
 PIXEL = """([x, y]) => {
   const canvas = document.querySelector(".pane-overlay");
@@ -280,3 +280,17 @@ async def test_all_views_are_framed_on_the_people_by_a_key(page):
     await page.mouse.move(0, 0)
     await page.keyboard.press("0")
     await shows(page, "quadrille.state.views.every((view) => view.zoom === 1)")
+
+
+async def test_zoom_is_kept_over_a_reload(page):
+    x, y = await to_client(page, 0, 200.0, 150.0)
+    await page.mouse.move(x, y)
+    await page.mouse.wheel(0, -600)
+    await shows(page, "localStorage.getItem('quadrille.views.elbow_rotation')")
+    before = [await to_client(page, camera, 100.0, 90.0) for camera in (0, 1)]
+    await page.reload()
+    await shows(page, OPENED)
+    for camera, place in enumerate(before):
+        assert await to_client(page, camera, 100.0, 90.0) == pytest.approx(place, abs=0.01)
+    await page.keyboard.press("0")  # the whole image, kept as well
+    await shows(page, "!localStorage.getItem('quadrille.views.elbow_rotation').includes('zoom')")

@@ -113,3 +113,50 @@ async def test_each_has_a_lane_and_two_poses_as_good_are_gone_to(couple, endpoin
     await couple.locator("#take-alternative").click()
     await couple.keyboard.press("Shift+X")
     await until(lambda: [m["action"] for m in endpoint.heard("pose")] == ["alternative", "alternative"])
+
+
+async def test_bars_and_legend_tell_what_is_visible_of_the_person_worked_on(couple, endpoint):
+    cell = {
+        "source": "manual", "cost_px": 1.0, "keyframe": True, "status": "", "remark": "", "reviewed": False,
+        "ambiguous": False, "limbs_lost": [],
+    }  # fmt: skip
+    for person, is_keyframe in ((None, True), (0, False), (1, True)):
+        cells = {12: cell | {"keyframe": is_keyframe}}
+        await endpoint.broadcast({"type": "timeline", "person": person, "cells": cells, "replace": False})
+    await shows(couple, "document.querySelector('#toggle-keyframe').ariaPressed === 'false'")
+    assert await couple.locator("#source").inner_text() == "person 0: manual"
+    await couple.keyboard.press("p")
+    await shows(couple, "document.querySelector('#toggle-keyframe').ariaPressed === 'true'")
+    assert await couple.locator("#source").inner_text() == "person 1: manual"
+    stop, legend = couple.locator("#search-stop"), couple.locator("#pose-legend")
+    await couple.keyboard.press("s")
+    await shows(couple, "document.querySelector('#search-stage').textContent.startsWith('paused')")
+    assert (await stop.get_attribute("title")).startswith("End the paused search")
+    assert not await legend.is_visible()
+    endpoint.state |= {
+        "compared_run": 2, "replay": {"run": 3, "step": 4, "steps": 9, "stage": "arms"},
+    }  # fmt: skip
+    endpoint.other_kind = "compared"
+    await endpoint.broadcast(endpoint.state)
+    await endpoint.send_overlay(candidate=0.1)
+    await shows(couple, "document.querySelectorAll('#pose-legend svg').length === 3")
+    texts = await legend.locator("span").all_inner_texts()
+    assert texts == ["Replay of run 3, step 5 of 9", "Esc exits", "best pose so far", "tested pose", "run 2"]
+    samples = legend.locator("path")
+    assert len({await samples.nth(i).get_attribute("stroke-dasharray") for i in (0, 2)}) == 2
+    assert await couple.locator("#source").inner_text() == "person 1: replay"
+    await couple.keyboard.press("Shift+Digit6")
+    await shows(couple, "document.querySelectorAll('#pose-legend svg').length === 1")
+    assert "contours are hidden" in await legend.inner_text()
+
+
+async def test_a_joint_tells_by_whom_it_is_hidden_and_solo_shows_it(couple, endpoint):
+    endpoint.hider = 1
+    await endpoint.send_overlay()
+    await couple.mouse.click(*await to_client(couple, 0, *await handle_of(couple, 0, "r_wrist", 0)))
+    corner = couple.locator(".pane-joint").first
+    await shows(couple, "document.querySelector('.pane-joint').innerText.includes('hidden by person 1')")
+    assert "is occluded by person 1" in await corner.get_attribute("title")
+    await couple.keyboard.press("Shift+A")
+    await shows(couple, "document.querySelector('.pane-joint').innerText.includes('behind person 1')")
+    assert "who is dimmed" in await corner.get_attribute("title")

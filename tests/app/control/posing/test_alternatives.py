@@ -1,4 +1,4 @@
-"""Two poses about as good: marked, drawn as a ghost, taken in place of each other, undone."""
+"""Two poses about as good: marked, drawn dashed, taken in place of each other, undone."""
 
 import numpy as np
 import pytest
@@ -34,9 +34,9 @@ def tracked(couple, session, opened):
     return opened(), ann, bob, lifted
 
 
-def ghosts(controller):
+def drawn(controller):
     paths = overlays.paths(controller.session, controller.state, VIEW, None)
-    return {p.person for p in paths if p.kind == "ghost" and len(p.segments_px)}
+    return {p.person for p in paths if p.kind == "alternative" and len(p.segments_px)}
 
 
 def ambiguous(controller, person=None):
@@ -47,11 +47,11 @@ def test_frames_with_another_pose_are_marked_and_show_it(tracked):
     controller, *_ = tracked
     assert [ambiguous(controller, p) for p in (None, ANN, BOB)] == [[0, 1], [0], [0, 1]]
     assert [len(p.alternatives) for p in controller.state.people] == [1, 2]
-    assert ghosts(controller) == {ANN, BOB}
+    assert drawn(controller) == {ANN, BOB}
     controller.visibility.show(ANN, False)
-    assert ghosts(controller) == {BOB}
+    assert drawn(controller) == {BOB}
     controller.navigation.seek(2)
-    assert ghosts(controller) == set()
+    assert drawn(controller) == set()
 
 
 def test_the_other_pose_is_taken_vouched_for_and_left_again(tracked):
@@ -62,12 +62,12 @@ def test_the_other_pose_is_taken_vouched_for_and_left_again(tracked):
     assert (controller.state.people[BOB].source, controller.state.people[ANN].source) == ("manual", "tracked")
     assert controller.state.undo == "take alternative pose of bob, frame 1"
     assert controller.stored_poses.timeline(0, BOB)[1]["keyframe"]
-    assert (ambiguous(controller, BOB), ghosts(controller)) == ([0], set())
+    assert (ambiguous(controller, BOB), drawn(controller)) == ([0], set())
     controller.alternatives.take_alternative(BOB)
     np.testing.assert_array_equal(controller.state.poses[BOB], bob)
     controller.history.undo()
     controller.history.undo()
-    assert (ambiguous(controller, BOB), ghosts(controller)) == ([0, 1], {BOB})
+    assert (ambiguous(controller, BOB), drawn(controller)) == ([0, 1], {BOB})
     assert controller.state.people[BOB].source == "tracked"
 
 
@@ -87,7 +87,7 @@ def test_who_vouches_for_a_pose_has_chosen(tracked):
     controller.navigation.seek(1)
     controller.navigation.select(BOB, None)
     controller.ranges.toggle_keyframe()
-    assert (ambiguous(controller, BOB), ghosts(controller)) == ([0], set())
+    assert (ambiguous(controller, BOB), drawn(controller)) == ([0], set())
 
 
 def test_without_another_pose_there_is_nothing_to_take(tracked):

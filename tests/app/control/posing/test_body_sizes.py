@@ -49,7 +49,7 @@ def test_a_draft_is_drawn_and_changes_nothing(posed, session):
     )  # both sides alike
     view = View(frozenset(["contours"]), (1.0,) * 4)
     drawn = messages.overlay(posed.session_of(posed.state), posed.state, PAGE, view, None)
-    assert b'"ghost"' in drawn
+    assert b'"new_sizes"' in drawn
     assert posed.models == (before,)
     posed.body_sizes.discard()
     assert posed.body_sizes.model(0) is before

@@ -48,6 +48,27 @@ def test_it_follows_the_pose_while_a_page_looks(opened):
     assert controller.state.landscape.current == pytest.approx(0.5)
 
 
+def test_it_begins_with_the_selected_point_and_follows_it(opened):
+    controller = opened()
+    names = controller.models[0].dof_names
+
+    def shown(joint):
+        wait_for(lambda: controller.state.landscape and names[controller.state.landscape.dof].startswith(f"{joint}."))
+
+    controller.navigation.select(0, "left_wrist")  # it turns with the elbow
+    controller.cost_landscape.watch(7, True)
+    shown("left_elbow")
+    controller.cost_landscape.choose("torso.x")
+    shown("torso")
+    controller.navigation.select(0, "right_knee")
+    shown("right_knee")
+    controller.cost_landscape.choose("torso.x")
+    shown("torso")
+    controller.cost_landscape.watch(7, False)
+    controller.cost_landscape.watch(7, True)
+    shown("right_knee")
+
+
 def test_a_value_is_set_as_an_edit(opened):
     controller = opened()
     dof = controller.models[0].dof_names.index("left_elbow.extension")

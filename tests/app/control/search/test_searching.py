@@ -122,7 +122,7 @@ def test_a_candidate_is_previewed_and_taken(opened):
     assert costs[0] == pytest.approx(run.best_px)
     before = controller.state.people
     controller.replay.preview(run.number, 1)
-    assert controller.state.search_view.preview is run.candidates[1].poses
+    assert controller.state.search_view.preview.poses is run.candidates[1].poses
     controller.replay.preview(run.number, 99)
     assert controller.state.search_view.preview is None
     assert controller.state.people is before
@@ -147,3 +147,76 @@ def test_what_is_locked_stays_in_a_run_again_and_in_what_is_taken(opened):
     wait_for(lambda: again.over)
     assert again.best[0][dof] == pytest.approx(0.7)
     assert all("left_shoulder.abduction" not in s.group.dofs for s in again.stages)
+
+
+def test_stop_ends_a_paused_search(opened):
+    controller = opened()
+    controller.search.set_settings(QUICK)
+    controller.search.step()
+    wait_for(lambda: controller.state.search.evaluations and not controller.state.search.running)
+    shown = controller.state.people
+    controller.activities.stop()
+    assert controller.state.search.kind is None
+    assert controller.state.search.message.startswith("stopped: ")
+    assert controller.state.people is shown
+    assert controller.replay.runs()[-1].over
+    controller.activities.stop()  # nothing is left to stop
+    controller.search.step()
+    wait_for(lambda: len(controller.replay.runs()) == 2)
+
+
+@pytest.mark.parametrize("what", ["discarded", "moved", "sizes"])
+def test_a_comparison_ends_with_its_run(opened, what):
+    controller = opened()
+    run = searched(controller)
+    controller.replay.compare(run.number)
+    controller.replay.preview(run.number, 0)
+    if what == "discarded":
+        for _ in range(6):
+            controller.search.forget()
+            controller.search.step()
+            wait_for(lambda: not controller.search.running)
+        assert run.number not in [r.number for r in controller.replay.runs()]
+    elif what == "moved":
+        drag(controller, "left_knee", (3.0, 3.0))
+        controller.replay.preview(run.number, 0)
+        controller.navigation.seek(3)
+        controller.replay.compare(None)
+        drag(controller, "left_knee", (3.0, 3.0))
+        controller.navigation.seek(0)
+        controller.replay.compare(run.number)
+        controller.history.undo()  # of the drag on frame 3, which is shown
+        assert controller.state.frame == 3
+    else:
+        controller.body_sizes.set_height(0, 1.7)
+        controller.body_sizes.apply(0, refit=False)
+    view = controller.state.search_view
+    assert (view.compared_run, view.compared, view.preview) == (None, None, None)
+
+
+def source_of(controller):
+    """The source of the pose, which the timeline and the state must agree on, also when the frame is shown again."""
+    shown = controller.state.people[0].source
+    assert controller.stored_poses.timeline(0)[0]["source"] == shown
+    controller.navigation.seek(1)
+    controller.navigation.seek(0)
+    assert controller.state.people[0].source == shown
+    return shown
+
+
+def test_the_shown_source_is_the_stored_one(opened):
+    controller = opened()
+    drag(controller, "torso", (4.0, 0.0))
+    controller.search.set_settings(QUICK)
+    controller.dof_locks.set(0, [0], True)  # this value stays as it was placed
+    controller.search.run()
+    wait_for(lambda: controller.state.search.message)
+    with controller.lock:
+        assert source_of(controller) == "manual"  # the most manual one of the values
+    controller.dof_locks.set(0, [0], False)
+    searched(controller)
+    assert source_of(controller) == "searched"
+    drag(controller, "left_wrist", (5.0, 5.0))
+    assert source_of(controller) == "manual"
+    controller.pinning.fit(0)
+    assert source_of(controller) == "fitted"

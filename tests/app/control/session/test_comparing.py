@@ -47,7 +47,7 @@ def test_the_views_show_the_pose_before_and_nothing_is_undone(fitted):
     assert messages.state(controller.session, state).cost_px == pytest.approx(before.cost_px)
     assert (state.people, state.undo, state.saved) == (result.people, undo, True)
     kinds = {p.kind for p in overlays.paths(controller.session_of(state), state, CONTOURS, None)}
-    assert "ghost" in kinds  # the result, to see where they differ
+    assert "result" in kinds  # the result, to see where they differ
     assert not state.is_stored_drawn
     controller.comparing.show_before(False)
     assert controller.state.drawn is controller.state

@@ -138,7 +138,7 @@ def test_the_views_show_lines_of_sight_and_the_plane(opened):
     session = controller.session
     do(controller, "begin")
     click(controller, corners()[0], cameras=(0,))
-    lines = {p.camera: p.segments_px for p in floor_lines(session, controller.state) if p.kind == "ghost"}
+    lines = {p.camera: p.segments_px for p in floor_lines(session, controller.state) if p.kind == "floor_sight"}
     assert sorted(lines) == [1, 2, 3]
     for camera, (x0, y0, x1, y1) in ((c, s[0]) for c, s in lines.items()):
         u, v = session.cameras[camera].camera.pinhole.project(corners()[0])

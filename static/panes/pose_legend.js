@@ -1,0 +1,91 @@
+/** Legend of the poses that the panes show besides the stored ones: replayed, tested, compared, previewed, alternative. */
+
+import { byId } from "../widgets/elements.js";
+import { LINE_STYLES } from "./drawing.js";
+
+/**
+ * @typedef {import("../model/protocol.js").Path["kind"]} Kind
+ * @typedef {import("../model/protocol.js").StateMessage} StateMessage
+ */
+
+const SAMPLE_PX = 30;
+
+/** Kinds of outlines in the legend, with their names. @type {Partial<Record<Kind, (state: StateMessage) => string>>} */
+const NAMES = {
+  candidate: () => "tested pose",
+  compared: ({ compared_run }) => `run ${compared_run}`,
+  preview: ({ preview }) => (preview ? `candidate ${preview.candidate + 1} of run ${preview.run}` : "candidate"),
+  alternative: () => "alternative pose",
+  result: ({ compared }) => `result of the ${compared?.work}`,
+  new_sizes: () => "new body sizes",
+};
+
+export class PoseLegend {
+  #store;
+  #element = byId("pose-legend", HTMLElement);
+  #shown = "";
+
+  /** @param {import("../model/store.js").Store} store */
+  constructor(store) {
+    this.#store = store;
+    store.subscribe((changed) => {
+      if (changed.has("state") || changed.has("overlay") || changed.has("layers")) this.#show();
+    });
+  }
+
+  #show() {
+    const { state, overlay, layers, session } = this.#store.facts;
+    if (!state || !overlay) return;
+    const replay = state.replay && `Replay of run ${state.replay.run}, step ${state.replay.step + 1} of ${state.replay.steps}`;
+    /** @type {Map<Kind, string>} colours of the kinds that are visible */
+    const colors = new Map();
+    for (const { kind, color, count } of overlay.paths) {
+      const { layer } = LINE_STYLES[kind];
+      if (count > 0 && (layer === null || layers.shown[layer])) colors.set(kind, color);
+    }
+    const lines = Object.entries(NAMES).flatMap(([name, label]) => {
+      const [kind, color] = [/** @type {Kind} */ (name), colors.get(/** @type {Kind} */ (name))];
+      return color ? [{ kind, color, text: label(state) }] : [];
+    });
+    if (replay && colors.has("model")) {
+      lines.unshift({ kind: "model", color: session?.people[state.person].color ?? "#fff", text: "best pose so far" });
+    }
+    const texts = [replay, ...(replay && !colors.has("model") ? ["contours are hidden"] : []), replay && "Esc exits"];
+    const described = JSON.stringify([texts, lines]);
+    if (described === this.#shown) return;
+    this.#shown = described;
+    this.#element.hidden = !replay && lines.length === 0;
+    this.#element.replaceChildren(...texts.filter(Boolean).map((text) => entry(text ?? "")), ...lines.map((line) => entry(line.text, line)));
+  }
+}
+
+/**
+ * @param {string} text
+ * @param {{kind: Kind, color: string}} [line] of which a sample is drawn
+ */
+function entry(text, line) {
+  const item = document.createElement("span");
+  if (line) item.append(sampleOf(line.kind, line.color));
+  item.append(text);
+  return item;
+}
+
+/**
+ * Sample of a line as the panes draw it.
+ *
+ * @param {Kind} kind
+ * @param {string} color
+ */
+function sampleOf(kind, color) {
+  const { width, dash } = LINE_STYLES[kind];
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  svg.setAttribute("viewBox", `0 0 ${SAMPLE_PX} 8`);
+  svg.setAttribute("aria-hidden", "true");
+  const path = document.createElementNS("http://www.w3.org/2000/svg", "path");
+  path.setAttribute("d", `M0 4H${SAMPLE_PX}`);
+  path.setAttribute("stroke", color);
+  path.setAttribute("stroke-width", String(width));
+  path.setAttribute("stroke-dasharray", dash.join(" "));
+  svg.append(path);
+  return svg;
+}
