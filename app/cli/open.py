@@ -35,8 +35,12 @@ def command(
         start_again: discard the working copy of the sample and make a new one.
     """
     from app.runtime.restart import restart
-    from app.server.workbench import Serving, open_session
+    from app.server.address import Serving
+    from app.server.doorway import Doorway
     from app.session.samples import DEFAULT_SAMPLE, sample_copy
+    from tracker.session.lock import SessionLock
+    from tracker.session.relink import require_files
+    from tracker.session.session import load_session
 
     if session is not None and (sample is not None or start_again):
         raise TrackerError(
@@ -44,7 +48,12 @@ def command(
             "leave one of them out"
         )
     folder = sample_copy(sample or DEFAULT_SAMPLE, start_again) if session is None else session
+    found = load_session(folder)
+    require_files(found)
     serving = Serving(host, port, allow_host, browser, token)
-    chosen = open_session(folder, serving, lambda line: print(line, flush=True))
+    with SessionLock(found.folder), Doorway(serving) as doorway:
+        from app.server.workbench import open_session  # takes seconds: the doorway answers meanwhile
+
+        chosen = open_session(found, doorway, lambda line: print(line, flush=True))
     if chosen is not None:
         restart(["open", str(chosen.folder), "--host", host, "--port", str(chosen.port), "--no-browser"])

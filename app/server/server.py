@@ -5,12 +5,11 @@ check, and listens on a private socket (`private_viser`).
 """
 
 import asyncio
-import errno
 import logging
 import os
+import socket
 import weakref
-from collections.abc import AsyncIterator, Callable
-from dataclasses import replace
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -19,8 +18,7 @@ from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
 from app.server import connections, viser_proxy
-from app.server.access import Access, is_loopback
-from tracker.errors import TrackerError
+from app.server.access import Access
 
 _LOG = logging.getLogger(__name__)
 _SOCKETS: web.AppKey[weakref.WeakSet[web.WebSocketResponse]] = web.AppKey("sockets", weakref.WeakSet)
@@ -49,7 +47,7 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
         panes: answers the pane sockets, one call per page.
         viser_socket: the Unix socket of viser.
         access: the check of every request.
-        static: the folder of the page (`static_folder`).
+        static: the folder of the page (`static_files.static_folder`).
     """
     app = web.Application(middlewares=[_guard(access)])
     app[_SOCKETS] = weakref.WeakSet()
@@ -101,50 +99,24 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
     return app
 
 
-async def serve_forever(
-    app: web.Application, access: Access, host: str, port: int, on_ready: Callable[[str, str], None]
-) -> None:
+async def serve_forever(app: web.Application, sockets: Sequence[socket.socket], on_ready: Callable[[], None]) -> None:
     """Serve until the task is cancelled, then close all sockets.
 
     Args:
         app: from `create_app`.
-        access: as given to `create_app`; its token is part of the address.
-        host: address to listen at.
-        port: port to listen at; 0 for a free one.
-        on_ready: called once when the server answers, with the page's address and the one to start a browser with.
-
-    Raises:
-        TrackerError: the port is taken, or the address is not this machine's.
+        sockets: that listen (`address.listen`).
+        on_ready: called once when the server answers.
     """
     runner = connections.LimitedRunner(app)
     await runner.setup()
     try:
-        try:
-            await web.TCPSite(runner, host, port).start()
-        except (OSError, OverflowError) as error:
-            raise TrackerError(_listen_message(host, port, error)) from error
-        port = runner.addresses[0][1]
-        once = None if access.invitation is None else access.invitation.code
-        on_ready(page_address(access, host, port), page_address(replace(access, token=once), host, port))
+        for each in sockets:
+            each.setblocking(False)
+            await web.SockSite(runner, each).start()
+        on_ready()
         await asyncio.Event().wait()
     finally:
         await runner.cleanup()
-
-
-def page_address(access: Access, host: str, port: int) -> str:
-    """Return the page's address, with the token if one is required."""
-    name = host if is_loopback(host) or not access.hosts else min(access.hosts)
-    bracketed = f"[{name}]" if ":" in name and not name.startswith("[") else name
-    return f"http://{bracketed}:{port}/" + (f"?token={access.token}" if access.token else "")
-
-
-def static_folder() -> Path:
-    """Return the folder of the page: inside the installed package, or beside it in a checkout."""
-    here = Path(__file__).resolve().parents[1]
-    for folder in (here / "static", here.parent / "static"):
-        if (folder / "index.html").is_file():
-            return folder
-    raise TrackerError(f"expected the page's files in '{here / 'static'}', found none; install quadrille again")
 
 
 def _guard(access: Access) -> Middleware:
@@ -196,12 +168,3 @@ async def _close_sockets(app: web.Application) -> None:
     sockets = app[_SOCKETS]
     ends = (s.close(code=aiohttp.WSCloseCode.GOING_AWAY, message=b"the program ends") for s in list(sockets))
     await asyncio.gather(*ends, return_exceptions=True)
-
-
-def _listen_message(host: str, port: int, error: OSError | OverflowError) -> str:
-    number = getattr(error, "errno", None)
-    if number == errno.EADDRINUSE:
-        return f"expected port {port} of {host} to be free, found it in use; stop the other program or choose --port"
-    if number in (errno.EACCES, errno.EPERM):
-        return f"expected to be allowed to listen at port {port}, found it refused; choose a --port above 1023"
-    return f"cannot listen at {host}, port {port} ({error}); give an address of this machine as --host, a free --port"

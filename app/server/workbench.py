@@ -1,16 +1,12 @@
-"""Open a session in the page: lock, store, controller, 3-D view and web server."""
+"""Open a session in the page: store, controller, 3-D view and web server."""
 
 import asyncio
 import getpass
 import signal
-import threading
-import webbrowser
 from collections.abc import Callable, Coroutine
 from contextlib import closing
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
-from urllib.parse import urlsplit
 
 from platformdirs import user_state_path
 
@@ -20,11 +16,13 @@ from app.page.thumbnails import Thumbnails
 from app.runtime.kernel_compiler import KernelCompiler
 from app.scene3d.gizmos import Gizmos
 from app.scene3d.scene import SceneView
-from app.server.access import access_for, is_loopback
+from app.server.access import is_loopback
+from app.server.doorway import Doorway
 from app.server.export_routes import ExportRoutes
 from app.server.private_viser import PrivateViser
-from app.server.server import create_app, serve_forever, static_folder
+from app.server.server import create_app, serve_forever
 from app.server.session_routes import SessionRoutes, refusal
+from app.server.static_files import static_folder
 from app.server.thumbnail_routes import ThumbnailRoutes
 from app.session import proxies
 from app.session.footage_crops import FootageCrops
@@ -36,26 +34,11 @@ from app.storage.saver import Saver
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
-from tracker.session.lock import SessionLock
-from tracker.session.relink import require_files
-from tracker.session.session import load_session
+from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
 
 _ANSWER_S = 0.3
 """Time for the answer to a page that has chosen another session."""
-
-
-@dataclass(frozen=True)
-class Serving:
-    """Address and access of the page."""
-
-    host: str = "127.0.0.1"
-    port: int = 8080
-    allow_hosts: tuple[str, ...] = ()
-    browser: bool = True
-    """Whether to open the page in the default browser."""
-    token: bool = True
-    """Whether requests need a token."""
 
 
 class NextSession(NamedTuple):
@@ -66,29 +49,25 @@ class NextSession(NamedTuple):
     """Port of the page, which connects again there."""
 
 
-def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> NextSession | None:
+def open_session(session: Session, doorway: Doorway, say: Callable[[str], None]) -> NextSession | None:
     """Serve the page of a session until the program is interrupted, or the page asks for another session.
 
     Args:
-        folder: the session folder.
-        serving: address and access of the page.
+        session: to open; the caller holds its lock.
+        doorway: answers at the page's address meanwhile.
         say: shows a line to the user.
 
     Returns:
         The session to open next; None if the program was interrupted.
 
     Raises:
-        TrackerError: the session cannot be opened, is open elsewhere, or the port is taken.
+        TrackerError: the session cannot be opened.
     """
-    session = load_session(folder)
-    require_files(session)
-    tokens = user_state_path("quadrille", appauthor=False)
-    access = access_for(serving.host, serving.allow_hosts, serving.token, tokens)
-    static = static_folder()
+    doorway.show("Opening the session")
+    tokens, serving = user_state_path("quadrille", appauthor=False), doorway.serving
     indices = footage_indices()
     with (
         closing(KernelCompiler()) as compiler,
-        SessionLock(session.folder),
         Recording(session.cameras, indices=indices, in_background=True) as recording,
     ):
         remember(tokens, session.folder)
@@ -98,6 +77,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
         offers = [found.offer for found in rescue.find(session.folder, store.id)]
         for offer in offers:
             say(offer)
+        doorway.show("Preparing the views")
         frames = FrameCache(Observer(session.cameras, recording), proxies.proxies(session))
         saver = Saver(session, store, _author())
         controller = Controller(session, saver, frames, compiler)
@@ -106,26 +86,22 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
         try:
             SceneView(viser.server, controller)
             Gizmos(viser.server, controller)
-            app = create_app(PaneSocket(controller, offers), viser.socket_path, access, static)
+            app = create_app(PaneSocket(controller, offers), viser.socket_path, doorway.access, static_folder())
             ExportRoutes(session.folder).add_to(app)
             is_private = is_loopback(serving.host) and not serving.allow_hosts
             others = SessionRoutes(
                 session.folder, tokens, refusal(is_private, serving.token), lambda: controller.state.save_error
             )
             others.add_to(app)
-            port = serving.port
             ThumbnailRoutes(thumbnails.jpeg, lambda: not _can_draw(controller)).add_to(app)
 
-            def ready(address: str, opened: str) -> None:
-                nonlocal port
-                port = urlsplit(address).port or port
+            def ready() -> None:
                 for name in proxies.stale(session):
                     say(f"the proxy of camera {name} is of other footage: run quadrille index {session.folder} again")
-                say(f"{session.name}: {address}")
-                if serving.browser:
-                    threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
+                say(f"{session.name}: {doorway.address}")
 
-            served = serve_forever(app, access, serving.host, serving.port, ready)
+            doorway.close()
+            served = serve_forever(app, doorway.sockets, ready)
             asyncio.run(_until_interrupted(served, others.is_chosen))
         finally:
             try:
@@ -137,7 +113,7 @@ def open_session(folder: Path, serving: Serving, say: Callable[[str], None]) -> 
             store.close()
             if unsaved is not None:
                 raise TrackerError(unsaved)
-    return None if others.chosen is None else NextSession(others.chosen, port)
+    return None if others.chosen is None else NextSession(others.chosen, doorway.port)
 
 
 def _can_draw(controller: Controller) -> bool:

@@ -11,7 +11,8 @@ from playwright.async_api import Error, async_playwright
 from serving import listening
 
 from app.server.access import Access
-from app.server.server import create_app, static_folder
+from app.server.server import create_app
+from app.server.static_files import static_folder
 
 BLANK = "<!doctype html><title>3-D</title><link rel=icon href='data:,'><body tabindex=0>"
 LIVE = Path(__file__).parent / "live"

@@ -16,7 +16,7 @@ HOUSE = {
         ["posing", "timeline"],
         ["panes"],
         ["model"],
-        ["widgets"],
+        ["widgets", "starting"],
     ],
     "app/  the viewer": [
         ["__main__"],

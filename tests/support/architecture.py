@@ -98,7 +98,19 @@ IMPORTS = {name: imported(ast.parse(path.read_text("utf-8")), FILES) for name, p
 OWN = {name: sorted(found & FILES.keys() - AT_IMPORT.get(name, set())) for name, found in IMPORTS.items()}
 
 
-PAGE_ROOMS = ["widgets", "model", "panes", "posing", "timeline", "search", "scene", "inspector", "shell", "."]
+PAGE_ROOMS = [
+    "widgets",
+    "model",
+    "panes",
+    "posing",
+    "timeline",
+    "search",
+    "scene",
+    "inspector",
+    "shell",
+    "starting",
+    ".",
+]
 PAGE_FLOOR = {room: floor for floor, room in enumerate(PAGE_ROOMS)}
 STATIC = ROOT / "static"
 PAGE_IMPORT = re.compile(r"""(?:from\s+|import\s*\(\s*|import\s+)["'](\.[^"']+)["']""")

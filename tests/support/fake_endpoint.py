@@ -579,13 +579,15 @@ def room(camera, frame):
 
 async def main(port):
     from app.server.access import access_for
+    from app.server.address import listen
     from app.server.private_viser import PrivateViser
-    from app.server.server import create_app, serve_forever, static_folder
+    from app.server.server import create_app, serve_forever
+    from app.server.static_files import static_folder
 
     scene = PrivateViser()
     access = access_for("127.0.0.1", token=False)
     app: web.Application = create_app(FakeEndpoint(n_people=1), scene.socket_path, access, static_folder())
-    await serve_forever(app, access, "127.0.0.1", port, lambda address, _: print(address))
+    await serve_forever(app, listen("127.0.0.1", port), lambda: print(f"http://127.0.0.1:{port}/"))
 
 
 if __name__ == "__main__":

@@ -10,8 +10,10 @@ from typing import get_args, get_type_hints
 import numpy as np
 import pytest
 from command_line import SAMPLE, assert_refused, stored
+from gestures import wait_for
 
 from app.cli.track import _SETTINGS, TrackArguments
+from app.server import address
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.evaluation.metrics import axes_matrix
 from tracker.formats.model_toml import load_model
@@ -314,18 +316,22 @@ def test_simulate(run, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["sim"]
 
 
-def test_without_a_command_the_page_is_opened(run, monkeypatch):
-    asked = []
+def test_without_a_command_the_page_is_opened(run, session, monkeypatch):
+    asked, samples, browsed = [], [], []
     monkeypatch.setattr(
-        "app.server.workbench.open_session", lambda folder, serving, say: asked.append((folder, serving))
+        "app.server.workbench.open_session", lambda found, doorway, say: asked.append((found.folder, doorway.serving))
     )
-    monkeypatch.setattr("app.session.samples.sample_copy", lambda name, afresh: Path(f"{name}, {afresh}"))
+    monkeypatch.setattr("app.session.samples.sample_copy", lambda *words: samples.append(words) or session)
+    monkeypatch.setattr("app.server.doorway.listen", lambda host, _: address.listen(host, 0))
+    monkeypatch.setattr("app.server.doorway.webbrowser.open", browsed.append)
     assert run()[0] == 0
-    assert run("some/session", "--port", "0", "--no-browser")[0] == 0
-    assert run("open", "some/session")[0] == 0
-    assert [str(folder) for folder, _ in asked] == ["tango, False", "some/session", "some/session"]
+    assert run(session, "--port", "0", "--no-browser")[0] == 0
+    assert run("open", session)[0] == 0
+    assert samples == [("tango", False)]
+    assert [folder for folder, _ in asked] == [session] * 3
     assert (asked[0][1].host, asked[0][1].port) == ("127.0.0.1", 8080)
     assert (asked[1][1].port, asked[1][1].browser) == (0, False)
+    wait_for(lambda: len(browsed) == 2)
 
 
 def test_init_takes_a_pose_from_a_table(run, session, tmp_path):
@@ -349,15 +355,15 @@ def test_init_takes_a_pose_from_a_table(run, session, tmp_path):
 
 
 def test_samples_are_opened_as_working_copies_by_name(run, monkeypatch, tmp_path):
-    asked = []
-    monkeypatch.setattr("app.server.workbench.open_session", lambda folder, serving, say: asked.append(folder))
+    asked, quiet = [], ("--port", "0", "--no-browser")
+    monkeypatch.setattr("app.server.workbench.open_session", lambda found, *_: asked.append(found.folder))
     monkeypatch.setattr("app.session.samples.user_data_path", lambda *_, **__: tmp_path)
-    assert run("--sample", "elbow_rotation")[0] == 0
+    assert run("--sample", "elbow_rotation", *quiet)[0] == 0
     assert asked == [tmp_path / "samples" / "elbow_rotation"]
     (asked[0] / "mine.txt").write_text("kept")
-    assert run("--sample", "elbow_rotation")[0] == 0
+    assert run("--sample", "elbow_rotation", *quiet)[0] == 0
     assert (asked[0] / "mine.txt").exists()
-    assert run("--sample", "elbow_rotation", "--start-again")[0] == 0
+    assert run("--sample", "elbow_rotation", "--start-again", *quiet)[0] == 0
     assert not (asked[0] / "mine.txt").exists()
     assert_refused(run("--sample", "waltz"), ["elbow_rotation, tango", "waltz"])
     assert_refused(run("some/session", "--sample", "tango"), ["some/session and --sample"])

@@ -9,6 +9,7 @@ from serving import running
 
 from app.server import connections, server
 from app.server.access import Access
+from app.server.static_files import static_folder
 
 
 class EchoPanes:
@@ -25,7 +26,7 @@ def short_times(monkeypatch):
 
 
 def serving():
-    app = server.create_app(EchoPanes(), server.static_folder() / "nobody", Access(), server.static_folder())
+    app = server.create_app(EchoPanes(), static_folder() / "nobody", Access(), static_folder())
     return running(connections.LimitedRunner(app))
 
 

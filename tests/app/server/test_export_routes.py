@@ -16,6 +16,7 @@ from app.export import formats
 from app.server import server
 from app.server.access import Access
 from app.server.export_routes import ExportRoutes
+from app.server.static_files import static_folder
 
 
 class Nobody:
@@ -36,7 +37,7 @@ def temporary(tmp_path, monkeypatch):
 async def client(tmp_path, temporary):
     folder = tmp_path / "dance"
     store_motion(folder, [MODELS["gavrila22"]] * 2, gaps={(0, 3)})
-    app = server.create_app(Nobody(), tmp_path / "nobody", Access(token="secret"), server.static_folder())
+    app = server.create_app(Nobody(), tmp_path / "nobody", Access(token="secret"), static_folder())
     ExportRoutes(folder).add_to(app)
     async with listening(app) as port, aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session:
         session.cookie_jar.update_cookies({f"quadrille_{port}": "secret"})

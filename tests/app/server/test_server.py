@@ -9,8 +9,9 @@ from aiohttp import web
 from serving import listening
 from yarl import URL
 
-from app.server import server
+from app.server import address, server
 from app.server.access import Access, Invitation
+from app.server.static_files import static_folder
 from tracker.errors import TrackerError
 
 NOBODY = Path("/nowhere/viser")
@@ -78,7 +79,7 @@ def access():
 
 @pytest.fixture
 async def port(fake_viser, access):
-    app = server.create_app(EchoPanes(), fake_viser.socket_path, access, server.static_folder())
+    app = server.create_app(EchoPanes(), fake_viser.socket_path, access, static_folder())
     async with listening(app) as port:
         yield port
 
@@ -202,7 +203,7 @@ async def test_a_page_that_leaves_closes_its_viser_socket(client, fake_viser):
 
 
 async def test_without_viser_the_proxy_says_so(tmp_path):
-    app = server.create_app(EchoPanes(), tmp_path / "nobody", Access(), server.static_folder())
+    app = server.create_app(EchoPanes(), tmp_path / "nobody", Access(), static_folder())
     async with (
         listening(app) as port,
         aiohttp.ClientSession() as session,
@@ -270,24 +271,23 @@ async def test_long_paths_are_not_found(port, fake_viser, caplog, prefix, name):
     assert status in (400, 404, 414) or (prefix, name) == ("/viser/", "%00")
 
 
-async def test_serving_a_busy_port_names_it_and_the_remedy():
+def test_serving_a_busy_port_names_it_and_the_remedy():
     with socket.socket() as busy:
         busy.bind(("127.0.0.1", 0))
         busy.listen()
         port = busy.getsockname()[1]
-        app = server.create_app(EchoPanes(), NOBODY, Access(), server.static_folder())
         with pytest.raises(TrackerError, match=rf"port {port} .* in use; .*--port"):
-            await server.serve_forever(app, Access(), "127.0.0.1", port, lambda *_: None)
+            address.listen("127.0.0.1", port)
 
 
-async def test_serving_tells_the_address_and_closes_its_sockets_at_the_end():
+async def test_serving_closes_its_sockets_at_the_end():
     ready = asyncio.get_running_loop().create_future()
-    app = server.create_app(EchoPanes(), NOBODY, Access(), server.static_folder())
-    task = asyncio.create_task(
-        server.serve_forever(app, Access(), "127.0.0.1", 0, lambda address, _: ready.set_result(address))
-    )
-    address = await asyncio.wait_for(ready, 20.0)
-    async with aiohttp.ClientSession() as session, session.ws_connect(address + "ws") as sock:
+    sockets = address.listen("127.0.0.1", 0)
+    app = server.create_app(EchoPanes(), NOBODY, Access(), static_folder())
+    task = asyncio.create_task(server.serve_forever(app, sockets, lambda: ready.set_result(True)))
+    await asyncio.wait_for(ready, 20.0)
+    url = address.page_address(Access(), "127.0.0.1", address.port_of(sockets))
+    async with aiohttp.ClientSession() as session, session.ws_connect(url + "ws") as sock:
         task.cancel()
         message = await sock.receive(timeout=20.0)
         assert (message.type, message.data) == (aiohttp.WSMsgType.CLOSE, aiohttp.WSCloseCode.GOING_AWAY)
@@ -296,6 +296,6 @@ async def test_serving_tells_the_address_and_closes_its_sockets_at_the_end():
 
 
 def test_page_address_carries_name_and_token():
-    assert server.page_address(Access(), "127.0.0.1", 8080) == "http://127.0.0.1:8080/"
-    assert server.page_address(Access(), "::1", 8080) == "http://[::1]:8080/"
-    assert server.page_address(NAMED, "0.0.0.0", 8080) == "http://lab.example.org:8080/?token=secret"
+    assert address.page_address(Access(), "127.0.0.1", 8080) == "http://127.0.0.1:8080/"
+    assert address.page_address(Access(), "::1", 8080) == "http://[::1]:8080/"
+    assert address.page_address(NAMED, "0.0.0.0", 8080) == "http://lab.example.org:8080/?token=secret"

@@ -12,6 +12,7 @@ from app.runtime import restart
 from app.server import server
 from app.server.access import Access
 from app.server.session_routes import SessionRoutes, refusal
+from app.server.static_files import static_folder
 from app.session.recent_sessions import recent_sessions, remember
 from tracker.session.lock import SessionLock
 from tracker.session.session import load_session
@@ -57,7 +58,7 @@ async def serve(folders, tmp_path):
     clients = []
 
     async def start(why=None, unsaved=None):
-        app = server.create_app(Nobody(), tmp_path / "nobody", Access(token="secret"), server.static_folder())
+        app = server.create_app(Nobody(), tmp_path / "nobody", Access(token="secret"), static_folder())
         routes = SessionRoutes(folders[0], folders[2], why, lambda: unsaved)
         routes.add_to(app)
         context = listening(app)

@@ -9,6 +9,7 @@ from serving import listening
 
 from app.server import server, thumbnail_routes
 from app.server.access import Access
+from app.server.static_files import static_folder
 from app.server.thumbnail_routes import ThumbnailRoutes
 from tracker.errors import RecordingError
 
@@ -40,7 +41,7 @@ class Maker:
 @pytest.fixture
 async def client(tmp_path):
     maker = Maker()
-    app = server.create_app(Nobody(), tmp_path / "nobody", Access(), server.static_folder())
+    app = server.create_app(Nobody(), tmp_path / "nobody", Access(), static_folder())
     ThumbnailRoutes(maker.make, lambda: maker.is_busy).add_to(app)
     async with listening(app) as port, aiohttp.ClientSession(f"http://127.0.0.1:{port}") as session:
         yield session, maker

@@ -15,9 +15,13 @@ from page_visits import visiting
 
 from app.control.session import save_retry
 from app.server import workbench
-from app.server.workbench import Serving, open_session
+from app.server.address import Serving
+from app.server.doorway import Doorway
+from app.server.workbench import open_session
 from app.storage import rescue
 from tracker.errors import SessionError, TrackerError
+from tracker.session.lock import SessionLock
+from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 
 
@@ -53,7 +57,8 @@ def open_with(session, monkeypatch):
             patch.setattr(workbench, "serve_forever", served)
             lines = []
             try:
-                open_session(session, Serving(port=0, browser=False), lines.append)
+                with SessionLock(session), Doorway(Serving(port=0, browser=False)) as doorway:
+                    open_session(load_session(session), doorway, lines.append)
             finally:
                 open_it.lines = lines
         return lines
@@ -112,7 +117,7 @@ def test_a_program_that_could_not_save_ends_with_status_1(run, session, monkeypa
         raise TrackerError("edits are not saved: the disk is full; they are kept in /x/rescue.json")
 
     monkeypatch.setattr("app.server.workbench.open_session", failing)
-    status, out, err = run("open", session, "--no-browser")
+    status, out, err = run("open", session, "--no-browser", "--port", "0")
     assert (status, out, "kept in /x/rescue.json" in err) == (1, "", True)
 
 

@@ -10,7 +10,8 @@ from serving import listening
 
 from app.server.access import Access
 from app.server.private_viser import PrivateViser
-from app.server.server import create_app, static_folder
+from app.server.server import create_app
+from app.server.static_files import static_folder
 
 
 async def test_after_another_start_the_page_goes_back_to_its_frame_and_person(browser, blank_viser):

@@ -1,0 +1,155 @@
+"""Answer at once: a page that says what the program is doing, until the session's own page is served at the same port.
+
+Loading the program takes seconds, on a busy machine many. This module imports little. Its page holds
+nothing of the session, so it needs no token; Host and Origin are checked as for every request.
+"""
+
+import json
+import socket
+import threading
+import webbrowser
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from types import TracebackType
+from typing import Self
+
+from platformdirs import user_state_path
+
+from app.server.access import Access, Invitation, access_for
+from app.server.address import Serving, listen, page_address, port_of
+from app.server.static_files import static_folder
+
+STEPS = ("Loading the program", "Opening the session", "Preparing the views")
+_POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; base-uri 'none'"
+_FILES: Mapping[str, tuple[str, str]] = {
+    "/": ("starting/index.html", "text/html; charset=utf-8"),
+    "/static/starting/starting.js": ("starting/starting.js", "text/javascript"),
+    "/static/starting/starting.css": ("starting/starting.css", "text/css"),
+    "/static/styles/tokens.css": ("styles/tokens.css", "text/css"),
+    "/static/theme.js": ("theme.js", "text/javascript"),
+    "/static/icon.svg": ("icon.svg", "image/svg+xml"),
+}
+"""What is served, by path, with its type. No other file is read."""
+_TIMEOUT_S = 2.0
+"""Time for a request to arrive: browsers also open connections that they do not use."""
+_POLL_S = 0.02
+
+
+class Doorway:
+    """Serves the starting page at listening sockets, from `with` to `close`."""
+
+    def __init__(self, serving: Serving) -> None:
+        """Listen, and read the page.
+
+        Args:
+            serving: address and access of the page.
+
+        Raises:
+            TrackerError: the port is taken, the address is not this machine's, or the access is not safe.
+        """
+        self.serving = serving
+        tokens = user_state_path("quadrille", appauthor=False)
+        self.access = access_for(serving.host, serving.allow_hosts, serving.token, tokens)
+        """What the session's page asks for; this page asks for no token."""
+        self._without_token = replace(self.access, token=None, invitation=None)
+        static = static_folder()
+        self._files = {path: ((static / name).read_bytes(), kind) for path, (name, kind) in _FILES.items()}
+        self._step = 0
+        self.sockets = listen(serving.host, serving.port)
+        """They listen until the end of the `with` block; who serves them next calls `close` before."""
+        self.port = port_of(self.sockets)
+        self._servers = [_Server(each, self) for each in self.sockets]
+        self._threads = [threading.Thread(target=s.serve_forever, args=(_POLL_S,), daemon=True) for s in self._servers]
+
+    @property
+    def address(self) -> str:
+        """The page's address, with the token if one is required."""
+        return page_address(self.access, self.serving.host, self.port)
+
+    def __enter__(self) -> Self:
+        """Begin to answer, and open the page in the browser if that is wanted."""
+        for thread in self._threads:
+            thread.start()
+        if self.serving.browser:
+            invited = self.access if self.access.invitation is None else self._invited(self.access.invitation)
+            opened = page_address(invited, self.serving.host, self.port)
+            threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
+        return self
+
+    def _invited(self, invitation: Invitation) -> Access:
+        """Return the access whose token is the invitation: other accounts see the address of a browser."""
+        return replace(self.access, token=invitation.code)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End to answer, and to listen."""
+        self.close()
+        for each in self.sockets:
+            each.close()
+
+    def show(self, step: str) -> None:
+        """Show what the program is doing, one of `STEPS`."""
+        self._step = STEPS.index(step)
+
+    def close(self) -> None:
+        """End to answer; requests that arrive later wait for who serves the sockets next."""
+        for server, thread in zip(self._servers, self._threads, strict=True):
+            if thread.is_alive():
+                server.shutdown()
+                thread.join()
+
+    def answer(self, path: str, host: str | None, origin: str | None) -> tuple[int, bytes, str]:
+        """Return the status, content and type of the answer to a request."""
+        why = self._without_token.refusal(host, origin)
+        if why is not None:
+            return HTTPStatus.FORBIDDEN, f"Quadrille refused this request: {why}.\n".encode(), "text/plain"
+        if path == "/starting.json":
+            return HTTPStatus.OK, json.dumps({"steps": STEPS, "at": self._step}).encode(), "application/json"
+        if path in self._files:
+            return HTTPStatus.OK, *self._files[path]
+        return HTTPStatus.SERVICE_UNAVAILABLE, b"The program is starting.\n", "text/plain"
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+
+    def __init__(self, listening: socket.socket, doorway: Doorway) -> None:
+        super().__init__(listening.getsockname()[:2], _Handler, bind_and_activate=False)
+        self.socket.close()
+        self.socket, self.doorway = listening, doorway
+
+    def handle_error(self, request: object, client_address: object) -> None:
+        """Pass over pages that went away."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: _Server
+    timeout = _TIMEOUT_S
+
+    def do_GET(self) -> None:
+        """Answer a request; the connection ends with it."""
+        hosts = self.headers.get_all("Host", [])
+        host = hosts[0] if len(hosts) == 1 else None
+        path = self.path.partition("?")[0]
+        status, content, kind = self.server.doorway.answer(path, host, self.headers.get("Origin"))
+        with suppress(OSError):
+            self.send_response(status)
+            for name, value in (
+                ("Content-Type", kind),
+                ("Content-Length", str(len(content))),
+                ("Content-Security-Policy", _POLICY),
+                ("X-Content-Type-Options", "nosniff"),
+                ("Referrer-Policy", "no-referrer"),
+                ("Cache-Control", "no-store"),
+                ("Connection", "close"),
+            ):
+                self.send_header(name, value)
+            self.end_headers()
+            self.wfile.write(content)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Say nothing on the terminal."""

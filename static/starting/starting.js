@@ -1,0 +1,35 @@
+/** Show what the program is doing until it serves the session's page, then load that. */
+
+const POLL_MS = 150;
+const ENDED = "The program does not answer. If it has ended, its terminal says why.";
+
+const steps = /** @type {HTMLElement} */ (document.querySelector("#steps"));
+const note = /** @type {HTMLElement} */ (document.querySelector("#note"));
+
+/** @param {{steps: string[], at: number}} progress */
+function show({ steps: names, at }) {
+  note.textContent = "";
+  steps.replaceChildren(
+    ...names.map((name, i) => {
+      const item = document.createElement("li");
+      item.textContent = name;
+      item.classList.toggle("is-done", i < at);
+      if (i === at) item.setAttribute("aria-current", "step");
+      return item;
+    }),
+  );
+}
+
+async function look() {
+  try {
+    const answer = await fetch("starting.json", { cache: "no-store" });
+    // The session's page has no such file, or asks for its token first.
+    if (!answer.ok) return location.reload();
+    show(await answer.json());
+  } catch {
+    note.textContent = ENDED;
+  }
+  setTimeout(look, POLL_MS);
+}
+
+look();
