@@ -17,9 +17,9 @@ from app.state.state import State
 from tracker.export.motion import ExportedMotion
 from tracker.export.options import ExportOptions
 from tracker.footage.recording import Recording
+from tracker.footage.video_writer import VideoWriter
 from tracker.geometry.arrays import Array, FloatArray, Image
 from tracker.geometry.cameras import Camera
-from tracker.simulate.stage.video_writer import VideoWriter
 
 _LAYERS = frozenset(("contours", "hidden"))
 _GRID_PX = (1920, 1080)

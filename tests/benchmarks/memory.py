@@ -23,8 +23,8 @@ from app.runtime.progress import Reporter
 from tracker.evaluation.references import read_joints
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
+from tracker.footage.video_writer import VideoWriter
 from tracker.session.session import Session, load_session, save_session
-from tracker.simulate.stage.video_writer import VideoWriter
 from tracker.tracking.chamfer.settings import TrackSettings
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"

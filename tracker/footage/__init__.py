@@ -1,5 +1,5 @@
 """Footage: random access to frame k of every camera, packet lists, proxies, backgrounds and masks.
 
 A frame is bit-identical however it is reached. Imports `geometry`. Callers use `recording.Recording`,
-`camera_source.CameraSource`, `video.open_footage` and `proxy.Proxy`.
+`camera_source.CameraSource`, `video.open_footage`, `proxy.Proxy` and `video_writer.VideoWriter`.
 """

@@ -17,6 +17,7 @@ from tracker.errors import SessionError, TrackerError
 from tracker.files import write_text_atomic
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
+from tracker.footage.video_writer import VideoWriter
 from tracker.formats.model_toml import format_model, load_model
 from tracker.formats.pose_csv import write_pose_table
 from tracker.formats.trc import write_trc
@@ -32,7 +33,6 @@ from tracker.simulate.stage.camera_rig import make_cameras
 from tracker.simulate.stage.film import exposed, film, freeze
 from tracker.simulate.stage.rasterizer import Figure
 from tracker.simulate.stage.room import Backdrop, see_room
-from tracker.simulate.stage.video_writer import VideoWriter
 
 BodyKind = Literal["skinned", "model"]
 Progress = Callable[[int, int], None]

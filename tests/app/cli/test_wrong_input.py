@@ -14,11 +14,11 @@ import tomli_w
 from command_line import SAMPLE, assert_refused, stored
 
 from tracker.evidence.camera_exchange import CameraExchange
+from tracker.footage.video_writer import VideoWriter
 from tracker.formats.anipose import write_calibration
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 from tracker.session.lock import SessionLock
-from tracker.simulate.stage.video_writer import VideoWriter
 
 SIZE = (64, 48)
 

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from tracker.footage.video import open_footage
-from tracker.simulate.stage.video_writer import GROUP_OF_PICTURES, VideoWriter
+from tracker.footage.video_writer import GROUP_OF_PICTURES, VideoWriter
 
 
 @pytest.mark.parametrize("fps", [25.0, 30000 / 1001])
