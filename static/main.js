@@ -19,7 +19,7 @@ const posing = posingRoom.mount(context, panes);
 const timeline = timelineRoom.mount(context);
 const search = searchRoom.mount(context);
 const scene = sceneRoom.mount(context, panes);
-const inspector = inspectorRoom.mount(context, posing, scene);
+const inspector = inspectorRoom.mount(context, { panes, posing, scene });
 shellRoom.mount(context, { panes, posing, timeline, search, scene, inspector });
 exposeState(context, panes.grid);
 context.connect(scene.isSoftware ? { type: "pause_3d", pause: true } : null);

@@ -1,7 +1,7 @@
 /**
  * Inspector: a column beside the views with the selected joint, body sizes, settings and what the 3-D view shows.
  *
- * The room imports `widgets`, types of `model` and `scene`, and `posing`.
+ * The room imports `widgets`, types of `model`, `panes` and `scene`, and `posing`.
  */
 
 import { alt, inArea } from "../widgets/key_matching.js";
@@ -25,16 +25,16 @@ const THEMES = [
  * Build the column.
  *
  * @param {import("../model/index.js").Context} context
- * @param {import("../posing/index.js").PosingRoom} posing
- * @param {import("../scene/index.js").SceneRoom} scene
+ * @param {{panes: import("../panes/index.js").Panes, posing: import("../posing/index.js").PosingRoom,
+ *   scene: import("../scene/index.js").SceneRoom}} rooms
  */
-export function mount(context, posing, scene) {
+export function mount(context, { panes, posing, scene }) {
   const sections = [
     jointSection(context, posing),
     new BodySection(context),
     trackSection(context),
     searchSection(context),
-    viewSection(context, scene),
+    viewSection(context, scene, panes),
   ];
   const inspector = new Inspector(context.store, sections);
   const bindings = inArea("Inspector", [

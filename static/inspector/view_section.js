@@ -28,15 +28,21 @@ const LAYERS = [
 /**
  * @param {import("../model/index.js").Context} context
  * @param {import("../scene/index.js").SceneRoom} scene
+ * @param {import("../panes/index.js").Panes} panes
  * @returns {import("./inspector.js").Section}
  */
-export function viewSection({ store, send, themes }, { floor }) {
+export function viewSection({ store, send, themes }, { floor }, panes) {
   const set = (/** @type {import("../model/protocol.js").View3dChanges} */ changes) => send({ type: "view_3d", changes });
   const theme = choiceRow({
     label: "Theme",
     title: "Colour scheme of the page and the 3-D view; kept in this browser",
     options: THEMES,
     change: (value) => themes.choose(value),
+  });
+  const link = checkRow({
+    label: "Link zoom",
+    title: "All camera views show the place that one is zoomed to, at the same size of the people (Alt+0)",
+    change: () => panes.grid.toggleLink(),
   });
   const camera = choiceRow({
     label: "Look through",
@@ -87,7 +93,7 @@ export function viewSection({ store, send, themes }, { floor }) {
   const body = document.createElement("div");
   const [bodies, ...others] = layers.map(({ row }) => row.element);
   body.append(
-    theme.element, heading("3-D view"), camera.element, bodies, colors.element, opacity.element, ...others, prediction,
+    theme.element, link.element, heading("3-D view"), camera.element, bodies, colors.element, opacity.element, ...others, prediction,
     heading("Floor"), floorText, buttons(setFloor, formerFloor),
     heading("Trails"), trails.element, points, buttons(noTrails),
   ); // prettier-ignore
@@ -95,8 +101,9 @@ export function viewSection({ store, send, themes }, { floor }) {
   let listed = "";
 
   const show = () => {
-    const { view3d, state, session, theme: chosen } = store.facts;
+    const { view3d, state, session, linkedViews, theme: chosen } = store.facts;
     theme.show(chosen.choice);
+    link.show(linkedViews);
     const cameras = session?.cameras.map(({ name }) => name) ?? [];
     if (cameras.join("\n") !== listed) {
       listed = cameras.join("\n"); // an open list of choices must not be replaced
@@ -129,7 +136,7 @@ export function viewSection({ store, send, themes }, { floor }) {
     title: "View",
     hint: "Theme of the page, and what the 3-D view shows",
     body,
-    update: (changed) => ["view3d", "state", "session", "theme"].some((fact) => changed.has(/** @type {"state"} */ (fact))) && show(),
+    update: (changed) => ["view3d", "state", "session", "theme", "linkedViews"].some((fact) => changed.has(/** @type {"state"} */ (fact))) && show(),
   };
 }
 

@@ -57,6 +57,7 @@ import { defaultLayers } from "./layers.js";
  * @property {number} rate playback speed, 1 for real time
  * @property {boolean} loops whether playback loops, within the marked range if there is one
  * @property {boolean} everyFrame whether playback waits for every frame instead of skipping late ones
+ * @property {boolean} linkedViews whether all views follow the zoom of one
  * @property {number | null} filled the camera whose pane fills the grid
  * @property {import("./layers.js").LayerChoice} layers visible layers and their opacity
  * @property {(import("./image_tone.js").ImageTone | undefined)[]} imageTones tone of each camera's image
@@ -109,6 +110,7 @@ export class Store {
     rate: 1,
     loops: false,
     everyFrame: false,
+    linkedViews: false,
     filled: null,
     layers: defaultLayers(),
     imageTones: [],

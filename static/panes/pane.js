@@ -106,6 +106,17 @@ export class Pane {
   }
 
   /**
+   * Show an image position in the middle at a scale, CSS pixels per image pixel.
+   *
+   * @param {{u: number, v: number}} center
+   * @param {number} scale
+   */
+  look(center, scale) {
+    this.view.look(center, scale);
+    this.#redraw();
+  }
+
+  /**
    * @param {number} dx
    * @param {number} dy
    */

@@ -2,6 +2,7 @@
 
 import { layOut } from "./grid_layout.js";
 import { keepViews, keptViews } from "./kept_views.js";
+import { followView, keepLink, keptLink } from "./linked_views.js";
 import { Pane } from "./pane.js";
 
 /** Two digits within this time form one number. */
@@ -25,6 +26,8 @@ export class PaneGrid {
   #digit = { value: 0, at: -Infinity };
   #cameras = "";
   #choice = "";
+  /** Panes whose view changes with that of another, or of all. @type {Set<number>} */
+  #following = new Set();
 
   /**
    * @param {HTMLElement} element
@@ -38,6 +41,7 @@ export class PaneGrid {
     this.#store = store;
     this.#latency = latency;
     store.subscribe((changed) => this.#update(changed));
+    store.set({ linkedViews: keptLink() });
     new ResizeObserver(() => this.#layOut()).observe(element);
     // Moving the window to another screen changes the device pixel ratio, but not the size of the element.
     addEventListener("resize", () => this.#layOut());
@@ -103,12 +107,37 @@ export class PaneGrid {
   /** Reset the view of the pane under the pointer, or else of all panes. */
   resetViews() {
     const under = this.panes.filter((pane) => pane.element.matches(":hover"));
+    if (under.length === 0) this.#following = new Set(this.panes.keys());
     for (const pane of under.length ? under : this.panes) pane.reset();
+  }
+
+  /** Link the zoom of all views, or no longer; the others follow the view that the pointer was in last. */
+  toggleLink() {
+    const { linkedViews, active } = this.#store.facts;
+    this.#store.set({ linkedViews: !linkedViews });
+    keepLink(!linkedViews);
+    if (this.panes.length) this.#follow(active ?? 0);
+  }
+
+  /**
+   * Let the other views follow one, if views are linked.
+   *
+   * @param {number} camera
+   */
+  #follow(camera) {
+    const { linkedViews, overlay } = this.#store.facts;
+    if (!linkedViews) return;
+    this.#following = new Set(this.panes.keys());
+    this.#following.delete(camera);
+    followView(this.panes, camera, overlay?.handles ?? []);
+    // A view that did not change draws nothing, so it would wait to be told of its next own change.
+    requestAnimationFrame(() => requestAnimationFrame(() => this.#following.clear()));
   }
 
   /** Zoom every view to the people in it; with Solo, to the selected person. */
   framePeople() {
     const { overlay, state, session } = this.#store.facts;
+    this.#following = new Set(this.panes.keys());
     this.panes.forEach((pane, camera) => {
       const { width, height } = session?.cameras[camera] ?? { width: 0, height: 0 };
       const isSeen = (/** @type {{u: number, v: number}} */ { u, v }) => u >= 0 && v >= 0 && u < width && v < height;
@@ -170,6 +199,7 @@ export class PaneGrid {
         viewChanged: () => {
           this.#refine();
           this.#keep();
+          if (!this.#following.delete(camera)) this.#follow(camera);
         },
         openToneMenu: this.#openToneMenu,
       });

@@ -38,6 +38,12 @@ export function paneBindings({ grid, gestures, layers, layersMenu }) {
       run: () => grid.framePeople(),
     },
     {
+      keys: ["Alt 0"],
+      label: "Link the zoom of all views (toggle)",
+      matches: alt("Digit0", false),
+      run: () => grid.toggleLink(),
+    },
+    {
       keys: ["Alt O"],
       label: "Take the next of the joints that overlap under the pointer",
       matches: alt("KeyO", false),

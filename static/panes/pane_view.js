@@ -51,6 +51,11 @@ export class PaneView {
     return { x, y, width: this.#image.width * this.scale, height: this.#image.height * this.scale };
   }
 
+  /** Image position in the middle of the pane. */
+  get center() {
+    return { ...this.#center };
+  }
+
   /** What the user has zoomed to, to be restored; null for the whole image. */
   get choice() {
     return this.isReset ? null : { zoom: this.zoom, ...this.#center };
@@ -139,6 +144,18 @@ export class PaneView {
     this.zoom = Math.max(1, Math.min(MAX_FRAME_ZOOM, scale / this.scale));
     this.#center = this.#middle();
     if (this.zoom > 1) this.#moveCenter((left + right) / 2 - this.#center.u, (top + bottom) / 2 - this.#center.v);
+  }
+
+  /**
+   * Show an image position in the middle.
+   *
+   * @param {{u: number, v: number}} center
+   * @param {number} scale CSS pixels per image pixel, within the limits of zoom
+   */
+  look({ u, v }, scale) {
+    this.zoom = 1;
+    this.zoom = Math.max(MIN_ZOOM, Math.min(MAX_ZOOM, scale / this.scale));
+    this.#moveCenter(u - this.#center.u, v - this.#center.v);
   }
 
   /**

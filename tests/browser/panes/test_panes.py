@@ -2,6 +2,7 @@
 
 import asyncio
 
+import numpy as np
 import pytest
 from fake_endpoint import project
 from page_driver import OPENED, dragging, handle_of, shows, state_of, to_client, until
@@ -280,6 +281,35 @@ async def test_all_views_are_framed_on_the_people_by_a_key(page):
     await page.mouse.move(0, 0)
     await page.keyboard.press("0")
     await shows(page, "quadrille.state.views.every((view) => view.zoom === 1)")
+
+
+async def test_linked_views_show_the_same_joint_at_the_same_size(page):
+    joint = next(h for h in (await state_of(page))["overlay"]["handles"] if h["camera"] == 0)
+    await page.keyboard.press("Alt+0")
+    x, y = await to_client(page, 0, joint["u"], joint["v"])
+    await page.mouse.move(x, y)
+    await page.mouse.wheel(0, -700)
+    await shows(page, "quadrille.state.views.every((view) => view.zoom > 1.5)")
+    handles = (await state_of(page))["overlay"]["handles"]
+    sizes = []
+    for camera in range(4):
+        pane = await page.locator(".pane").nth(camera).bounding_box()
+        own = [h for h in handles if h["camera"] == camera]
+        places = {h["point"]: await to_client(page, camera, h["u"], h["v"]) for h in own}
+        middle = pane["x"] + pane["width"] / 2, pane["y"] + pane["height"] / 2
+        off = {point: np.hypot(px - middle[0], py - middle[1]) for point, (px, py) in places.items()}
+        assert min(off.values()) < 0.25 * pane["height"]
+        sizes.append(np.std(list(places.values()), axis=0) @ np.std(list(places.values()), axis=0))
+    np.testing.assert_allclose(sizes, sizes[0], rtol=0.02)
+    zooms = [view["zoom"] for view in (await state_of(page))["views"]]
+    await page.mouse.wheel(0, 300)  # they follow on, and each only once
+    await shows(page, f"quadrille.state.views.every((view, i) => view.zoom < {zooms}[i])")
+    await page.keyboard.press("Alt+0")  # no longer
+    others = [view["zoom"] for view in (await state_of(page))["views"]][1:]
+    await page.mouse.wheel(0, -600)
+    await shows(page, f"quadrille.state.views[0].zoom > {zooms[0]}")
+    await page.wait_for_timeout(100)
+    assert [view["zoom"] for view in (await state_of(page))["views"]][1:] == others
 
 
 async def test_zoom_is_kept_over_a_reload(page):
