@@ -62,8 +62,9 @@ def main() -> None:
             f"quadrille: {error}", style="bold red", markup=False, highlight=False, soft_wrap=True
         )
         sys.exit(1)
-    except KeyboardInterrupt:
-        sys.exit(130)
+    except KeyboardInterrupt as stopped:
+        is_terminated = isinstance(stopped, process_exit.TerminationError)
+        sys.exit(process_exit.TERMINATED if is_terminated else process_exit.INTERRUPTED)
     except BrokenPipeError:  # as in `quadrille evaluate S | head -1`: the reader has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # discard what is still buffered
         sys.exit(141)

@@ -1,5 +1,6 @@
 """How the program ends as a process, while OpenCV is at work in a thread that nobody waits for."""
 
+import signal
 import subprocess
 import sys
 
@@ -43,3 +44,27 @@ def test_it_ends_with_its_status(ends, status):
     assert done.stdout == "closed\n"
     assert ("ZeroDivisionError" in done.stderr) == (ends == "1 / 0")
     assert "terminate" not in done.stderr
+
+
+EXPORTING = """
+import sys, tempfile, time
+from app import __main__ as program
+
+def export(*_, **options):
+    with tempfile.TemporaryDirectory(dir=sys.argv[-1]):
+        print("at work", flush=True)
+        time.sleep(60)
+
+program._command_line = lambda words: type("App", (), {"cli": export})
+sys.argv[1:1] = ["export"]
+program.program()
+"""
+
+
+def test_termination_cleans_up_as_an_interrupt_does(tmp_path):
+    with subprocess.Popen([sys.executable, "-c", EXPORTING, str(tmp_path)], stdout=subprocess.PIPE) as process:
+        assert process.stdout.readline() == b"at work\n"
+        assert list(tmp_path.iterdir())
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(60) == 143
+    assert not list(tmp_path.iterdir())
