@@ -130,7 +130,7 @@ export class PaneGrid {
     this.#following = new Set(this.panes.keys());
     this.#following.delete(camera);
     followView(this.panes, camera, overlay?.handles ?? []);
-    // A view that did not change draws nothing, so it would wait to be told of its next own change.
+    // A view that stays as it is reports no change: its next own change would count as following.
     requestAnimationFrame(() => requestAnimationFrame(() => this.#following.clear()));
   }
 

@@ -98,7 +98,7 @@ export class ExportPanel {
       const last = (this.#store.facts.session?.n_frames ?? 1) - 1;
       const [from, to] = frames ? [Number(frames[1]), Number(frames[2] ?? frames[1])] : [0, -1];
       if (from > to || to > last) {
-        this.#tell(`Expected frames within 0-${last}, such as 0-${Math.min(9, last)}, or nothing.`, true);
+        this.#showMessage(`Expected frames within 0-${last}, such as 0-${Math.min(9, last)}, or nothing.`, true);
         return null;
       }
       words.set("frames", `${from}:${to + 1}`);
@@ -117,20 +117,20 @@ export class ExportPanel {
     const running = (this.#running = new AbortController());
     this.#start.disabled = true;
     this.#cancel.hidden = false;
-    this.#tell("Exporting…");
+    this.#showMessage("Exporting…");
     const timer = setInterval(() => void this.#showProgress(), PROGRESS_MS);
     try {
       const answer = await fetch(address, { signal: running.signal });
       if (!answer.ok) throw new Error((await answer.text()).slice(0, MAX_REASON));
       const name = fileName(answer.headers.get("Content-Disposition") ?? "");
       save(await answer.blob(), name);
-      this.#tell(`Saved ${name}`);
+      this.#showMessage(`Saved ${name}`);
       this.#say("info", `Exported ${name}.`);
     } catch (error) {
-      if (running.signal.aborted) this.#tell("Canceled");
+      if (running.signal.aborted) this.#showMessage("Canceled");
       else {
         const reason = error instanceof TypeError ? "the program cannot be reached" : String(/** @type {Error} */ (error).message);
-        this.#tell(`Failed: ${reason}`, true);
+        this.#showMessage(`Failed: ${reason}`, true);
         this.#say("error", `Export failed: ${reason}`);
       }
     } finally {
@@ -144,7 +144,7 @@ export class ExportPanel {
   async #showProgress() {
     try {
       const { done, total } = await (await fetch("export/progress")).json();
-      if (this.#running && total) this.#tell(`Exporting, ${Math.floor((100 * done) / total)}%`);
+      if (this.#running && total) this.#showMessage(`Exporting, ${Math.floor((100 * done) / total)}%`);
     } catch {
       // The export itself reports that the program cannot be reached.
     }
@@ -156,7 +156,7 @@ export class ExportPanel {
    * @param {string} text
    * @param {boolean} isFailure
    */
-  #tell(text, isFailure = false) {
+  #showMessage(text, isFailure = false) {
     this.#progress.textContent = text;
     this.#progress.classList.toggle("is-failed", isFailure);
   }

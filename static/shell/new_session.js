@@ -49,7 +49,7 @@ export class NewSession {
     this.#begin();
     this.#make.disabled = true;
     try {
-      await postJson("sessions/new", this.#request(), (line) => this.#tell(JSON.parse(line)));
+      await postJson("sessions/new", this.#request(), (line) => this.#showLine(JSON.parse(line)));
     } catch (error) {
       this.#add("is-failed", error instanceof Error ? error.message : String(error));
     }
@@ -77,7 +77,7 @@ export class NewSession {
   }
 
   /** @param {Line} line */
-  #tell({ passed, warning, failed, made }) {
+  #showLine({ passed, warning, failed, made }) {
     if (passed) this.#add("is-passed", passed);
     if (warning) this.#add("is-warning", warning);
     if (failed) this.#add("is-failed", failed);

@@ -96,12 +96,15 @@ _UPGRADES = {
     6: ("ALTER TABLE pose_changes ADD COLUMN limbs BLOB",),
 }
 """Statements that upgrade a store from each older version to the next."""
+_FORMER_SETTINGS = "told"
+"""Name of the table and the column of settings in stores of versions 3 to 5."""
+_RENAMED_SETTINGS = f"{_FORMER_SETTINGS} AS program_settings"
 _MISSING_COLUMNS = {
     1: ("views_px", "parts_px", "remark", "program_settings", "reviewed", "limbs"),
     2: ("program_settings", "reviewed", "limbs"),
-    3: ("told AS program_settings", "reviewed", "limbs"),
-    4: ("told AS program_settings", "limbs"),
-    5: ("told AS program_settings", "limbs"),
+    3: (_RENAMED_SETTINGS, "reviewed", "limbs"),
+    4: (_RENAMED_SETTINGS, "limbs"),
+    5: (_RENAMED_SETTINGS, "limbs"),
     6: ("limbs",),
 }
 """Columns of `pose_changes` that each older version lacks or names differently. A store opened read only is read
@@ -148,5 +151,6 @@ def show_as_new(db: sqlite3.Connection) -> None:
         nulls = ", ".join(f"NULL AS {column}" for column in ("change", "rank", "model_revision", "numbers", "cost_px"))
         db.execute(f"CREATE TEMP VIEW alternatives AS SELECT {nulls} WHERE 0")
     if found < 6:
-        programs = "SELECT NULL AS id, NULL AS settings WHERE 0" if found < 3 else "SELECT * FROM main.told"
+        no_programs = "SELECT NULL AS id, NULL AS settings WHERE 0"
+        programs = no_programs if found < 3 else f"SELECT * FROM main.{_FORMER_SETTINGS}"
         db.execute(f"CREATE TEMP VIEW program_settings AS {programs}")

@@ -25,18 +25,18 @@ class Page:
     def send(self, kind, **fields):
         dispatch(self.controller, 1, parse(json.dumps({"type": kind, **fields})))
 
-    def told(self):
+    def updates(self):
         """The messages that it has not received yet, by type."""
         news = self.feed.updates(self.controller, self.controller.state)
         return {message.__struct_config__.tag: message for message in news}
 
 
 def test_settings_are_shown_changed_one_by_one_and_their_defaults_known(page):
-    first = page.told()["settings"]
+    first = page.updates()["settings"]
     assert (first.track, first.search) == (first.track_default, first.search_default)
     page.send("track_settings", changes={"estimate": "search", "order": 2, "past_poses": 5, "recover": False})
     page.send("search_settings", changes={"bound_rad": 0.5, "theta_px": 25, "passes": [1, 0.5]})
-    shown = page.told()["settings"]
+    shown = page.updates()["settings"]
     settings = page.controller.state.settings
     assert (settings.estimate, settings.recover, settings.backward_pass) == ("search", None, True)
     assert (settings.predict.order, settings.predict.window) == (2, 5)
@@ -50,38 +50,38 @@ def test_settings_are_shown_changed_one_by_one_and_their_defaults_known(page):
 
 
 def test_the_3d_view_is_chosen_and_kept_with_the_session(page, opened):
-    assert not page.told()["view_3d"].view.ghost
+    assert not page.updates()["view_3d"].view.ghost
     page.send("view_3d", changes={"floor": False, "opacity": 0.4, "trail_points": ["head"], "trail_frames": 30})
-    told = page.told()
-    assert set(told) == {"view_3d"}  # nothing else changed
-    view = told["view_3d"].view
+    updates = page.updates()
+    assert set(updates) == {"view_3d"}  # nothing else changed
+    view = updates["view_3d"].view
     assert (view.floor, view.bodies, view.opacity, view.trail_points) == (False, True, 0.4, {"head"})
-    assert "head" in told["view_3d"].trail_points
+    assert "head" in updates["view_3d"].trail_points
     with pytest.raises(MessageError, match=r"a number >= 0\.1 as 'changes.opacity'"):
         page.send("view_3d", changes={"opacity": 0})
     page.controller.view_3d.note_prediction("from frame 3")
-    assert page.told()["view_3d"].prediction == "from frame 3"
+    assert page.updates()["view_3d"].prediction == "from frame 3"
     page.controller = opened()
-    assert Page(page.controller).told()["view_3d"].view == view
+    assert Page(page.controller).updates()["view_3d"].view == view
 
 
 def test_sizes_become_a_draft_and_then_a_body_that_can_be_undone(page):
-    before = page.told()["body_sizes"]
+    before = page.updates()["body_sizes"]
     page.send("body_sizes", action="part", person=0, part="left_forearm", length_m=0.29)
     page.send("body_sizes", action="width", person=0, girdle="shoulder", width_m=0.41)
-    told = page.told()["body_sizes"]
-    parts = {part.name: part for part in told.parts}
+    updates = page.updates()["body_sizes"]
+    parts = {part.name: part for part in updates.parts}
     was = {part.name: part for part in before.parts}
-    assert told.edited
+    assert updates.edited
     assert parts["right_forearm"].length_m == pytest.approx(0.29)  # both sides alike
     assert parts["left_forearm"].half_depth_m == pytest.approx(was["left_forearm"].half_depth_m)
-    assert {w.name: w.width_m for w in told.widths}["shoulder"] == pytest.approx(0.41)
+    assert {w.name: w.width_m for w in updates.widths}["shoulder"] == pytest.approx(0.41)
     page.send("body_sizes", action="apply", person=0, refit=True)
-    told = page.told()["body_sizes"]
-    assert (told.edited, told.has_former, before.has_former) == (False, True, False)
-    assert "Applied" in told.outcome
+    updates = page.updates()["body_sizes"]
+    assert (updates.edited, updates.has_former, before.has_former) == (False, True, False)
+    assert "Applied" in updates.outcome
     page.controller.history.undo()
-    assert {p.name: p.length_m for p in page.told()["body_sizes"].parts} == pytest.approx(
+    assert {p.name: p.length_m for p in page.updates()["body_sizes"].parts} == pytest.approx(
         {p.name: p.length_m for p in before.parts}
     )
 
@@ -93,7 +93,7 @@ def test_sides_are_edited_alone_and_a_draft_is_discarded(page):
     assert parts["left_calf"].girths_m[1] == pytest.approx(0.07)
     assert parts["right_calf"].girths_m[1] != pytest.approx(0.07)
     page.send("body_sizes", action="discard", person=0)
-    assert not page.told()["body_sizes"].edited
+    assert not page.updates()["body_sizes"].edited
 
 
 WRONG = {
@@ -111,7 +111,7 @@ def test_wrong_sizes_are_refused_in_a_sentence_and_limits_are_those_that_are_che
         with pytest.raises(TrackerError, match=expected):
             page.send("body_sizes", person=0, **message)
     assert page.controller.state.draft is None
-    sizes = page.told()["body_sizes"]
+    sizes = page.updates()["body_sizes"]
     for length_m in sizes.size_limits_m:
         page.send("body_sizes", action="part", person=0, part="left_calf", length_m=length_m)
     page.send("body_sizes", action="discard", person=0)

@@ -30,12 +30,12 @@ def fitted(opened):
 def test_a_fit_is_compared_with_the_pose_before_it(fitted):
     controller, before = fitted
     state = controller.state
-    told = messages.state(controller.session, state).compared
-    assert (told.work, told.is_before_shown) == ("fit", False)
-    assert told.before_px == pytest.approx(before.cost_px)
-    assert told.after_px == state.cost_px < told.before_px
-    assert told.before_view_costs_px == pytest.approx(before.view_costs_px)
-    assert told.after_view_costs_px == state.view_costs_px
+    message = messages.state(controller.session, state).compared
+    assert (message.work, message.is_before_shown) == ("fit", False)
+    assert message.before_px == pytest.approx(before.cost_px)
+    assert message.after_px == state.cost_px < message.before_px
+    assert message.before_view_costs_px == pytest.approx(before.view_costs_px)
+    assert message.after_view_costs_px == state.view_costs_px
 
 
 def test_the_views_show_the_pose_before_and_nothing_is_undone(fitted):
