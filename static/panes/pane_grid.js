@@ -1,6 +1,6 @@
 /** Grid of the panes of all cameras, or one pane that fills it. */
 
-import { layOut } from "./grid_layout.js";
+import { arrange, boxesOf } from "./grid_layout.js";
 import { keep, kept, keptByName } from "./kept_views.js";
 import { followView, keepLink, keptLink } from "./linked_views.js";
 import { Pane } from "./pane.js";
@@ -253,7 +253,9 @@ export class PaneGrid {
     const { filled } = this.#store.facts;
     const { clientWidth, clientHeight } = this.#element;
     const shown = filled === null ? cameras : [cameras[filled]];
-    const boxes = layOut(shown.map(({ width, height }) => width / height), clientWidth, clientHeight); // prettier-ignore
+    const aspects = shown.map(({ width, height }) => width / height);
+    const { arrangement, shares } = arrange(aspects, clientWidth, clientHeight);
+    const boxes = boxesOf(arrangement, shares, clientWidth, clientHeight);
     this.panes.forEach((pane, camera) => {
       if (filled === null) pane.place(boxes[camera]);
       else pane.place(filled === camera ? boxes[0] : null);
