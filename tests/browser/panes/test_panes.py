@@ -247,7 +247,7 @@ async def test_the_splitter_moves_by_drag_and_key_within_bounds(page):
     box = await page.locator("#split").bounding_box()
     await page.mouse.move(box["x"] + 2, 300)
     await page.mouse.down()
-    await page.mouse.move(700, 300, steps=4)
+    await page.mouse.move(702, 300, steps=4)
     await page.mouse.up()
     assert (await panes.bounding_box())["width"] == pytest.approx(700, abs=1) != before
     await page.locator("#split").focus()
