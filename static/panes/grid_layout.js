@@ -1,56 +1,176 @@
-/** Layout of the grid of panes. All sizes are CSS pixels. */
+/**
+ * Layout of the grid of panes. All sizes are CSS pixels.
+ *
+ * Panes fill tracks in order: rows from top to bottom, or columns from left to right. A *length* is along a track, a *depth*
+ * across it; a ratio is length / depth of an image.
+ */
 
 /** Gap between neighbours. */
 const GAP = 2;
-
-/** @typedef {{x: number, y: number, width: number, height: number}} Box */
+/** Another arrangement must show this much more. Rows are tried before columns, whose order is less usual. */
+const GAIN = 1.02;
+/** An image counts at most so many times the smallest one: views are compared, so none is large at the cost of the others. */
+const MAX_UNEVENNESS = 2;
+const ROUNDING = 1e-6;
 
 /**
- * Lay out images in rows of equal height, as large as the space allows. Widths are proportional to aspect ratios. An
- * incomplete row is centred.
+ * @typedef {{x: number, y: number, width: number, height: number}} Box
+ * @typedef {{isColumns: boolean, counts: number[]}} Arrangement counts: panes of each track
+ * @typedef {{tracks: number[], panes: number[][]}} Shares of each track in the total depth, and of each pane in the length of
+ *   its track; each list sums to 1
+ */
+
+/**
+ * Choose the arrangement and shares that show the largest total area of the images, none much smaller than the others.
  *
  * @param {number[]} aspects width / height of each image
  * @param {number} width
  * @param {number} height
- * @returns {Box[]}
+ * @returns {{arrangement: Arrangement, shares: Shares}}
  */
-export function layOut(aspects, width, height) {
-  let best = { size: -1, rows: /** @type {number[][]} */ ([]) };
-  for (let count = 1; count <= aspects.length; count += 1) {
-    const rows = inRows(aspects, count);
-    const size = Math.min(height / rows.length, width / widest(rows));
-    if (size > best.size) best = { size, rows };
+export function arrange(aspects, width, height) {
+  let best = { area: -1, arrangement: { isColumns: false, counts: [aspects.length] }, shares: { tracks: [1], panes: [[1]] } };
+  for (const isColumns of [false, true]) {
+    const ratios = isColumns ? aspects.map((aspect) => 1 / aspect) : aspects;
+    const [length, depth] = isColumns ? [height, width] : [width, height];
+    for (const counts of fillings(ratios)) {
+      const tracks = inTracks(ratios, counts);
+      for (const shares of [sharesOf(tracks, length, depth), equalShares(counts)]) {
+        const area = shownArea(tracks, shares, length, depth);
+        if (area > GAIN * best.area) best = { area, arrangement: { isColumns, counts }, shares };
+      }
+    }
   }
-  const { rows } = best;
-  const perAspect = Math.min(...rows.map((row) => (width - GAP * (row.length - 1)) / sum(row)));
-  const rowHeight = Math.floor((height - GAP * (rows.length - 1)) / rows.length);
-  return rows.flatMap((row, index) => {
-    const widths = row.map((aspect) => Math.max(1, Math.floor(aspect * perAspect)));
-    let x = Math.max(0, Math.floor((width - sum(widths) - GAP * (row.length - 1)) / 2));
-    return widths.map((paneWidth) => {
-      const box = { x, y: index * (rowHeight + GAP), width: paneWidth, height: Math.max(1, rowHeight) };
-      x += paneWidth + GAP;
-      return box;
-    });
-  });
+  return best;
 }
 
 /**
- * Fill rows in order, each with the fewest images that the number of rows allows. Equal images then align in columns.
+ * Boxes of the panes in whole pixels, with gaps between them.
  *
- * @param {number[]} aspects
- * @param {number} count
+ * @param {Arrangement} arrangement
+ * @param {Shares} shares
+ * @param {number} width
+ * @param {number} height
+ * @returns {Box[]}
  */
-function inRows(aspects, count) {
-  const perRow = Math.ceil(aspects.length / count);
-  const rows = [];
-  for (let first = 0; first < aspects.length; first += perRow) rows.push(aspects.slice(first, first + perRow));
-  return rows;
+export function boxesOf({ isColumns }, shares, width, height) {
+  const [length, depth] = isColumns ? [height, width] : [width, height];
+  const tracks = spansOf(shares.tracks, depth);
+  return tracks.flatMap((track, index) =>
+    spansOf(shares.panes[index], length).map((pane) =>
+      isColumns
+        ? { x: track.start, y: pane.start, width: track.size, height: pane.size }
+        : { x: pane.start, y: track.start, width: pane.size, height: track.size },
+    ),
+  );
 }
 
-/** @param {number[][]} rows */
-function widest(rows) {
-  return Math.max(...rows.map(sum));
+/**
+ * Numbers of panes in each track, for tracks of all lengths and of all numbers of panes that come into question; short
+ * tracks first.
+ *
+ * @param {number[]} ratios
+ */
+function fillings(ratios) {
+  const lengths = ratios.flatMap((_, first) => ratios.slice(first).map((_, more) => sum(ratios.slice(first, first + more + 1))));
+  const longest = Math.max(...ratios);
+  const byLength = lengths.filter((length) => length >= longest).sort((a, b) => a - b).map((length) => filled(ratios, length)); // prettier-ignore
+  const byCount = ratios.map((_, index) => filled(ratios.map(() => 1), index + 1)); // prettier-ignore
+  return [...new Map([...byLength, ...byCount].map((counts) => [counts.join(), counts])).values()];
+}
+
+/**
+ * @param {number[]} ratios
+ * @param {number} length of a track, in depths
+ */
+function filled(ratios, length) {
+  const counts = [0];
+  let left = length;
+  for (const ratio of ratios) {
+    if (ratio > left + ROUNDING) {
+      counts.push(0);
+      left = length;
+    }
+    counts[counts.length - 1] += 1;
+    left -= ratio;
+  }
+  return counts;
+}
+
+/**
+ * @param {number[]} ratios
+ * @param {number[]} counts
+ */
+function inTracks(ratios, counts) {
+  let first = 0;
+  return counts.map((count) => ratios.slice(first, (first += count)));
+}
+
+/**
+ * Images of a track are equally deep. Tracks are equally deep too, but none deeper than its images can use while others can
+ * use more.
+ *
+ * @param {number[][]} tracks ratios of their images
+ * @param {number} length
+ * @param {number} depth
+ * @returns {Shares}
+ */
+function sharesOf(tracks, length, depth) {
+  const usable = tracks.map((ratios) => length / sum(ratios));
+  const depths = tracks.map(() => 0);
+  let rest = depth;
+  const shallowFirst = tracks.map((_, index) => index).sort((a, b) => usable[a] - usable[b]);
+  shallowFirst.forEach((track, rank) => {
+    depths[track] = Math.min(usable[track], rest / (tracks.length - rank));
+    rest -= depths[track];
+  });
+  return {
+    tracks: depths.map((one) => (one + rest / tracks.length) / depth),
+    panes: tracks.map((ratios) => ratios.map((ratio) => ratio / sum(ratios))),
+  };
+}
+
+/**
+ * @param {number[]} counts
+ * @returns {Shares}
+ */
+function equalShares(counts) {
+  return { tracks: counts.map(() => 1 / counts.length), panes: counts.map((count) => Array(count).fill(1 / count)) };
+}
+
+/**
+ * Total area of the images, as far as it counts.
+ *
+ * @param {number[][]} tracks ratios of their images
+ * @param {Shares} shares
+ * @param {number} length
+ * @param {number} depth
+ */
+function shownArea(tracks, shares, length, depth) {
+  const areas = tracks.flatMap((ratios, track) =>
+    ratios.map((ratio, pane) => {
+      const shown = Math.min(shares.tracks[track] * depth, (shares.panes[track][pane] * length) / ratio);
+      return ratio * shown ** 2;
+    }),
+  );
+  const most = MAX_UNEVENNESS * Math.min(...areas);
+  return sum(areas.map((area) => Math.min(area, most)));
+}
+
+/**
+ * Divide a size by shares, with gaps.
+ *
+ * @param {number[]} shares
+ * @param {number} size
+ */
+function spansOf(shares, size) {
+  const free = size - GAP * (shares.length - 1);
+  let before = 0;
+  return shares.map((share, index) => {
+    const start = Math.round(before * free);
+    before += share;
+    return { start: start + GAP * index, size: Math.max(1, Math.round(before * free) - start) };
+  });
 }
 
 /** @param {number[]} values */

@@ -1,26 +1,48 @@
-/** Zoom of each view, kept by the browser for each session. */
-
-const STORED = "quadrille.views.";
-
-/** @typedef {{zoom?: unknown, u?: unknown, v?: unknown} | null} Choice null for the whole image */
+/** What the browser keeps of each session's panes. */
 
 /**
- * @param {string} session name of the session
- * @returns {Record<string, Choice | undefined>} by name of the camera; empty if nothing valid is stored
+ * @typedef {"views" | "filled-pane" | "pane-shares"} Kind zoom of each view by the name of its camera; name of the camera
+ *   whose pane fills the grid, or null; shares of the panes by arrangement
  */
-export function keptViews(session) {
+
+/**
+ * @param {Kind} kind
+ * @param {string} session name of the session
+ * @returns {unknown} undefined if nothing valid is stored
+ */
+export function kept(kind, session) {
   try {
-    const found = JSON.parse(localStorage.getItem(STORED + session) ?? "{}");
-    return typeof found === "object" && found ? found : {};
+    return JSON.parse(localStorage.getItem(keyOf(kind, session)) ?? "");
   } catch {
-    return {};
+    return undefined;
   }
 }
 
 /**
+ * As `kept`, for what is kept by name.
+ *
+ * @param {Kind} kind
  * @param {string} session name of the session
- * @param {Record<string, Choice>} views by name of the camera
+ * @returns {Record<string, unknown> | null} null if nothing valid is stored
  */
-export function keepViews(session, views) {
-  localStorage.setItem(STORED + session, JSON.stringify(views));
+export function keptByName(kind, session) {
+  const found = kept(kind, session);
+  return typeof found === "object" && !Array.isArray(found) ? /** @type {Record<string, unknown> | null} */ (found) : null;
+}
+
+/**
+ * @param {Kind} kind
+ * @param {string} session name of the session
+ * @param {unknown} value
+ */
+export function keep(kind, session, value) {
+  localStorage.setItem(keyOf(kind, session), JSON.stringify(value));
+}
+
+/**
+ * @param {Kind} kind
+ * @param {string} session
+ */
+function keyOf(kind, session) {
+  return `quadrille.${kind}.${session}`;
 }

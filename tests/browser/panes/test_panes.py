@@ -324,3 +324,61 @@ async def test_zoom_is_kept_over_a_reload(page):
         assert await to_client(page, camera, 100.0, 90.0) == pytest.approx(place, abs=0.01)
     await page.keyboard.press("0")  # the whole image, kept as well
     await shows(page, "!localStorage.getItem('quadrille.views.elbow_rotation').includes('zoom')")
+
+
+async def test_a_session_is_framed_on_its_people_when_it_first_opens_and_not_again(page, endpoint):
+    await page.evaluate("localStorage.removeItem('quadrille.views.elbow_rotation')")
+    await page.reload()
+    await shows(page, f"{OPENED} && quadrille.state.views.every((view) => view.zoom > 1.05)")
+    framed = (await state_of(page))["views"]
+    await page.reload()  # kept, as if by hand
+    await shows(page, OPENED)
+    assert (await state_of(page))["views"] == framed
+    # What was framed is framed still in a pane of another shape.
+    await page.set_viewport_size({"width": 1100, "height": 800})
+    await shows(page, f"quadrille.state.views[0].scale !== {framed[0]['scale']}")
+    pane = await page.locator(".pane").first.bounding_box()
+    handles = [h for h in (await state_of(page))["overlay"]["handles"] if h["camera"] == 0]
+    places = np.array([await to_client(page, 0, h["u"], h["v"]) for h in handles])
+    low, high = places.min(axis=0), places.max(axis=0)
+    np.testing.assert_allclose(((high - low) / (pane["width"], pane["height"])).max(), 1 / 1.4, atol=0.01)
+    await page.keyboard.press("0")
+    await shows(page, "quadrille.state.views.every((view) => view.zoom === 1)")
+    await page.keyboard.press("Period")
+    await shows(page, "quadrille.state.shown.frame === 13 && quadrille.state.overlay.frame === 13")
+    assert all(view["zoom"] == 1 for view in (await state_of(page))["views"])
+    # Without a pose there is nobody to frame.
+    endpoint.state["people"][0]["source"] = None
+    await page.evaluate("localStorage.removeItem('quadrille.views.elbow_rotation')")
+    await page.reload()
+    await shows(page, OPENED)
+    assert all(view["zoom"] == 1 for view in (await state_of(page))["views"])
+
+
+async def test_a_view_moved_before_the_first_overlay_stays_where_it_is(page, endpoint):
+    endpoint.held = asyncio.Event()
+    await page.evaluate("localStorage.removeItem('quadrille.views.elbow_rotation')")
+    await page.reload()
+    await shows(page, "window.quadrille?.state.views.length === 4 && quadrille.state.state")
+    pane = await page.locator(".pane").nth(1).bounding_box()
+    await page.mouse.move(pane["x"] + 100, pane["y"] + 100)
+    await page.mouse.wheel(0, -300)
+    await shows(page, "quadrille.state.views[1].zoom > 1")
+    moved = (await state_of(page))["views"]
+    endpoint.held.set()
+    await shows(page, OPENED)
+    await page.wait_for_timeout(50)
+    assert [view["zoom"] for view in (await state_of(page))["views"]] == [view["zoom"] for view in moved]
+
+
+async def test_the_pane_that_fills_the_grid_is_kept_over_a_reload(page):
+    await page.keyboard.press("3")
+    await shows(page, "quadrille.state.filled === 2")
+    await page.reload()
+    await shows(page, OPENED)
+    assert [await p.is_visible() for p in await page.locator(".pane").all()] == [False, False, True, False]
+    await page.keyboard.press("3")
+    await shows(page, "quadrille.state.filled === null")
+    await page.reload()
+    await shows(page, OPENED)
+    assert await page.locator(".pane:visible").count() == 4
