@@ -54,7 +54,7 @@ export function mount() {
 
     /** @param {ClientMessage | null} greeting sent first on every connection */
     connect(greeting) {
-      connection = new Connection(receiver, greeting);
+      connection = new Connection(receiver, greeting, () => store.facts.opening === null);
     },
   };
 }
