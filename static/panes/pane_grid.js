@@ -1,11 +1,11 @@
 /** Grid of the panes of all cameras, or one pane that fills it. */
 
-import { arrange, layOut, movedShares } from "./grid_layout.js";
-import { keep, kept, keptByName } from "./kept_views.js";
+import { arrange, layOut, movedShares } from "../layout/grid_layout.js";
+import { keep, kept, keptByName } from "../layout/kept_views.js";
 import { followView, keepLink, keptLink } from "./linked_views.js";
 import { Pane } from "./pane.js";
-import { PaneBorders } from "./pane_borders.js";
-import { PaneShares } from "./pane_shares.js";
+import { PaneBorders } from "../layout/pane_borders.js";
+import { PaneShares } from "../layout/pane_shares.js";
 
 /** Two digits within this time form one number. */
 const SECOND_DIGIT_MS = 700;
