@@ -56,4 +56,5 @@ def command(
 
         chosen = open_session(found, doorway, lambda line: print(line, flush=True))
     if chosen is not None:
-        restart(["open", str(chosen.folder), "--host", host, "--port", str(chosen.port), "--no-browser"])
+        words = ["open", str(chosen.folder), "--host", host, "--port", str(chosen.port), "--no-browser"]
+        restart(words, chosen.listening)

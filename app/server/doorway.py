@@ -18,6 +18,7 @@ from typing import Self
 
 from platformdirs import user_state_path
 
+from app.runtime.restart import inherited
 from app.server.access import Access, Invitation, access_for
 from app.server.address import Serving, listen, page_address, port_of
 from app.server.static_files import static_folder
@@ -58,8 +59,8 @@ class Doorway:
         static = static_folder()
         self._files = {path: ((static / name).read_bytes(), kind) for path, (name, kind) in _FILES.items()}
         self._step = 0
-        self.sockets = listen(serving.host, serving.port)
-        """They listen until the end of the `with` block; who serves them next calls `close` before."""
+        self.sockets = inherited() or listen(serving.host, serving.port)
+        """They listen until the end of the `with` block; who serves copies of them calls `close` before."""
         self.port = port_of(self.sockets)
         self._servers = [_Server(each, self) for each in self.sockets]
         self._threads = [threading.Thread(target=s.serve_forever, args=(_POLL_S,), daemon=True) for s in self._servers]

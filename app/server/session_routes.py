@@ -54,10 +54,16 @@ class SessionRoutes:
 
     def add_to(self, app: web.Application) -> None:
         """Add the routes to an application."""
+        app.router.add_get("/starting.json", self._started)
         app.router.add_get("/sessions", self._list)
         app.router.add_get("/sessions/paths", self._complete)
         app.router.add_post("/sessions/open", self._open)
         app.router.add_post("/sessions/new", self._make)
+
+    async def _started(self, _: web.Request) -> web.Response:
+        """Answer a page that waits for the program, as `Doorway` does before: no step is left."""
+        folder = "" if self._refusal is not None else str(self._folder)
+        return web.json_response({"steps": [], "at": 0, "folder": folder})
 
     async def _list(self, _: web.Request) -> web.Response:
         if self._refusal is not None:

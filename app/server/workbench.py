@@ -3,6 +3,7 @@
 import asyncio
 import getpass
 import signal
+import socket
 from collections.abc import Callable, Coroutine
 from contextlib import closing
 from pathlib import Path
@@ -47,6 +48,8 @@ class NextSession(NamedTuple):
     folder: Path
     port: int
     """Port of the page, which connects again there."""
+    listening: tuple[socket.socket, ...]
+    """Copies of the sockets of that port: connections wait there for the next program."""
 
 
 def open_session(session: Session, doorway: Doorway, say: Callable[[str], None]) -> NextSession | None:
@@ -101,7 +104,7 @@ def open_session(session: Session, doorway: Doorway, say: Callable[[str], None])
                 say(f"{session.name}: {doorway.address}")
 
             doorway.close()
-            served = serve_forever(app, doorway.sockets, ready)
+            served = serve_forever(app, [each.dup() for each in doorway.sockets], ready)
             asyncio.run(_until_interrupted(served, others.is_chosen))
         finally:
             try:
@@ -113,7 +116,9 @@ def open_session(session: Session, doorway: Doorway, say: Callable[[str], None])
             store.close()
             if unsaved is not None:
                 raise TrackerError(unsaved)
-    return None if others.chosen is None else NextSession(others.chosen, doorway.port)
+    if others.chosen is None:
+        return None
+    return NextSession(others.chosen, doorway.port, tuple(each.dup() for each in doorway.sockets))
 
 
 def _can_draw(controller: Controller) -> bool:

@@ -85,9 +85,10 @@ export class BodySection {
     buttons.append(this.#apply, this.#discard, this.#former);
     this.#note.className = "section-note";
     this.#note.setAttribute("role", "status");
-    this.body.append(
-      this.#person, this.#height.element, this.#alike.element, this.#table, this.#keyframes.element, this.#note, buttons,
-    ); // prettier-ignore
+    const foot = document.createElement("div");
+    foot.className = "section-foot";
+    foot.append(this.#keyframes.element, this.#note, buttons);
+    this.body.append(this.#person, this.#height.element, this.#alike.element, this.#table, foot);
   }
 
   /** @param {Set<keyof import("../model/store.js").Facts>} changed */

@@ -21,14 +21,17 @@ export class Connection {
 
   /** @type {import("./protocol.js").ClientMessage | null} */
   #greeting;
+  #isWanted;
 
   /**
    * @param {Listener} listener
    * @param {import("./protocol.js").ClientMessage | null} greeting sent first on every connection
+   * @param {() => boolean} isWanted whether to connect again; asked before each attempt
    */
-  constructor(listener, greeting = null) {
+  constructor(listener, greeting = null, isWanted = () => true) {
     this.#listener = listener;
     this.#greeting = greeting;
+    this.#isWanted = isWanted;
     this.#connect();
     // Reconnect immediately when the network is back.
     addEventListener("online", () => this.#connect());
@@ -65,9 +68,13 @@ export class Connection {
     };
     socket.onclose = () => {
       this.#listener.onOpen(false);
-      setTimeout(() => this.#connect(), this.#delayMs * (0.75 + 0.5 * Math.random()));
-      this.#delayMs = Math.min(2 * this.#delayMs, MAX_DELAY_MS);
+      this.#connectLater();
     };
     this.#socket = socket;
+  }
+
+  #connectLater() {
+    setTimeout(() => (this.#isWanted() ? this.#connect() : this.#connectLater()), this.#delayMs * (0.75 + 0.5 * Math.random()));
+    this.#delayMs = Math.min(2 * this.#delayMs, MAX_DELAY_MS);
   }
 }

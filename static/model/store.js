@@ -18,6 +18,7 @@ import { defaultLayers } from "./layers.js";
  * @typedef {object} Facts
  * @property {boolean} connected
  * @property {string | null} opening name of another session that the program is opening
+ * @property {string} openingStep what the program is doing to open it; empty while unknown
  * @property {import("./protocol.js").SessionMessage | null} session
  * @property {import("./protocol.js").StateMessage | null} state
  * @property {import("./cells.js").Cells} timeline cells of all people together
@@ -71,6 +72,7 @@ export class Store {
   facts = {
     connected: false,
     opening: null,
+    openingStep: "",
     session: null,
     state: null,
     timeline: new Cells(0),

@@ -1,9 +1,11 @@
 /** Grid of the panes of all cameras, or one pane that fills it. */
 
-import { layOut } from "./grid_layout.js";
-import { keepViews, keptViews } from "./kept_views.js";
+import { arrange, layOut, movedShares } from "../layout/grid_layout.js";
+import { keep, kept, keptByName } from "../layout/kept_views.js";
 import { followView, keepLink, keptLink } from "./linked_views.js";
 import { Pane } from "./pane.js";
+import { PaneBorders } from "../layout/pane_borders.js";
+import { PaneShares } from "../layout/pane_shares.js";
 
 /** Two digits within this time form one number. */
 const SECOND_DIGIT_MS = 700;
@@ -23,9 +25,14 @@ export class PaneGrid {
   #latency;
   #openToneMenu;
   #element;
+  #borders;
+  #shares = new PaneShares();
+  #arrangement = { isColumns: false, counts: [1] };
   #digit = { value: 0, at: -Infinity };
-  #cameras = "";
+  #built = "";
   #choice = "";
+  /** Whether the session opens for the first time, and no view was moved yet. */
+  #isOpening = false;
   /** Panes whose view changes with that of another, or of all. @type {Set<number>} */
   #following = new Set();
 
@@ -40,6 +47,10 @@ export class PaneGrid {
     this.#element = element;
     this.#store = store;
     this.#latency = latency;
+    this.#borders = new PaneBorders(element, (border, size) => {
+      this.#shares.choose(this.#arrangement, border.of, size === null ? null : movedShares(border, size));
+      this.#layOut();
+    });
     store.subscribe((changed) => this.#update(changed));
     store.set({ linkedViews: keptLink() });
     new ResizeObserver(() => this.#layOut()).observe(element);
@@ -146,6 +157,17 @@ export class PaneGrid {
     });
   }
 
+  /** Whether panes have other sizes than the automatic ones. */
+  get isResized() {
+    return this.#shares.isChosen;
+  }
+
+  /** Return to the automatic sizes of all panes. */
+  resetSizes() {
+    this.#shares.reset();
+    this.#layOut();
+  }
+
   /**
    * Window position of an undistorted pixel.
    *
@@ -163,7 +185,8 @@ export class PaneGrid {
   /** @param {Set<keyof import("../model/store.js").Facts>} changed */
   #update(changed) {
     if (changed.has("session")) this.#build();
-    if (changed.has("filled")) this.#layOut();
+    if (changed.has("filled")) this.#fill();
+    if (changed.has("overlay")) this.#frameAtOpening();
     if (changed.has("target")) this.#ask(this.panes.map((pane) => pane.reduction));
     if (changed.has("active") || changed.has("session")) this.#markActive();
     const withPictures = PICTURED.some((fact) => changed.has(fact));
@@ -188,22 +211,20 @@ export class PaneGrid {
   }
 
   #build() {
-    const cameras = this.#store.facts.session?.cameras ?? [];
+    const { name = "", cameras = [] } = this.#store.facts.session ?? {};
     // The session is sent again on each connection. With the same cameras, zoom and filled pane remain.
-    const described = JSON.stringify(cameras);
-    if (described === this.#cameras) return;
-    this.#cameras = described;
-    const kept = keptViews(this.#store.facts.session?.name ?? "");
+    const described = JSON.stringify([name, cameras]);
+    if (described === this.#built) return;
+    this.#built = described;
+    this.#shares.open(name);
+    const views = keptByName("views", name);
+    this.#isOpening = views === null;
     this.panes = cameras.map((info, camera) => {
       const pane = new Pane(this.#store, camera, info, {
-        viewChanged: () => {
-          this.#refine();
-          this.#keep();
-          if (!this.#following.delete(camera)) this.#follow(camera);
-        },
+        viewChanged: () => this.#viewChanged(camera),
         openToneMenu: this.#openToneMenu,
       });
-      pane.view.restore(kept[info.name]);
+      pane.view.restore(views?.[info.name]);
       for (const target of this.#pointerTargets) target.watch(pane, camera);
       pane.element.addEventListener("dblclick", (event) => {
         if (!(event.target instanceof Element && event.target.closest("button"))) this.toggleFill(camera);
@@ -211,8 +232,26 @@ export class PaneGrid {
       return pane;
     });
     this.#element.replaceChildren(...this.panes.map((pane) => pane.element));
-    this.#store.set({ filled: null });
+    const filled = cameras.findIndex((info) => info.name === kept("filled-pane", name));
+    this.#store.set(filled < 0 ? { filled: null } : { filled, active: filled });
     this.#layOut();
+  }
+
+  /** @param {number} camera */
+  #viewChanged(camera) {
+    this.#isOpening = false;
+    this.#refine();
+    this.#keep();
+    if (!this.#following.delete(camera)) this.#follow(camera);
+  }
+
+  /** Zoom to the people when the session opens for the first time, if anybody has a pose. */
+  #frameAtOpening() {
+    const { overlay, state } = this.#store.facts;
+    if (!this.#isOpening || !overlay || !state) return;
+    this.#isOpening = false;
+    const isMoved = this.panes.some(({ view }) => !view.isReset);
+    if (!isMoved && state.people.some(({ source }) => source !== null)) this.framePeople();
   }
 
   /** Keep the zoom of all views. */
@@ -220,7 +259,13 @@ export class PaneGrid {
     const { session } = this.#store.facts;
     if (!session) return;
     const names = session.cameras.map(({ name }) => name);
-    keepViews(session.name, Object.fromEntries(this.panes.map((pane, camera) => [names[camera], pane.view.choice])));
+    keep("views", session.name, Object.fromEntries(this.panes.map((pane, camera) => [names[camera], pane.view.choice])));
+  }
+
+  #fill() {
+    const { session, filled } = this.#store.facts;
+    if (session) keep("filled-pane", session.name, filled === null ? null : session.cameras[filled].name);
+    this.#layOut();
   }
 
   #layOut() {
@@ -229,11 +274,18 @@ export class PaneGrid {
     const { filled } = this.#store.facts;
     const { clientWidth, clientHeight } = this.#element;
     const shown = filled === null ? cameras : [cameras[filled]];
-    const boxes = layOut(shown.map(({ width, height }) => width / height), clientWidth, clientHeight); // prettier-ignore
+    const aspects = shown.map(({ width, height }) => width / height);
+    const { arrangement, shares: automatic } = arrange(aspects, clientWidth, clientHeight);
+    this.#arrangement = arrangement;
+    const shares = this.#shares.of(arrangement, automatic);
+    const { boxes, borders } = layOut(arrangement, shares, clientWidth, clientHeight);
     this.panes.forEach((pane, camera) => {
       if (filled === null) pane.place(boxes[camera]);
       else pane.place(filled === camera ? boxes[0] : null);
     });
+    let first = 0;
+    const names = arrangement.counts.map((count) => shown.slice(first, (first += count)).map(({ name }) => name));
+    this.#borders.show(borders, arrangement.isColumns, names);
     this.#ask(this.panes.map((pane) => pane.reduction));
   }
 

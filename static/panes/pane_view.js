@@ -1,5 +1,6 @@
 /**
- * Zoom and centre of an image in its pane. The centre is an image position, so that it stays when the pane is resized.
+ * Zoom and centre of an image in its pane. The centre is an image position, so that it stays when the pane is resized. A
+ * box that was framed is framed again, until the view is moved.
  *
  * Image positions are undistorted pixels with pixel centres at integers, so an image spans -0.5 to width - 0.5. Screen
  * positions are CSS pixels from the upper left corner of the pane.
@@ -11,12 +12,16 @@ const MAX_ZOOM = 40;
 const FRAME_MARGIN = 1.4;
 const MAX_FRAME_ZOOM = 8;
 
+/** @typedef {{left: number, top: number, right: number, bottom: number}} ImageBox image positions */
+
 export class PaneView {
   /** 1 if the whole image fits the pane. */
   zoom = 1;
   #image;
   #pane = { width: 1, height: 1 };
   #center;
+  /** @type {ImageBox | null} what the pane is filled with */
+  #framed = null;
 
   /**
    * @param {number} width of the image, px
@@ -56,19 +61,22 @@ export class PaneView {
     return { ...this.#center };
   }
 
-  /** What the user has zoomed to, to be restored; null for the whole image. */
+  /** What the view shows, to be restored; null for the whole image. */
   get choice() {
+    if (this.#framed) return { framed: this.#framed };
     return this.isReset ? null : { zoom: this.zoom, ...this.#center };
   }
 
   /**
    * Restore a choice. Anything else shows the whole image.
    *
-   * @param {{zoom?: unknown, u?: unknown, v?: unknown} | null | undefined} choice
+   * @param {unknown} choice
    */
   restore(choice) {
     this.reset();
-    const { zoom, u, v } = choice ?? {};
+    if (typeof choice !== "object" || !choice) return;
+    const { framed, zoom, u, v } = /** @type {Record<string, any>} */ (choice);
+    if (framed && [framed.left, framed.top, framed.right, framed.bottom].every(Number.isFinite)) return this.frame(framed);
     if (!Number.isFinite(zoom) || !Number.isFinite(u) || !Number.isFinite(v)) return;
     this.zoom = Math.max(MIN_ZOOM, Math.min(MAX_ZOOM, Number(zoom)));
     this.#moveCenter(Number(u) - this.#center.u, Number(v) - this.#center.v);
@@ -85,6 +93,7 @@ export class PaneView {
    */
   resize(width, height) {
     this.#pane = { width: Math.max(1, width), height: Math.max(1, height) };
+    if (this.#framed) this.frame(this.#framed);
   }
 
   /**
@@ -113,6 +122,7 @@ export class PaneView {
    * @param {number} factor
    */
   zoomAt(x, y, factor) {
+    this.#framed = null;
     const fixed = this.toImage(x, y);
     this.zoom = Math.max(MIN_ZOOM, Math.min(MAX_ZOOM, this.zoom * factor));
     const moved = this.toImage(x, y);
@@ -124,10 +134,12 @@ export class PaneView {
    * @param {number} dy
    */
   panBy(dx, dy) {
+    this.#framed = null;
     this.#moveCenter(-dx / this.scale, -dy / this.scale);
   }
 
   reset() {
+    this.#framed = null;
     this.zoom = 1;
     this.#center = this.#middle();
   }
@@ -135,9 +147,11 @@ export class PaneView {
   /**
    * Fill the pane with a box of the image and a margin around it.
    *
-   * @param {{left: number, top: number, right: number, bottom: number}} box image positions
+   * @param {ImageBox} box
    */
-  frame({ left, top, right, bottom }) {
+  frame(box) {
+    const { left, top, right, bottom } = box;
+    this.#framed = box;
     const { width, height } = this.#pane;
     const scale = Math.min(width / Math.max(1, right - left), height / Math.max(1, bottom - top)) / FRAME_MARGIN;
     this.zoom = 1;
@@ -153,6 +167,7 @@ export class PaneView {
    * @param {number} scale CSS pixels per image pixel, within the limits of zoom
    */
   look({ u, v }, scale) {
+    this.#framed = null;
     this.zoom = 1;
     this.zoom = Math.max(MIN_ZOOM, Math.min(MAX_ZOOM, scale / this.scale));
     this.#moveCenter(u - this.#center.u, v - this.#center.v);

@@ -7,6 +7,8 @@ import { hasTrack } from "../model/selectors.js";
 import { button, byId } from "../widgets/elements.js";
 
 const STORED = "quadrille.first_steps";
+/** A body that nobody has placed, with a higher cost, stands too far from the person to be found by a search, px. */
+const FAR_PX = 10;
 
 export class FirstSteps {
   #store;
@@ -40,14 +42,24 @@ export class FirstSteps {
   }
 
   #begin() {
-    this.#place.hidden = (this.#store.facts.session?.people.length ?? 1) < 2;
+    const isOne = (this.#store.facts.session?.people.length ?? 1) < 2;
+    byId("first-body", HTMLElement).hidden = !isOne;
+    byId("first-each", HTMLElement).hidden = isOne;
+    this.#showPlace(!isOne);
     if (localStorage.getItem(STORED) !== "seen") this.#row.hidden = false;
+  }
+
+  /** @param {boolean} isShown whether the first step is to place the people */
+  #showPlace(isShown) {
+    this.#place.hidden = !isShown;
+    byId("first-off", HTMLElement).hidden = isShown;
   }
 
   /** Tick the steps that are done. */
   #follow() {
     const { state } = this.#store.facts;
     if (!state) return;
+    if (this.#place.hidden && state.people[0].source === null && (state.cost_px ?? 0) > FAR_PX) this.#showPlace(true);
     const done = (/** @type {HTMLElement} */ step) => step.classList.add("is-done");
     if (state.people.every(({ source }) => source !== null)) done(this.#place);
     if (state.compared?.work === "search" || state.job.message) done(this.#search);

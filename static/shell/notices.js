@@ -138,13 +138,14 @@ export class Notices {
  */
 export function watchConnection(banner, store) {
   const show = () => {
-    const { connected, session, opening } = store.facts;
-    banner.textContent = opening !== null ? `Opening ${opening}…` : session ? "Connection lost. Reconnecting…" : "Connecting…";
+    const { connected, session, opening, openingStep } = store.facts;
+    const step = openingStep && `: ${openingStep.toLowerCase()}`;
+    banner.textContent = opening !== null ? `Opening ${opening}${step}…` : session ? "Connection lost. Reconnecting…" : "Connecting…";
     banner.classList.toggle("is-shown", !connected || opening !== null);
     document.body.classList.toggle("is-cut-off", !connected);
   };
   store.subscribe((changed) => {
-    if (changed.has("connected") || changed.has("session") || changed.has("opening")) show();
+    if (changed.has("connected") || changed.has("session") || changed.has("opening") || changed.has("openingStep")) show();
   });
   show();
 }

@@ -115,12 +115,13 @@ export class Sessions {
       this.#say(error instanceof Error ? error.message : String(error), true);
       return;
     }
-    if (await untilAnotherIsOpen(this.#present)) {
+    const showStep = (/** @type {string} */ step) => this.#store.set({ openingStep: step });
+    if (await untilAnotherIsOpen(this.#present, showStep)) {
       location.reload();
       return;
     }
     const text = `Expected ${this.#store.facts.opening} to be open by now. The terminal of the program says what is wrong.`;
-    this.#store.set({ opening: null });
+    this.#store.set({ opening: null, openingStep: "" });
     this.#notify({ type: "notice", level: "error", text });
   }
 
@@ -138,14 +139,16 @@ export class Sessions {
  * Wait until the program has been replaced by one that serves another session. Returns whether it has in time.
  *
  * @param {string} present folder of the session that is being closed
+ * @param {(step: string) => void} showStep called with what the program is doing
  */
-async function untilAnotherIsOpen(present) {
+async function untilAnotherIsOpen(present, showStep) {
   const deadline = performance.now() + PATIENCE_MS;
   while (performance.now() < deadline) {
     await new Promise((resolve) => setTimeout(resolve, POLL_MS));
     try {
-      const { folder } = await (await fetch("sessions")).json();
-      if (folder !== present) return true;
+      const { steps, at, folder } = await (await fetch("starting.json", { cache: "no-store" })).json();
+      if (steps.length) showStep(steps[at]);
+      else if (folder !== present) return true;
     } catch {
       // The program is starting.
     }

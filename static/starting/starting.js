@@ -23,9 +23,10 @@ function show({ steps: names, at }) {
 async function look() {
   try {
     const answer = await fetch("starting.json", { cache: "no-store" });
-    // The session's page has no such file, or asks for its token first.
-    if (!answer.ok) return location.reload();
-    show(await answer.json());
+    const progress = answer.ok ? await answer.json() : null;
+    // No step is left once the session's page is served. It may refuse to answer without its token.
+    if (!progress?.steps.length) return location.reload();
+    show(progress);
   } catch {
     note.textContent = ENDED;
   }

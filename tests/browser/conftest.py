@@ -17,6 +17,8 @@ from app.server.static_files import static_folder
 BLANK = "<!doctype html><title>3-D</title><link rel=icon href='data:,'><body tabindex=0>"
 LIVE = Path(__file__).parent / "live"
 VIEWPORT = {"width": 1440, "height": 900}
+WHOLE_IMAGES = "localStorage.setItem('quadrille.views.elbow_rotation', '{}')"
+"""JavaScript: the user has seen the session before, and left all views at the whole image."""
 
 
 def pytest_collection_modifyitems(items):
@@ -146,6 +148,7 @@ async def page(browser, server, address, tabs):
         tabs.append(await _blank_tab(browser, server))
     page = tabs[0]
     page.errors.clear()
+    await page.evaluate(WHOLE_IMAGES)
     await page.goto(address)
     await shows(page, OPENED)
     yield page
@@ -173,6 +176,7 @@ async def _leave(page, server):
 async def fresh_page(browser, server, address):
     """As `page`, in a tab of its own."""
     page = await _blank_tab(browser, server)
+    await page.evaluate(WHOLE_IMAGES)
     await page.goto(address)
     await shows(page, OPENED)
     yield page

@@ -15,11 +15,27 @@ ROOT = Path(__file__).resolve().parents[2]
 class Program:
     """`quadrille open SESSION` in a process of its own. Without a token a page finds it again after a restart."""
 
-    def __init__(self, session: Path, *options: str, hears_errors: bool = False, has_token: bool = False) -> None:
-        """Prepare it; with `hears_errors`, `errors` holds its standard error when it has ended."""
-        self._hears_errors = hears_errors
+    def __init__(
+        self,
+        session: Path | None,
+        *options: str,
+        hears_errors: bool = False,
+        has_token: bool = False,
+        log: Path | None = None,
+    ) -> None:
+        """Prepare it.
+
+        Args:
+            session: folder to open; None for the bundled sample, as `quadrille` alone does.
+            options: more words of the command line.
+            hears_errors: keep its standard error in `errors` when it has ended.
+            has_token: require the token.
+            log: file that its standard error is written to.
+        """
+        self._hears_errors, self._log = hears_errors, log
         self.errors = ""
-        self._words = [sys.executable, "-m", "app", "open", str(session), "--no-browser", *options]
+        self._words = [sys.executable, "-m", "app", "open", *([str(session)] if session else []), "--no-browser"]
+        self._words += options
         if not has_token:
             self._words.append("--no-token")
         self._process: asyncio.subprocess.Process | None = None
@@ -37,15 +53,17 @@ class Program:
 
     async def start(self, port: int = 0) -> None:
         """Start it at a port; 0 takes a free one."""
-        self._process = await asyncio.create_subprocess_exec(
-            *self._words,
-            "--port",
-            str(port),
-            cwd=ROOT,
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE if self._hears_errors else None,
-            env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        )
+        with open(self._log or os.devnull, "ab") as log:
+            heard = asyncio.subprocess.PIPE if self._hears_errors else None
+            self._process = await asyncio.create_subprocess_exec(
+                *self._words,
+                "--port",
+                str(port),
+                cwd=ROOT,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=log if self._log else heard,
+                env={**os.environ, "PYTHONUNBUFFERED": "1"},
+            )
         async with asyncio.timeout(120):
             while not self.address:
                 line = (await self._process.stdout.readline()).decode()

@@ -48,9 +48,11 @@ class ScriptedUser:
         return values
 
     def error_mm(self, values):
-        """Mean distance of the limb joints from the truth."""
+        """Mean distance of the limb joints from the truth, of those that it has."""
         points = self.model.points_world(values)
-        return 1e3 * np.mean([np.linalg.norm(points[self.model.point_names.index(n)] - self._places[n]) for n in LIMBS])
+        return 1e3 * np.nanmean(
+            [np.linalg.norm(points[self.model.point_names.index(n)] - self._places[n]) for n in LIMBS]
+        )
 
     def aim_px(self, joint, camera):
         """Where the user takes a joint to be in a view; another time it is another place."""

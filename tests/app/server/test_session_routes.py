@@ -79,6 +79,8 @@ async def test_recent_sessions_are_listed_and_one_is_opened(folders, serve):
     for folder in (dance, walk, folders[0].parent / "gone"):
         remember(state, folder)
     client = await serve()
+    started = json.loads((await client.get("/starting.json"))[1])
+    assert started == {"steps": [], "at": 0, "folder": str(walk)}
     listed = json.loads((await client.get("/sessions"))[1])
     assert listed["folder"] == str(walk)
     assert [(r["folder"], r["name"]) for r in listed["recent"]] == [

@@ -73,6 +73,10 @@ async def test_sizes_are_entered_in_centimetres_then_applied(page, endpoint):
     await endpoint.broadcast(endpoint.body_sizes)
     await shows(page, "document.querySelector('.size-table').textContent.includes('Right forearm')")
     assert "Not applied yet" in await page.locator("[data-section=body] [role=status]").inner_text()
+    await page.set_viewport_size({"width": 1280, "height": 420})  # there is no room for all sizes
+    await page.locator("#inspector").evaluate("(column) => column.scrollTo(0, 0)")
+    column, box = await page.locator("#inspector").bounding_box(), await apply.bounding_box()
+    assert box["y"] + box["height"] <= column["y"] + column["height"]
     await row(page, "Keyframes").locator("select").select_option("keep")
     await apply.click()
     await until(lambda: len(endpoint.received) == 3)

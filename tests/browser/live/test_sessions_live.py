@@ -8,6 +8,7 @@ import pytest
 from command_line import SAMPLE
 from page_driver import shows
 from program import WITHOUT_3D, Program
+from stranger import Errors
 
 pytestmark = pytest.mark.slow
 
@@ -21,6 +22,7 @@ async def test_another_session_takes_the_place_of_the_first(browser, tmp_path, m
     context = await browser.new_context(viewport={"width": 1280, "height": 720})
     try:
         page = await context.new_page()
+        errors = Errors(page)
         await page.add_init_script(WITHOUT_3D)
         await page.goto(program.address, timeout=120_000)
         await shows(page, "window.quadrille?.state.overlay", 120)
@@ -33,6 +35,7 @@ async def test_another_session_takes_the_place_of_the_first(browser, tmp_path, m
         print(f"another session after {time.monotonic() - began:.1f} s")
         await page.keyboard.press("Control+o")
         await shows(page, f"document.querySelector('#recent-sessions').innerText.includes('{tmp_path / 'walk'}')")
+        assert errors.found == []
         assert not (tmp_path / "walk" / "lock.json").exists()
         assert (tmp_path / "dance" / "lock.json").exists()
         recent = json.loads((tmp_path / "state" / "quadrille" / "recent_sessions.json").read_text())

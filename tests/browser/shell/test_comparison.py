@@ -8,6 +8,11 @@ COMPARED = {
     "number": 4, "work": "fit", "before_px": 5.74, "after_px": 5.44, "before_view_costs_px": [6.0, 5.0, 5.9, None],
     "after_view_costs_px": [5.0, 5.6, 5.9, None], "warning": "", "is_before_shown": False,
 }  # fmt: skip
+TEXT_BOXES = """['#show-comparison', '#cost'].map((one) => {
+  const range = document.createRange();
+  range.selectNodeContents(document.querySelector(one));
+  return range.getBoundingClientRect().toJSON();
+})"""
 TEXT = "document.querySelector('#show-comparison').textContent"
 
 
@@ -43,7 +48,8 @@ async def test_costs_before_and_after_are_shown_and_one_key_shows_the_pose_befor
 @pytest.mark.endpoint(n_people=2)
 async def test_the_top_bar_has_room_for_a_comparison(page, endpoint):
     job = endpoint.idle_job("done: 12,345 poses scored")
-    endpoint.state |= {"compared": COMPARED | {"before_px": 15.74}, "cost_px": 15.44, "job": job}
+    compared = COMPARED | {"before_px": 15.74, "warning": WARNING}
+    endpoint.state |= {"compared": compared, "cost_px": 15.44, "job": job}
     await endpoint.broadcast(endpoint.state)
     await shows(page, f"{TEXT} === '15.74 →'")
     for width in (1280, 1920):
@@ -52,6 +58,9 @@ async def test_the_top_bar_has_room_for_a_comparison(page, endpoint):
         boxes = [await one.bounding_box() for one in await page.locator(".top-bar button:visible").all()]
         assert max(box["x"] + box["width"] for box in boxes) <= width
         assert max(box["y"] + box["height"] for box in boxes) <= 48
+        before, cost = await page.evaluate(TEXT_BOXES)
+        assert before["height"] < 20  # the mark of the warning stands beside the number
+        assert before["bottom"] <= cost["top"] + 4 or before["right"] <= cost["left"]
 
 
 async def test_a_result_that_disagrees_with_the_placement_is_reported_once(page, endpoint):

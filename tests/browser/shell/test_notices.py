@@ -120,7 +120,17 @@ async def test_the_first_steps_tell_the_shortest_way_and_are_closed_for_good(bro
     card = page.locator("#first-steps")
     await card.wait_for()
     steps = [" ".join(text.split()) for text in await card.locator("li:visible").all_inner_texts()]
-    assert [step.rstrip(",") for step in steps] == ["Press F to search the pose", "then G to fit it", "then T to track"]
+    shortest = ["Press F to search the pose", "then G to fit it", "then T to track"]
+    assert [step.rstrip(",") for step in steps] == shortest
+    # A body that stands far from the person is not found by a search.
+    endpoint.state |= {"cost_px": 28.4, "people": [endpoint.state["people"][0] | {"source": None}]}
+    await endpoint.broadcast(endpoint.state)
+    await page.locator("#first-place").wait_for()
+    steps = [" ".join(text.split()) for text in await card.locator("li:visible").all_inner_texts()]
+    assert [step.rstrip(",") for step in steps] == [
+        "Place the body: drag the square, then joints, in two views", *shortest
+    ]  # fmt: skip
+    assert not await page.locator("#first-off").is_visible()
     endpoint.state["compared"] = {
         "number": 1, "work": "fit", "before_px": 6.3, "after_px": 2.4, "before_view_costs_px": [],
         "after_view_costs_px": [], "warning": "", "is_before_shown": False,

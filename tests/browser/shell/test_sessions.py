@@ -8,11 +8,13 @@ from page_driver import shows
 RECENT = {"refusal": None, "folder": "/data/here", "recent": [
     {"folder": "/data/walks/dance", "name": "dance", "opened": "2026-03-04T10:00:00+00:00"},
 ]}  # fmt: skip
+STARTED = {"steps": [], "at": 0, "folder": "/data/here"}
 WHY = "expected a page that only its user can open, found --no-token"
 
 
 async def test_a_session_is_opened_by_its_folder_or_from_the_list(fresh_page, endpoint):
     page, listed, posted = fresh_page, dict(RECENT), []
+    starting = [STARTED, *({"steps": ["Loading the program"], "at": 0} for _ in range(4)), STARTED | {"folder": "/b"}]
 
     async def answer(route):
         request, path = route.request, route.request.url.partition("/sessions")[2]
@@ -26,7 +28,11 @@ async def test_a_session_is_opened_by_its_folder_or_from_the_list(fresh_page, en
         else:
             await route.fulfill(json=listed)
 
+    async def start(route):
+        await route.fulfill(json=starting.pop(0))
+
     await page.route(re.compile(r"/sessions(/|$)"), answer)
+    await page.route("**/starting.json", start)
     await page.keyboard.press("Control+o")
     await shows(page, "document.activeElement.id === 'session-folder'")
     await shows(page, "document.querySelector('#recent-sessions').innerText.includes('/data/walks/dance')")
@@ -39,6 +45,9 @@ async def test_a_session_is_opened_by_its_folder_or_from_the_list(fresh_page, en
     async with page.expect_event("load"):
         await page.locator("#recent-sessions button").click()
         await shows(page, "document.querySelector('#banner').textContent === 'Opening dance…'")
+        for socket in [*endpoint.sockets]:  # the program ends
+            await socket.close()
+        await shows(page, "document.querySelector('#banner').textContent === 'Opening dance: loading the program…'")
     assert posted == ["/data/w", "/data/walks/dance"]
     await shows(page, "window.quadrille?.state.overlay")
     listed |= {"refusal": WHY, "recent": []}
@@ -61,9 +70,10 @@ async def test_a_new_session_is_made_from_a_form_that_lists_the_checks(fresh_pag
             lines = [*CHECKS, outcomes[len(posted) - 1]] if len(posted) < 3 else [{"name": "new"}]
             await route.fulfill(body="\n".join(map(json.dumps, lines)))
         else:
-            await route.fulfill(json=RECENT if len(posted) < 3 else RECENT | {"folder": "/data/new"})
+            await route.fulfill(json=RECENT)
 
     await page.route(re.compile(r"/sessions(/|$)"), answer)
+    await page.route("**/starting.json", lambda route: route.fulfill(json=STARTED | {"folder": "/data/new"}))
     await page.set_viewport_size({"width": 1280, "height": 720})
     await page.keyboard.press("Control+k")
     await page.keyboard.type("new session")

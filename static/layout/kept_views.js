@@ -1,0 +1,48 @@
+/** What the browser keeps of each session's panes. */
+
+/**
+ * @typedef {"views" | "filled-pane" | "pane-shares"} Kind zoom of each view by the name of its camera; name of the camera
+ *   whose pane fills the grid, or null; shares of the panes by arrangement
+ */
+
+/**
+ * @param {Kind} kind
+ * @param {string} session name of the session
+ * @returns {unknown} undefined if nothing valid is stored
+ */
+export function kept(kind, session) {
+  try {
+    return JSON.parse(localStorage.getItem(keyOf(kind, session)) ?? "");
+  } catch {
+    return undefined;
+  }
+}
+
+/**
+ * As `kept`, for what is kept by name.
+ *
+ * @param {Kind} kind
+ * @param {string} session name of the session
+ * @returns {Record<string, unknown> | null} null if nothing valid is stored
+ */
+export function keptByName(kind, session) {
+  const found = kept(kind, session);
+  return typeof found === "object" && !Array.isArray(found) ? /** @type {Record<string, unknown> | null} */ (found) : null;
+}
+
+/**
+ * @param {Kind} kind
+ * @param {string} session name of the session
+ * @param {unknown} value
+ */
+export function keep(kind, session, value) {
+  localStorage.setItem(keyOf(kind, session), JSON.stringify(value));
+}
+
+/**
+ * @param {Kind} kind
+ * @param {string} session
+ */
+function keyOf(kind, session) {
+  return `quadrille.${kind}.${session}`;
+}
