@@ -2,7 +2,7 @@
 
 import { button, byId, keyCaps } from "../widgets/elements.js";
 import { fitness } from "../widgets/fuzzy.js";
-import { markSection } from "./mark_list.js";
+import { markSection } from "../timeline/mark_list.js";
 
 export class KeyList {
   #dialog = byId("key-list", HTMLDialogElement);

@@ -2,7 +2,7 @@
 
 import { sampleOf } from "../panes/pose_legend.js";
 import { SOURCES } from "../model/cells.js";
-import { STATUSES, diamondSwatch, sourceSwatch, statusSwatch } from "../timeline/cell_marks.js";
+import { STATUSES, diamondSwatch, sourceSwatch, statusSwatch } from "./cell_marks.js";
 
 /** @typedef {import("../model/protocol.js").Path["kind"]} Kind */
 
