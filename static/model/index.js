@@ -22,6 +22,9 @@ import { unavailableReasons } from "./unavailable_reasons.js";
  * @typedef {ReturnType<typeof mount>} Context what all other rooms are mounted with
  */
 
+/** Messages after which the program may go to another frame. @type {ClientMessage["type"][]} */
+const MOVING = ["undo", "redo", "go_to"];
+
 /** Create the model. The page connects to the program only when `connect` is called, after all rooms are mounted. */
 export function mount() {
   const store = new Store();
@@ -32,7 +35,11 @@ export function mount() {
   const notify = (/** @type {NoticeMessage} */ notice) => noticeListeners.forEach((listener) => listener(notice));
   /** @type {Connection | null} */
   let connection = null;
-  const send = (/** @type {ClientMessage} */ message) => connection?.send(message);
+  const send = (/** @type {ClientMessage} */ message) => {
+    if (MOVING.includes(message.type)) navigation.expectMove();
+    connection?.send(message);
+  };
+  const navigation = new Navigation(store, send);
   const receiver = new Receiver(store, notify, send, recentImages);
   return {
     store,
@@ -41,7 +48,7 @@ export function mount() {
     latency,
     recentImages,
     actions: new Actions(store, send),
-    navigation: new Navigation(store, send),
+    navigation,
     layers: new Layers(store),
     imageTones: new ImageTones(store),
     themes: new Themes(store),

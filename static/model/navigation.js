@@ -12,6 +12,8 @@ export class Navigation {
   #pending = null;
   /** @type {number | null} */
   #next = null;
+  /** Whether the program may show another frame before it obeys the next request. */
+  #isMoving = false;
 
   /**
    * @param {import("./store.js").Store} store
@@ -23,11 +25,17 @@ export class Navigation {
     store.subscribe((changed) => {
       if (changed.has("connected")) this.#reset();
       if (changed.has("shown") || changed.has("state")) this.#arrived();
+      if (changed.has("state") && !this.#pending) this.#isMoving = false;
     });
   }
 
   get #last() {
     return (this.#store.facts.session?.n_frames ?? 1) - 1;
+  }
+
+  /** Expect that the program goes to another frame by itself: an undo goes to the frame of its edit. */
+  expectMove() {
+    this.#isMoving = true;
   }
 
   /**
@@ -70,7 +78,7 @@ export class Navigation {
    */
   request(frame) {
     this.#store.set({ target: frame });
-    this.#next = frame;
+    this.#next = frame === this.#pending?.frame ? null : frame;
     if (!this.#pending) this.#sendNext();
   }
 
@@ -79,8 +87,7 @@ export class Navigation {
     if (this.#next === null) return;
     const frame = this.#next;
     this.#next = null;
-    const { shown, state } = this.#store.facts;
-    if (shown?.frame === frame && state?.frame === frame) return;
+    if (!this.#isMoving && this.#isAt(frame)) return;
     const request = { frame };
     this.#pending = request;
     this.#send({ type: "seek", frame });
@@ -94,16 +101,24 @@ export class Navigation {
 
   #arrived() {
     const { shown, state, target } = this.#store.facts;
-    if (this.#pending && shown?.frame === this.#pending.frame) this.#sendNext();
+    const { frame } = this.#pending ?? {};
+    if (this.#pending && shown?.frame === frame && (!this.#isMoving || state?.frame === frame)) this.#sendNext();
     // Another tab, an undo or a tracker may have changed the frame.
     if (!this.#pending && this.#next === null && state && state.frame !== target) {
       this.#store.set({ target: state.frame });
     }
   }
 
+  /** @param {number} frame */
+  #isAt(frame) {
+    const { shown, state } = this.#store.facts;
+    return shown?.frame === frame && state?.frame === frame;
+  }
+
   #reset() {
     this.#pending = null;
     this.#next = null;
+    this.#isMoving = false;
     this.pause();
   }
 }

@@ -1,7 +1,7 @@
 /**
  * Panes: the camera images with everything drawn over them, and the pointer in them.
  *
- * The room imports `widgets` and `model`.
+ * The room imports `widgets`, `model` and `layout`.
  */
 
 import { byId } from "../widgets/elements.js";

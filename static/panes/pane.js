@@ -153,7 +153,7 @@ export class Pane {
   /**
    * Move the pane to its place in the grid. Hidden panes free their canvases.
    *
-   * @param {import("./grid_layout.js").Box | null} box
+   * @param {import("../layout/grid_layout.js").Box | null} box
    */
   place(box) {
     const { x, y, width, height } = box ?? { x: 0, y: 0, width: 0, height: 0 };

@@ -69,7 +69,7 @@ export class PaneCorner {
     this.#tone.classList.add("pane-tone");
     this.#tone.addEventListener("click", () => openToneMenu(this.#tone));
     this.#tools.className = "pane-tools";
-    this.#tools.append(this.#scale, this.#fit, this.#tone);
+    this.#tools.append(this.#scale, this.#tone, this.#fit);
   }
 
   get elements() {

@@ -1,9 +1,11 @@
 /** Grid of the panes of all cameras, or one pane that fills it. */
 
-import { arrange, boxesOf } from "./grid_layout.js";
-import { keep, kept, keptByName } from "./kept_views.js";
+import { arrange, layOut, movedShares } from "../layout/grid_layout.js";
+import { keep, kept, keptByName } from "../layout/kept_views.js";
 import { followView, keepLink, keptLink } from "./linked_views.js";
 import { Pane } from "./pane.js";
+import { PaneBorders } from "../layout/pane_borders.js";
+import { PaneShares } from "../layout/pane_shares.js";
 
 /** Two digits within this time form one number. */
 const SECOND_DIGIT_MS = 700;
@@ -23,6 +25,9 @@ export class PaneGrid {
   #latency;
   #openToneMenu;
   #element;
+  #borders;
+  #shares = new PaneShares();
+  #arrangement = { isColumns: false, counts: [1] };
   #digit = { value: 0, at: -Infinity };
   #built = "";
   #choice = "";
@@ -42,6 +47,10 @@ export class PaneGrid {
     this.#element = element;
     this.#store = store;
     this.#latency = latency;
+    this.#borders = new PaneBorders(element, (border, size) => {
+      this.#shares.choose(this.#arrangement, border.of, size === null ? null : movedShares(border, size));
+      this.#layOut();
+    });
     store.subscribe((changed) => this.#update(changed));
     store.set({ linkedViews: keptLink() });
     new ResizeObserver(() => this.#layOut()).observe(element);
@@ -148,6 +157,17 @@ export class PaneGrid {
     });
   }
 
+  /** Whether panes have other sizes than the automatic ones. */
+  get isResized() {
+    return this.#shares.isChosen;
+  }
+
+  /** Return to the automatic sizes of all panes. */
+  resetSizes() {
+    this.#shares.reset();
+    this.#layOut();
+  }
+
   /**
    * Window position of an undistorted pixel.
    *
@@ -196,6 +216,7 @@ export class PaneGrid {
     const described = JSON.stringify([name, cameras]);
     if (described === this.#built) return;
     this.#built = described;
+    this.#shares.open(name);
     const views = keptByName("views", name);
     this.#isOpening = views === null;
     this.panes = cameras.map((info, camera) => {
@@ -254,12 +275,17 @@ export class PaneGrid {
     const { clientWidth, clientHeight } = this.#element;
     const shown = filled === null ? cameras : [cameras[filled]];
     const aspects = shown.map(({ width, height }) => width / height);
-    const { arrangement, shares } = arrange(aspects, clientWidth, clientHeight);
-    const boxes = boxesOf(arrangement, shares, clientWidth, clientHeight);
+    const { arrangement, shares: automatic } = arrange(aspects, clientWidth, clientHeight);
+    this.#arrangement = arrangement;
+    const shares = this.#shares.of(arrangement, automatic);
+    const { boxes, borders } = layOut(arrangement, shares, clientWidth, clientHeight);
     this.panes.forEach((pane, camera) => {
       if (filled === null) pane.place(boxes[camera]);
       else pane.place(filled === camera ? boxes[0] : null);
     });
+    let first = 0;
+    const names = arrangement.counts.map((count) => shown.slice(first, (first += count)).map(({ name }) => name));
+    this.#borders.show(borders, arrangement.isColumns, names);
     this.#ask(this.panes.map((pane) => pane.reduction));
   }
 

@@ -5,7 +5,6 @@
  */
 
 import { button, byId } from "../widgets/elements.js";
-import { makeSplitter } from "../widgets/splitter.js";
 import { leaveFields, watchTyping } from "../widgets/typing.js";
 import { Announcer } from "./announcer.js";
 import { Comparison } from "./comparison.js";
@@ -23,6 +22,7 @@ import { SavedMark } from "./saved_mark.js";
 import { Sessions } from "./sessions.js";
 import { escapeBinding, helpBindings } from "./shell_keys.js";
 import { TopBar } from "./top_bar.js";
+import { divideWorkspace } from "./workspace.js";
 
 /**
  * @typedef {object} Rooms
@@ -51,7 +51,7 @@ export function mount(context, rooms) {
   const people = new People(store, actions, posing);
   showProgressMarks(store);
   watchConnection(byId("banner", HTMLElement), store);
-  makeSplitter(byId("workspace", HTMLElement), byId("split", HTMLElement), byId("inspector", HTMLElement));
+  divideWorkspace(byId("workspace", HTMLElement), byId("split", HTMLElement), byId("inspector", HTMLElement));
   const history = new HistoryList(store, send);
   new ExportPanel(store, context.notify);
   new SavedMark(store, send);

@@ -1,7 +1,7 @@
 /** Drawer above the timeline with tabs for curves, search, cost landscape and doubtful poses. Its height and tab are stored. */
 
 import { button, byId } from "../widgets/elements.js";
-
+import { makeSeparator, showPosition } from "../widgets/separator.js";
 
 /** @type {readonly import("../model/protocol.js").CurveGroup[]} */
 export const CURVE_GROUPS = ["arms", "torso", "legs", "cost"];
@@ -15,9 +15,6 @@ const DEFAULT_SHARES = { curves: 0.21, search: 0.3, doubts: 0.2 };
 const MIN_PX = 140;
 /** Minimum height of the rest of the window, CSS pixels. */
 const PANES_PX = 340;
-/** Height of the tabs, CSS pixels. */
-const BAR_PX = 34;
-const KEY_STEP_PX = 16;
 
 export class Drawer {
   #store;
@@ -38,7 +35,11 @@ export class Drawer {
         tab.blur();
       });
     }
-    this.#listen();
+    makeSeparator(this.#grip, {
+      position: () => -this.#stage.clientHeight,
+      moveTo: (position) => this.#resize(-position),
+      reset: () => this.#resize(null),
+    });
     addEventListener("resize", () => this.#fit());
     this.#open(localStorage.getItem(STORED_OPEN) === "yes" ? this.#lastTab : null);
   }
@@ -98,31 +99,12 @@ export class Drawer {
     const chosen = Number(localStorage.getItem(STORED_HEIGHT + this.#kind)) || DEFAULT_SHARES[this.#kind] * innerHeight;
     const height = Math.round(Math.max(MIN_PX, Math.min(max, chosen)));
     this.#stage.style.height = `${height}px`;
-    this.#grip.setAttribute("aria-valuenow", String(height));
-    this.#grip.setAttribute("aria-valuemin", String(MIN_PX));
-    this.#grip.setAttribute("aria-valuemax", String(max));
+    showPosition(this.#grip, { now: height, min: MIN_PX, max });
   }
 
   /** @param {number | null} height null for the default */
   #resize(height) {
     localStorage.setItem(STORED_HEIGHT + this.#kind, height === null ? "" : String(Math.max(MIN_PX, Math.round(height))));
     this.#fit();
-  }
-
-  #listen() {
-    const grip = this.#grip;
-    grip.addEventListener("pointerdown", (event) => {
-      if (event.button === 0) grip.setPointerCapture(event.pointerId);
-    });
-    grip.addEventListener("pointermove", (event) => {
-      if (grip.hasPointerCapture(event.pointerId)) this.#resize(this.#stage.getBoundingClientRect().bottom - event.clientY - BAR_PX);
-    });
-    grip.addEventListener("dblclick", () => this.#resize(null));
-    grip.addEventListener("keydown", (event) => {
-      const step = { ArrowUp: KEY_STEP_PX, ArrowDown: -KEY_STEP_PX }[event.key];
-      if (step === undefined) return;
-      event.preventDefault();
-      this.#resize(this.#stage.clientHeight + step);
-    });
   }
 }

@@ -4,7 +4,7 @@ import { button, byId } from "../widgets/elements.js";
 import { clock } from "../widgets/text.js";
 import { personCells } from "../model/selectors.js";
 import { SOURCES, STATUSES as CELL_STATUSES } from "../model/cells.js";
-import { STATUSES } from "./timeline_drawing.js";
+import { STATUSES, sourceSwatch, statusSwatch } from "./cell_marks.js";
 
 export class Transport {
   #store;
@@ -112,8 +112,8 @@ export class Transport {
     const statuses = new Set(CELL_STATUSES.filter((_, index) => timeline.statuses.includes(index)));
     const shown = STATUSES.filter((status) => statuses.has(status));
     const rows = [
-      shown.map((status) => swatch(status, `--status-${status}`, status)),
-      SOURCES.filter((source) => sources.has(source)).map((source) => swatch(source, `--source-${source}`, "")),
+      shown.map((status) => entry(status, statusSwatch(status))),
+      SOURCES.filter((source) => sources.has(source)).map((source) => entry(source, sourceSwatch(source))),
     ];
     this.#legend.title = [...shown, ...sources].join(", ");
     this.#legend.replaceChildren(
@@ -128,14 +128,10 @@ export class Transport {
 
 /**
  * @param {string} text
- * @param {string} color CSS variable
- * @param {string} kind class that sets the shape of the mark
+ * @param {HTMLElement} mark
  */
-function swatch(text, color, kind) {
+function entry(text, mark) {
   const item = document.createElement("span");
-  const mark = document.createElement("i");
-  mark.style.background = `var(${color})`;
-  if (kind) mark.className = `is-${kind}`;
   item.append(mark, text);
   return item;
 }

@@ -15,7 +15,7 @@ HOUSE = {
         ["search", "scene"],
         ["posing", "timeline"],
         ["panes"],
-        ["model"],
+        ["model", "layout"],
         ["widgets", "starting"],
     ],
     "app/  the viewer": [

@@ -101,6 +101,7 @@ OWN = {name: sorted(found & FILES.keys() - AT_IMPORT.get(name, set())) for name,
 PAGE_ROOMS = [
     "widgets",
     "model",
+    "layout",
     "panes",
     "posing",
     "timeline",

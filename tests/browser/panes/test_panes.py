@@ -247,7 +247,7 @@ async def test_the_splitter_moves_by_drag_and_key_within_bounds(page):
     box = await page.locator("#split").bounding_box()
     await page.mouse.move(box["x"] + 2, 300)
     await page.mouse.down()
-    await page.mouse.move(700, 300, steps=4)
+    await page.mouse.move(702, 300, steps=4)
     await page.mouse.up()
     assert (await panes.bounding_box())["width"] == pytest.approx(700, abs=1) != before
     await page.locator("#split").focus()
@@ -382,3 +382,68 @@ async def test_the_pane_that_fills_the_grid_is_kept_over_a_reload(page):
     await page.reload()
     await shows(page, OPENED)
     assert await page.locator(".pane:visible").count() == 4
+
+
+async def sizes_of(page):
+    boxes = [await pane.bounding_box() for pane in await page.locator(".pane").all()]
+    return [(round(box["width"]), round(box["height"])) for box in boxes]
+
+
+async def pulled(page, locator, dx, dy):
+    box = await locator.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    await page.mouse.move(x, y)
+    await page.mouse.down()
+    await page.mouse.move(x + dx, y + dy, steps=3)
+    await page.mouse.up()
+
+
+async def test_panes_are_resized_by_their_borders_and_corners(page):
+    automatic = await sizes_of(page)
+    middle = await page.evaluate("quadrille.state.views[0]")
+    center = [(automatic[0][0] / 2 - middle["origin"]["x"]) / middle["scale"], 240]
+    between = page.get_by_role("separator", name="Border between FRONT and RIGHT")
+    # Near the end of the border, clear of the corner.
+    box = await between.bounding_box()
+    assert await between.evaluate("(bar) => getComputedStyle(bar).cursor") == "col-resize"
+    await page.mouse.move(box["x"] + 4, box["y"] + 20)
+    await page.mouse.down()
+    await page.mouse.move(box["x"] + 94, box["y"] + 40, steps=3)
+    await page.mouse.up()
+    (width, height), (other, _) = automatic[:2]
+    assert await sizes_of(page) == [(width + 90, height), (other - 90, height), *automatic[2:]]
+    # What was in the middle is there still.
+    view = (await state_of(page))["views"][0]
+    assert (width + 90) / 2 == pytest.approx(view["origin"]["x"] + view["scale"] * center[0], abs=1)
+    rows = page.get_by_role("separator", name="Border between row 1 and row 2")
+    await rows.focus()
+    await page.keyboard.press("ArrowUp")
+    resized = await sizes_of(page)
+    assert [h for _, h in resized] == [height - 24, height - 24, automatic[2][1] + 24, automatic[3][1] + 24]
+    assert int(await rows.get_attribute("aria-valuenow")) < 50
+    await page.reload()
+    await shows(page, OPENED)
+    assert await sizes_of(page) == resized
+    # No pane vanishes, however far the border is moved.
+    await pulled(page, between, 2000, 0)
+    assert (await sizes_of(page))[1][0] == 120
+    await between.dblclick()
+    assert (await sizes_of(page))[:2] == [(width, height - 24), (other, height - 24)]
+    # Where all borders meet they move together.
+    await pulled(page, page.locator(".pane-corner"), -50, 30)
+    assert await sizes_of(page) == [
+        (width - 50, height + 6),
+        (other + 50, height + 6),
+        (automatic[2][0] - 50, automatic[2][1] - 6),
+        (automatic[3][0] + 50, automatic[3][1] - 6),
+    ]
+    await page.keyboard.press("1")
+    await shows(page, "quadrille.state.filled === 0")
+    assert await page.locator(".pane-border, .pane-corner").count() == 0
+    await page.keyboard.press("1")
+    await shows(page, "quadrille.state.filled === null")
+    await page.keyboard.press("Control+k")
+    await page.keyboard.type("reset sizes of all panes")
+    await page.keyboard.press("Enter")
+    await shows(page, "localStorage.getItem('quadrille.pane-shares.elbow_rotation') === '{}'")
+    assert await sizes_of(page) == automatic

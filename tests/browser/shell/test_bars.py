@@ -1,5 +1,7 @@
 """Keys, top bar and timeline against `fake_endpoint`: what they send and what they say."""
 
+import asyncio
+
 from page_driver import handle_of, shows, state_of, to_client, until
 from playwright.async_api import expect
 
@@ -19,6 +21,38 @@ async def test_frames_end_at_the_ends(page, endpoint):
         await page.keyboard.press(key)
     await shows(page, "quadrille.state.shown.frame === 0")
     assert {m["frame"] for m in endpoint.heard("seek")} == {0}
+
+
+async def test_a_frame_asked_for_after_an_undo_is_shown_although_it_was_on_the_screen(page, endpoint):
+    undone, answer = asyncio.Event(), endpoint.answer
+
+    async def undo_elsewhere(message):
+        """An undo goes to the frame of its edit, and takes a while."""
+        if message["type"] == "undo":
+            await undone.wait()
+            endpoint.state |= endpoint.judged(30)
+            await endpoint.broadcast(endpoint.state)
+            await endpoint.send_frame()
+        else:
+            await answer(message)
+
+    await page.keyboard.press("Home")
+    await shows(page, "quadrille.state.shown.frame === 0 && quadrille.state.state.frame === 0")
+    endpoint.answer = undo_elsewhere
+    endpoint.received.clear()
+    await page.keyboard.press("Control+z")
+    await page.keyboard.press("Home")
+    await page.keyboard.press("Home")  # one request is enough
+    undone.set()
+    await until(lambda: endpoint.heard("seek") == [{"type": "seek", "frame": 0}])
+    await shows(page, "quadrille.state.state.frame === 0 && quadrille.state.shown.frame === 0")
+    assert await page.evaluate("quadrille.state.target") == 0
+    await page.keyboard.press("Period")  # needs not wait
+    await shows(page, "quadrille.state.shown.frame === 1", 1)
+    assert [message["frame"] for message in endpoint.heard("seek")] == [0, 1]
+    # Without another request the page goes along.
+    await page.keyboard.press("Control+z")
+    await shows(page, "quadrille.state.shown.frame === 30 && quadrille.state.target === 30")
 
 
 async def test_keys_send_one_message(page, endpoint):

@@ -7,6 +7,8 @@
 
 /** Gap between neighbours. */
 const GAP = 2;
+/** Smallest pane that a border can leave. */
+const [MIN_WIDTH, MIN_HEIGHT] = [120, 80];
 /** Another arrangement must show this much more. Rows are tried before columns, whose order is less usual. */
 const GAIN = 1.02;
 /** An image counts at most so many times the smallest one: views are compared, so none is large at the cost of the others. */
@@ -18,6 +20,13 @@ const ROUNDING = 1e-6;
  * @typedef {{isColumns: boolean, counts: number[]}} Arrangement counts: panes of each track
  * @typedef {{tracks: number[], panes: number[][]}} Shares of each track in the total depth, and of each pane in the length of
  *   its track; each list sums to 1
+ * @typedef {object} Border the gap between two neighbours
+ * @property {"tracks" | number} of whether the neighbours are tracks, or else panes of the track of this index
+ * @property {number} index of the neighbour before it
+ * @property {boolean} isVertical
+ * @property {Box} box
+ * @property {number[]} sizes of all tracks, or of all panes of the track
+ * @property {number} min smallest size of a neighbour
  */
 
 /**
@@ -45,24 +54,71 @@ export function arrange(aspects, width, height) {
 }
 
 /**
- * Boxes of the panes in whole pixels, with gaps between them.
+ * Boxes of the panes in whole pixels, and the borders between them.
  *
  * @param {Arrangement} arrangement
  * @param {Shares} shares
  * @param {number} width
  * @param {number} height
- * @returns {Box[]}
+ * @returns {{boxes: Box[], borders: Border[]}}
  */
-export function boxesOf({ isColumns }, shares, width, height) {
+export function layOut({ isColumns }, shares, width, height) {
   const [length, depth] = isColumns ? [height, width] : [width, height];
+  const [minLength, minDepth] = isColumns ? [MIN_HEIGHT, MIN_WIDTH] : [MIN_WIDTH, MIN_HEIGHT];
   const tracks = spansOf(shares.tracks, depth);
-  return tracks.flatMap((track, index) =>
-    spansOf(shares.panes[index], length).map((pane) =>
-      isColumns
-        ? { x: track.start, y: pane.start, width: track.size, height: pane.size }
-        : { x: pane.start, y: track.start, width: pane.size, height: track.size },
-    ),
-  );
+  /** @type {Box[]} */
+  const boxes = [];
+  const borders = bordersOf("tracks", tracks, minDepth, (gap) => boxOf({ start: 0, size: length }, gap, isColumns), isColumns);
+  tracks.forEach((track, index) => {
+    const panes = spansOf(shares.panes[index], length);
+    boxes.push(...panes.map((pane) => boxOf(pane, track, isColumns)));
+    borders.push(...bordersOf(index, panes, minLength, (gap) => boxOf(gap, track, isColumns), !isColumns));
+  });
+  return { boxes, borders };
+}
+
+/**
+ * Shares of the neighbours of a border that is moved.
+ *
+ * @param {Border} border
+ * @param {number} size of the neighbour before it, as far as both keep their smallest size
+ */
+export function movedShares({ index, sizes, min }, size) {
+  const both = sizes[index] + sizes[index + 1];
+  // Where there are many, panes are smaller than that by themselves.
+  const least = Math.min(min, sizes[index], sizes[index + 1]);
+  const before = Math.max(least, Math.min(both - least, size));
+  const moved = sizes.map((one, at) => (at === index ? before : at === index + 1 ? both - before : one));
+  return moved.map((one) => one / sum(moved));
+}
+
+/** @typedef {{start: number, size: number}} Span */
+
+/**
+ * @param {"tracks" | number} of
+ * @param {Span[]} spans
+ * @param {number} min
+ * @param {(gap: Span) => Box} boxOfGap
+ * @param {boolean} isVertical
+ * @returns {Border[]}
+ */
+function bordersOf(of, spans, min, boxOfGap, isVertical) {
+  const sizes = spans.map(({ size }) => size);
+  return spans.slice(0, -1).map(({ start, size }, index) => {
+    const box = boxOfGap({ start: start + size, size: GAP });
+    return { of, index, isVertical, box, sizes, min };
+  });
+}
+
+/**
+ * @param {Span} along a track
+ * @param {Span} across it
+ * @param {boolean} isColumn whether the track is a column
+ * @returns {Box}
+ */
+function boxOf(along, across, isColumn) {
+  const [horizontal, vertical] = isColumn ? [across, along] : [along, across];
+  return { x: horizontal.start, y: vertical.start, width: horizontal.size, height: vertical.size };
 }
 
 /**
@@ -162,9 +218,10 @@ function shownArea(tracks, shares, length, depth) {
  *
  * @param {number[]} shares
  * @param {number} size
+ * @returns {Span[]}
  */
 function spansOf(shares, size) {
-  const free = size - GAP * (shares.length - 1);
+  const free = Math.max(0, size - GAP * (shares.length - 1));
   let before = 0;
   return shares.map((share, index) => {
     const start = Math.round(before * free);

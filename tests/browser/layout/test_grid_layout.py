@@ -6,10 +6,10 @@ PORTRAIT, LANDSCAPE = 1080 / 1920, 1920 / 1080
 SIZES = [(794, 505), (698, 253), (1187, 862), (1190, 504), (990, 253), (634, 672)]
 """Of the grid in windows of 1280x720 and 1920x1080, with and without drawers, px."""
 ARRANGED = """async (cases) => {
-  const { arrange, boxesOf } = await import("/static/panes/grid_layout.js");
+  const { arrange, layOut } = await import("/static/layout/grid_layout.js");
   return cases.map(([aspects, width, height]) => {
     const { arrangement, shares } = arrange(aspects, width, height);
-    return { ...arrangement, boxes: boxesOf(arrangement, shares, width, height) };
+    return { ...arrangement, ...layOut(arrangement, shares, width, height) };
   });
 }"""
 
