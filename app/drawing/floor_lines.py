@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from app.drawing.overlays import EPIPOLAR_COLOR, Path
+from app.drawing.overlay_colors import KIND_COLORS
+from app.drawing.overlays import Path
 from app.state.floor_picking import Picking
 from app.state.state import State
 from tracker.geometry.arrays import Array
@@ -10,7 +11,6 @@ from tracker.geometry.cameras import Camera, epipolar_segment
 from tracker.geometry.ground_plane import GroundPlane, up_rotation
 from tracker.session.session import Session
 
-FLOOR_COLOR = "#7ee08a"
 _MARK_PX = 7.0
 """Half the size of a mark in an image 640 px wide, px."""
 _HALF_WIDTH_M = 2.0
@@ -29,12 +29,13 @@ def floor_lines(session: Session, state: State) -> list[Path]:
     for index, view in enumerate(views):
         if picking.plane is not None:
             grid = _grid(picking.plane, up_rotation(state.floor.up, picking.plane), _middle(picking))
-            out.append(Path(index, 0, "floor", FLOOR_COLOR, _seen(view, grid)))
-        out.append(Path(index, 0, "floor", FLOOR_COLOR, _marks(picking, index, view)))
+            out.append(Path(index, 0, "floor", KIND_COLORS["floor"], _seen(view, grid)))
+        out.append(Path(index, 0, "floor", KIND_COLORS["floor"], _marks(picking, index, view)))
         lines = _lines_of_sight(picking, index, views)
         if lines:
             # Paths of this kind are drawn whatever the layers: they show where to click.
-            out.append(Path(index, 0, "floor_sight", EPIPOLAR_COLOR, np.array(lines, dtype=np.float32).reshape(-1, 4)))
+            lines_px = np.array(lines, dtype=np.float32).reshape(-1, 4)
+            out.append(Path(index, 0, "floor_sight", KIND_COLORS["floor_sight"], lines_px))
     return out
 
 

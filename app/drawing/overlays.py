@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 
 from app.drawing.facing import facing_arrow
+from app.drawing.overlay_colors import KIND_COLORS
 from app.state.page_view import View
 from app.state.people import DragState
 from app.state.state import State
@@ -25,14 +26,6 @@ from tracker.images.edge_segments import accept_segments
 from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Person, Session
 
-CANDIDATE_COLOR = "#ffffff"
-COMPARED_COLOR = "#ff9df2"
-PREVIEW_COLOR = "#5ce1ff"
-OTHER_COLOR = "#d8f25a"
-PART_EDGE_COLOR = "#9aa3ad"
-EPIPOLAR_COLOR = "#ffd54a"
-ACCEPTED_COLOR = "#35e0c8"
-REJECTED_COLOR = "#ff4fa3"
 _PERSON_KINDS = (
     "model", "hidden", "facing", "facing_away", "candidate", "compared", "preview", "alternative", "new_sizes",
 )  # fmt: skip
@@ -130,11 +123,11 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     drafted, others = _with_draft(state, bodies), _alternatives(state, bodies)
     result = stored.poses if state is not stored and state.search_view.replay is None else None
     preview = state.search_view.preview
-    outlined: tuple[tuple[PathKind, tuple[Array, ...] | None, str], ...] = (
-        ("candidate", tried if "contours" in view.layers else None, CANDIDATE_COLOR),
-        ("compared", state.search_view.compared, COMPARED_COLOR),
-        ("preview", None if preview is None else preview.poses, PREVIEW_COLOR),
-        ("result", result, COMPARED_COLOR),
+    outlined: tuple[tuple[PathKind, tuple[Array, ...] | None], ...] = (
+        ("candidate", tried if "contours" in view.layers else None),
+        ("compared", state.search_view.compared),
+        ("preview", None if preview is None else preview.poses),
+        ("result", result),
     )
     for index in sorted(view.cameras):
         camera = session.cameras[index].camera.pinhole
@@ -146,15 +139,15 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         if "contours" in view.layers:
             out += _facing(session, bodies, camera, index)
         if state.draft is not None:
-            out += _some({state.draft.person}, drafted, camera, index, "new_sizes", PREVIEW_COLOR)
+            out += _some({state.draft.person}, drafted, camera, index, "new_sizes")
         if others:
             changed = {i for i, (now, other) in enumerate(zip(bodies, others, strict=True)) if now is not other}
-            out += _some(changed, others, camera, index, "alternative", OTHER_COLOR)
-        for kind, poses, color in outlined:
+            out += _some(changed, others, camera, index, "alternative")
+        for kind, poses in outlined:
             if poses is not None:
-                out += _outlined(session, poses, camera, index, kind, color)
+                out += _outlined(session, poses, camera, index, kind)
         if "part_edges" in view.layers:
-            out.append(Path(index, 0, "part_edge", PART_EDGE_COLOR, part_edges.part_edges(bodies, camera)))
+            out.append(Path(index, 0, "part_edge", KIND_COLORS["part_edge"], part_edges.part_edges(bodies, camera)))
         if views is not None:
             out += [s for s in _segments(bodies, views[index], index, view) if s.kind in view.layers]
     if state.drag is not None and "epipolar" in view.layers:
@@ -276,13 +269,11 @@ def _facing(session: Session, bodies: Sequence[PosedBody], camera: Camera, index
     return out
 
 
-def _outlined(
-    session: Session, poses: Sequence[Array], camera: Camera, index: int, kind: PathKind, color: str
-) -> list[Path]:
-    """Draw the visible contours of other poses of all people, in one colour."""
+def _outlined(session: Session, poses: Sequence[Array], camera: Camera, index: int, kind: PathKind) -> list[Path]:
+    """Draw the visible contours of other poses of all people."""
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, poses, strict=True)]
     contour = _traced(bodies, camera)
-    return _by_person(bodies, contour, ~contour.occluded, index, kind, [color] * len(bodies))
+    return _by_person(bodies, contour, ~contour.occluded, index, kind, [KIND_COLORS[kind]] * len(bodies))
 
 
 def _with_draft(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
@@ -305,11 +296,11 @@ def _alternatives(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
 
 
 def _some(
-    chosen: Collection[int], people: Sequence[PosedBody], camera: Camera, index: int, kind: PathKind, color: str
+    chosen: Collection[int], people: Sequence[PosedBody], camera: Camera, index: int, kind: PathKind
 ) -> list[Path]:
     """Draw the visible contours of some people, given by index, among all people."""
     contour = _traced(people, camera)
-    found = _by_person(people, contour, ~contour.occluded, index, kind, [color] * len(people))
+    found = _by_person(people, contour, ~contour.occluded, index, kind, [KIND_COLORS[kind]] * len(people))
     return [path for path in found if path.person in chosen]
 
 
@@ -383,8 +374,8 @@ def _segments(bodies: Sequence[PosedBody], view: ViewEvidence, index: int, shown
     lines = np.hstack([points_px[:-1], points_px[1:]])[is_joined].astype(np.float32)
     of_accepted = chosen[owners[drawn[:-1][is_joined]]]
     return [
-        Path(index, 0, "rejected", REJECTED_COLOR, lines[~of_accepted]),
-        Path(index, 0, "accepted", ACCEPTED_COLOR, lines[of_accepted]),
+        Path(index, 0, "rejected", KIND_COLORS["rejected"], lines[~of_accepted]),
+        Path(index, 0, "accepted", KIND_COLORS["accepted"], lines[of_accepted]),
     ]
 
 
@@ -406,5 +397,5 @@ def _epipolar_lines(session: Session, state: State) -> list[Path]:
             segment = epipolar_segment(source, target.camera.pinhole, source.project(point_world))
             if segment is not None:
                 row = segment.reshape(1, 4).astype(np.float32)
-                out.append(Path(index, drag.person, "epipolar", EPIPOLAR_COLOR, row))
+                out.append(Path(index, drag.person, "epipolar", KIND_COLORS["epipolar"], row))
     return out

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from app.drawing import overlay_colors
 from tracker.body.model import PosedBody
 from tracker.contours.label_image import part_labels
 from tracker.evidence.view_evidence import ViewEvidence
@@ -15,7 +16,6 @@ from tracker.geometry.arrays import Image
 from tracker.geometry.cameras import Camera
 from tracker.images.background_subtraction import Mask
 
-SILHOUETTE_COLOR = "#4ae08c"
 _JPEG_QUALITY = 85
 _FAST = 1
 """zlib's lowest level: masks are large even areas, for which it compresses as well as the highest."""
@@ -51,8 +51,8 @@ def distance_limit_px(view: ViewEvidence) -> float:
 def silhouette(view: ViewEvidence) -> bytes:
     """Encode the silhouette of all people in a view as PNG of one bit per pixel; empty if unknown."""
     if view.silhouette is None:
-        return mask(np.zeros((view.camera.height, view.camera.width), np.bool_), SILHOUETTE_COLOR)
-    return mask(view.silhouette.inside, SILHOUETTE_COLOR)
+        return mask(np.zeros((view.camera.height, view.camera.width), np.bool_), overlay_colors.SILHOUETTE)
+    return mask(view.silhouette.inside, overlay_colors.SILHOUETTE)
 
 
 def mask(inside: Mask, color: str) -> bytes:

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.drawing.overlays import EPIPOLAR_COLOR, Path
+from app.drawing.overlay_colors import KIND_COLORS
+from app.drawing.overlays import Path
 from app.state.page_view import View
 from app.state.state import State, finite_or_none
 from tracker.geometry.cameras import epipolar_segment
@@ -99,7 +100,7 @@ def pin_lines(session: Session, state: State, view: View) -> list[Path]:
                 segment = epipolar_segment(source, target.camera.pinhole, np.array(position_px))
             if segment is not None:
                 row = segment.reshape(1, 4).astype(np.float32)
-                out.append(Path(index, state.person, "epipolar", EPIPOLAR_COLOR, row))
+                out.append(Path(index, state.person, "epipolar", KIND_COLORS["epipolar"], row))
     return out
 
 

@@ -7,20 +7,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.drawing import pictures
+from app.drawing import overlay_colors, pictures
+from app.drawing.outlined_lines import draw_lines
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours, part_edges
-from tracker.geometry.arrays import Array, FloatArray, Image
+from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera, Region
 
 SIZE_PX = 160
 """Width and height of a thumbnail, pixels."""
-LIMB_COLOR = (255, 255, 255)
-"""The limb in question stands out from the colours of people and footage."""
 _MARGIN = 0.12
 """Margin around the person, as a share of the crop."""
-_SUBPIXEL_BITS = 4
 
 
 class Crop(NamedTuple):
@@ -95,10 +93,10 @@ def thumbnail(
     people = np.repeat(np.arange(len(bodies)), [len(b.model.parts) for b in bodies])
     shown = ~contour.occluded
     for person, color in enumerate(colors):
-        r, g, b = bytes.fromhex(color[1:])
-        _draw_lines(drawn, contour.pieces_px[shown & (people == person)[contour.parts]], (r, g, b), 1)
+        pieces = contour.pieces_px[shown & (people == person)[contour.parts]]
+        draw_lines(drawn, pieces, overlay_colors.rgb(color), 2)
     # The limb also where it is occluded: that is often why it is lost.
-    _draw_lines(drawn, contour.pieces_px[limb[contour.parts]], LIMB_COLOR, 2)
+    draw_lines(drawn, contour.pieces_px[limb[contour.parts]], overlay_colors.rgb(overlay_colors.NEUTRAL), 2)
     return pictures.footage(drawn, (SIZE_PX, SIZE_PX))
 
 
@@ -123,9 +121,3 @@ def _square(points_px: Array) -> Region:
     side = max(16, int(np.ceil((1 + 2 * _MARGIN) * float((high - low).max()))))
     u0, v0 = (int(c) for c in np.round((low + high - side) / 2))
     return u0, v0, u0 + side, v0 + side
-
-
-def _draw_lines(image: Image, segments_px: FloatArray, color: tuple[int, int, int], width: int) -> None:
-    """Draw line segments, (N, 4), into an image in place."""
-    ends = np.round(segments_px.reshape(-1, 2, 2) * (1 << _SUBPIXEL_BITS)).astype(np.int32)
-    cv2.polylines(image, list(ends), False, color, width, cv2.LINE_AA, _SUBPIXEL_BITS)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from app.drawing.overlay_colors import TRAIL_AFTER, TRAIL_BEFORE, TRAIL_END, rgb
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
 
@@ -13,10 +14,6 @@ _MAX_GAP = 5
 """Poses more frames apart are not connected: the motion between them is unknown."""
 _MAX_CACHED = 4000
 """Number of frames whose points are cached."""
-_BEFORE_RGB = np.array([38.0, 112.0, 233.0])
-_AFTER_RGB = np.array([240.0, 120.0, 20.0])
-_FAR_RGB = np.array([140.0, 140.0, 145.0])
-"""Colours of a trail: just before the shown frame, just after it, and at both ends."""
 _GAMMA = 2.2
 """Exponent from screen colours to light intensities."""
 
@@ -79,13 +76,14 @@ class Trails:
 
 
 def _colors(offsets: NDArray[np.int64], length: int) -> Array:
-    """Return the colours of a trail, (N, 3): blue before the shown frame, orange after it, grey at its ends.
+    """Return the colours of a trail, (N, 3): violet before the shown frame, green after it, grey at its ends.
 
     Args:
         offsets: frames from the shown one, (N,).
         length: of the trail, frames to either side.
     """
     near = np.clip(1 - np.abs(offsets) / (length + 1), 0.0, 1.0)[:, None]
-    shown = near * np.where(offsets[:, None] < 0, _BEFORE_RGB, _AFTER_RGB) + (1 - near) * _FAR_RGB
+    before, after, end = (np.array(rgb(c)) for c in (TRAIL_BEFORE, TRAIL_AFTER, TRAIL_END))
+    shown = near * np.where(offsets[:, None] < 0, before, after) + (1 - near) * end
     # viser takes the colours of lines for light intensities, and would show these much paler.
     return np.asarray(255 * (shown / 255) ** _GAMMA)

@@ -8,7 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from app.drawing import overlays
+from app.drawing import overlay_colors, overlays
+from app.drawing.outlined_lines import draw_lines
 from app.drawing.pictures import placeholder
 from app.session.footage_indices import footage_indices
 from app.state.page_view import View
@@ -26,7 +27,6 @@ _GRID_PX = (1920, 1080)
 """Largest width and height of a grid of views."""
 _HIDDEN_SHARE = 0.35
 """Opacity of occluded contours."""
-_SUBPIXEL_BITS = 4
 _FAR_PX = 30_000.0
 """Pixels farther out are not drawn: OpenCV counts in 32 bits."""
 
@@ -83,16 +83,14 @@ def _drawn_paths(motion: ExportedMotion, frame: int, shown: Sequence[int]) -> li
 
 def _draw(image: Image, camera: Camera, paths: Sequence[overlays.Path]) -> None:
     """Draw contours into an image as filmed: occluded ones faintly below the visible ones."""
-    width = max(1, round(max(camera.size) / 640))
+    width = max(2, round(max(camera.size) / 640))
     for kind, share in (("hidden", _HIDDEN_SHARE), ("model", 1.0)):
         found = [p for p in paths if p.kind == kind and len(p.segments_px)]
         if not found:
             continue
         layer = image if share == 1.0 else image.copy()
         for path in found:
-            color = tuple(int(path.color[k : k + 2], 16) for k in (1, 3, 5))
-            filmed = np.round(_as_filmed(camera, path.segments_px) * (1 << _SUBPIXEL_BITS)).astype(np.int32)
-            cv2.polylines(layer, list(filmed), False, color, width, cv2.LINE_AA, _SUBPIXEL_BITS)
+            draw_lines(layer, _as_filmed(camera, path.segments_px), overlay_colors.rgb(path.color), width)
         if layer is not image:
             cv2.addWeighted(layer, share, image, 1 - share, 0, dst=image)
 

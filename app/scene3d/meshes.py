@@ -6,6 +6,7 @@ import numpy as np
 import viser
 
 from app.drawing.facing import nose
+from app.drawing.overlay_colors import rgb
 from app.drawing.overlays import Side, side_of
 from app.state.view_3d import View3d
 from tracker.body.model import BodyModel, PosedBody
@@ -46,7 +47,7 @@ class PeopleMeshes:
                 server.scene.add_mesh_simple(
                     f"{root}/{person.name}/{part.name}",
                     *_mesh(person.model, index),
-                    color=color or _rgb(part.color),
+                    color=color or rgb(part.color),
                     opacity=opacity,
                     cast_shadow=False,
                     receive_shadow=False,
@@ -88,7 +89,7 @@ class PeopleMeshes:
         for index, (person, handles) in enumerate(zip(self._people, self.handles, strict=True)):
             opacity = _DIMMED * view.opacity if index in dimmed else view.opacity
             for part, handle in zip(person.model.parts, handles, strict=True):
-                handle.color = _rgb(part.color) if view.colors == "parts" else shaded(person.color, side_of(part.name))
+                handle.color = rgb(part.color) if view.colors == "parts" else shaded(person.color, side_of(part.name))
                 handle.opacity = None if opacity >= 1 else opacity
             _set_visible(handles, view.bodies and index not in hidden)
 
@@ -102,7 +103,7 @@ def _mesh(model: BodyModel, part: int) -> tuple[Array, Array]:
 
 def shaded(color: str, side: Side) -> tuple[int, int, int]:
     """Return a person's colour for a side of the body: lighter on the left, darker on the right."""
-    red, green, blue = _rgb(color)
+    red, green, blue = rgb(color)
     if side == "left":
         return tuple(round(c + _LIGHTER * (255 - c)) for c in (red, green, blue))  # type: ignore[return-value]
     if side == "right":
@@ -114,7 +115,3 @@ def _set_visible(handles: Sequence[viser.MeshHandle], visible: bool) -> None:
     for handle in handles:
         if handle.visible != visible:
             handle.visible = visible
-
-
-def _rgb(color: str) -> tuple[int, int, int]:
-    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)

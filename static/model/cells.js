@@ -5,7 +5,7 @@
  * @typedef {import("./protocol.js").Status} Status
  */
 
-/** Sources of a pose in the order of the legend. styles/tokens.css has their colours. */
+/** Sources of a pose in the order of the legend. timeline/cell_marks.js has their marks. */
 export const SOURCES = [
   "manual",
   "pinned",

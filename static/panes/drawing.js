@@ -1,5 +1,7 @@
 /** Draw a pane: pictures, and vectors over them. All sizes on the screen are CSS pixels. */
 
+import { OFF_DASH, imageColor } from "../widgets/image_colors.js";
+
 /**
  * @typedef {import("../model/protocol.js").Overlay} Overlay
  * @typedef {import("../model/protocol.js").Handle} Handle
@@ -7,9 +9,6 @@
  * @typedef {{handle: Handle, x: number, y: number}} PlacedHandle
  */
 
-const HALO = "rgba(0, 0, 0, 0.45)";
-// White, because joints and contours have the colour of their person.
-const BONE = "#fff";
 const PIXELS_VISIBLE_FROM = 4;
 const BEHIND_IMAGES = "#000";
 const JOINT_RADIUS = 3.5;
@@ -21,7 +20,6 @@ const LABEL_LINE_PX = 16;
 const HELD_RADIUS = 8.5;
 /** Height of the labels in the upper corners of a pane. */
 const CORNERS_PX = 44;
-const REACH_DASH = [3, 3];
 /** Dashes of right limbs: sides differ in line, people in colour. */
 const RIGHT_DASH = [9, 4];
 /** Border of joints behind a dimmed person. */
@@ -32,28 +30,28 @@ const DIMMED = 0.3;
 /**
  * Line style and layer of each kind of path. A layer of null is always drawn.
  *
- * @typedef {{width: number, dash: number[], layer: import("../model/protocol.js").Layer | null, hasHalo: boolean,
+ * @typedef {{width: number, dash: number[], layer: import("../model/protocol.js").Layer | null, hasOutline: boolean,
  *   ofPerson?: boolean}} LineStyle ofPerson: whether they are dimmed with their person
  * @type {Record<import("../model/protocol.js").Path["kind"], LineStyle>}
  */
 export const LINE_STYLES = {
-  model: { width: 1.75, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
-  hidden: { width: 1.25, dash: [4, 4], layer: "hidden", hasHalo: false, ofPerson: true },
-  facing: { width: 2.25, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
-  facing_away: { width: 2.25, dash: [3, 4], layer: "contours", hasHalo: true, ofPerson: true },
-  candidate: { width: 1.25, dash: [], layer: "contours", hasHalo: true, ofPerson: true },
-  compared: { width: 1.5, dash: [6, 4], layer: null, hasHalo: true, ofPerson: true },
-  preview: { width: 1.75, dash: [2, 4], layer: null, hasHalo: true, ofPerson: true },
-  result: { width: 1.5, dash: [6, 4], layer: null, hasHalo: true, ofPerson: true },
-  alternative: { width: 1.5, dash: [9, 4, 2, 4], layer: null, hasHalo: true, ofPerson: true },
-  new_sizes: { width: 1.5, dash: [9, 4, 2, 4, 2, 4], layer: null, hasHalo: true, ofPerson: true },
-  part_edge: { width: 1, dash: [], layer: "part_edges", hasHalo: true },
-  epipolar: { width: 1.25, dash: [6, 4], layer: "epipolar", hasHalo: true },
-  // Halos would merge thousands of short lines into one area.
-  accepted: { width: 1.5, dash: [], layer: "accepted", hasHalo: false },
-  floor: { width: 1.25, dash: [], layer: null, hasHalo: true },
-  floor_sight: { width: 1.5, dash: [5, 4], layer: null, hasHalo: true },
-  rejected: { width: 1, dash: [], layer: "rejected", hasHalo: false },
+  model: { width: 1.75, dash: [], layer: "contours", hasOutline: true, ofPerson: true },
+  hidden: { width: 1.25, dash: [4, 4], layer: "hidden", hasOutline: true, ofPerson: true },
+  facing: { width: 2.25, dash: [], layer: "contours", hasOutline: true, ofPerson: true },
+  facing_away: { width: 2.25, dash: [3, 4], layer: "contours", hasOutline: true, ofPerson: true },
+  candidate: { width: 1.25, dash: [], layer: "contours", hasOutline: true, ofPerson: true },
+  compared: { width: 1.5, dash: [6, 4], layer: null, hasOutline: true, ofPerson: true },
+  preview: { width: 1.75, dash: [2, 4], layer: null, hasOutline: true, ofPerson: true },
+  result: { width: 2, dash: [0.5, 4.5], layer: null, hasOutline: true, ofPerson: true },
+  alternative: { width: 1.5, dash: [9, 4, 2, 4], layer: null, hasOutline: true, ofPerson: true },
+  new_sizes: { width: 1.5, dash: [9, 4, 2, 4, 2, 4], layer: null, hasOutline: true, ofPerson: true },
+  part_edge: { width: 1, dash: [], layer: "part_edges", hasOutline: true },
+  epipolar: { width: 1.25, dash: [6, 4], layer: "epipolar", hasOutline: true },
+  // Outlines would merge thousands of short lines into one area.
+  accepted: { width: 1.5, dash: [], layer: "accepted", hasOutline: false },
+  floor: { width: 1.25, dash: [], layer: null, hasOutline: true },
+  floor_sight: { width: 1.5, dash: [5, 4], layer: null, hasOutline: true },
+  rejected: { width: 1, dash: [], layer: "rejected", hasOutline: false },
 };
 
 /**
@@ -125,7 +123,7 @@ export function drawPaths(context, view, overlay, camera, layers, isDimmed) {
     const isFaint = style.ofPerson && isDimmed(path.person);
     context.globalAlpha = (style.layer ? layers.opacity[style.layer] : 1) * (isFaint ? DIMMED : 1);
     context.setLineDash(path.kind === "model" && path.side === "right" ? RIGHT_DASH : style.dash);
-    stroke(context, line, path.color, style.width, style.hasHalo && !isFaint);
+    stroke(context, line, path.color, style.width, style.hasOutline && !isFaint);
   }
   context.setLineDash([]);
   context.globalAlpha = 1;
@@ -151,18 +149,18 @@ function tracePath(view, segments, first, count) {
 }
 
 /**
- * Stroke with a dark halo, so that the line is visible on any image.
+ * Stroke with a dark outline, so that the line is visible on any image.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {Path2D} line
  * @param {string} color
  * @param {number} width
- * @param {boolean} hasHalo
+ * @param {boolean} hasOutline
  */
-function stroke(context, line, color, width, hasHalo = true) {
+function stroke(context, line, color, width, hasOutline = true) {
   context.lineJoin = context.lineCap = "round";
-  if (hasHalo) {
-    context.strokeStyle = HALO;
+  if (hasOutline) {
+    context.strokeStyle = imageColor("outline");
     context.lineWidth = width + 2;
     context.stroke(line);
   }
@@ -207,9 +205,9 @@ export function drawSkeleton(context, placed, people, opacity) {
       line.lineTo(b.x, b.y);
     }
     context.globalAlpha = opacity;
-    stroke(context, solid, BONE, 1.25);
+    stroke(context, solid, imageColor("neutral"), 1.25);
     context.setLineDash(RIGHT_DASH);
-    stroke(context, dashed, BONE, 1.25);
+    stroke(context, dashed, imageColor("neutral"), 1.25);
     context.setLineDash([]);
     context.globalAlpha = 1;
   });
@@ -233,7 +231,7 @@ export function drawHandle(context, { handle, x, y }, color, emphasis, isSeen = 
     stroke(context, ring, color, 2);
   }
   // Hidden joints are rings in the person's colour, visible joints discs with a white ring.
-  context.strokeStyle = HALO;
+  context.strokeStyle = imageColor("outline");
   context.lineWidth = 3.5;
   context.stroke(outline);
   if (isSeen) {
@@ -285,8 +283,8 @@ export function drawOutOfReach(context, view, outOfReach, handle, color, paneWid
   const line = new Path2D();
   line.moveTo(wanted.x, wanted.y);
   line.lineTo(reached.x, reached.y);
-  context.setLineDash(REACH_DASH);
-  stroke(context, line, "#fff", 1.75);
+  context.setLineDash(OFF_DASH);
+  stroke(context, line, imageColor("off"), 1.75);
   context.setLineDash([]);
   const outline = handleOutline(handle ?? { point: "", side: "" }, wanted.x, wanted.y, 1.5);
   stroke(context, outline, color, 2.25);

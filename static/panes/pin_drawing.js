@@ -1,16 +1,13 @@
 /** Draw the pins of a view, their distance to the model, and their triangulated point. All sizes are CSS pixels. */
 
 import { displayName } from "../widgets/text.js";
+import { OFF_DASH, imageColor } from "../widgets/image_colors.js";
 
 /**
  * @typedef {import("../model/protocol.js").PinMark} PinMark
  * @typedef {{pin: PinMark, x: number, y: number, headX: number, headY: number}} PlacedPin
  */
 
-const HALO = "rgba(0, 0, 0, 0.55)";
-/** Colour of the pins of the selected joint, their lines and their triangulated point. */
-const CHOSEN = "#ffd54a";
-const OFF = "#ff8a7a";
 /** Opacity of the pins of other people. */
 const OTHERS = 0.4;
 const STEM = 15;
@@ -70,7 +67,7 @@ export function drawPins(context, view, facts, camera, paneWidth) {
   context.globalAlpha = 1;
   drawMeeting(context, view, overlay, camera, paneWidth);
   for (const one of placed) {
-    const color = isChosen(one) ? CHOSEN : (session.people[one.pin.person]?.color ?? "#fff");
+    const color = isChosen(one) ? imageColor("mark") : (session.people[one.pin.person]?.color ?? "#fff");
     context.globalAlpha = isSame(one.pin, pinHover) ? 1 : strengthOf(one);
     drawPin(context, one, color, isSame(one.pin, pinHover) || isSame(one.pin, facts.heldPin));
   }
@@ -102,7 +99,9 @@ function drawError(context, view, { pin, x, y }) {
   const line = new Path2D();
   line.moveTo(x, y);
   line.lineTo(model.x, model.y);
-  strokeWithHalo(context, line, OFF, 1.5);
+  context.setLineDash(OFF_DASH);
+  strokeOutlined(context, line, imageColor("off"), 1.5);
+  context.setLineDash([]);
 }
 
 /**
@@ -116,10 +115,10 @@ function drawPin(context, { x, y, headX, headY }, color, isGrown) {
   const stem = new Path2D();
   stem.moveTo(x, y);
   stem.lineTo(headX, headY);
-  strokeWithHalo(context, stem, "#fff", 1.5);
+  strokeOutlined(context, stem, "#fff", 1.5);
   const head = new Path2D();
   head.arc(headX, headY, radius, 0, 2 * Math.PI);
-  context.strokeStyle = HALO;
+  context.strokeStyle = imageColor("outline");
   context.lineWidth = 3.5;
   context.stroke(head);
   context.fillStyle = color;
@@ -148,21 +147,21 @@ function drawMeeting(context, view, overlay, camera, paneWidth) {
   diamond.lineTo(x, y + MEETING_RADIUS);
   diamond.lineTo(x - MEETING_RADIUS, y);
   diamond.closePath();
-  strokeWithHalo(context, diamond, CHOSEN, 1.5);
+  strokeOutlined(context, diamond, imageColor("mark"), 1.5);
   if (mark.error_px !== null) label(context, x, y + 16, [`${mark.error_px.toFixed(1)} px`], paneWidth);
 }
 
 /**
- * Stroke with a dark halo, so that the line is visible on any image.
+ * Stroke with a dark outline, so that the line is visible on any image.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {Path2D} line
  * @param {string} color
  * @param {number} width
  */
-function strokeWithHalo(context, line, color, width) {
+function strokeOutlined(context, line, color, width) {
   context.lineCap = context.lineJoin = "round";
-  context.strokeStyle = HALO;
+  context.strokeStyle = imageColor("outline");
   context.lineWidth = width + 2;
   context.stroke(line);
   context.strokeStyle = color;

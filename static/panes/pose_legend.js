@@ -76,11 +76,12 @@ function entry(text, line) {
  * @param {Kind} kind
  * @param {string} color
  */
-function sampleOf(kind, color) {
+export function sampleOf(kind, color) {
   const { width, dash } = LINE_STYLES[kind];
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
   svg.setAttribute("viewBox", `0 0 ${SAMPLE_PX} 8`);
   svg.setAttribute("aria-hidden", "true");
+  svg.setAttribute("class", "line-sample over-image");
   const path = document.createElementNS("http://www.w3.org/2000/svg", "path");
   path.setAttribute("d", `M0 4H${SAMPLE_PX}`);
   path.setAttribute("stroke", color);

@@ -1,6 +1,7 @@
 /** Best candidates of a search as stick figures, in the view where they differ most. */
 
 import { prepare } from "../panes/drawing.js";
+import { imageColor } from "../widgets/image_colors.js";
 import { byId } from "../widgets/elements.js";
 import { keyOf } from "../model/pictures.js";
 import { selectedRun } from "../model/search_runs.js";
@@ -125,7 +126,7 @@ export class CandidateStrip {
         line.lineTo(...b);
       }
       context.lineCap = "round";
-      context.strokeStyle = "rgba(0, 0, 0, 0.6)";
+      context.strokeStyle = imageColor("outline");
       context.lineWidth = 3.5;
       context.stroke(line);
       context.strokeStyle = person.color;

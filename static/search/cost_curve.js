@@ -2,7 +2,7 @@
  * Plot of best and tested costs by number of poses evaluated, with stages and other runs. A click replays that step.
  */
 
-import { colorName } from "../timeline/curve_drawing.js";
+import { colorName, dashOf } from "../widgets/series_lines.js";
 import { prepare } from "../panes/drawing.js";
 import { byId } from "../widgets/elements.js";
 import { Plot } from "../widgets/plot.js";
@@ -122,10 +122,10 @@ export class CostCurve {
         const of = all[index];
         const isSelected = one.number === run?.number;
         if (isSelected) drawTested(context, plot, of, style);
-        context.strokeStyle = style.getPropertyValue(runColor(one.number));
+        context.strokeStyle = style.getPropertyValue(colorName(one.number - 1));
         context.globalAlpha = isSelected ? 1 : 0.6;
         context.lineWidth = isSelected ? 2 : 1.25;
-        context.setLineDash(isSelected ? [] : [5, 4]);
+        context.setLineDash(dashOf(one.number - 1));
         plot.drawLine(context, of.evaluations, of.best, true);
         context.setLineDash([]);
         context.globalAlpha = 1;
@@ -163,15 +163,6 @@ export class CostCurve {
     const costs = `tested ${steps.tested[at].toFixed(2)} · best ${steps.best[at].toFixed(2)} px`;
     this.#read.textContent = `${where}${count(steps.evaluations[at])} poses · ${costs}`;
   }
-}
-
-/**
- * CSS variable with the colour of a run.
- *
- * @param {number} number
- */
-export function runColor(number) {
-  return colorName(number - 1);
 }
 
 /**

@@ -1,6 +1,6 @@
 /** Plot of the cost over the range of one degree of freedom. Hovering reads values, a click sets the value. */
 
-import { colorName } from "../timeline/curve_drawing.js";
+import { colorName, dashOf, lineSwatch } from "../widgets/series_lines.js";
 import { prepare } from "../panes/drawing.js";
 import { byId } from "../widgets/elements.js";
 import { Plot } from "../widgets/plot.js";
@@ -140,9 +140,11 @@ export class CostLandscape {
     plot.within(context, () => {
       curves.slice(1).forEach((curve, view) => {
         context.strokeStyle = style.getPropertyValue(colorName(view + 1));
+        context.setLineDash(dashOf(view + 1));
         context.lineWidth = 1.25;
         plot.drawLine(context, xs, curve);
       });
+      context.setLineDash([]);
       context.strokeStyle = style.getPropertyValue(colorName(0));
       context.lineWidth = 2.25;
       plot.drawLine(context, xs, found.total);
@@ -205,15 +207,13 @@ export class CostLandscape {
 
 /**
  * @param {string} label empty for the value of the degree of freedom
- * @param {number} color
+ * @param {number} index of the curve
  */
-function legendEntry(label, color) {
+function legendEntry(label, index) {
   const entry = document.createElement("span");
   if (label) {
-    const swatch = document.createElement("i");
-    swatch.style.background = `var(${colorName(color)})`;
-    entry.append(swatch, label);
-    entry.title = color === 0 ? "Mean of all views, px" : `Cost in ${label}, px`;
+    entry.append(lineSwatch(index), label);
+    entry.title = index === 0 ? "Mean of all views, px" : `Cost in ${label}, px`;
   } else {
     entry.title = "Value under the pointer, or of the current pose";
   }

@@ -1,6 +1,6 @@
 /** Search runs of the current frame: results, differing settings, and buttons to compare and apply. */
 
-import { runColor } from "./cost_curve.js";
+import { lineSwatch } from "../widgets/series_lines.js";
 import { byId } from "../widgets/elements.js";
 import { makeButton } from "./search_widgets.js";
 import { selectedRun } from "../model/search_runs.js";
@@ -51,13 +51,11 @@ export class RunList {
   #makeRow(number) {
     const element = document.createElement("div");
     element.className = "run-row";
-    const swatch = document.createElement("i");
-    swatch.style.background = `var(${runColor(number)})`;
     const look = makeButton(`Run ${number}`, `Show costs, stages and candidates of run ${number}`, () => {
       this.#store.set({ searchRun: number });
     });
     look.className = "run-name";
-    look.prepend(swatch);
+    look.prepend(lineSwatch(number - 1));
     const figures = document.createElement("div");
     figures.className = "run-figures";
     const differs = document.createElement("div");

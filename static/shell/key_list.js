@@ -1,15 +1,18 @@
-/** Dialog that lists the keys by area, with a search field. */
+/** Dialog that lists the keys by area, and the marks, with a search field. */
 
 import { button, byId, keyCaps } from "../widgets/elements.js";
 import { fitness } from "../widgets/fuzzy.js";
+import { markSection } from "../timeline/mark_list.js";
 
 export class KeyList {
   #dialog = byId("key-list", HTMLDialogElement);
   #query = byId("key-query", HTMLInputElement);
   #list = byId("key-areas", HTMLElement);
+  #marks = byId("key-marks", HTMLElement);
   #none = byId("key-none", HTMLElement);
 
   constructor() {
+    this.#marks.append(markSection());
     this.#query.addEventListener("input", () => this.#search());
     button("show-key-list", () => this.show());
     this.#dialog.addEventListener("click", (event) => event.target === this.#dialog && this.#dialog.close());
@@ -46,7 +49,7 @@ export class KeyList {
 
   #search() {
     const query = this.#query.value;
-    for (const section of this.#list.children) {
+    for (const section of [...this.#list.children, ...this.#marks.children]) {
       const area = section.querySelector("h3")?.textContent ?? "";
       let some = false;
       for (const row of section.querySelectorAll("dl > div")) {
@@ -56,6 +59,6 @@ export class KeyList {
       }
       /** @type {HTMLElement} */ (section).hidden = !some;
     }
-    this.#none.hidden = this.#list.querySelector("section:not([hidden])") !== null;
+    this.#none.hidden = [this.#list, this.#marks].some((one) => one.querySelector("section:not([hidden])") !== null);
   }
 }

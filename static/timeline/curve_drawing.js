@@ -2,7 +2,9 @@
 
 import { roundUp } from "../widgets/frame_axis.js";
 import { extent, trace } from "../model/series.js";
-import { drawDiamond, markPositions } from "./timeline_drawing.js";
+import { colorName, dashOf } from "../widgets/series_lines.js";
+import { drawDiamond } from "./cell_marks.js";
+import { markPositions } from "./timeline_drawing.js";
 
 /**
  * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
@@ -46,21 +48,13 @@ export function drawCurves(context, axis, height, curves, labels, hidden, keyfra
       const path = new Path2D();
       trace(path, values, axis, (value) => toY(scale, value));
       context.strokeStyle = style.getPropertyValue(colorName(labels.indexOf(label)));
+      context.setLineDash(dashOf(labels.indexOf(label)));
       context.stroke(path);
     }
     context.restore();
     drawTitle(context, axis, top, `${plot.title}, ${UNITS[plot.unit]}`, style);
   });
   drawFrameNumbers(context, axis, height, style);
-}
-
-/**
- * CSS variable with the colour of a curve.
- *
- * @param {number} index
- */
-export function colorName(index) {
-  return `--series-${index % 8}`;
 }
 
 /**

@@ -3,11 +3,12 @@
  * program sends curves only while they are open.
  */
 
-import { colorName, drawCurves } from "./curve_drawing.js";
+import { drawCurves } from "./curve_drawing.js";
 import { CURVE_GROUPS } from "./drawer.js";
 import { prepare } from "../panes/drawing.js";
 import { byId } from "../widgets/elements.js";
 import { FrameAxis } from "../widgets/frame_axis.js";
+import { lineSwatch } from "../widgets/series_lines.js";
 import { zoomByWheel } from "./frame_window.js";
 import { keyframesOf } from "../model/cells.js";
 
@@ -128,10 +129,8 @@ export class Curves {
         one.className = "legend-switch";
         one.setAttribute("aria-pressed", String(!this.#hidden.has(label)));
         one.title = `Show or hide ${label}`;
-        const swatch = document.createElement("i");
-        swatch.style.background = `var(${colorName(index)})`;
         const value = document.createElement("output");
-        one.append(swatch, label, value);
+        one.append(lineSwatch(index), label, value);
         one.addEventListener("click", () => this.#switch(one, label));
         return one;
       }),

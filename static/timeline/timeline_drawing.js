@@ -5,6 +5,7 @@
 
 import { NO_POSE, REVIEWED, SOURCES, STATUSES as ALL, keyframesOf } from "../model/cells.js";
 import { trace } from "../model/series.js";
+import { DARK_INK, SOURCE_MARKS, STATUSES, STATUS_COLORS, STATUS_HEIGHTS, drawDiamond, fillBands, hatch } from "./cell_marks.js";
 
 /**
  * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
@@ -17,8 +18,8 @@ const KEYFRAME_GAP = 5;
 const CELLS_TOP = 44;
 /** Height of the cells of a single person, and of each of several people; gap between lanes. */
 const [CELL_HEIGHT, LANE_HEIGHT, LANE_GAP] = [12, 15, 3];
-/** Height of the strip of source colours below the colour of a person. */
-const SOURCE_STRIP = 3;
+/** Height of the strip of sources below the colour of a person, and the gap between them. */
+const [SOURCE_STRIP, STRIP_GAP] = [5, 1];
 /** Width of a run from which its status is drawn as a pattern; a narrower one would show a random part of it. */
 const PATTERN_FROM = 4;
 
@@ -43,10 +44,6 @@ export function layout(people) {
   return { cells, lanes, review: { top: bottom + 2, bottom: bottom + 4 }, overview, height: overview.bottom + 2 };
 }
 
-/** Statuses that are drawn, the worst last and on top. Besides its colour, each has its own height. */
-export const STATUSES = /** @type {const} */ (["good", "doubtful", "lost"]);
-const STATUS_HEIGHTS = { good: 3, doubtful: 7, lost: 12 };
-
 /**
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
@@ -63,7 +60,7 @@ export function drawLabels(context, axis, style, lanes, people) {
   const rows = [["cost", COST], ["status", STATUS]]; // prettier-ignore
   if (people.length < 2) rows.push(["pose", lanes[0]]);
   for (const [text, { top, bottom }] of rows) context.fillText(text, axis.left - 8, (top + bottom) / 2);
-  if (people.length > 1) people.forEach((person, lane) => drawName(context, axis, person, lanes[lane]));
+  if (people.length > 1) people.forEach((person, lane) => drawName(context, axis, style, person, lanes[lane]));
 }
 
 /**
@@ -71,15 +68,18 @@ export function drawLabels(context, axis, style, lanes, people) {
  *
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis
+ * @param {CSSStyleDeclaration} style
  * @param {import("../model/protocol.js").PersonInfo} person
  * @param {Band} lane
  */
-function drawName(context, axis, { name, color }, { top, bottom }) {
+function drawName(context, axis, style, { name, color }, { top, bottom }) {
   const room = axis.left - 12;
   let text = name;
   while (text.length > 1 && context.measureText(text).width > room) text = `${text.slice(0, -2)}…`;
   context.fillText(text, axis.left - 9, (top + bottom) / 2);
   const { fillStyle } = context;
+  context.fillStyle = style.getPropertyValue("--edge");
+  context.fillRect(axis.left - 7, top - 1, 6, bottom - top + 2);
   context.fillStyle = color;
   context.fillRect(axis.left - 6, top, 4, bottom - top);
   context.fillStyle = fillStyle;
@@ -117,14 +117,14 @@ function gapOf(axis) {
  * @param {Band} lane
  */
 export function drawSources(context, axis, cells, style, { top, bottom }) {
-  const height = bottom - top;
   context.fillStyle = style.getPropertyValue("--track");
-  context.fillRect(axis.left, top, axis.right - axis.left, height);
-  const colors = SOURCES.map((source) => style.getPropertyValue(`--source-${source}`));
+  context.fillRect(axis.left, top, axis.right - axis.left, bottom - top);
+  const marks = SOURCES.map((source) => SOURCE_MARKS[source]);
+  const colors = marks.map(({ color }) => style.getPropertyValue(color));
   const { sources } = cells;
   eachRun(axis, (frame) => (sources[frame] === NO_POSE ? -1 : sources[frame]), gapOf(axis), (source, x, width) => {
     context.fillStyle = colors[source];
-    context.fillRect(x, top, width, height);
+    fillBands(context, marks[source].bands, x, width, { top, bottom });
   });
 }
 
@@ -140,12 +140,13 @@ export function drawSources(context, axis, cells, style, { top, bottom }) {
  * @param {string} color of the person
  */
 export function drawPerson(context, axis, cells, style, { top, bottom }, color) {
-  const split = bottom - SOURCE_STRIP;
-  drawSources(context, axis, cells, style, { top: split, bottom });
+  drawSources(context, axis, cells, style, { top: bottom - SOURCE_STRIP, bottom });
+  const split = bottom - SOURCE_STRIP - STRIP_GAP;
   const { sources, statuses } = cells;
-  const lost = style.getPropertyValue("--status-lost");
-  const fills = { good: color, doubtful: hatch(context, color, false), lost: hatch(context, lost, true) };
-  const narrow = { good: color, doubtful: style.getPropertyValue("--status-doubtful"), lost };
+  const of = (/** @type {string} */ name) => style.getPropertyValue(name);
+  const lost = of("--bad");
+  const fills = { good: color, doubtful: hatch(context, color, DARK_INK, false), lost: hatch(context, lost, of("--hatch"), true) };
+  const narrow = { good: color, doubtful: of("--warning"), lost };
   context.fillStyle = style.getPropertyValue("--track");
   context.fillRect(axis.left, top, axis.right - axis.left, split - top);
   // The worst last: where frames share a pixel, it stays visible.
@@ -154,36 +155,15 @@ export function drawPerson(context, axis, cells, style, { top, bottom }, color) 
       sources[frame] !== NO_POSE && (STATUSES.find((one) => one === ALL[statuses[frame]]) ?? "good") === kind;
     const min = kind === "good" ? 1 : 2;
     eachRun(axis, (frame) => (is(frame) ? 0 : -1), gapOf(axis), (_, x, width) => {
+      const wide = Math.max(min, width);
       context.fillStyle = (width < PATTERN_FROM ? narrow : fills)[kind];
-      context.fillRect(x, top, Math.max(min, width), split - top);
+      context.fillRect(x, top, wide, split - top);
+      // Colours of people are bright for footage: on a bright page their areas have dark edges.
+      context.fillStyle = of("--edge");
+      context.fillRect(x, top, wide, 1);
+      context.fillRect(x, split - 1, wide, 1);
     });
   }
-}
-
-/**
- * Make a pattern of dark diagonal stripes in one direction, or in both.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {string} color
- * @param {boolean} isCrossed
- */
-function hatch(context, color, isCrossed) {
-  const size = 6;
-  const tile = Object.assign(document.createElement("canvas"), { width: size, height: size });
-  const ink = /** @type {CanvasRenderingContext2D} */ (tile.getContext("2d"));
-  ink.fillStyle = color;
-  ink.fillRect(0, 0, size, size);
-  ink.strokeStyle = "rgb(0 0 0 / 72%)";
-  ink.lineWidth = isCrossed ? 1.2 : 2;
-  for (const way of isCrossed ? [1, -1] : [1]) {
-    for (const shift of [-size, 0, size]) {
-      ink.beginPath();
-      ink.moveTo(shift, way > 0 ? size : 0);
-      ink.lineTo(shift + size, way > 0 ? 0 : size);
-      ink.stroke();
-    }
-  }
-  return context.createPattern(tile, "repeat") ?? color;
 }
 
 /**
@@ -213,7 +193,7 @@ export function drawAmbiguous(context, axis, frames, { top, bottom }) {
       context.beginPath();
       context.arc(x, y, 2, 0, 2 * Math.PI);
       context.fillStyle = "#fff";
-      context.strokeStyle = "rgba(0, 0, 0, 0.7)";
+      context.strokeStyle = DARK_INK;
       context.fill();
       context.stroke();
     }
@@ -266,8 +246,10 @@ export function drawStatuses(context, axis, cells, style) {
     const height = STATUS_HEIGHTS[status];
     // Rare bad frames must remain visible, so bars are at least two pixels wide.
     const min = status === "good" ? 1 : 2;
-    context.fillStyle = style.getPropertyValue(`--status-${status}`);
+    const color = style.getPropertyValue(STATUS_COLORS[status]);
+    const fill = status === "good" ? color : hatch(context, color, style.getPropertyValue("--hatch"), status === "lost");
     eachRun(axis, (frame) => (statuses[frame] === index ? index : -1), gapOf(axis), (_, x, width) => {
+      context.fillStyle = width < PATTERN_FROM ? color : fill;
       context.fillRect(x, STATUS.bottom - height, Math.max(min, width), height);
     });
   }
@@ -315,10 +297,10 @@ export function drawOverview(context, whole, cells, style, overview) {
   const { statuses, marks, sources } = cells;
   /** @type {[(frame: number) => boolean, string, number, number][]} condition, colour, fraction of the height, minimum width */
   const layers = [
-    [(frame) => sources[frame] !== NO_POSE, "--faint", 0.5, 1],
-    [(frame) => (marks[frame] & REVIEWED) !== 0, "--good", 0.5, 1],
-    [(frame) => STATUSES[statuses[frame] - 1] === "doubtful", "--status-doubtful", 1, 1],
-    [(frame) => STATUSES[statuses[frame] - 1] === "lost", "--status-lost", 1, 1],
+    [(frame) => sources[frame] !== NO_POSE, "--faint", 1 / 3, 1],
+    [(frame) => (marks[frame] & REVIEWED) !== 0, "--good", 1 / 2, 1],
+    [(frame) => STATUSES[statuses[frame] - 1] === "doubtful", "--warning", 2 / 3, 1],
+    [(frame) => STATUSES[statuses[frame] - 1] === "lost", "--bad", 1, 1],
   ];
   for (const [is, color, share, min] of layers) {
     context.fillStyle = style.getPropertyValue(color);
@@ -374,26 +356,4 @@ export function drawRange(context, axis, { first, last }, style, bottom) {
   context.fillRect(left, 0, Math.max(2, right - left), 2);
   if (axis.shows(first)) context.fillRect(left, 0, 2, 7);
   if (axis.shows(last)) context.fillRect(Math.max(left, right - 2), 0, 2, 7);
-}
-
-/**
- * Draw the diamond of a keyframe.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {number} x
- * @param {number} y
- * @param {number} radius
- */
-export function drawDiamond(context, x, y, radius) {
-  context.beginPath();
-  context.moveTo(x, y - radius);
-  context.lineTo(x + radius, y);
-  context.lineTo(x, y + radius);
-  context.lineTo(x - radius, y);
-  context.closePath();
-  context.fillStyle = "#fff";
-  context.strokeStyle = "rgba(0, 0, 0, 0.7)";
-  context.lineWidth = 1;
-  context.fill();
-  context.stroke();
 }

@@ -4,7 +4,7 @@ import { button, byId } from "../widgets/elements.js";
 import { clock } from "../widgets/text.js";
 import { personCells } from "../model/selectors.js";
 import { SOURCES, STATUSES as CELL_STATUSES } from "../model/cells.js";
-import { STATUSES } from "./timeline_drawing.js";
+import { STATUSES, sourceSwatch, statusSwatch } from "./cell_marks.js";
 
 export class Transport {
   #store;
@@ -94,10 +94,10 @@ export class Transport {
     const source = state?.source ?? null;
     const other = state?.other_sizes ?? false;
     const name = session && session.people.length > 1 && state ? session.people[state.person].name : "";
-    const what = state?.replay ? "replay" : `${source}${other ? ", earlier body sizes" : ""}`;
+    const what = state?.replay ? "replay" : `${source}${other ? ", earlier sizes" : ""}`;
     this.#source.textContent = source === null && !state?.replay ? `${name && `${name}: `}No pose` : `${name || "Pose"}: ${what}`;
-    const converted = "To convert keyframes: panel Body, Refit keyframes, Apply";
-    const made = `This pose was made with other body sizes and is shown with them. ${converted}`;
+    const converted = "Track again to use the present ones; a keyframe is refitted by Body sizes, Apply, in the inspector";
+    const made = `This pose was made with earlier body sizes and is shown with them. ${converted}`;
     this.#source.title = other ? made : `Source of the pose${name && ` of ${name}`}, as stored: the most manual one of its values`;
     const cell = personCells(this.#store.facts).get(target);
     this.#keyframe.disabled = !connected || !state;
@@ -110,10 +110,12 @@ export class Transport {
     const { timeline } = this.#store.facts;
     const sources = new Set(SOURCES.filter((_, index) => timeline.sources.includes(index)));
     const statuses = new Set(CELL_STATUSES.filter((_, index) => timeline.statuses.includes(index)));
+    const shown = STATUSES.filter((status) => statuses.has(status));
     const rows = [
-      STATUSES.filter((status) => statuses.has(status)).map((status) => swatch(status, `--status-${status}`, status)),
-      SOURCES.filter((source) => sources.has(source)).map((source) => swatch(source, `--source-${source}`, "")),
+      shown.map((status) => entry(status, statusSwatch(status))),
+      SOURCES.filter((source) => sources.has(source)).map((source) => entry(source, sourceSwatch(source))),
     ];
+    this.#legend.title = [...shown, ...sources].join(", ");
     this.#legend.replaceChildren(
       ...rows.map((swatches) => {
         const row = document.createElement("div");
@@ -126,14 +128,10 @@ export class Transport {
 
 /**
  * @param {string} text
- * @param {string} color CSS variable
- * @param {string} kind class that sets the shape of the mark
+ * @param {HTMLElement} mark
  */
-function swatch(text, color, kind) {
+function entry(text, mark) {
   const item = document.createElement("span");
-  const mark = document.createElement("i");
-  mark.style.background = `var(${color})`;
-  if (kind) mark.className = `is-${kind}`;
   item.append(mark, text);
   return item;
 }

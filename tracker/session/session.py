@@ -41,7 +41,8 @@ from tracker.validation import quoted
 SESSION_FILE = "session.toml"
 CALIBRATION_FILE = "calibration.toml"
 ANNOTATIONS_FILE = "annotations.sqlite"
-PALETTE = ("#f2a33a", "#4cc3d9", "#c678dd", "#98c379", "#e06c75", "#61afef", "#d19a66", "#56b6c2")
+PALETTE = ("#60c0d8", "#d062f2", "#53a504", "#f5b8c2", "#96f19e", "#abb179", "#8793a7", "#a78c85")
+"""Colours of the people of a new session, distinct from one another with every kind of colour vision."""
 
 
 @dataclass(frozen=True, eq=False)

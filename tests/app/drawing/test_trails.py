@@ -49,12 +49,12 @@ def test_a_trail_goes_through_the_stored_poses(gavrila, stored):
     assert of_wrist[:, 1] == pytest.approx(np.array(expected[1:]), abs=1e-6)
 
 
-def test_before_is_blue_after_is_orange_and_the_ends_fade(gavrila, stored):
+def test_before_is_violet_after_is_green_and_the_ends_fade(gavrila, stored):
     points, colors = Trails(gavrila, stored).segments(50, 10, frozenset(("head",)), 100)
     of_time = colors[np.argsort(points[:, 0, 0]), 0].astype(int)
     before, after, first = of_time[9], of_time[11], of_time[0]
-    assert before[2] > before[0] + 80
-    assert after[0] > after[2] + 80
+    assert before[2] > before[1] + 80
+    assert after[1] > after[2] + 40
     assert np.ptp(first) < np.ptp(before) / 2
 
 

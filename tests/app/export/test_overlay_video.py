@@ -30,9 +30,9 @@ def frames_of(path):
         return stream.average_rate, [f.to_ndarray(format="rgb24").astype(int) for f in file.decode(stream)]
 
 
-def orange(image):
-    """Pixels of the colour #f2a33a of the person, (H, W)."""
-    return np.abs(image - (0xF2, 0xA3, 0x3A)).max(axis=-1) < 60
+def painted(image):
+    """Pixels of the colour #60c0d8 of the person, (H, W)."""
+    return np.abs(image - (0x60, 0xC0, 0xD8)).max(axis=-1) < 60
 
 
 def test_one_view_has_the_footage_with_the_body_over_it(session, tmp_path):
@@ -45,7 +45,7 @@ def test_one_view_has_the_footage_with_the_body_over_it(session, tmp_path):
     assert rate == loaded.fps
     camera = next(c.camera for c in loaded.cameras if c.camera.name == "FRONT")
     assert images[0].shape == (camera.height, camera.width, 3)
-    drawn = orange(images[0]) & ~orange(images[1])  # frame 3 has no body
+    drawn = painted(images[0]) & ~painted(images[1])  # frame 3 has no body
     assert np.count_nonzero(drawn) > 300
     points_px = camera.project(motion.people[0].poses[2].body.points_world)
     rows, columns = np.nonzero(drawn)
@@ -62,7 +62,7 @@ def test_a_grid_shows_all_views(session, tmp_path):
     for row in (0, 1):
         for column in (0, 1):
             tile = image[row * height : (row + 1) * height, column * width : (column + 1) * width]
-            assert np.count_nonzero(orange(tile)) > 150
+            assert np.count_nonzero(painted(tile)) > 150
 
 
 @pytest.mark.parametrize(

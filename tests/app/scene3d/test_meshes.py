@@ -2,16 +2,19 @@
 
 import numpy as np
 import pytest
+from color_vision import MACHADO_2009, difference
 
 from app.drawing.facing import face_part, nose
 from app.scene3d.meshes import shaded
 from tracker.formats.model_toml import load_model
+from tracker.session.session import PALETTE
 
 
-@pytest.mark.parametrize("color", ["#f2a33a", "#4cc3d9"])
+@pytest.mark.parametrize("color", PALETTE)
 def test_left_is_lighter_and_right_darker_than_the_middle_of_the_same_colour(color):
     left, middle, right = (np.array(shaded(color, side)) for side in ("left", "", "right"))
-    assert left.mean() - 40 > middle.mean() > right.mean() + 40
+    assert left.mean() - 15 > middle.mean() > right.mean() + 40
+    assert all(difference(left / 255, right / 255, vision) > 20 for vision in MACHADO_2009)
     assert np.argmax(left) == np.argmax(middle) == np.argmax(right)
 
 

@@ -1,54 +1,6 @@
-"""Accessibility: names, contrast, focus, reduced motion, and a page that does not jump."""
+"""Accessibility: names, focus, reduced motion, and a page that does not jump."""
 
 from page_driver import dragging, shows, state_of, until
-
-from tracker.store.records import SOURCES
-
-LUMINANCE = """(color) => {
-  const context = new OffscreenCanvas(1, 1).getContext('2d');
-  context.fillStyle = color;
-  context.fillRect(0, 0, 1, 1);
-  const [r, g, b] = [...context.getImageData(0, 0, 1, 1).data].map((c) => {
-    const share = c / 255;
-    return share <= 0.04045 ? share / 12.92 : ((share + 0.055) / 1.055) ** 2.4;
-  });
-  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-}"""
-TEXT = [
-    *((text, ground) for text in ("text", "muted") for ground in ("chrome", "raised", "pressed", "stage", "plot")),
-    *((text, ground) for text in ("bad", "accent") for ground in ("chrome", "raised")),
-    ("on-accent", "accent"),
-]
-MARKS = [
-    *((mark, "chrome") for mark in ("accent", "good", "bad", "status-good", "status-doubtful", "status-lost")),
-    *((f"series-{i}", "plot") for i in range(8)),
-    *((f"source-{source}", "track") for source in SOURCES),
-]
-
-
-async def test_colours_are_told_apart(page):
-    """WCAG AA: 4.5 to 1 for text, 3 to 1 for what is not text."""
-    for scheme in ("dark", "light"):
-        await page.emulate_media(color_scheme=scheme)
-        await shows(page, f"document.documentElement.dataset.theme === '{scheme}'")
-        assert await poor_contrasts(page) == []
-
-
-async def poor_contrasts(page):
-    return await page.evaluate(
-        f"""([text, marks]) => {{
-          const luminance = {LUMINANCE};
-          const style = getComputedStyle(document.documentElement);
-          const of = (name) => luminance(style.getPropertyValue(`--${{name}}`));
-          const ratio = ([a, b]) => {{
-            const [low, high] = [of(a), of(b)].sort((x, y) => x - y);
-            return (high + 0.05) / (low + 0.05);
-          }};
-          const below = (pairs, least) => pairs.filter((p) => !(ratio(p) >= least)).map((p) => [...p, ratio(p)]);
-          return [...below(text, 4.5), ...below(marks, 3)];
-        }}""",
-        [TEXT, MARKS],
-    )
 
 
 async def test_every_control_has_a_name_and_a_title_in_every_panel(page):

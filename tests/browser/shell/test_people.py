@@ -72,7 +72,7 @@ LANE = """([lane, frame]) => {
   const { n_frames } = quadrille.state.session;
   const pitch = (canvas.clientWidth - 60) / n_frames;
   const [x, y] = [52 + frame * pitch + 1, 44 + 18 * lane + 1];
-  const [width, height] = [Math.floor(pitch - 3), 10].map((size) => size * devicePixelRatio);
+  const [width, height] = [Math.floor(pitch - 3), 8].map((size) => size * devicePixelRatio);
   const { data } = canvas.getContext("2d").getImageData(x * devicePixelRatio, y * devicePixelRatio, width, height);
   const colors = new Set();
   let dark = 0;

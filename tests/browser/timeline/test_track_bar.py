@@ -13,14 +13,13 @@ STRIP = """(frame) => {
   const style = getComputedStyle(canvas);
   const context = document.createElement("canvas").getContext("2d");
   const column = canvas.getContext("2d").getImageData(x, 28 * devicePixelRatio, 1, 12 * devicePixelRatio).data;
-  for (const status of ["good", "doubtful", "lost"]) {
-    context.fillStyle = style.getPropertyValue(`--status-${status}`);
+  const height = [...column].filter((value, i) => i % 4 === 3 && value > 0).length;
+  for (const [status, token] of [["good", "--good"], ["doubtful", "--warning"], ["lost", "--bad"]]) {
+    context.fillStyle = style.getPropertyValue(token);
     context.fillRect(0, 0, 1, 1);
     const [r, g, b] = context.getImageData(0, 0, 1, 1).data;
-    let height = 0;
     for (let i = 0; i < column.length; i += 4)
-      if (column[i] === r && column[i + 1] === g && column[i + 2] === b) height += 1;
-    if (height) return [status, height / devicePixelRatio];
+      if (column[i] === r && column[i + 1] === g && column[i + 2] === b) return [status, height / devicePixelRatio];
   }
   return [null, 0];
 }"""

@@ -1,0 +1,129 @@
+/**
+ * Marks of the timeline: sources, statuses and keyframes. Besides its colour, each has its own shape. Sizes are CSS pixels.
+ */
+
+/** @typedef {{color: string, bands: [number, number][]}} SourceMark */
+
+/**
+ * Marks of the sources of a pose. The colour tells what made the pose: a hand, work on one frame, or a run over many. The
+ * bands, from the top as fractions of the height, differ for every source.
+ *
+ * @type {Record<string, SourceMark>}
+ */
+export const SOURCE_MARKS = {
+  manual: { color: "--source-hand", bands: [[0, 1]] },
+  pinned: { color: "--source-hand", bands: [[0, 0.4], [0.6, 1]] },
+  searched: { color: "--source-frame", bands: [[0.4, 1]] },
+  fitted: { color: "--source-frame", bands: [[0.4, 0.6], [0.8, 1]] },
+  tracked: { color: "--source-run", bands: [[0.2, 0.8]] },
+  interpolated: { color: "--source-run", bands: [[0.4, 0.6]] },
+  smoothed: { color: "--source-run", bands: [[0.2, 0.4], [0.6, 0.8]] },
+  imported: { color: "--source-run", bands: [[0, 0.2], [0.8, 1]] },
+}; // prettier-ignore
+
+/** Statuses that are drawn, the worst last and on top. Besides its colour, each has its own height and pattern. */
+export const STATUSES = /** @type {const} */ (["good", "doubtful", "lost"]);
+export const STATUS_COLORS = { good: "--good", doubtful: "--warning", lost: "--bad" };
+export const STATUS_HEIGHTS = { good: 3, doubtful: 7, lost: 12 };
+/** Dark stripes on the colour of a person. */
+export const DARK_INK = "rgb(0 0 0 / 72%)";
+
+/**
+ * Fill the bands of a source between two heights, to whole pixels.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {[number, number][]} bands
+ * @param {number} x
+ * @param {number} width
+ * @param {{top: number, bottom: number}} lane
+ */
+export function fillBands(context, bands, x, width, { top, bottom }) {
+  const height = bottom - top;
+  for (const [from, to] of bands) {
+    const [above, below] = [Math.round(from * height), Math.round(to * height)];
+    context.fillRect(x, top + above, width, below - above);
+  }
+}
+
+/**
+ * Sample of a source for the legend.
+ *
+ * @param {string} source
+ */
+export function sourceSwatch(source) {
+  const mark = document.createElement("i");
+  const { color, bands } = SOURCE_MARKS[source];
+  const stops = bands.flatMap(([from, to]) => [
+    `transparent ${100 * from}%`, `var(${color}) ${100 * from}% ${100 * to}%`, `transparent ${100 * to}%`,
+  ]); // prettier-ignore
+  mark.className = "source-mark";
+  mark.style.backgroundImage = `linear-gradient(${stops.join(", ")})`;
+  return mark;
+}
+
+/**
+ * Sample of a status for the legend.
+ *
+ * @param {string} status
+ */
+export function statusSwatch(status) {
+  const mark = document.createElement("i");
+  mark.className = `status-mark is-${status}`;
+  return mark;
+}
+
+/** Sample of a keyframe for the legend. */
+export function diamondSwatch() {
+  const mark = document.createElement("i");
+  mark.className = "keyframe-mark";
+  return mark;
+}
+
+/**
+ * Make a pattern of diagonal stripes in one direction, or in both.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {string} color
+ * @param {string} stripes
+ * @param {boolean} isCrossed
+ */
+export function hatch(context, color, stripes, isCrossed) {
+  const size = 6;
+  const tile = Object.assign(document.createElement("canvas"), { width: size, height: size });
+  const ink = /** @type {CanvasRenderingContext2D} */ (tile.getContext("2d"));
+  ink.fillStyle = color;
+  ink.fillRect(0, 0, size, size);
+  ink.strokeStyle = stripes;
+  ink.lineWidth = isCrossed ? 1.2 : 2;
+  for (const way of isCrossed ? [1, -1] : [1]) {
+    for (const shift of [-size, 0, size]) {
+      ink.beginPath();
+      ink.moveTo(shift, way > 0 ? size : 0);
+      ink.lineTo(shift + size, way > 0 ? 0 : size);
+      ink.stroke();
+    }
+  }
+  return context.createPattern(tile, "repeat") ?? color;
+}
+
+/**
+ * Draw the diamond of a keyframe.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {number} x
+ * @param {number} y
+ * @param {number} radius
+ */
+export function drawDiamond(context, x, y, radius) {
+  context.beginPath();
+  context.moveTo(x, y - radius);
+  context.lineTo(x + radius, y);
+  context.lineTo(x, y + radius);
+  context.lineTo(x - radius, y);
+  context.closePath();
+  context.fillStyle = "#fff";
+  context.strokeStyle = DARK_INK;
+  context.lineWidth = 1;
+  context.fill();
+  context.stroke();
+}

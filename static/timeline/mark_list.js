@@ -1,0 +1,58 @@
+/** Samples of the marks of the timeline and of the lines over images, with their meanings. */
+
+import { sampleOf } from "../panes/pose_legend.js";
+import { SOURCES } from "../model/cells.js";
+import { STATUSES, diamondSwatch, sourceSwatch, statusSwatch } from "./cell_marks.js";
+
+/** @typedef {import("../model/protocol.js").Path["kind"]} Kind */
+
+const STATUS_MEANINGS = { good: "good", doubtful: "doubtful: check it", lost: "lost" };
+const SOURCE_MEANINGS = /** @type {Record<string, string>} */ ({
+  manual: "manual: placed by hand",
+  pinned: "pinned: fitted to pins",
+  searched: "searched on its frame",
+  fitted: "fitted on its frame",
+  tracked: "tracked in a run",
+  interpolated: "interpolated between poses",
+  smoothed: "smoothed over a range",
+  imported: "imported from a file",
+});
+/** @type {[Kind, "neutral" | "proposal" | "mark", string][]} */
+const LINES = [
+  ["candidate", "neutral", "pose under test"],
+  ["compared", "neutral", "result of another run"],
+  ["result", "neutral", "result, while the pose before is shown"],
+  ["preview", "proposal", "candidate: click takes it"],
+  ["alternative", "proposal", "alternative pose: Shift+X takes it"],
+  ["new_sizes", "proposal", "new body sizes: Apply takes them"],
+  ["epipolar", "mark", "line of sight of a pin or drag"],
+];
+
+/** Section of the list of keys. */
+export function markSection() {
+  const section = document.createElement("section");
+  const heading = document.createElement("h3");
+  heading.textContent = "Marks and lines";
+  const list = document.createElement("dl");
+  list.append(
+    ...STATUSES.map((status) => row(statusSwatch(status), STATUS_MEANINGS[status])),
+    row(diamondSwatch(), "keyframe"),
+    ...SOURCES.map((source) => row(sourceSwatch(source), SOURCE_MEANINGS[source])),
+    ...LINES.map(([kind, color, meaning]) => row(sampleOf(kind, `var(--image-${color})`), meaning)),
+  );
+  section.append(heading, list);
+  return section;
+}
+
+/**
+ * @param {Element} mark
+ * @param {string} meaning
+ */
+function row(mark, meaning) {
+  const element = document.createElement("div");
+  const [term, description] = [document.createElement("dt"), document.createElement("dd")];
+  term.append(mark);
+  description.textContent = meaning;
+  element.append(term, description);
+  return element;
+}
