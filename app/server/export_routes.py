@@ -100,7 +100,7 @@ class ExportRoutes:
         frames = None if not query.get("frames") else _frames(query["frames"], session.n_frames)
         motion = read_motion(session, people, frames, query.get("skip_lost") == "1")
         self._total = n_ticks(chosen, motion)
-        stem = identifier(session.folder.name)
+        stem = identifier("_".join([session.folder.name, *([] if person is None or len(names) == 1 else [person])]))
         paths = export(chosen, motion, options, folder / f"{stem}{chosen.suffixes[0]}", tick=self._tick(request))
         if len(paths) == 1:
             return paths[0]

@@ -7,6 +7,7 @@ import msgspec
 from msgspec import Meta
 
 from app.session.path_choice import typed_path
+from tracker.errors import SessionError
 from tracker.session.assemble import DEFAULT_MODEL, NewSession, assemble, footage_in
 from tracker.session.session import Session
 from tracker.validation import FrameRate, Name
@@ -25,8 +26,8 @@ class NewSessionForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     footage: _Path
     """Folder with a video or a folder of images for each camera, named after it."""
     people: Annotated[list[Name], Meta(min_length=1, max_length=20)]
-    height_m: _Height | None = None
-    """Body height of all people; null for that of the body model."""
+    heights_m: Annotated[list[_Height], Meta(max_length=20)] = []
+    """Body heights: one for all people, or one for each in their order; empty for that of the body model."""
     up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
     """World axis that points up."""
     units: Literal["m", "cm", "mm"] | None = None
@@ -47,6 +48,12 @@ def make_session(form: NewSessionForm, report: Callable[[str], None]) -> Session
     Raises:
         TrackerError: something is missing or does not fit.
     """
+    if len(form.heights_m) not in (0, 1, len(form.people)):
+        raise SessionError(
+            f"expected one height for all, or one for each of {len(form.people)} people, found {len(form.heights_m)}; "
+            "separate them by commas, in the order of the names"
+        )
+    each = dict(zip(form.people, form.heights_m, strict=False))
     request = NewSession(
         typed_path(form.folder),
         calibration=typed_path(form.calibration),
@@ -54,7 +61,7 @@ def make_session(form: NewSessionForm, report: Callable[[str], None]) -> Session
         background=None if form.background is None else typed_path(form.background),
         people=tuple(form.people),
         models=DEFAULT_MODEL,
-        heights=form.height_m,
+        heights=each if len(form.heights_m) > 1 else next(iter(form.heights_m), None),
         fps=form.fps,
         up=form.up,
         units=form.units,

@@ -44,6 +44,14 @@ export function paneBindings({ grid, gestures, layers, layersMenu }) {
       run: () => grid.toggleLink(),
     },
     {
+      keys: [],
+      label: "Reset the sizes of all panes",
+      words: "resize border split automatic",
+      matches: () => false,
+      why: () => (grid.isResized ? null : "No pane was resized. Drag a border between two panes to do so."),
+      run: () => grid.resetSizes(),
+    },
+    {
       keys: ["Alt O"],
       label: "Take the next of the joints that overlap under the pointer",
       matches: alt("KeyO", false),

@@ -42,6 +42,7 @@ export class ScenePause {
   /** Whether an animation frame must wait. */
   get #waits() {
     const { state, dragging, shown, target } = this.#store.facts;
+    if (this.#scene.closest(".is-scene-folded")) return true;
     const now = performance.now();
     if (now < this.#freeUntil) return false;
     if (dragging) return true;

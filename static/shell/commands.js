@@ -108,7 +108,6 @@ export function contextCommands({ store, navigation, grid, posing, layers, actio
     add("Camera", label, () => grid.toggleFill(index), `camera view ${index + 1} ${name}`);
     commands[commands.length - 1].id = `camera ${name}`;
   });
-  if (grid.isResized) add("Views", "Reset the sizes of all panes", () => grid.resetSizes(), "resize border split automatic");
   if ((session?.people.length ?? 0) > 1) {
     session?.people.forEach(({ name }, index) => {
       const isShown = state?.people[index]?.shown ?? true;

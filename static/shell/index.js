@@ -22,7 +22,7 @@ import { SavedMark } from "./saved_mark.js";
 import { Sessions } from "./sessions.js";
 import { escapeBinding, helpBindings } from "./shell_keys.js";
 import { TopBar } from "./top_bar.js";
-import { divideWorkspace } from "./workspace.js";
+import { Workspace } from "./workspace.js";
 
 /**
  * @typedef {object} Rooms
@@ -51,7 +51,7 @@ export function mount(context, rooms) {
   const people = new People(store, actions, posing);
   showProgressMarks(store);
   watchConnection(byId("banner", HTMLElement), store);
-  divideWorkspace(byId("workspace", HTMLElement), byId("split", HTMLElement), byId("inspector", HTMLElement));
+  const workspace = new Workspace(store);
   const history = new HistoryList(store, send);
   new ExportPanel(store, context.notify);
   new SavedMark(store, send);
@@ -66,6 +66,7 @@ export function mount(context, rooms) {
     ...helpBindings({ actions, history, notices, palette, keyList, firstSteps, sessions, reasons }),
     escapeBinding({ store, actions, notices, grid, gestures, pinning, floor: rooms.scene.floor }),
     ...peopleBindings({ actions, posing, people, reasons }),
+    ...workspace.bindings,
   ];
   const { panes, timeline, search, scene, inspector } = rooms;
   const table = orderedByArea([

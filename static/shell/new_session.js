@@ -62,13 +62,14 @@ export class NewSession {
   #request() {
     const values = /** @type {Record<string, string>} */ (Object.fromEntries(new FormData(this.#form)));
     const optional = (/** @type {string} */ text) => text.trim() || null;
-    const number = (/** @type {string} */ text, factor = 1) => (text.trim() ? Number(text) * factor : null);
+    const number = (/** @type {string} */ text) => (text.trim() ? Number(text) : null);
+    const list = (/** @type {string} */ text) => text.split(",").map((part) => part.trim()).filter(Boolean);
     return {
       folder: values.folder,
       calibration: values.calibration,
       footage: values.footage,
-      people: values.people.split(",").map((name) => name.trim()).filter(Boolean),
-      height_m: number(values.height, 0.01),
+      people: list(values.people),
+      heights_m: list(values.heights).map((height) => Number(height) / 100),
       up: values.up,
       units: optional(values.units),
       fps: number(values.fps),

@@ -1,37 +1,135 @@
-/** Widths of the camera panes and the 3-D view beside them. The place of their separator is stored. */
+/**
+ * Widths of the camera panes and of the 3-D view beside them. The 3-D view folds away on request, or where the inspector
+ * leaves the panes too little room. The place of the separator and the choice are stored.
+ */
 
+import { byId } from "../widgets/elements.js";
+import { inArea, alt } from "../widgets/key_matching.js";
 import { makeSeparator, showPosition } from "../widgets/separator.js";
 
 const STORED = "quadrille.panes-fraction";
+const STORED_FOLD = "quadrille.scene-fold";
 const DEFAULT_FRACTION = 0.62;
 const MIN_PANES_PX = 480;
 const MIN_SCENE_PX = 300;
+/** Panes below both sizes, beside inspector and 3-D view, are too small for work. */
+const [CRAMPED_WIDTH_PX, CRAMPED_HEIGHT_PX] = [900, 340];
+/** The 3-D view is opened from its folded state by moving the separator this far. */
+const OPEN_PX = 20;
 
-/**
- * @param {HTMLElement} workspace
- * @param {HTMLElement} bar
- * @param {HTMLElement} column beside the 3-D view, whose width is taken from the 3-D view first
- */
-export function divideWorkspace(workspace, bar, column) {
-  let fraction = Number(localStorage.getItem(STORED)) || DEFAULT_FRACTION;
+/** @typedef {"folded" | "open" | null} Fold choice of the user; null where it is the automatic one */
 
-  const show = () => {
-    const width = workspace.clientWidth;
-    const max = width - column.offsetWidth - MIN_SCENE_PX;
-    const panes = Math.round(Math.max(Math.min(MIN_PANES_PX, max), Math.min(max, fraction * width)));
-    workspace.style.setProperty("--panes-width", `${panes}px`);
-    const share = 100 / Math.max(1, width);
-    showPosition(bar, { now: share * panes, min: share * Math.min(MIN_PANES_PX, max), max: share * max });
+export class Workspace {
+  #element = byId("workspace", HTMLElement);
+  #bar = byId("split", HTMLElement);
+  #inspector = byId("inspector", HTMLElement);
+  #button = byId("show-scene", HTMLButtonElement);
+  #fraction = Number(localStorage.getItem(STORED)) || DEFAULT_FRACTION;
+  /** @type {Fold} */
+  #fold = restoredFold();
+
+  /** @param {import("../model/store.js").Store} store */
+  constructor(store) {
+    makeSeparator(this.#bar, {
+      position: () => this.#show(),
+      moveTo: (position) => this.#moveTo(position),
+      reset: () => this.#reset(),
+    });
+    this.#bar.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter") return;
+      event.preventDefault();
+      this.toggleScene();
+    });
+    this.#button.addEventListener("click", () => this.toggleScene());
+    let isLookingThrough = false;
+    store.subscribe((changed) => {
+      if (!changed.has("state")) return;
+      const looks = (store.facts.state?.snapped ?? null) !== null;
+      if (looks && !isLookingThrough && this.#isFolded) this.toggleScene();
+      isLookingThrough = looks;
+    });
+    const sizes = new ResizeObserver(() => this.#show());
+    sizes.observe(this.#element);
+    sizes.observe(this.#inspector);
+  }
+
+  get bindings() {
+    const binding = {
+      keys: ["Alt Y"],
+      label: "3-D view: fold away or open (toggle)",
+      words: "show hide close collapse scene panel",
+      matches: alt("KeyY", false),
+      run: () => this.toggleScene(),
+    };
+    return inArea("3-D view", [binding]);
+  }
+
+  /** Fold the 3-D view away, or open it. */
+  toggleScene() {
+    this.#choose(!this.#isFolded);
+  }
+
+  /** Width beside the inspector. */
+  get #width() {
+    return this.#element.clientWidth - this.#inspector.offsetWidth;
+  }
+
+  get #isFolded() {
+    return this.#fold === null ? this.#isCramped : this.#fold === "folded";
+  }
+
+  get #isCramped() {
+    if (this.#inspector.hidden) return false;
+    const width = this.#width - MIN_SCENE_PX;
+    return width < MIN_PANES_PX || (width < CRAMPED_WIDTH_PX && this.#element.clientHeight < CRAMPED_HEIGHT_PX);
+  }
+
+  /** @param {boolean} isFolded */
+  #choose(isFolded) {
+    this.#fold = isFolded === this.#isCramped ? null : isFolded ? "folded" : "open";
+    if (this.#fold) localStorage.setItem(STORED_FOLD, this.#fold);
+    else localStorage.removeItem(STORED_FOLD);
+    this.#show();
+  }
+
+  /** Apply the widths. Returns the width of the panes. */
+  #show() {
+    const isFolded = this.#isFolded;
+    const whole = this.#element.clientWidth;
+    const bar = this.#bar.offsetWidth;
+    const max = this.#width - MIN_SCENE_PX;
+    const min = Math.min(MIN_PANES_PX, max);
+    const panes = isFolded ? this.#width - bar : Math.round(Math.max(min, Math.min(max, this.#fraction * whole)));
+    this.#element.classList.toggle("is-scene-folded", isFolded);
+    this.#element.style.setProperty("--panes-width", `${panes}px`);
+    const share = 100 / Math.max(1, whole);
+    showPosition(this.#bar, { now: share * panes, min: share * min, max: share * (this.#width - bar) });
+    this.#button.setAttribute("aria-pressed", String(!isFolded));
+    this.#button.title = `3-D view: ${isFolded ? "open it" : "fold it away"} (Alt+Y)`;
     return panes;
-  };
-  const moveTo = (/** @type {number} */ x) => {
-    fraction = x / workspace.clientWidth;
-    fraction = show() / workspace.clientWidth;
-    localStorage.setItem(STORED, String(fraction));
-  };
+  }
 
-  makeSeparator(bar, { position: show, moveTo, reset: () => moveTo(DEFAULT_FRACTION * workspace.clientWidth) });
-  const sizes = new ResizeObserver(show);
-  sizes.observe(workspace);
-  sizes.observe(column);
+  /** @param {number} position */
+  #moveTo(position) {
+    const edge = this.#width - this.#bar.offsetWidth;
+    if (this.#isFolded && position > edge - OPEN_PX) return;
+    const folds = position > edge - MIN_SCENE_PX / 2;
+    if (folds !== this.#isFolded) this.#choose(folds);
+    if (folds) return;
+    this.#fraction = position / this.#element.clientWidth;
+    this.#fraction = this.#show() / this.#element.clientWidth;
+    localStorage.setItem(STORED, String(this.#fraction));
+  }
+
+  #reset() {
+    this.#fraction = DEFAULT_FRACTION;
+    localStorage.removeItem(STORED);
+    this.#choose(this.#isCramped);
+  }
+}
+
+/** @returns {Fold} */
+function restoredFold() {
+  const stored = localStorage.getItem(STORED_FOLD);
+  return stored === "folded" || stored === "open" ? stored : null;
 }

@@ -94,10 +94,10 @@ export class Transport {
     const source = state?.source ?? null;
     const other = state?.other_sizes ?? false;
     const name = session && session.people.length > 1 && state ? session.people[state.person].name : "";
-    const what = state?.replay ? "replay" : `${source}${other ? ", earlier body sizes" : ""}`;
+    const what = state?.replay ? "replay" : `${source}${other ? ", earlier sizes" : ""}`;
     this.#source.textContent = source === null && !state?.replay ? `${name && `${name}: `}No pose` : `${name || "Pose"}: ${what}`;
-    const converted = "To convert keyframes: panel Body, Refit keyframes, Apply";
-    const made = `This pose was made with other body sizes and is shown with them. ${converted}`;
+    const converted = "Track again to use the present ones; a keyframe is refitted by Body sizes, Apply, in the inspector";
+    const made = `This pose was made with earlier body sizes and is shown with them. ${converted}`;
     this.#source.title = other ? made : `Source of the pose${name && ` of ${name}`}, as stored: the most manual one of its values`;
     const cell = personCells(this.#store.facts).get(target);
     this.#keyframe.disabled = !connected || !state;
@@ -110,10 +110,12 @@ export class Transport {
     const { timeline } = this.#store.facts;
     const sources = new Set(SOURCES.filter((_, index) => timeline.sources.includes(index)));
     const statuses = new Set(CELL_STATUSES.filter((_, index) => timeline.statuses.includes(index)));
+    const shown = STATUSES.filter((status) => statuses.has(status));
     const rows = [
-      STATUSES.filter((status) => statuses.has(status)).map((status) => entry(status, statusSwatch(status))),
+      shown.map((status) => entry(status, statusSwatch(status))),
       SOURCES.filter((source) => sources.has(source)).map((source) => entry(source, sourceSwatch(source))),
     ];
+    this.#legend.title = [...shown, ...sources].join(", ");
     this.#legend.replaceChildren(
       ...rows.map((swatches) => {
         const row = document.createElement("div");

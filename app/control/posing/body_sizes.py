@@ -143,8 +143,9 @@ class BodySizeEditing:
                 change = {str(edit): [name, before, saver.revisions.current(person)]}
                 saver.store_setting(_KEY, {**saver.setting(_KEY, {}), **change})
             off = f", joints {refitted.off_m * 1000:.0f} mm off on average" if n else ""
+            message = f"Applied{outcome}{off}." + ("" if same or not refit else self._rest(person))
             self._runs.clear()
-            session_state.show_frame(session_state.state.frame, draft=None, sizes_message=f"Applied{outcome}{off}.")
+            session_state.show_frame(session_state.state.frame, draft=None, sizes_message=message)
             session_state.refresh_saving()
 
     def follow(self) -> None:
@@ -177,6 +178,12 @@ class BodySizeEditing:
             return
         model = with_dimensions(self._session_state.present[person], sizes)
         self._session_state.set(draft=SizeDraft(person, model), sizes_message="")
+
+    def _rest(self, person: int) -> str:
+        """Return a sentence on the poses of a person that keep their sizes, being no keyframes; may be empty."""
+        rows = self._session_state.saver.rows(person, range(self._session_state.session.n_frames))
+        n = sum(not row.keyframe for row in rows)
+        return f" {n} other pose{' keeps' if n == 1 else 's keep'} the earlier sizes until tracked again." if n else ""
 
     def _refit(self, person: int) -> _Refitted:
         """Return the keyframes of a person that were made with another body, retargeted to the present one."""

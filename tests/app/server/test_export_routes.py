@@ -51,7 +51,7 @@ async def test_files_are_made_sent_and_deleted(client, temporary):
     assert {f["name"]: f["axes"] for f in listed}["bvh"] == "y-up"
     async with client.get("/export/trc?person=ann&frames=1:5&axes=y-up&units=mm") as response:
         assert response.status == 200
-        assert response.headers["Content-Disposition"] == "attachment; filename*=UTF-8''dance.trc"
+        assert response.headers["Content-Disposition"] == "attachment; filename*=UTF-8''dance_ann.trc"
         rows = (await response.text()).splitlines()
     assert rows[2].split("\t")[4] == "mm"
     assert [row.split("\t")[0] for row in rows[6:]] == ["2", "3", "4", "5"]

@@ -186,13 +186,13 @@ async def test_a_session_is_made_with_its_checks_told_one_by_one(folders, serve,
     client = await serve()
     form = {
         "folder": str(tmp_path / "new"), "calibration": str(walk / "calibration.toml"), "footage": str(walk),
-        "people": ["ann", "bob"], "height_m": 1.7,
+        "people": ["ann", "bob"], "heights_m": [1.7, 1.6],
     }  # fmt: skip
     lines = await client.make(form)
     assert [next(iter(line)) for line in lines] == ["passed"] * 6 + ["made"]
     assert "4 cameras: FRONT" in lines[0]["passed"]
     assert "50 frames at 25" in lines[3]["passed"]
-    assert "ann 1.70 m" in lines[4]["passed"]
+    assert "ann 1.70 m, bob 1.60 m" in lines[4]["passed"]
     assert lines[-1]["made"] == str(tmp_path / "new")
     made = load_session(tmp_path / "new")
     assert [p.name for p in made.people] == ["ann", "bob"]
@@ -201,13 +201,14 @@ async def test_a_session_is_made_with_its_checks_told_one_by_one(folders, serve,
     assert "exists already" in lines[-1]["failed"]
     for wrong, expected in (
         ({"footage": str(tmp_path / "state")}, "expected a folder of videos"),
+        ({"heights_m": [1.7, 1.6, 1.5]}, "one for each of 2 people, found 3"),
         ({"footage": "relative"}, "expected a path from the root"),
         ({"calibration": str(walk / "session.toml"), "folder": str(tmp_path / "other")}, "calibration"),
     ):
         (line,) = await client.make(form | wrong)
         assert expected in line["failed"]
     assert not (tmp_path / "other").exists()
-    status, text = await client.open(form | {"height_m": 9}, "/sessions/new")
+    status, text = await client.open(form | {"heights_m": [9]}, "/sessions/new")
     assert (status, "a height of 0.3 to 3 metres" in text) == (400, True)
     public = await serve(why="no")
     assert (await public.open(form, "/sessions/new"))[0] == 403

@@ -77,6 +77,11 @@ async def test_sizes_are_entered_in_centimetres_then_applied(page, endpoint):
     await page.locator("#inspector").evaluate("(column) => column.scrollTo(0, 0)")
     column, box = await page.locator("#inspector").bounding_box(), await apply.bounding_box()
     assert box["y"] + box["height"] <= column["y"] + column["height"]
+    await endpoint.broadcast({"type": "notice", "level": "info", "text": "The fit lowered the cost."})
+    notice = page.locator("#notices .notice:visible")
+    await notice.wait_for()
+    box = await notice.bounding_box()
+    assert box["x"] + box["width"] <= column["x"]
     await row(page, "Keyframes").locator("select").select_option("keep")
     await apply.click()
     await until(lambda: len(endpoint.received) == 3)

@@ -5,7 +5,7 @@ from page_driver import shows
 
 async def test_angles_have_whole_names_where_there_is_room_and_are_explained(page):
     names = page.locator("#joint-dofs .dof-name")
-    for width, shown in ((1920, "abduction"), (1100, "abd.")):
+    for width, shown in ((1920, "abduction"), (1280, "abd."), (1100, "abd.")):
         await page.set_viewport_size({"width": width, "height": 720})
         await shows(page, f"document.querySelectorAll('.dof-name')[3].innerText === '{shown}'")
         row = page.locator(".dof").nth(3)

@@ -120,7 +120,7 @@ async def test_the_first_steps_tell_the_shortest_way_and_are_closed_for_good(bro
     card = page.locator("#first-steps")
     await card.wait_for()
     steps = [" ".join(text.split()) for text in await card.locator("li:visible").all_inner_texts()]
-    shortest = ["Press F to search the pose", "then G to fit it", "then T to track"]
+    shortest = ["Press F to search", "then G to fit", "then T to track"]
     assert [step.rstrip(",") for step in steps] == shortest
     # A body that stands far from the person is not found by a search.
     endpoint.state |= {"cost_px": 28.4, "people": [endpoint.state["people"][0] | {"source": None}]}

@@ -81,7 +81,7 @@ async def test_a_new_session_is_made_from_a_form_that_lists_the_checks(fresh_pag
     for name, value in {"footage": "/data/videos", "calibration": "/data/cameras.toml", "folder": "/data/new"}.items():
         await page.fill(f"#new-{name}", value)
     await page.fill("#new-people", "ann, bob")
-    await page.fill("#new-height", "170")
+    await page.fill("#new-height", "170, 158.5")
     await page.keyboard.press("Enter")
     checks = page.locator("#new-session-checks li")
     await shows(page, "document.querySelectorAll('#new-session-checks li').length === 3")
@@ -95,6 +95,6 @@ async def test_a_new_session_is_made_from_a_form_that_lists_the_checks(fresh_pag
         await page.click("#open-made-session")
     assert posted[1] == ("/new", {
         "folder": "/data/new", "calibration": "/data/cameras.toml", "footage": "/data/videos", "people": ["ann", "bob"],
-        "height_m": 1.7, "up": "z", "units": None, "fps": None, "background": None,
+        "heights_m": [1.7, 1.585], "up": "z", "units": None, "fps": None, "background": None,
     })  # fmt: skip
     assert posted[2] == ("/open", {"folder": "/data/new"})

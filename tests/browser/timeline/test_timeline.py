@@ -274,3 +274,21 @@ async def test_marks_of_the_shown_frame(page, endpoint):
     await go_to(page, 20)
     assert await page.locator("#toggle-keyframe").get_attribute("aria-pressed") == "true"
     assert await page.locator("#toggle-reviewed").is_disabled()  # a keyframe is reviewed
+
+
+@pytest.mark.endpoint(n_people=2)
+async def test_the_legend_leaves_out_what_does_not_fit(page, endpoint):
+    await page.set_viewport_size({"width": 1280, "height": 720})
+    endpoint.state["other_sizes"] = True
+    await endpoint.broadcast(endpoint.state)
+    await shows(page, "document.querySelector('#source').textContent.endsWith(', earlier sizes')")
+    legend = await page.locator("#legend").bounding_box()
+    entries = await page.locator("#legend span").all()
+    boxes = [await entry.bounding_box() for entry in entries if await entry.is_visible()]
+    assert max((box["x"] + box["width"] for box in boxes), default=0) <= legend["x"] + legend["width"]
+    names = [await entry.text_content() for entry in entries]
+    assert await page.locator("#legend").get_attribute("title") == ", ".join(names)
+    endpoint.state["other_sizes"] = False
+    await endpoint.broadcast(endpoint.state)
+    await page.set_viewport_size({"width": 1920, "height": 720})
+    await page.locator("#legend span").last.wait_for()

@@ -64,6 +64,14 @@ def test_each_side_by_itself(posed):
     assert length(posed.body_sizes.model(0), "left_thigh") == pytest.approx(length(before, "left_thigh"))
 
 
+def test_poses_that_keep_the_earlier_sizes_are_told(posed):
+    posed.ranges.mark(FRAMES[1], FRAMES[1], "none", [0])
+    lengthen(posed)
+    posed.body_sizes.apply(0, refit=True)
+    assert posed.state.sizes_message.startswith("Applied, 1 keyframe refitted")
+    assert posed.state.sizes_message.endswith("average. 1 other pose keeps the earlier sizes until tracked again.")
+
+
 def test_keyframes_are_refitted_to_their_joints_as_one_edit(posed, session):
     was = {frame: joints(posed, frame) for frame in FRAMES}
     lengthen(posed)

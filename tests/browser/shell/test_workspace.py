@@ -1,0 +1,65 @@
+"""Widths of the panes and the 3-D view, and how the 3-D view folds away."""
+
+from page_driver import OPENED, shows, until
+
+SMALL = {"width": 1280, "height": 720}
+
+
+async def widths(page):
+    """Of the first pane and of the 3-D view, 0 where it is hidden."""
+    scene = page.locator("#scene")
+    pane = await page.locator(".pane").first.bounding_box()
+    return pane["width"], (await scene.bounding_box())["width"] if await scene.is_visible() else 0
+
+
+async def test_the_3d_view_leaves_its_room_where_inspector_and_search_leave_none(page):
+    await page.set_viewport_size(SMALL)
+    await page.keyboard.press("b")
+    assert (await widths(page))[1] > 300
+    await page.keyboard.press("Alt+i")
+    await shows(page, "document.querySelector('.is-scene-folded')")
+    pane, scene = await widths(page)
+    assert pane > 240  # 172 beside the 3-D view
+    assert scene == 0
+    inspector = await page.locator("#inspector").bounding_box()
+    assert inspector["x"] + inspector["width"] == SMALL["width"]
+    # On request it is there, also after a reload.
+    button = page.locator("#show-scene")
+    assert await button.get_attribute("aria-pressed") == "false"
+    await button.click()
+    assert (await widths(page))[1] >= 290
+    await page.reload()
+    await shows(page, OPENED)
+    assert (await widths(page))[1] >= 290
+    await page.keyboard.press("Alt+y")
+    assert (await widths(page))[1] == 0
+    # Elsewhere nothing is folded: this was the automatic choice.
+    await page.keyboard.press("Alt+i")
+    await shows(page, "!document.querySelector('.is-scene-folded')")
+
+
+async def test_the_separator_folds_the_3d_view_away_and_opens_it(page, endpoint):
+    bar = page.locator("#split")
+
+    async def drag_to(x):
+        box = await bar.bounding_box()
+        await page.mouse.move(box["x"] + 2, 300)
+        await page.mouse.down()
+        await page.mouse.move(x, 300, steps=4)
+        await page.mouse.up()
+
+    await drag_to(1400)
+    assert (await widths(page))[1] == 0
+    await page.reload()
+    await shows(page, OPENED)
+    assert (await widths(page))[1] == 0
+    await drag_to(900)
+    assert abs((await widths(page))[1] - (1440 - 900)) < 5
+    await bar.focus()
+    await page.keyboard.press("Enter")
+    assert (await widths(page))[1] == 0
+    # Who looks through a camera wants to see it.
+    await page.keyboard.press("y")
+    await until(lambda: endpoint.heard("snap"))
+    await shows(page, "!document.querySelector('.is-scene-folded')")
+    assert (await widths(page))[1] > 300

@@ -1,0 +1,204 @@
+"""One recording of a first hour: what its stranger sees, and how a judge who knows the truth finds the result."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+from page_driver import state_of
+from scripted_user import TRUNK, ScriptedUser
+
+from tracker.errors import FormatError
+from tracker.evaluation.metrics import evaluate_joints
+from tracker.evaluation.references import read_joints, stored_motion
+from tracker.session.session import load_session
+from tracker.store.stored_poses import read_stored_poses
+
+SEED = 5
+LIMB_ENDS = {
+    "Upper arm": ("shoulder", "elbow"), "Forearm": ("elbow", "wrist"),
+    "Thigh": ("hip", "knee"), "Calf": ("knee", "ankle"),
+}  # fmt: skip
+UPRIGHT_DEG = 20
+"""A person who leans by less stands upright."""
+OFF_PX = 8
+"""A joint that looks further off than this on the screen is corrected, CSS px."""
+CORRECTED = 4
+"""At most so many joints of a frame are corrected, each in two views."""
+GUTTER_PX, PADDING_PX = 52, 8
+"""What of the timeline is left and right of its frames."""
+DONE = (
+    "!quadrille.state.state.job.running && !quadrille.state.state.track.running "
+    "&& !quadrille.state.state.range.running && quadrille.state.state.saved"
+)
+WORK_S = 900
+"""Longest time of one piece of work."""
+
+
+class Hour:
+    """One recording, its stranger, and what a judge knows of it."""
+
+    def __init__(self, stranger, data, folder, people, n_frames):
+        self.stranger, self.page = stranger, stranger.page
+        self.data, self.folder, self.people = data, folder, people
+        self._n_frames = n_frames
+        """Number of frames that are worked on; None for all."""
+        self.start = 0
+        """The frame on which the people are placed."""
+        self.truths = [data / name for name in people.values()]
+        self.pictures = os.environ.get("QUADRILLE_PICTURES")
+
+    @property
+    def session(self):
+        return load_session(self.folder)
+
+    @property
+    def frames(self):
+        """The frames that are worked on."""
+        n = self.session.n_frames
+        return range(n) if self._n_frames is None else range(self.start, min(n, self.start + self._n_frames))
+
+    @property
+    def is_whole(self):
+        """Whether the whole recording is worked on."""
+        return self._n_frames is None
+
+    def looks_upright(self, frame):
+        """Whether everybody is seen to stand on a frame."""
+        return self.lean_deg(frame) < UPRIGHT_DEG
+
+    def lean_deg(self, frame):
+        """How much the person leans who leans most, degrees."""
+        leans = []
+        for truth in self.truths:
+            joints = read_joints(truth, self.session.fps)
+            at = dict(zip(joints.names, joints.points[frame], strict=True))
+            trunk = sum(at[n] * (1 if n.endswith("shoulder") else -1) for n in TRUNK)
+            leans.append(np.degrees(np.arccos(trunk[2] / np.linalg.norm(trunk))))
+        return max(leans)
+
+    def user(self, frame, person):
+        """What the stranger sees on a frame."""
+        return ScriptedUser(self.session, self.truths[person], frame, SEED + frame, self.views, person)
+
+    @property
+    def views(self):
+        """Indices of the cameras."""
+        return range(len(self.session.cameras))
+
+    def errors_mm(self, frames):
+        """Mean error of each person over frames that have poses."""
+        session = self.session
+        return [
+            evaluate_joints(stored_motion(session, person).joints, read_joints(truth, session.fps), frames).mpjpe_mm
+            for person, truth in enumerate(self.truths)
+        ]
+
+    def judged(self, frames=None):
+        """Error and state of the stored poses, for a row of the table."""
+        session, frames = self.session, self.frames if frames is None else frames
+        errors, lost, counts = [], 0, {"doubtful": 0, "lost": 0}
+        for person, truth in enumerate(self.truths):
+            reference = read_joints(truth, session.fps)
+            try:
+                found = evaluate_joints(stored_motion(session, person).joints, reference, frames)
+                errors.append(f"{found.mpjpe_mm:.0f}")
+                lost += found.lost_frames
+            except FormatError:  # no pose yet
+                errors.append("–")
+            who = session.people[person]
+            for pose in read_stored_poses(session.annotations_path, who.name, who.model).values():
+                if pose.record.status in counts and not (pose.record.reviewed or pose.record.keyframe):
+                    counts[pose.record.status] += 1
+        return {
+            "error, mm": " / ".join(errors), "doubtful": str(counts["doubtful"]), "lost": str(counts["lost"]),
+            "truly lost": str(lost),
+        }  # fmt: skip
+
+    async def picture(self, name):
+        """Keep a picture of the page."""
+        if self.pictures:
+            path = Path(self.pictures) / self.data.name / f"{len(self.stranger.stages):02} {name}.png"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            await self.page.screenshot(path=path, timeout=120_000)
+
+    async def notices(self):
+        """Messages of the page, newest first."""
+        rows = "[...document.querySelectorAll('#notice-log-list li')]"
+        return await self.page.evaluate(f"{rows}.map((li) => [li.className, li.lastChild.textContent])")
+
+    async def choose_person(self, person):
+        """Click the name of a person, if there are several; returns the number of clicks."""
+        if len(self.people) == 1:
+            return 0
+        await self.stranger.click(f"#people label[title^='Select {list(self.people)[person]} ']")
+        await self.stranger.until(f"quadrille.state.state.person === {person}")
+        return 1
+
+    async def work(self, key, kind):
+        """Press a key that fits or searches, and wait for the result."""
+        number = ((await state_of(self.page))["state"]["compared"] or {}).get("number", -1)
+        await self.stranger.press(key)
+        compared = "quadrille.state.state.compared"
+        await self.stranger.until(f"{compared}?.work === '{kind}' && {compared}.number !== {number} && {DONE}", 240)
+
+    async def mark(self, first, last):
+        """Mark a range on the timeline."""
+        box = await self.page.locator("#timeline").bounding_box()
+        left, width = box["x"] + GUTTER_PX, box["width"] - GUTTER_PX - PADDING_PX
+        x = [round(left + width * (frame + 0.5) / self.session.n_frames) for frame in (first, last)]
+        y = box["y"] + box["height"] / 3
+        self.stranger.stages[-1].mouse += 1
+        await self.page.keyboard.down("Shift")
+        await self.page.mouse.move(x[0], y)
+        await self.page.mouse.down()
+        await self.page.mouse.move(x[1], y, steps=4)
+        await self.page.mouse.up()
+        await self.page.keyboard.up("Shift")
+        await self.stranger.until(f"quadrille.state.range?.first === {first} && quadrille.state.range.last === {last}")
+
+    async def track_within(self, button, first, last):
+        """Track a marked range by its bar, and unmark it."""
+        if first < last:
+            await self.mark(first, last)
+            await self.stranger.click(button)
+            await self.stranger.until("quadrille.state.state.range.running || quadrille.state.state.track.running", 60)
+            await self.stranger.until(DONE, WORK_S)
+            await self.stranger.click("#range-close")
+
+    async def correct_frame(self, frame, person, most=CORRECTED):
+        """Drag joints that look off, the worst first, in the two views that show it best; returns how many."""
+        stranger, user = self.stranger, self.user(frame, person)
+        done = set()
+        if await stranger.tilt(user, person):
+            done.add("tilt")
+        for _ in range(most):
+            seen = await stranger.seen_off(user, self.views, person)
+            trunk = [np.mean([seen[n, c][0] for n in TRUNK if (n, c) in seen]) for c in self.views]
+            if "torso" not in done and max(trunk) > OFF_PX:
+                done.add("torso")
+                for camera in np.argsort(trunk)[:-3:-1]:
+                    await stranger.move_trunk(user, int(camera), person)
+                continue
+            left = {key: off for key, (off, _) in seen.items() if key[0] not in done}
+            joint, _ = max(left, key=left.__getitem__)
+            if max(left.values()) < OFF_PX:
+                break
+            done.add(joint)
+            n_dragged = 0
+            for camera in sorted(self.views, key=lambda c: -left.get((joint, c), 0)):
+                n_dragged += await stranger.drag(camera, joint, seen[joint, camera][1], person)
+                if n_dragged == 2:
+                    break
+        return len(done)
+
+
+def known_lengths(hour, person):
+    """The lengths of a person's limbs by name, metres, as a tape measures them."""
+    truth = read_joints(hour.truths[person], hour.session.fps)
+    at = {n: truth.points[:, i] for i, n in enumerate(truth.names)}
+    return {
+        part: float(np.mean([
+            np.nanmedian(np.linalg.norm(at[f"{side}_{a}"] - at[f"{side}_{b}"], axis=1)) for side in ("left", "right")
+        ]))
+        for part, (a, b) in LIMB_ENDS.items()
+    }  # fmt: skip
