@@ -14,8 +14,8 @@ class View3d:
 
     bodies: bool = True
     """Whether the bodies are drawn."""
-    colors: Literal["parts", "people"] = "parts"
-    """Whether bodies have the colours of parts or of people."""
+    colors: Literal["parts", "people"] = "people"
+    """Whether bodies have the colours of parts or of people, as in the panes."""
     opacity: float = 1.0
     """Of the bodies, 0 to 1."""
     cameras: bool = True
@@ -39,14 +39,13 @@ def stored(view: View3d) -> dict[str, Any]:
     return asdict(view) | {"trail_points": sorted(view.trail_points)}
 
 
-def restored(data: object, default: View3d | None = None) -> View3d:
+def restored(data: object) -> View3d:
     """Return the view of a stored setting; missing and invalid fields have their defaults.
 
     Args:
         data: the result of `stored`, or any other JSON value.
-        default: the view of a new session.
     """
-    default = default or View3d()
+    default = View3d()
     if not isinstance(data, Mapping):
         return default
     are_switches = [f.name for f in fields(View3d) if isinstance(getattr(default, f.name), bool)]

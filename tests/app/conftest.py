@@ -81,9 +81,9 @@ def opened(session, observer):
 def couple(session, opened):
     """A controller of two people, ann and bob, of whom the sample's footage shows one; nobody has been placed."""
     toml = session / "session.toml"
-    row = '    { name = "person", model = "models/person.toml", color = "#60c0d8" },\n'
+    row = '    { name = "person", model = "models/person.toml", color = "#53a504" },\n'
     ann = row.replace('"person"', '"ann"', 1)
-    bob = row.replace('"person"', '"bob"', 1).replace("#60c0d8", "#d062f2")
+    bob = row.replace('"person"', '"bob"', 1).replace("#53a504", "#d062f2")
     text = toml.read_text("utf-8")
     assert row in text
     toml.write_text(text.replace(row, ann + bob), "utf-8")

@@ -41,7 +41,7 @@ from tracker.validation import quoted
 SESSION_FILE = "session.toml"
 CALIBRATION_FILE = "calibration.toml"
 ANNOTATIONS_FILE = "annotations.sqlite"
-PALETTE = ("#60c0d8", "#d062f2", "#53a504", "#f5b8c2", "#96f19e", "#abb179", "#8793a7", "#a78c85")
+PALETTE = ("#53a504", "#d062f2", "#f5b8c2", "#60c0d8", "#96f19e", "#abb179", "#8793a7", "#a78c85")
 """Colours of the people of a new session, distinct from one another with every kind of colour vision."""
 
 

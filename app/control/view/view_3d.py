@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from app.control.session.session_state import SessionState
-from app.state.view_3d import View3d, restored, stored
+from app.state.view_3d import restored, stored
 
 _KEY = "view_3d"
 """Setting of the session."""
@@ -16,9 +16,7 @@ class View3dSettings:
     def __init__(self, session_state: SessionState) -> None:
         """Restore the settings of the session."""
         self._session_state = session_state
-        # Colours by person distinguish two close bodies; colours by part do not.
-        default = View3d(colors="people" if len(session_state.session.people) > 1 else "parts")
-        session_state.set(view_3d=restored(session_state.saver.setting(_KEY), default))
+        session_state.set(view_3d=restored(session_state.saver.setting(_KEY)))
 
     def choose(self, **changes: Any) -> None:
         """Change fields of `View3d`; on disk when this returns.

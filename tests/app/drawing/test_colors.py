@@ -145,6 +145,12 @@ def test_warnings_errors_selection_and_marks_own_their_hues(scheme):
     assert [f"{a} and {b}: {found:.1f}" for a, b, found in near if found < OWN_HUE] == []
 
 
+def test_the_first_people_are_far_from_outlines_over_them():
+    """A candidate or new sizes nearly coincide with the body: the dash alone is hard to see there."""
+    outlines = (overlay_colors.NEUTRAL, overlay_colors.PROPOSAL)
+    assert min(difference(rgb(a), rgb(b)) for a in PALETTE[:2] for b in outlines) > 30
+
+
 def test_python_and_the_page_draw_with_the_same_colors():
     page = tokens("light")
     assert page["image-proposal"] == overlay_colors.PROPOSAL == tokens("dark")["accent"]

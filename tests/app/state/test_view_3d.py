@@ -9,7 +9,7 @@ from app.state.view_3d import View3d, restored, stored
 
 OTHER = View3d(
     bodies=False,
-    colors="people",
+    colors="parts",
     opacity=0.35,
     cameras=False,
     images=False,
