@@ -17,8 +17,9 @@ NEAR_ENOUGH_PX = 4
 SETTLED = "!quadrille.state.dragging && quadrille.state.state.saved && quadrille.state.connected"
 LEANS_RAD = np.radians(25)
 """A body that leans otherwise by more than this in a view is tilted."""
-IN_FULL = 0.6
-"""A trunk that looks shorter than this part of its longest is seen from its end: nobody judges there how it leans."""
+IN_FULL = 0.35
+"""Where the two sides of the trunk are together shorter than this part of the person, it is seen from its end, and
+nobody judges how it leans."""
 MOVED = 6
 """Steps of the mouse in a drag."""
 
@@ -168,13 +169,12 @@ class Stranger:
 
     async def tilt(self, user, person=0):
         """Tilt the body, in the view that shows best that it leans otherwise; returns whether it did."""
-        axes = {c: await self._trunk_axes(user, c, person) for c in user.views}
-        longest = max(np.hypot(*axis) for pair in axes.values() for axis in pair)
-        turns = {
-            camera: float(np.arctan2(drawn[0] * seen[1] - drawn[1] * seen[0], drawn @ seen))
-            for camera, (drawn, seen) in axes.items()
-            if min(np.hypot(*drawn), np.hypot(*seen)) > IN_FULL * longest
-        }
+        turns = {}
+        for camera in user.views:
+            drawn, seen = await self._trunk_axes(user, camera, person)
+            size = np.nanmax(np.ptp([user.aim_px(n, camera) for n in LIMBS], axis=0))
+            if min(np.hypot(*drawn), np.hypot(*seen)) > IN_FULL * size:
+                turns[camera] = float(np.arctan2(drawn[0] * seen[1] - drawn[1] * seen[0], drawn @ seen))
         camera = max(turns, key=lambda c: abs(turns[c]), default=None)
         if camera is None or abs(turns[camera]) < LEANS_RAD:
             return False
