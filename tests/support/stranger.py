@@ -172,7 +172,8 @@ class Stranger:
         turns = {}
         for camera in user.views:
             drawn, seen = await self._trunk_axes(user, camera, person)
-            size = np.nanmax(np.ptp([user.aim_px(n, camera) for n in LIMBS], axis=0))
+            aims = np.array([user.aim_px(n, camera) for n in LIMBS])
+            size = np.max(np.nanmax(aims, axis=0) - np.nanmin(aims, axis=0))
             if min(np.hypot(*drawn), np.hypot(*seen)) > IN_FULL * size:
                 turns[camera] = float(np.arctan2(drawn[0] * seen[1] - drawn[1] * seen[0], drawn @ seen))
         camera = max(turns, key=lambda c: abs(turns[c]), default=None)
