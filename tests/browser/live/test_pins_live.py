@@ -219,6 +219,9 @@ async def test_pins_are_removed_by_right_click_by_key_and_all(pinned):
 
 async def test_a_pin_outside_of_the_image_is_refused_and_panes_keep_their_size(pinned):
     page, _ = pinned
+    await page.mouse.move(0, 0)
+    await page.keyboard.press("0")
+    await shows(page, f"quadrille.state.views[{FRONT}].zoom === 1")
     await page.keyboard.press("x")
     box = await page.locator(".pane").first.bounding_box()
     await page.mouse.dblclick(box["x"] + 5, box["y"] + 150)  # beside the image
