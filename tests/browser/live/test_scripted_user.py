@@ -102,6 +102,13 @@ class Hands:
         at = await handle_of(self.page, camera, "torso", self.person)
         await self.drag(camera, "torso", np.add(at, by_px))
 
+    async def zoom_to_body(self):
+        """Zoom all views to the body where it is now: the page opened with the body that stood wrong."""
+        before = (await state_of(self.page))["views"]
+        await self.page.keyboard.press("Shift+0")
+        await shows(self.page, f"quadrille.state.views[0].origin.y !== {before[0]['origin']['y']}")
+        self.actions += 1
+
     async def slide(self, joint, name, by):
         """Draw the name of a degree of freedom sideways, degrees."""
         if (await state_of(self.page))["state"]["point"] != joint:
@@ -146,6 +153,7 @@ async def test_a_body_is_placed_by_drags(live, folder, record_property):
         await hands.drag(RIGHT, joint, user.aim_px(joint, RIGHT))
     for camera in (FRONT, RIGHT):
         await hands.move_trunk(camera, user.trunk_off_px(hands.values, camera))
+    await hands.zoom_to_body()
     for joint in ("knee", "ankle", "elbow", "wrist"):
         for side in ("left", "right"):
             for camera in (FRONT, RIGHT):
