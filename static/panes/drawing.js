@@ -16,6 +16,8 @@ const TORSO_HALF_SIDE = 5.5;
 const TORSO = "torso";
 /** Half diagonal of the diamonds of right joints. */
 const DIAMOND_RADIUS = 4.75;
+/** Distance of a label below its joint, where it fits on neither side, CSS pixels. */
+const BELOW_JOINT_PX = 24;
 const LABEL_LINE_PX = 16;
 const HELD_RADIUS = 8.5;
 /** Height of the labels in the upper corners of a pane. */
@@ -302,8 +304,15 @@ export function drawOutOfReach(context, view, outOfReach, handle, color, paneWid
 export function drawLabel(context, lines, { x, y }, paneWidth) {
   context.font = "500 12px system-ui, sans-serif";
   context.textBaseline = "middle";
-  const width = Math.max(...lines.map((text) => context.measureText(text).width)) + 12;
-  const left = x + 14 + width < paneWidth ? x + 14 : x - 14 - width;
+  const widthOf = (/** @type {string} */ text) => context.measureText(text).width + 12;
+  // In a narrow pane, what is in parentheses has a line of its own.
+  lines = lines.flatMap((text) => (widthOf(text) < paneWidth ? [text] : text.replace(" (", "\n(").split("\n")));
+  const width = Math.max(...lines.map(widthOf));
+  let left = x + 14 + width < paneWidth ? x + 14 : x - 14 - width;
+  if (left < 0) {
+    left = Math.max(0, Math.min(x - width / 2, paneWidth - width));
+    y += BELOW_JOINT_PX;
+  }
   context.fillStyle = "rgba(12, 13, 15, 0.85)";
   context.beginPath();
   context.roundRect(left, y - 10, width, 4 + LABEL_LINE_PX * lines.length, 4);

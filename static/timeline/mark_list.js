@@ -28,9 +28,10 @@ const LINES = [
   ["epipolar", "mark", "line of sight of a pin or drag"],
 ];
 
-/** Section of the list of keys. */
+/** Section of the list of keys, and content of the legend's popover. */
 export function markSection() {
   const section = document.createElement("section");
+  section.className = "mark-list";
   const heading = document.createElement("h3");
   heading.textContent = "Marks and lines";
   const list = document.createElement("dl");

@@ -5,6 +5,7 @@
 
 import { NO_POSE, REVIEWED, SOURCES, STATUSES as ALL, keyframesOf } from "../model/cells.js";
 import { trace } from "../model/series.js";
+import { shortened } from "../widgets/text.js";
 import { DARK_INK, SOURCE_MARKS, STATUSES, STATUS_COLORS, STATUS_HEIGHTS, drawDiamond, fillBands, hatch } from "./cell_marks.js";
 
 /**
@@ -74,8 +75,7 @@ export function drawLabels(context, axis, style, lanes, people) {
  */
 function drawName(context, axis, style, { name, color }, { top, bottom }) {
   const room = axis.left - 12;
-  let text = name;
-  while (text.length > 1 && context.measureText(text).width > room) text = `${text.slice(0, -2)}…`;
+  const text = shortened(name, (one) => context.measureText(one).width <= room);
   context.fillText(text, axis.left - 9, (top + bottom) / 2);
   const { fillStyle } = context;
   context.fillStyle = style.getPropertyValue("--edge");

@@ -4,7 +4,9 @@ import { button, byId } from "../widgets/elements.js";
 import { clock } from "../widgets/text.js";
 import { personCells } from "../model/selectors.js";
 import { SOURCES, STATUSES as CELL_STATUSES } from "../model/cells.js";
+import { opensPopover, togglePopover } from "../widgets/popovers.js";
 import { STATUSES, sourceSwatch, statusSwatch } from "./cell_marks.js";
+import { markSection } from "./mark_list.js";
 
 export class Transport {
   #store;
@@ -18,7 +20,7 @@ export class Transport {
   #total = byId("frame-total", HTMLElement);
   #clock = byId("clock", HTMLElement);
   #source = byId("source", HTMLElement);
-  #legend = byId("legend", HTMLElement);
+  #legend = byId("legend", HTMLButtonElement);
 
   /**
    * @param {import("../model/store.js").Store} store
@@ -51,6 +53,9 @@ export class Transport {
     this.#frame.addEventListener("keydown", (event) => {
       if (event.key === "Escape") this.#frame.blur(); // Enter: `leaveFields`
     });
+    const marks = byId("marks-panel", HTMLElement);
+    marks.append(markSection());
+    opensPopover(marks, this.#legend, () => togglePopover(marks, this.#legend));
     store.subscribe((changed) => {
       if (changed.has("session")) this.#showSession();
       if (changed.has("target") || changed.has("session")) this.#showFrame();
@@ -115,10 +120,11 @@ export class Transport {
       shown.map((status) => entry(status, statusSwatch(status))),
       SOURCES.filter((source) => sources.has(source)).map((source) => entry(source, sourceSwatch(source))),
     ];
-    this.#legend.title = [...shown, ...sources].join(", ");
+    this.#legend.title = `${[...shown, ...sources].join(", ")}. Click for all marks and lines`;
     this.#legend.replaceChildren(
       ...rows.map((swatches) => {
-        const row = document.createElement("div");
+        const row = document.createElement("span");
+        row.className = "legend-row";
         row.append(...swatches);
         return row;
       }),

@@ -16,6 +16,19 @@ export function displayName(name) {
   return name.replaceAll("_", " ");
 }
 
+/**
+ * Shorten a name in its middle, because names often differ at the end: `pers…2`.
+ *
+ * @param {string} name
+ * @param {(text: string) => boolean} fits
+ */
+export function shortened(name, fits) {
+  const end = name.slice(-2).trimStart();
+  let text = name;
+  for (let kept = name.length - end.length - 1; kept > 0 && !fits(text); kept -= 1) text = `${name.slice(0, kept).trimEnd()}…${end}`;
+  return text;
+}
+
 /** @param {string} text */
 export function capital(text) {
   return text.charAt(0).toUpperCase() + text.slice(1);

@@ -138,8 +138,7 @@ async def improve(hour):
             await stranger.until("quadrille.state.state.compared.is_before_shown")
             await hour.picture("before the search")
             await stranger.press("Shift+b")
-            await stranger.press("Control+z")
-            await stranger.until("quadrille.state.state.redo?.includes('search')")
+            await hour.take_back()
             stage.result["remark"] = "warned of, taken back"
 
 
@@ -311,6 +310,9 @@ async def go_on(hour, until_s, report):
             await hour.choose_person(person)
             if await hour.correct_frame(frame, person, most=2):
                 await hour.work(*(("f", "search") if rng.random() < 0.15 else ("g", "fit")))
+                compared = (await state_of(hour.page))["state"]["compared"]
+                if compared and compared["work"] == "search" and compared["warning"]:
+                    await hour.take_back()
             if rng.random() < 0.2:
                 await hour.track_within("#range-forward", frame, min(frame + STEP, hour.frames[-1]))
             if rng.random() < 0.2:

@@ -1,5 +1,6 @@
 """One recording of a first hour: what its stranger sees, and how a judge who knows the truth finds the result."""
 
+import json
 import os
 from pathlib import Path
 
@@ -140,6 +141,12 @@ class Hour:
         await self.stranger.press(key)
         compared = "quadrille.state.state.compared"
         await self.stranger.until(f"{compared}?.work === '{kind}' && {compared}.number !== {number} && {DONE}", 240)
+
+    async def take_back(self):
+        """Undo the last edit."""
+        undone = (await state_of(self.page))["state"]["undo"]
+        await self.stranger.press("Control+z")
+        await self.stranger.until(f"quadrille.state.state.redo === {json.dumps(undone)} && {DONE}")
 
     async def mark(self, first, last):
         """Mark a range on the timeline."""

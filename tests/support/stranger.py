@@ -17,6 +17,9 @@ NEAR_ENOUGH_PX = 4
 SETTLED = "!quadrille.state.dragging && quadrille.state.state.saved && quadrille.state.connected"
 LEANS_RAD = np.radians(25)
 """A body that leans otherwise by more than this in a view is tilted."""
+IN_FULL = 0.35
+"""Where the two sides of the trunk are together shorter than this part of the person, it is seen from its end, and
+nobody judges how it leans."""
 MOVED = 6
 """Steps of the mouse in a drag."""
 
@@ -166,23 +169,27 @@ class Stranger:
 
     async def tilt(self, user, person=0):
         """Tilt the body, in the view that shows best that it leans otherwise; returns whether it did."""
-        turns = {c: await self._lean_off(user, c, person) for c in user.views}
-        camera = max(turns, key=lambda c: abs(turns[c]))
-        if abs(turns[camera]) < LEANS_RAD:
+        turns = {}
+        for camera in user.views:
+            drawn, seen = await self._trunk_axes(user, camera, person)
+            aims = np.array([user.aim_px(n, camera) for n in LIMBS])
+            size = np.max(np.nanmax(aims, axis=0) - np.nanmin(aims, axis=0))
+            if min(np.hypot(*drawn), np.hypot(*seen)) > IN_FULL * size:
+                turns[camera] = float(np.arctan2(drawn[0] * seen[1] - drawn[1] * seen[0], drawn @ seen))
+        camera = max(turns, key=lambda c: abs(turns[c]), default=None)
+        if camera is None or abs(turns[camera]) < LEANS_RAD:
             return False
-        turn = np.array(
-            [[np.cos(turns[camera]), -np.sin(turns[camera])], [np.sin(turns[camera]), np.cos(turns[camera])]]
-        )
+        c, s = np.cos(turns[camera]), np.sin(turns[camera])
         middle = np.array(await handle_of(self.page, camera, "torso", person))
         at = np.array(await handle_of(self.page, camera, "left_shoulder", person))
-        return await self.drag(camera, "left_shoulder", middle + turn @ (at - middle), person, key="Shift")
+        to = middle + np.array([[c, -s], [s, c]]) @ (at - middle)
+        return await self.drag(camera, "left_shoulder", to, person, key="Shift")
 
-    async def _lean_off(self, user, camera, person):
-        """Angle in a view from the line between hips and shoulders of the body to that of the person, radians."""
+    async def _trunk_axes(self, user, camera, person):
+        """The lines from hips to shoulders in a view, undistorted px: of the body as drawn, and of the person."""
         seen = {n: user.aim_px(n, camera) for n in TRUNK}
         drawn = {n: np.array(await handle_of(self.page, camera, n, person)) for n in TRUNK}
-        (ax, ay), (bx, by) = (sum(at[n] * (1 if n.endswith("shoulder") else -1) for n in TRUNK) for at in (drawn, seen))
-        return float(np.arctan2(ax * by - ay * bx, ax * bx + ay * by))
+        return [sum(at[n] * (1 if n.endswith("shoulder") else -1) for n in TRUNK) for at in (drawn, seen)]
 
     async def move_trunk(self, user, camera, person=0):
         """Drag the square by as much as shoulders and hips look off."""

@@ -93,3 +93,21 @@ async def test_right_limbs_are_dashed_and_a_joint_out_of_reach_stays_at_the_poin
         assert np.mean((await pixels(page, line))[:, 0] > 200) > 0.15
         ring = [(wanted[0] + 5 * np.cos(a), wanted[1] + 5 * np.sin(a)) for a in np.linspace(0, 2 * np.pi, 12)]
         assert np.mean(is_orange(await pixels(page, ring))) > 0.6
+
+
+LABEL = """async ([text, x, width]) => {
+  const { drawLabel } = await import(new URL("static/panes/drawing.js", document.baseURI).href);
+  const context = new OffscreenCanvas(10, 10).getContext("2d");
+  const drawn = [];
+  Object.assign(context, { roundRect: (...box) => drawn.push(box), fillText: (line) => drawn.push(line) });
+  drawLabel(context, [text], { x, y: 50 }, width);
+  return drawn;
+}"""
+
+
+async def test_the_label_of_a_joint_stays_within_its_pane(page):
+    for x, width in ((20, 400), (380, 400), (100, 196), (190, 196)):
+        box, *lines = await page.evaluate(LABEL, ["right shoulder (turns the body, held)", x, width])
+        assert 0 <= box[0] <= box[0] + box[2] <= width
+        assert " ".join(lines) == "right shoulder (turns the body, held)"
+        assert box[1] > 60 or not box[0] <= x <= box[0] + box[2]  # not over the joint

@@ -285,15 +285,25 @@ async def test_the_legend_leaves_out_what_does_not_fit(page, endpoint):
     await endpoint.broadcast(endpoint.state)
     await shows(page, "document.querySelector('#source').textContent.endsWith(', earlier sizes')")
     legend = await page.locator("#legend").bounding_box()
-    entries = await page.locator("#legend span").all()
+    entries = await page.locator(".legend-row > span").all()
     boxes = [await entry.bounding_box() for entry in entries if await entry.is_visible()]
     assert max((box["x"] + box["width"] for box in boxes), default=0) <= legend["x"] + legend["width"]
     names = [await entry.text_content() for entry in entries]
-    assert await page.locator("#legend").get_attribute("title") == ", ".join(names)
+    assert (await page.locator("#legend").get_attribute("title")).startswith(f"{', '.join(names)}.")
+    await page.locator("#legend").click()
+    panel = page.locator("#marks-panel")
+    box = await panel.bounding_box()
+    assert box["y"] >= 0
+    assert box["x"] + box["width"] <= 1280
+    listed = await panel.inner_text()
+    assert all(name in listed for name in ("lost", "keyframe", "smoothed", "pose under test"))
+    await page.locator("#legend").click()
+    await panel.wait_for(state="hidden")
     endpoint.state["other_sizes"] = False
     await endpoint.broadcast(endpoint.state)
+    await page.locator("#legend").get_by_text("lost").wait_for()  # there is room for every status
     await page.set_viewport_size({"width": 1920, "height": 720})
-    await page.locator("#legend span").last.wait_for()
+    await page.locator(".legend-row > span").last.wait_for()
 
 
 PROFILE = """(frame) => {
