@@ -88,7 +88,8 @@ export class TopBar {
     this.#stage.textContent = isActive ? `${running ? work : "paused"} ${done} of ${total}` : how;
     this.#stage.title = isActive ? way : message;
     const counts = [doubtful && `${doubtful} doubtful`, lost && `${lost} lost`].filter(Boolean);
-    const figures = [`${per_second.toFixed(1)}/s`, ...counts].join(" · ");
+    const rate = per_second > 0 ? `${per_second.toFixed(1)}/s` : done === 0 && "starting";
+    const figures = [rate, ...counts].filter(Boolean).join(" · ");
     this.#figures.textContent = isActive ? figures : rest.join(" · ");
     const bar = document.createElement("i");
     bar.style.setProperty("--done", `${(100 * done) / Math.max(1, total)}%`);

@@ -76,7 +76,7 @@ def folder(tmp_path_factory):
             # The others are the same picture darker: an image that stays behind shows.
             assert cv2.imwrite(str(home / view.name / f"{frame:06d}.png"), picture if frame == 0 else picture // 2)
         sources.append(CameraSource(view, home / view.name))
-    people = [Person("person", model, "#f2a33a")]
+    people = [Person("person", model, "#203080")]  # its light left limbs differ from white too
     session = create_session(home / "session", cameras=sources, people=people, fps=25.0)
     store = AnnotationStore(session.annotations_path)
     revision = store.add_model_revision("person", format_model(model))

@@ -217,8 +217,8 @@ async def test_work_that_waits_for_kernels_says_so(page, endpoint):
     track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "total": 18}
     for compiling, done, text in (
         ("tracking", 0, "waiting for compilation"),
-        (None, 0, "0.0/s"),
-        ("tracking", 3, "0.0/s"),
+        (None, 0, "starting"),
+        ("tracking", 3, ""),
     ):
         endpoint.state |= {"compiling": compiling, "track": track | {"done": done}}
         await endpoint.broadcast(endpoint.state)

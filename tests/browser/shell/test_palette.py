@@ -115,6 +115,8 @@ async def test_the_list_of_keys_is_searched_and_fits(page):
     assert await page.locator("#key-list dd:visible").all_inner_texts() == [
         "Previous doubtful or lost frame", "Previous doubtful or lost pose by severity",
     ]  # fmt: skip
+    await page.locator("#key-query").fill("interpolated between")  # the marks are listed too
+    assert await page.locator("#key-list dd:visible").all_inner_texts() == ["interpolated between poses"]
 
 
 async def test_undo_holds_in_every_part_of_the_page(page, endpoint):

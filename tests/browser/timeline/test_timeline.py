@@ -5,6 +5,8 @@ from itertools import pairwise
 import pytest
 from page_driver import shows, state_of, until
 
+from tracker.store.records import SOURCES
+
 GUTTER, PADDING = 52, 8
 
 
@@ -302,3 +304,29 @@ async def test_the_legend_leaves_out_what_does_not_fit(page, endpoint):
     await page.locator("#legend").get_by_text("lost").wait_for()  # there is room for every status
     await page.set_viewport_size({"width": 1920, "height": 720})
     await page.locator(".legend-row > span").last.wait_for()
+
+
+PROFILE = """(frame) => {
+  const canvas = document.querySelector("#timeline canvas");
+  const pitch = (canvas.clientWidth - 60) / quadrille.state.session.n_frames;
+  const at = [52 + (frame + 0.3) * pitch, 44, 1, 12].map((place) => Math.round(place * devicePixelRatio));
+  const { data } = canvas.getContext("2d").getImageData(...at);
+  const rows = Array.from({ length: at[3] }, (_, row) => [...data.slice(4 * row, 4 * row + 3)].join());
+  return rows;
+}"""
+"""JavaScript: the colours down the lane of a single person at a frame."""
+BANDS = "(marks) => marks.map((one) => getComputedStyle(one).backgroundImage.match(/[0-9.]+%/g).join())"
+"""JavaScript: heights of the bands in the legend."""
+
+
+async def test_each_source_has_bands_of_its_own(page, endpoint):
+    """Colour-blind people tell sources apart too: on the timeline as in the legend."""
+    plain = {"cost_px": 1.0, "keyframe": False, "status": "", "remark": "", "reviewed": False, "ambiguous": False}
+    cells = {str(frame): plain | {"source": name, "limbs_lost": []} for frame, name in enumerate(SOURCES)}
+    await endpoint.broadcast({"type": "timeline", "person": None, "cells": cells, "replace": True})
+    await page.set_viewport_size({"width": 1920, "height": 720})
+    await shows(page, "document.querySelectorAll('#legend .source-mark').length === 8")
+    empty = (await page.evaluate(PROFILE, 20))[0]
+    lanes = [await page.evaluate(PROFILE, frame) for frame in range(len(SOURCES))]
+    assert len({tuple(color == empty for color in lane) for lane in lanes}) == len(SOURCES)
+    assert len(set(await page.eval_on_selector_all("#legend .source-mark", BANDS))) == len(SOURCES)
