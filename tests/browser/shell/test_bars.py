@@ -2,6 +2,7 @@
 
 import asyncio
 
+import pytest
 from page_driver import handle_of, shows, state_of, to_client, until
 from playwright.async_api import expect
 
@@ -190,6 +191,19 @@ async def test_nothing_is_cut_off_in_small_windows(page):
         timeline = await page.locator("#timeline").bounding_box()
         assert timeline["y"] + timeline["height"] <= height
         await shows(page, "quadrille.state.views[0].scale > 0.5")
+
+
+@pytest.mark.endpoint(n_people=2)
+async def test_the_bar_of_two_people_fits_every_window(page):
+    for width in (1600, 1510, 1480, 1410, 1390, 1310, 1280, 1250, 1150, 1110, 1024):
+        await page.set_viewport_size({"width": width, "height": 700})
+        await shows(page, f"document.documentElement.scrollWidth === {width}")
+        boxes = [await control.bounding_box() for control in await page.locator(".top-bar button:visible").all()]
+        assert max(box["x"] + box["width"] for box in boxes) <= width, width
+        assert min(box["width"] for box in boxes) >= 12, width  # the dot that tells whether all is saved
+        names = page.locator("#people .person-name")
+        widths = await names.evaluate_all("(all) => all.map((one) => one.scrollWidth - one.clientWidth)")
+        assert widths == [0, 0], width
 
 
 async def test_every_control_has_a_name_and_a_tooltip(page):
