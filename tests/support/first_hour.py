@@ -173,30 +173,45 @@ class Hour:
             await self.stranger.click("#range-close")
 
     async def correct_frame(self, frame, person, most=CORRECTED):
-        """Drag joints that look off, the worst first, in the two views that show it best; returns how many."""
+        """Drag what looks off, the worst first, in the two views that show it best; returns how much was corrected.
+
+        A drag after which more looks off is taken back.
+        """
         stranger, user = self.stranger, self.user(frame, person)
+        corrected = int(await stranger.tilt(user, person))
         done = set()
-        if await stranger.tilt(user, person):
-            done.add("tilt")
         for _ in range(most):
             seen = await stranger.seen_off(user, self.views, person)
             trunk = [np.mean([seen[n, c][0] for n in TRUNK if (n, c) in seen]) for c in self.views]
-            if "torso" not in done and max(trunk) > OFF_PX:
-                done.add("torso")
-                for camera in np.argsort(trunk)[:-3:-1]:
-                    await stranger.move_trunk(user, int(camera), person)
-                continue
             left = {key: off for key, (off, _) in seen.items() if key[0] not in done}
-            joint, _ = max(left, key=left.__getitem__)
-            if max(left.values()) < OFF_PX:
+            if "torso" not in done and max(trunk) > OFF_PX:
+                joint, order = "torso", np.argsort(trunk)[::-1]
+            elif max(left.values()) < OFF_PX:
                 break
+            else:
+                joint, _ = max(left, key=left.__getitem__)
+                order = sorted((c for c in self.views if (joint, c) in left), key=lambda c: -left[joint, c])
             done.add(joint)
-            n_dragged = 0
-            for camera in sorted(self.views, key=lambda c: -left.get((joint, c), 0)):
-                n_dragged += await stranger.drag(camera, joint, seen[joint, camera][1], person)
-                if n_dragged == 2:
-                    break
-        return len(done)
+            n_dragged = await self._drag_in_two(user, joint, [int(c) for c in order], seen, person)
+            now = await stranger.seen_off(user, self.views, person)
+            if sum(off for off, _ in now.values()) > sum(off for off, _ in seen.values()):
+                for _ in range(n_dragged):
+                    await self.take_back()
+            elif n_dragged:
+                corrected += 1
+        return corrected
+
+    async def _drag_in_two(self, user, joint, order, seen, person):
+        """Drag a joint in the first two views of an order that show it; returns the number of drags."""
+        n_dragged = 0
+        for camera in order:
+            if joint == "torso":
+                n_dragged += await self.stranger.move_trunk(user, camera, person)
+            else:
+                n_dragged += await self.stranger.drag(camera, joint, seen[joint, camera][1], person)
+            if n_dragged == 2:
+                break
+        return n_dragged
 
 
 def known_lengths(hour, person):

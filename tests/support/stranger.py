@@ -157,15 +157,18 @@ class Stranger:
 
     async def seen_off(self, user, cameras, person=0):
         """How far each limb joint looks off in each view, CSS px, and where it should be, undistorted px."""
-        seen = {}
-        for camera in cameras:
-            for joint in LIMBS:
-                aim = user.aim_px(joint, camera)
-                if np.isfinite(aim).all():
-                    at = await handle_of(self.page, camera, joint, person)
-                    off = np.subtract(await to_client(self.page, camera, *aim), await to_client(self.page, camera, *at))
-                    seen[joint, camera] = (float(np.hypot(*off)), aim)
-        return seen
+        handles = {
+            (h["point"], h["camera"]): (h["u"], h["v"])
+            for h in await self.page.evaluate("quadrille.state.overlay.handles")
+            if h["person"] == person
+        }
+        aims = {(joint, camera): user.aim_px(joint, camera) for camera in cameras for joint in LIMBS}
+        aims = {key: aim for key, aim in aims.items() if np.isfinite(aim).all()}
+        places = [[key[1], *place] for key, aim in aims.items() for place in (aim.tolist(), handles[key])]
+        shown = await self.page.evaluate("(all) => all.map(([c, u, v]) => quadrille.toClient(c, u, v))", places)
+        xy = np.array([[at["x"], at["y"]] for at in shown]).reshape(-1, 2, 2)
+        off = np.linalg.norm(xy[:, 0] - xy[:, 1], axis=1)
+        return {key: (float(px), aim) for (key, aim), px in zip(aims.items(), off, strict=True)}
 
     async def tilt(self, user, person=0):
         """Tilt the body, in the view that shows best that it leans otherwise; returns whether it did."""

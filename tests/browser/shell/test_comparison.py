@@ -52,7 +52,7 @@ async def test_the_top_bar_has_room_for_a_comparison(page, endpoint):
     endpoint.state |= {"compared": compared, "cost_px": 15.44, "job": job}
     await endpoint.broadcast(endpoint.state)
     await shows(page, f"{TEXT} === '15.74 →'")
-    for width in (1280, 1920):
+    for width in (1280, 1440, 1520, 1640, 1700, 1770, 1920):
         await page.set_viewport_size({"width": width, "height": 720})
         await shows(page, f"innerWidth === {width}")
         boxes = [await one.bounding_box() for one in await page.locator(".top-bar button:visible").all()]
