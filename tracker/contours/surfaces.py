@@ -1,5 +1,6 @@
 """Shapes of several bodies as arrays, for the kernels that trace contours."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array, FloatArray
-from tracker.geometry.shapes import Shape, TaperedSuperquadric
+from tracker.geometry.shapes import Profile, Shape, TaperedSuperquadric
 
 N_RINGS, N_SECTORS = 14, 24
 """Cells of the grid on a part that is no solid of revolution."""
@@ -56,8 +57,30 @@ class Surfaces(NamedTuple):
 def surfaces_of(models: tuple[BodyModel, ...]) -> Surfaces:
     """Return the arrays of the shapes of some bodies; cached, because models are immutable."""
     shapes = [s for m in models for s in m.shapes]
+    return _surfaces(models, shapes, [s.profile(PROFILE_TOLERANCE_M) for s in shapes])
+
+
+def resized_surfaces(models: tuple[BodyModel, ...], similar: Surfaces) -> Surfaces:
+    """Return the arrays of the shapes of some bodies; quicker than `surfaces_of` where many sizes are tried.
+
+    Args:
+        models: the bodies.
+        similar: arrays of the same bodies at other sizes. Profiles are sampled at the same heights, which fits sizes
+            that do not differ much.
+    """
+    shapes = [s for m in models for s in m.shapes]
+    profiles: list[Profile | None] = []
+    for i, shape in enumerate(shapes):
+        n = int(similar.profile_sizes[i])
+        if n and isinstance(shape, TaperedSuperquadric):
+            profiles.append(shape.profile_at(similar.profiles[i, 1, 1 : n - 1].astype(np.float64)))
+        else:
+            profiles.append(shape.profile(PROFILE_TOLERANCE_M))
+    return _surfaces(models, shapes, profiles)
+
+
+def _surfaces(models: tuple[BodyModel, ...], shapes: Sequence[Shape], profiles: Sequence[Profile | None]) -> Surfaces:
     half_axes = np.array([s.half_axes for s in shapes])
-    profiles = [s.profile(PROFILE_TOLERANCE_M) for s in shapes]
     profile_sizes = np.array([0 if p is None else len(p.radii) for p in profiles])
     table = np.zeros((len(shapes), 4, profile_sizes.max()), np.float32)
     for i, p in enumerate(profiles):

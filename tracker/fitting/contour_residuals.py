@@ -24,7 +24,7 @@ from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import StaticContours, static_contours_buffer
-from tracker.contours.surfaces import surfaces_of
+from tracker.contours.surfaces import Surfaces, resized_surfaces, surfaces_of
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_arrays import ContourTerm, Scratch, Sums, ViewArrays, scratch_buffer, sums_buffer
 from tracker.fitting.contour_kernels import COST_ONLY, accumulate_normal_equations
@@ -76,6 +76,29 @@ class PartCosts(NamedTuple):
     """Share of the silhouette's contour that some part explains, (V,); NaN in views without a silhouette."""
 
 
+class PieceSums(NamedTuple):
+    """Residuals at the visible pieces of contour of one person in one view, summed piece by piece."""
+
+    parts: IntArray
+    """Index of the person's part of each piece, (N,)."""
+    points_px: Array
+    """Middle of each piece, (N, 2), working px."""
+    unit_points: Array
+    """The same in the unit coordinates of its part, (N, 3)."""
+    gradients: Array
+    """Derivative of the cost by the image of the piece, (N, 2), per px."""
+    hessians: Array
+    """Gauss-Newton's second derivative by it, (N, 2, 2), per px^2."""
+
+    @property
+    def pulled(self) -> "PieceSums":
+        """The pieces that have residuals."""
+        at = self.hessians.any(axis=(1, 2))
+        return PieceSums(
+            self.parts[at], self.points_px[at], self.unit_points[at], self.gradients[at], self.hessians[at]
+        )
+
+
 class Workspace(NamedTuple):
     """Buffers for one pose. Residuals that share a workspace must be used one at a time."""
 
@@ -115,6 +138,7 @@ class ContourResiduals:
             contours: predicted contours of all bodies in each view; traced here by default.
         """
         settings = settings or MatchSettings()
+        self._models, self._person = tuple(b.model for b in bodies), person
         self._model = bodies[person].model
         self._own = parts_of([b.model for b in bodies], person)
         thetas = [v.outlier_px(theta_px) for v in views]
@@ -164,6 +188,43 @@ class ContourResiduals:
     def workspace(self) -> Workspace:
         """Buffers of these residuals."""
         return Workspace(self._term.Ts, self._term.scratch, self._term.sums)
+
+    def resized(self, model: BodyModel) -> Surfaces:
+        """Return the shapes of all bodies, the person's at other sizes, for `with_surfaces`."""
+        models = tuple(model if i == self._person else m for i, m in enumerate(self._models))
+        return resized_surfaces(models, self._term.surfaces)
+
+    def with_surfaces(self, model: BodyModel, surfaces: Surfaces) -> "ContourResiduals":
+        """Return the same residuals for the person's body at other sizes. Both use the same buffers.
+
+        Args:
+            model: the body.
+            surfaces: see `resized`; several views share it.
+        """
+        out = copy(self)
+        out._model, out._term = model, self._term._replace(surfaces=surfaces)
+        return out
+
+    def piece_sums(self, pose: Array) -> tuple[float, PieceSums]:
+        """Return the cost of a pose, (n_values,), and the residuals piece by piece.
+
+        For residuals of a single view, whose pieces are those in the buffers.
+        """
+        assert len(self._term.views.sizes) == 1
+        cost, scratch = self._accumulate(self._model.kinematics(pose)), self._term.scratch
+        firsts = scratch.firsts[self._own.start : self._own.stop + 1]
+        at = slice(firsts[0], firsts[-1])
+        pieces, pulls = scratch.pieces[:, at].astype(np.float64), scratch.pulls[:, at].copy()
+        normals = pieces[3:5].T
+        at_ends = np.stack([pulls[[2, 3]], pulls[[3, 4]]]).transpose(2, 0, 1)
+        sums = PieceSums(
+            np.repeat(np.arange(len(firsts) - 1), np.diff(firsts)),
+            pieces[:2].T,
+            pieces[5:8].T,
+            pulls[1][:, None] * normals + pulls[5:7].T,
+            pulls[0][:, None, None] * normals[:, :, None] * normals[:, None, :] + at_ends,
+        )
+        return cost, sums
 
     def restricted_to(self, parts: IntArray, workspace: Workspace) -> "ContourResiduals":
         """Return the residuals for poses that differ in some parts of the person only; faster.

@@ -134,6 +134,12 @@ class TaperedSuperquadric:
             return None
         return _superquadric_profile(self, tolerance_m)
 
+    def profile_at(self, heights: Array) -> Profile:
+        """Return the profile of a solid of revolution at given heights within (-1, 1), (n,), in unit coordinates."""
+        e1, k = self.exponents[0], self.taper[0]
+        sine = _signed_power(heights, 1 / e1)  # of the latitude
+        return _profile(e1, k, np.arcsin(np.clip(sine, -1.0, 1.0)))
+
     @property
     def enclosure(self) -> Enclosure:
         """Return a cone around the solid, or a cylinder if the taper differs along x and y."""
@@ -245,11 +251,15 @@ def _superquadric_profile(shape: TaperedSuperquadric, tolerance_m: float) -> Pro
     (a1, a2, a3), e1, k = shape.half_axes, shape.exponents[0], shape.taper[0]
     eta = np.linspace(-np.pi / 2, np.pi / 2, 401)[1:-1]
     z, r = _signed_power(np.sin(eta), e1), np.cos(eta) ** e1
+    return _profile(e1, k, eta[_chords(np.stack([max(a1, a2) * r * (1 + k * z), a3 * z], axis=1), tolerance_m)])
+
+
+def _profile(e1: float, k: float, eta: Array) -> Profile:
+    """Return the profile of a superquadric of revolution with exponent e1 and taper k at latitudes, (n,)."""
+    z, r = _signed_power(np.sin(eta), e1), np.cos(eta) ** e1
     s = 1 + k * z
     away = np.cos(eta) ** (2 - e1) / s
-    along = _signed_power(np.sin(eta), 2 - e1) - k * np.cos(eta) ** 2 / s
-    selected = _chords(np.stack([max(a1, a2) * r * s, a3 * z], axis=1), tolerance_m)
-    return _with_ends((r * s)[selected], z[selected], away[selected], along[selected])
+    return _with_ends(r * s, z, away, _signed_power(np.sin(eta), 2 - e1) - k * np.cos(eta) ** 2 / s)
 
 
 def _signed_power(base: Array, exponent: float) -> Array:
